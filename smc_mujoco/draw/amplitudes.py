@@ -16,15 +16,13 @@ from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.draw.page import Size
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-PAGE_HEIGHT = 5.6  # inches on a full page
+PAGE_HEIGHT = 5.6  # inches
 
 
 def lag(scenario: Scenario) -> float:
@@ -44,32 +42,17 @@ def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float
 
 
 def amplitudes(
-    traces: Mapping[str, Mapping[str, Trace]],
-    path: str | os.PathLike[str] | None = None,
-    title: str | None = None,
-    size: Size = None,
-    format: str | None = None,
-    fig: Figure | SubFigure | None = None,
+    traces: Mapping[str, Mapping[str, Trace]], path: str | os.PathLike[str] | None = None, title: str = "Chattering"
 ) -> Figure | SubFigure:
     """Draw the amplitude of s of the first channel over the actuator's lag, predicted and run.
 
-    Args:
-      traces: condition -> label -> Trace, each condition with another lag.
-      path, size, format, fig: as in `figure`.
-      title: default: "Chattering".
-
-    Raises:
-      ScenarioError: no traces, or as `chattering` and `figure`.
+    `traces` are condition -> label -> Trace, each condition with another lag.
     """
     runs: dict[str, list[Trace]] = {}
     for label, trace in (pair for by_label in traces.values() for pair in by_label.items()):
         runs.setdefault(label, []).append(trace)
-    if not runs:
-        raise ScenarioError("no trace to draw: give at least one")
-    paths = pages.files(path, format)
-    width, height = pages.measure(size, fig)
-    with style.page(width):
-        page = pages.blank(width, height or style.points(PAGE_HEIGHT), fig)
+    with style.page():
+        page = pages.blank(style.FULL_WIDTH, PAGE_HEIGHT)
         ax = page.subplots()
         colours = style.law_colours([its[0].scenario.law for its in runs.values()])
         handles, predicted, hollow = [], {}, False
@@ -96,8 +79,8 @@ def amplitudes(
         ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")
         ax.xaxis.set_major_formatter("{x:g}")
         ax.margins(0.04, 0.06)
-        pages.set_head(page, width, title or "Chattering", handles, shared)
-        pages.write(page, paths)
+        pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
+        pages.write(page, pages.files(path))
     return page
 
 

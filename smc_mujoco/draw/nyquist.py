@@ -1,7 +1,5 @@
 """Predicted chattering beside a run: L and 1/N in the complex plane with their crossing, and s with the amplitude.
 
-    nyquist([scenario], "chatter.svg")
-
 L is the answer of the linearised mechanism to u, 1/N the inverse of the law's describing function at the frequency of
 the crossing. Both are divided by their common value there, and turned: they cross at -1. One row for each scenario; s
 is that of the last periods of a run, or of the whole run where no limit cycle is predicted.
@@ -16,18 +14,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from smc_mujoco.analysis.chattering import Chattering, predict
+from smc_mujoco.analysis.chattering import Chattering
 from smc_mujoco.analysis.harmonics import Loop
 from smc_mujoco.analysis.step_halving import NOTE, StepChange
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.draw.page import Handle, Size
-from smc_mujoco.simulation.run import run
+from smc_mujoco.draw.page import Handle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-ROW_HEIGHT = 3.4  # inches on a full page, height of a row
+ROW_HEIGHT = 3.4  # inches
 SPAN_FACTOR = 40.0  # of the frequencies of L about the crossing, and of the amplitudes of N: a factor
 PLANE_EDGE = 2.5  # of the complex plane
 SHOWN_PERIODS = 6  # of s
@@ -35,53 +31,40 @@ SHOWN_PERIODS = 6  # of s
 
 def nyquist(
     scenarios: Sequence[Scenario],
+    channel: int,
+    cycles: Sequence[Chattering],
+    traces: Sequence[Trace],
+    changes: Sequence[StepChange],
     path: str | os.PathLike[str] | None = None,
-    channel: int = 0,
-    cycles: Sequence[Chattering] | None = None,
-    traces: Sequence[Trace] | None = None,
-    size: Size = None,
-    format: str | None = None,
-    fig: Figure | SubFigure | None = None,
-    changes: Sequence[StepChange] | None = None,
 ) -> Figure | SubFigure:
     """Draw the harmonic balance of scenarios, and their sliding variable, predicted and run.
 
     Args:
       scenarios: of one plant and one set of conditions, with different laws.
       channel: index of a driven channel.
-      cycles: predicted for these scenarios; default: they are predicted.
-      traces: of these scenarios; default: they are run.
-      path, size, format, fig: as in `figure`.
-      changes: of the traces, see `smc.step_halving`; the marked ones are told. Default: half the step is not tried.
-
-    Raises:
-      ScenarioError: no scenarios, or as `chattering` and `figure`.
+      cycles, traces: predicted for these scenarios, and run.
+      changes: of the traces, see `smc.step_halving`; the marked ones are told.
+      path: as in `figure`.
     """
-    if not scenarios:
-        raise ScenarioError("no scenario to draw: give at least one")
-    paths = pages.files(path, format)
-    if cycles is None:
-        cycles = [predict(scenario, channel, ranges=False) for scenario in scenarios]
-    runs = [run(scenario) for scenario in scenarios] if traces is None else traces
-    width, height = pages.measure(size, fig)
-    with style.page(width):
+    with style.page():
         colours = style.law_colours([scenario.law for scenario in scenarios])
         gains, shared = pages.gain_sources([[scenario.law.source] for scenario in scenarios])
         handles: list[Handle] = [
             Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle) + source)
             for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True)
         ]
-        whole = pages.head_height(width, handles) + style.points(ROW_HEIGHT) * len(scenarios)
-        page = pages.blank(width, height or whole, fig)
+        whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)
+        page = pages.blank(style.FULL_WIDTH, whole)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
-        for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, runs, colours, strict=True):
+        for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, traces, colours, strict=True):
             plane(row[0], scenario, cycle, channel, colour)
             last_periods(row[1], trace, cycle, channel, colour)
-        for ax, change in zip(axes[:, 1], changes, strict=True) if changes else ():
+        for ax, change in zip(axes[:, 1], changes, strict=True):
             if change.marked:
                 ax.set_title(NOTE, loc="left", fontsize=style.points(9.5))
-        pages.set_head(page, width, f"Chattering of {style.plant_name(scenarios[0].plant)}", handles, shared)
-        pages.write(page, paths)
+        title = f"Chattering of {style.plant_name(scenarios[0].plant)}"
+        pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
+        pages.write(page, pages.files(path))
     return page
 
 

@@ -28,7 +28,6 @@ GAIN = "gain:"  # prefix of the sliders' names
 SPACE_KEY = 32  # code of the key in GLFW
 FRAME_TIME = 1.0 / 60.0  # s, of most screens
 MAX_FRAME_TIME = 0.1  # s, longest time that a frame simulates and takes, so that slow runs still respond to the mouse
-SETTLED_FRAMES = 30  # frames without a change after which gains are printed: half a second
 
 
 def watch(scenario: Scenario) -> None:
@@ -85,7 +84,7 @@ class Live:
         ids = [self.model.actuator(GAIN + name).id for name in slider_gains(scenario.law)]
         self.sliders = self.model.actuator_ctrladr[ids] if ids else np.zeros(0, int)
         self.limits = self.model.actuator_ctrlrange[self.sliders].T  # one row a control: some actuators have none
-        self.paused, self.say, self.printed, self.unchanged = False, say, scenario.law, 0
+        self.paused, self.say = False, say
         self.begin(scenario)
         self.show()
 
@@ -130,14 +129,10 @@ class Live:
         self.loop.push[:] = self.data.xfrc_applied
         values = np.clip(self.data.ctrl[self.sliders], *self.limits).tolist()
         gains = dict(self.law.gains) | dict(zip(slider_gains(self.law), values, strict=True))
-        self.unchanged += 1
         if gains != dict(self.law.gains):
             law = dataclasses.replace(self.law, gains=gains)
-            self.loop.scenario, self.unchanged = dataclasses.replace(self.loop.scenario, law=law), 0
+            self.loop.scenario = dataclasses.replace(self.loop.scenario, law=law)
             self.loop.law.gains = PythonComponent(law, len(self.loop.law.memory)).gains  # the memory stays
-        elif self.unchanged >= SETTLED_FRAMES and self.printed != self.law:
-            self.printed = self.law
-            self.say(as_code(self.law))
 
     def advance(self, seconds: float) -> None:
         """Simulate the time that is due, at most MAX_FRAME_TIME. Restart a finished run, pause a failed one."""

@@ -218,10 +218,10 @@ def test_run_hands_the_scene_s_camera_to_the_film(call, undrawn, folder, monkeyp
     monkeypatch.setattr(film, "film", lambda *args, **options: asked.update(options) or args[1])
     (folder / "seen.py").write_text("""import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
-scene = smc.Scene(title="Seen", conditions={"calm": {"only": run}}, camera=(60, -20, 3))
+scene = smc.Scene(title="Seen", conditions={"calm": {"only": run}}, camera=(60, -20))
 """)
     assert call("run", "seen.py")[0] == 0
-    assert asked["camera"] == (60.0, -20.0, 3.0)
+    assert asked["camera"] == (60.0, -20.0)
 
 
 @pytest.mark.parametrize("plant", ["duffing", "pendulum_network"])

@@ -44,8 +44,3 @@ def test_predictions_are_lines_and_runs_are_dots_of_the_same_colour():
         assert list(line.get_xdata()) == lags == pytest.approx([5.0, 10.0])
         assert {line.get_color()} == {dot.get_color() for dot in dots}
     plt.close("all")
-
-
-def test_nothing_to_draw_is_one_sentence():
-    with pytest.raises(smc.ScenarioError, match="no trace to draw"):
-        amplitudes({})

@@ -105,7 +105,7 @@ def test_harmonic_balance_and_the_last_periods_of_a_run(snapshot):
     ]
     cycle = Chattering(amplitude=0.2, amplitude_x=0.01, frequency=8.0, response=complex(-0.02, 0.003))
     changes = [StepChange(0.11, 0.0), StepChange(0.09, 0.05)]
-    page = nyquist(scenarios, cycles=[cycle, Chattering()], traces=[made(one) for one in scenarios], changes=changes)
+    page = nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
     assert sketch(page) == snapshot
 
 
@@ -144,8 +144,6 @@ REFUSED = {  # call -> arguments, and what replaces them
         {"panels": ["y"]}, {"panels": []}, {"size": (5.0,)}, {"size": (5.0, 4.0), "fig": Figure()},
         {"format": 10**5000},
     ]),
-    amplitudes.amplitudes: ({"traces": {}}, [{}]),
-    nyquist: ({"scenarios": []}, [{}]),
     orders: ({"rows": []}, [{}]),
     region.draw: ({"maps": []}, [{}]),
     pareto: ({"tunings": []}, [{}]),

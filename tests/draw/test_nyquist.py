@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.draw.nyquist import nyquist
 
@@ -12,7 +13,8 @@ from smc_mujoco.draw.nyquist import nyquist
 def page():
     fields = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 2.0, "x0": 0.05}
     scenarios = [smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")]
-    return nyquist(scenarios, size=(8.0, 5.0), changes=[StepChange(0.11, 0.0), StepChange(0.09, 0.05)])
+    cycles = [predict(scenario, ranges=False) for scenario in scenarios]
+    return nyquist(scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.11, 0.0), StepChange(0.09, 0.05)])
 
 
 def test_both_curves_pass_minus_one_where_the_mark_is(page):
@@ -34,11 +36,6 @@ def test_s_of_the_run_fills_the_predicted_band(page):
 def test_a_calm_law_has_no_crossing_and_no_band(page):
     assert [text.get_text() for text in page.axes[2].texts] == ["no crossing"]
     assert not page.axes[3].patches
-
-
-def test_no_scenario_is_one_sentence():
-    with pytest.raises(smc.ScenarioError, match="no scenario to draw"):
-        nyquist([])
 
 
 def test_a_run_that_half_the_step_changes_says_so(page):

@@ -184,7 +184,8 @@ def _noted(name: str) -> Callable:
         first, Pen.busy = not Pen.busy, True
         if first:
             named = [f"{key}={_plain(value)}" for key, value in options.items()]
-            shape = [_outline(given[0]), *given[1:]] if name == "polygon" else given
+            many = name == "polygon" or (name == "line" and len(given[0]) > 4)
+            shape = [_outline(given[0]), *given[1:]] if many else given
             Pen.notes.append(" ".join([name, *map(_plain, shape), *named]))
         try:
             return draw(self, *given, **options)

@@ -316,5 +316,5 @@ def chatter(
     if pictures:
         from smc_mujoco.draw.nyquist import nyquist
 
-        nyquist(cases, out, channel, cycles, traces, changes=changes)
+        nyquist(cases, channel, cycles, traces, changes, out)
         terminal.wrote(*pictures)

@@ -101,7 +101,7 @@ def view(
 
     - Pause and continue: the space bar.
     - Change a gain: its slider gain:NAME in the panel "Control" at the right, from a tenth of the scene's value to ten
-      times that value. Changed gains are printed, as code that makes the law.
+      times that value. At the end the law is printed, as code that makes it.
     - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
     - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
 

@@ -17,6 +17,7 @@ from smc_mujoco.simulation.trace import Trace
 
 PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
 WANTED_OPACITY = 0.5  # of the wanted path
+OUTSIDE = 100  # px beyond the picture, farther than which no path is followed
 BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 13, 5, 42  # px, of a bar, between bars, and from one limit to the other
 BAR_LETTERS, NUMBER_SIZE = 10, 13  # px
 LABEL_GAP = 5  # px, from a label to its bars
@@ -56,57 +57,25 @@ def key(traces: Sequence[Trace]) -> list[str]:
 
 
 class Trail:
-    """A path in the picture, of which `draw` draws the part until a time.
+    """A path in the picture, (m, 2) px, at times (m,) s, that grows from frame to frame."""
 
-    Args:
-      points: of the path, (m, 2) px.
-      times: at which the path reaches its points, (m,) s.
-      seen: which points are drawn, (m,) of bool.
-      colour: as "#RRGGBB".
-      width: of the line, px.
-      size: width and height of the picture, px.
-      opacity: 0 to 1.
-    """
+    def __init__(self, points: np.ndarray, times: np.ndarray, colour: str, width: float, opacity: float = 1.0):
+        self.corner = np.floor(points.min(axis=0) - width).astype(int)
+        size = np.ceil(points.max(axis=0) + width).astype(int) - self.corner
+        self.fine = Image.new("L", tuple((arrows.SUPERSAMPLING * size).tolist()))  # opacities
+        self.mask = self.fine.reduce(arrows.SUPERSAMPLING)
+        self.points, self.times, self.reached = arrows.SUPERSAMPLING * (points - self.corner), times, 0
+        self.colour, self.width, self.opacity = style.rgb(colour), arrows.SUPERSAMPLING * width, round(255 * opacity)
 
-    def __init__(
-        self,
-        points: np.ndarray,
-        times: np.ndarray,
-        seen: np.ndarray,
-        colour: str,
-        width: float,
-        size: tuple[int, int],
-        opacity: float = 1.0,
-    ):
-        self.colour, half = np.array(style.rgb(colour), float), width / 2
-        steps = np.ceil(2.0 * np.hypot(*np.diff(points, axis=0).T)).astype(int)  # a point each half px
-        place = np.concatenate([[0.0], np.cumsum(np.maximum(steps, steps > 0))])
-        even = np.arange(int(place[-1]) + 1)
-        dense = np.stack([np.interp(even, place, axis) for axis in points.T], axis=1)
-        at, above = np.interp(even, place, times), np.interp(even, place, seen) > 0.5
-        reach = math.ceil(half + 1.0)
-        low = np.clip(np.floor(dense.min(axis=0)).astype(int) - reach, 0, size)
-        high = np.clip(np.ceil(dense.max(axis=0)).astype(int) + reach + 1, 0, size)
-        wide, tall = (high - low).tolist()
-        cover, since = np.zeros((tall, wide)), np.full((tall, wide), np.inf)
-        middle = np.floor(dense).astype(int)
-        for i in range(-reach, reach + 1):
-            for j in range(-reach, reach + 1):
-                pixel = np.add(middle, (i, j))
-                ink = above * np.clip(half + 0.5 - np.hypot(*(pixel + 0.5 - dense).T), 0.0, 1.0)
-                x, y = (pixel - low).T
-                inside = (x >= 0) & (x < wide) & (y >= 0) & (y < tall) & (ink > 0.0)
-                np.maximum.at(cover, (y[inside], x[inside]), ink[inside])
-                np.minimum.at(since, (y[inside], x[inside]), at[inside])
-        y, x = np.unravel_index(np.argsort(since, axis=None)[: np.isfinite(since).sum()], since.shape)
-        self.since, self.cover = since[y, x], opacity * cover[y, x, None]  # of each pixel, in the order of time
-        self.pixels = y + low[1], x + low[0]
-
-    def draw(self, picture: np.ndarray, time: float) -> None:
-        """Draw the path until a time, s."""
-        count = int(np.searchsorted(self.since, time, side="right"))
-        y, x, cover = self.pixels[0][:count], self.pixels[1][:count], self.cover[:count]
-        picture[y, x] = (picture[y, x] * (1.0 - cover) + self.colour * cover).astype(np.uint8)
+    def draw(self, image: Image.Image, time: float) -> None:
+        """Draw the path until a time, s, which is not before that of the last picture."""
+        stop = int(np.searchsorted(self.times, time, side="right"))
+        if stop > self.reached:
+            new = self.points[max(self.reached - 2, 0) : stop]  # it joins what is there
+            pen = ImageDraw.Draw(self.fine)
+            pen.line([tuple(point) for point in new.tolist()], self.opacity, round(self.width), joint="curve")
+            self.mask, self.reached = self.fine.reduce(arrows.SUPERSAMPLING), stop
+        image.paste(self.colour, tuple(self.corner.tolist()), self.mask)
 
 
 class Overlay:
@@ -133,12 +102,10 @@ class Overlay:
         self.traces, self.project, self.room, self.scale, self.colours = traces, project, room, scale, colours
         self.trails, self.wanted = [], []
         for trace, colour, place in zip(traces, colours, places, strict=True):
-            path, wanted = (points + place for points in tip.tip_paths(trace))
-            above = path[:, 2] >= 0.0, wanted[:, 2] >= 0.0  # the floor hides what is below it
-            self.trails.append(Trail(project(path), trace.t, above[0], colour, PATH_WIDTH * scale, size))
-            self.wanted.append(
-                Trail(project(wanted), trace.t, above[1], style.INK, WANTED_PATH_WIDTH * scale, size, WANTED_OPACITY)
-            )
+            above = [np.maximum(points + place, (-np.inf, -np.inf, 0.0)) for points in tip.tip_paths(trace)]
+            path, wanted = (project(points).clip(-OUTSIDE, np.add(size, OUTSIDE)) for points in above)
+            self.trails.append(Trail(path, trace.t, colour, PATH_WIDTH * scale))
+            self.wanted.append(Trail(wanted, trace.t, style.INK, WANTED_PATH_WIDTH * scale, WANTED_OPACITY))
         self.edges = edges
         self.shares = [self.share(trace) for trace in traces] if all(map(has_bars, traces)) else None
         self.errors = [windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces]
@@ -158,11 +125,10 @@ class Overlay:
     def over(self, picture: np.ndarray, frame: int, bodies: Callable[[int, str], np.ndarray]) -> np.ndarray:
         """Return the picture of a frame with all this; `bodies` returns where a machine's body or tip is, (3,) m."""
         time = float(self.edges[frame + 1])
-        picture = picture.copy()
-        for trail, wanted in zip(self.trails, self.wanted, strict=True):
-            wanted.draw(picture, np.inf)
-            trail.draw(picture, time)
         image = Image.fromarray(picture)
+        for trail, wanted in zip(self.trails, self.wanted, strict=True):
+            wanted.draw(image, np.inf)
+            trail.draw(image, time)
         draw = ImageDraw.Draw(image)
         for k, force in enumerate(self.forces):
             if force is not None and (size := float(np.linalg.norm(force[frame]))) > 0.5:

@@ -11,8 +11,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, items_of, number, shown
 
 FOVY = 9.0  # degrees, chosen: a long lens, so that no machine looks larger than its neighbours
-USUAL_FOVY = 45.0  # degrees, MuJoCo's default
-Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees, and a distance in m if it is chosen
+Camera = str | Sequence[float]  # a name, or azimuth and elevation in degrees
 
 
 class Room(NamedTuple):
@@ -29,13 +28,11 @@ def checked(chosen: Camera | None) -> Camera | None:
     if chosen is None or isinstance(chosen, str):
         return chosen
     parts = items_of("camera", chosen)
-    if len(parts) not in (2, 3):
+    if len(parts) != 2:
         raise ScenarioError(
-            f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees, "
-            "or (azimuth, elevation, distance) with m"
+            f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees"
         )
-    angles = number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], low=-90.0, high=90.0)
-    return *angles, *(number("camera's distance", distance, above=0.0) for distance in parts[2:])
+    return number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], low=-90.0, high=90.0)
 
 
 def turn(azimuth: float, elevation: float) -> np.ndarray:
@@ -51,30 +48,19 @@ def turn(azimuth: float, elevation: float) -> np.ndarray:
     return np.column_stack([right, np.cross(right, ahead), -ahead])
 
 
-def fit(
-    points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room, distance: float | None = None
-) -> np.ndarray:
+def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room) -> np.ndarray:
     """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a picture of `size` px.
 
     With p and z a point's place across and along the view, a camera at c across and at distance D sees it between
     the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c from both sides, for the picture's
     width and for its height; D is the least at which both leave room.
-
-    Args:
-      distance: m along the view from the middle of the points, of a lens of USUAL_FOVY that shows as much as this one;
-        default: the nearest.
     """
     across, up, z = points @ turn[:, 0], points @ turn[:, 1], -points @ turn[:, 2]
     x, y = size[0] / 2, size[1] / 2
     left, right, low, high = np.array([room.left - x, room.right - x, y - room.bottom, y - room.top]) * pixel(size)
     sides = [(across, left, right), (up, low, high)]
     bounds = [(np.max(p - b * z), np.min(p - a * z), a, b) for p, a, b in sides]
-    nearest = max((low - high) / (b - a) for low, high, a, b in bounds)
-    if distance is None:
-        distance = nearest
-    else:
-        zoom = np.tan(np.radians(USUAL_FOVY) / 2) / np.tan(np.radians(FOVY) / 2)
-        distance = float(distance * zoom - (z.min() + z.max()) / 2)
+    distance = max((low - high) / (b - a) for low, high, a, b in bounds)
     centre = [(low - b * distance + high - a * distance) / 2 for low, high, a, b in bounds]
     return turn @ np.array([*centre, distance])
 

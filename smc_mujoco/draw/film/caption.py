@@ -22,7 +22,6 @@ LABEL_SIZE, TITLE_SIZE, KEY_SIZE, BADGE_SIZE = 15, 24, 13, 13  # px, height of l
 EDGE = 24  # px, from the picture's edge to text
 MAX_LABEL_SHARE = 0.3  # of the picture's width, for a label beside its machine
 STRIP_WIDTH, STRIP_COUNTS = 110, 6  # of an encoder's strip, px and counts
-NEWS_TIME = 1.5  # s for which a change of the plant is highlighted
 
 
 class Caption:
@@ -137,7 +136,7 @@ class Caption:
         """Return the picture with the text on it: machines that have failed, their states, and the playback speed."""
         past = max((start for start in self.jumps if start <= time), default=None)
         image = Image.fromarray(picture)
-        sheet = self.sheet(failed, states, past, past is not None and time < past + NEWS_TIME)
+        sheet = self.sheet(failed, states, past)
         image.paste(sheet, mask=sheet)
         for k in np.flatnonzero(self.gauges):
             if not failed[k]:
@@ -160,17 +159,20 @@ class Caption:
         at, letters = ((left + right) / 2, middle), style.font(KEY_SIZE * s, bold=True)
         draw.text(at, speed, style.letters_on(fill), letters, anchor="mm")
 
-    def _sheet(
-        self, failed: tuple[bool, ...], states: tuple[State | None, ...], change: float | None, news: bool
-    ) -> Image.Image:
-        """Draw everything but the clock; `change` is the time of the plant's last change, highlighted if it is news."""
+    def _sheet(self, failed: tuple[bool, ...], states: tuple[State | None, ...], change: float | None) -> Image.Image:
+        """Draw everything but the clock; `change` is the time of the plant's last change, told in a dark box."""
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
         draw, s = ImageDraw.Draw(sheet), self.scale
         draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE_SIZE * s, bold=True))
         for i, text in enumerate(self.key):
             draw.text((EDGE * s, (48 + 1.4 * KEY_SIZE * i) * s), text, style.DISTURBANCE, style.font(KEY_SIZE * s))
         if change is not None:
-            self._note(draw, f"{self.jumps[change]} since {change:g} s", news)
+            font, right, y = style.font(KEY_SIZE * s, bold=True), self.size[0] - EDGE * s, 56 * s
+            words = f"{self.jumps[change]} since {change:g} s"
+            words = style.cropped(words, self.note_room - 8 * s, KEY_SIZE * s, bold=True)
+            box = right - style.width(words, KEY_SIZE * s, bold=True) - 8 * s, y - 11 * s, right + 8 * s, y + 11 * s
+            draw.rounded_rectangle(box, radius=5 * s, fill=style.INK)
+            draw.text((right, y), words, style.PAPER, font, anchor="rm")
         for text, colour, box, gone in zip(self.texts(failed), self.colours, self.pills, failed, strict=True):
             fill = style.FAILED if gone else colour
             draw.rounded_rectangle(tuple(box), radius=(box[3] - box[1]) / 2, fill=fill)
@@ -206,17 +208,6 @@ class Caption:
         draw.line((middle, top + 2 * s, middle, bottom - 2 * s), style.MUTED, max(1, round(s)))
         place, r = top + 0.35 * (bottom - top), 3.5 * s
         draw.ellipse((read - r, place - r, read + r, place + r), fill=self.colours[k])
-
-    def _note(self, draw: ImageDraw.ImageDraw, text: str, news: bool) -> None:
-        """Draw what has changed, under the clock; in a dark box while it is news."""
-        s = self.scale
-        text = style.cropped(text, self.note_room, KEY_SIZE * s, bold=True)
-        right, y = self.size[0] - EDGE * s, 56 * s
-        if news:
-            box = right - style.width(text, KEY_SIZE * s, bold=True) - 8 * s, y - 11 * s, right + 8 * s, y + 11 * s
-            draw.rounded_rectangle(box, radius=5 * s, fill=style.INK)
-        colour = style.PAPER if news else style.INK
-        draw.text((right, y), text, colour, style.font(KEY_SIZE * s, bold=True), anchor="rm")
 
 
 def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:

@@ -1,10 +1,10 @@
 """Encoding of a film in a separate thread, so that pictures are drawn meanwhile."""
 
+import collections
 import contextlib
-import queue
 import signal
-import threading
 from collections.abc import Callable, Iterator
+from concurrent import futures
 from pathlib import Path
 from types import ModuleType
 
@@ -56,38 +56,22 @@ def mediapy() -> ModuleType:
 def in_thread(write: Write) -> Iterator[Write]:
     """Yield a function that has `write` called with the same pictures, in order, in another thread.
 
-    It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by its next call, or at the
+    It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by a later call, or at the
     end. After an error, here or there, pictures that still wait are dropped.
     """
-    waiting: queue.Queue[np.ndarray | None] = queue.Queue(MAX_WAITING)
-    errors: list[Exception] = []
-    ended = threading.Event()
-
-    def work() -> None:
-        while (picture := waiting.get()) is not None:
-            if not errors and not ended.is_set():
-                try:
-                    write(picture)
-                except Exception as error:  # raised again in the other thread
-                    errors.append(error)
+    thread, waiting = futures.ThreadPoolExecutor(1, "encoder"), collections.deque[futures.Future]()
 
     def put(picture: np.ndarray) -> None:
-        if errors:
-            raise errors[0]
-        waiting.put(picture)
+        while waiting and (waiting[0].done() or len(waiting) > MAX_WAITING):
+            waiting.popleft().result()
+        waiting.append(thread.submit(write, picture))
 
-    thread = threading.Thread(target=work, name="encoder", daemon=True)
-    thread.start()
     try:
         yield put
-    except BaseException:
-        ended.set()
-        raise
+        for written in waiting:
+            written.result()
     finally:
-        waiting.put(None)
-        thread.join()
-    if errors:
-        raise errors[0]
+        thread.shutdown(cancel_futures=True)
 
 
 @contextlib.contextmanager

@@ -6,9 +6,10 @@ and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
+import itertools
 import os
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,6 @@ MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
 CHARTS_SHARE = 0.36  # of the film's height
 LAST_FRAME_TIME = 1200  # ms, for which a clip's last picture stays before it repeats
-Report = Callable[[int], None]
 
 
 def film(
@@ -46,7 +46,6 @@ def film(
     title: str | None = None,
     size: tuple[int, int] = (1280, 720),
     fps: float = FPS,
-    report: Report | None = None,
     speed: float | None = None,
     camera: Camera | None = None,
 ) -> Path:
@@ -59,12 +58,10 @@ def film(
       labels: one a trace; default: the laws' labels.
       title: default: the plant's name.
       size: width and height in px, even.
-      report: called with the number of frames written since its last call; default: a progress bar.
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
-      camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera, or
-        (azimuth, elevation, distance), m for a lens of 45 degrees. A name and two angles give the direction of the
-        view, and the camera stands as near as all machines can be seen. Default: the plant's own `look`; for your own
-        model the first camera that does not move.
+      camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera. It gives
+        the direction of the view, and the camera stands as near as all machines can be seen. Default: the plant's own
+        `look`; for your own model the first camera that does not move.
 
     Raises:
       ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
@@ -72,22 +69,13 @@ def film(
     path = with_ending(path, ".mp4")
     shown = pace.clock(traces, fps, speed)
     pictures = frames(traces, shown, labels, title, size, camera)
-    with replacing(path) as part, contextlib.closing(pictures), reporting(report, len(shown.times)) as done:
+    with replacing(path) as part, contextlib.closing(pictures), bar("film", len(shown.times)) as progress:
         first = next(pictures)
         with encoder(part, first.shape[:2], fps) as write:
-            write(first)
-            done(1)
-            for picture in pictures:
+            for picture in itertools.chain([first], pictures):
                 write(picture)
-                done(1)
+                progress.advance(1)
     return path
-
-
-@contextlib.contextmanager
-def reporting(report: Report | None, frames: int) -> Iterator[Report]:
-    """Yield `report`, or the same function of a progress bar if there is none."""
-    with bar("film", frames, shown=report is None) as progress:
-        yield report or progress.advance
 
 
 def missing() -> str | None:
@@ -103,7 +91,6 @@ def clip(
     span: tuple[float, float] = (0.0, 4.0),
     size: tuple[int, int] = (800, 450),
     fps: float = 20.0,
-    report: Report | None = None,
     speed: float | None = None,
     camera: Camera | None = None,
 ) -> Path:
@@ -117,10 +104,10 @@ def clip(
     if not 0 < count <= 600:
         raise ScenarioError(f"a clip of {start:g} .. {stop:g} s has {count} frames: give a span with 1 to 600")
     pictures = []
-    with reporting(report, count) as done:
+    with bar("clip", count) as progress:
         for picture in frames(traces, shown, labels, title, size, camera):
             pictures.append(Image.fromarray(picture))
-            done(1)
+            progress.advance(1)
     ends = [round(1000 / fps)] * (count - 1) + [LAST_FRAME_TIME]
     with replacing(path) as part:
         pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
@@ -242,7 +229,7 @@ def framed(
         stage.canvas.close()
     else:
         stage = Stage(traces, colours, size, room, chosen, motions, apart)
-        fact = "shows nothing from any side: give another camera, such as camera=(60, -20, 3)"
+        fact = "shows nothing from any side: give another camera, such as camera=(60, -20)"
     warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_stacklevel())
     return stage
 

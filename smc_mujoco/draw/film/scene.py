@@ -116,28 +116,12 @@ def set_floor(
     model.vis.rgba.fog[:] = (*HAZE, 1.0)
 
 
-def hide_cut(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    turn: np.ndarray,
-    place: np.ndarray,
-    size: tuple[int, int],
-    room: camera.Room,
-) -> None:
-    """Hide fixed things below the room that the lower edge of the picture would cut, such as the foot of a stand."""
-    fixed = np.flatnonzero((model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE))
-    corners = boxes(model, data)[fixed]
-    down = camera.project(corners.reshape(-1, 3), turn, place, size)[:, 1].reshape(len(fixed), 8)
-    cut = (down.min(axis=1) > room.bottom) & (down.max(axis=1) > size[1])
-    model.geom_group[fixed[cut]] = HIDDEN_GROUP
-
-
 def turn(scenario: Scenario, chosen: Camera | None = None) -> np.ndarray:
     """Return the frame of the camera, (3, 3), as camera.py has it: the chosen one, else the plant's own."""
     if isinstance(chosen, str):
         return camera_of(scenario, chosen)
     if chosen is not None:
-        return camera.turn(*chosen[:2])
+        return camera.turn(*chosen)
     if not scenario.plant.on_stage:
         return camera.turn(*view(models.compile_model(scenario)))
     return camera_of(scenario, LOOK)
@@ -205,17 +189,11 @@ def lane(scenarios: Sequence[Scenario], reaches: Sequence[np.ndarray], turn: np.
         return (wide + gap * max(wide, tall)) * right
     if not any(scenario.realistic for scenario in scenarios):
         return step
-    things = [fixed_boxes(models.compile_model(scenario)) for scenario in scenarios]
-    low, high = [corners.min(axis=1)[:, :2] for corners in things], [corners.max(axis=1)[:, :2] for corners in things]
-    for stretch in np.arange(1.0, 20.0, 0.05):
-        gaps = []
-        for j, k in itertools.combinations(range(len(things)), 2):
-            by = (k - j) * stretch * step[:2]
-            apart = np.maximum(low[k][:, None] + by - high[j], low[j] - high[k][:, None] - by)
-            gaps.append(apart.max(axis=2).min())
-        if min(gaps, default=MIN_DISTANCE) >= MIN_DISTANCE:
-            return stretch * step
-    return step
+    way = step / np.linalg.norm(step)
+    sides = [fixed_boxes(models.compile_model(scenario)) @ way for scenario in scenarios]
+    pairs = itertools.combinations(range(len(sides)), 2)
+    apart = max(((sides[j].max() - sides[k].min() + MIN_DISTANCE) / (k - j) for j, k in pairs), default=0.0)
+    return max(float(np.linalg.norm(step)), apart) * way
 
 
 def forward(model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -1,7 +1,7 @@
 """The stage of a film: poses and renders the machines of all traces under one camera that sees them all.
 
 The camera stands at the nearest place from which every machine stays inside the room that the page leaves, wherever
-its trace takes it, or as far away as the user chose.
+its trace takes it.
 """
 
 import itertools
@@ -58,8 +58,7 @@ class Stage:
         self.motions = motions or [None] * len(traces)
         runs = zip(self.puppets, traces, self.motions, strict=True)
         reaches = [puppet.reach(trace, motion) for puppet, trace, motion in runs]
-        distance = None if chosen is None or isinstance(chosen, str) or len(chosen) < 3 else chosen[2]
-        where, seen, place = placed(traces, self.puppets, reaches, turn, size, room, distance, apart)
+        where, seen, place = placed(traces, self.puppets, reaches, turn, size, room, apart)
         self.model = scene.compose(scenarios, where, size)
         self.data, self.goal = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.aimed = np.zeros(len(traces), bool)
@@ -88,7 +87,6 @@ class Stage:
         flat = [camera.project(points, turn, place, size) for points in seen]
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in flat])
         scene.forward(self.model, self.data)
-        scene.hide_cut(self.model, self.data, turn, place, size, room)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
         self.turn, self.place, self.size, self.where = turn, place, size, where
         self.canvas = Canvas(self.model, self.data, size, arms=arm.is_arm(traces))
@@ -211,7 +209,6 @@ def placed(
     turn: np.ndarray,
     size: tuple[int, int],
     room: camera.Room,
-    distance: float | None,
     apart: float,
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     """Return the places of the machines, (machines, 3) m, their points there, and the place of the camera, (3,) m.
@@ -225,7 +222,7 @@ def placed(
 
     def fitted(where: np.ndarray) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
         seen = [points + there for points, there in zip(reaches, where, strict=True)]
-        return where, seen, camera.fit(np.concatenate(seen), turn, size, room, distance)
+        return where, seen, camera.fit(np.concatenate(seen), turn, size, room)
 
     fit = fitted(where)
     step = np.diff(camera.project(where, turn, fit[2], size)[:, 0]).mean() if len(where) > 1 else 0.0

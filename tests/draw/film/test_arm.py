@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from helpers import arms
+from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
@@ -43,12 +44,18 @@ def paper():
     return np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
 
 
-def test_a_trail_is_drawn_until_now_and_not_below_the_floor():
-    points, times = np.array([[20.0, 30.0], [60.0, 30.0], [60.0, 90.0]]), np.array([0.0, 1.0, 2.0])
-    trail = arm.Trail(points, times, np.ones(3, bool), COLOUR, 3.0, SIZE)
-    early, late, hidden = paper(), paper(), paper()
-    trail.draw(early, 0.5)
-    trail.draw(late, 2.0)
+def drawn(trail, time):
+    image = Image.fromarray(paper())
+    trail.draw(image, time)
+    return np.asarray(image)
+
+
+def test_a_trail_is_drawn_until_now():
+    corners = np.array([[20.0, 30.0], [60.0, 30.0], [60.0, 90.0]])
+    times = np.linspace(0.0, 2.0, 41)
+    points = np.stack([np.interp(times, [0.0, 1.0, 2.0], place) for place in corners.T], axis=1)
+    trail = arm.Trail(points, times, COLOUR, 3.0)
+    early, late = drawn(trail, 0.5), drawn(trail, 2.0)
     for picture, x, y, inked in (
         (early, 25, 29, True),
         (early, 45, 29, False),
@@ -57,19 +64,25 @@ def test_a_trail_is_drawn_until_now_and_not_below_the_floor():
         (late, 45, 34, False),
     ):
         assert (picture[y, x].tolist() == list(style.rgb(COLOUR))) is inked
-    arm.Trail(points, times, np.array([True, True, False]), COLOUR, 3.0, SIZE).draw(hidden, 2.0)
-    assert hidden[29, 45].tolist() == list(style.rgb(COLOUR))
-    assert hidden[80, 60].tolist() == [255, 255, 255]
-    out = arm.Trail(points - 1000.0, times, np.ones(3, bool), COLOUR, 3.0, SIZE)
-    out.draw(late, 2.0)  # outside the picture
+    assert (drawn(arm.Trail(points, times, COLOUR, 3.0), 2.0) == late).all()  # at once or part by part
+    assert (drawn(arm.Trail(points - 1000.0, times, COLOUR, 3.0), 2.0) == 255).all()  # outside the picture
+
+
+def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
+    low = np.array([[0.0, 0.0, 0.5], [0.5, 0.0, -0.5], [1.0, 0.0, -40.0]])
+    monkeypatch.setattr(tip, "tip_paths", lambda trace: (low, low))
+    shown = overlay(dataclasses.replace(trace, t=np.array([0.0, 0.1, 0.2])))
+    floor = project(np.zeros((1, 3)))[0, 1]
+    for trail in (shown.trails[0], shown.wanted[0]):
+        rows = np.flatnonzero((drawn(trail, 1.0) != 255).any(axis=(1, 2)))
+        assert floor - 55 <= rows.min() <= floor - 45
+        assert rows.max() <= floor + 2
 
 
 def test_the_trail_of_an_arm_is_its_tips_path(trace):
     shown = overlay(trace)
     path = project(tip.tip_paths(trace)[0])
-    early, late = paper(), paper()
-    shown.trails[0].draw(early, 0.1)
-    shown.trails[0].draw(late, 0.5)
+    early, late = drawn(shown.trails[0], 0.1), drawn(shown.trails[0], 0.5)
     before = path[trace.t <= 0.1]
     apart = np.hypot(*(path[:, None] - before).T).min(axis=0)  # px from the early path
     assert apart.max() > 3.0

@@ -56,7 +56,7 @@ def test_an_error_of_the_encoder_ends_the_film_in_one_sentence_and_soon(tmp_path
     monkeypatch.setattr(mediapy.VideoWriter, "add_image", broken)
     with pytest.raises(smc.ScenarioError, match="cannot write mp4: Error writing: no space left on device"):
         encode(tmp_path, 10_000)
-    assert len(calls) == 3  # those that waited were dropped
+    assert len(calls) <= 3 + MAX_WAITING  # none that came later
 
 
 def test_after_an_error_no_more_pictures_are_made():
