@@ -1,27 +1,32 @@
-"""Charts of a report, plotly's figures: small multiples with the same axes, one panel a plant, one colour a law.
+"""Charts of a report: plotly's figures, with a panel for each plant and a colour for each law; and SVG pictures.
 
-Numbers have five digits.
+Numbers have five digits. The pictures are those of the suite's other commands.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from smc_mujoco.common.files import scratch
 from smc_mujoco.draw import region
+from smc_mujoco.draw.figure import figure
 from smc_mujoco.evidence.report import words
-from smc_mujoco.evidence.report.films import Curve, Scene
 from smc_mujoco.evidence.report.words import style
+from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.mechanisms.plant import catalogue as known_plants
 
 if TYPE_CHECKING:
     from smc_mujoco.analysis.margins import Margin
     from smc_mujoco.analysis.region_of_attraction import Basin
+    from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Field, Front
+    from smc_mujoco.simulation.trace import Trace
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 KEYS_PER_LINE = 5  # laws in a line of a legend
@@ -54,14 +59,13 @@ Panel = dict[str, Any]  # row and column
 
 
 def panels(
-    titles: Sequence[str], height: int, margin: tuple[int, int, int, int], gap: float, rows: int = 1
+    titles: Sequence[str], height: int, margin: tuple[int, int, int, int], gap: float
 ) -> tuple[go.Figure, list[Panel]]:
-    """Return a figure of panels, in one row or below each other, with a title at the left of each; and the panels.
+    """Return a figure of panels in a row, with a title at the left of each; and the panels.
 
     Height and margin (left, right, top, bottom) are in px, the gap between panels is a share of the whole.
     """
-    columns = len(titles) // rows
-    fig = make_subplots(rows, columns, subplot_titles=titles, horizontal_spacing=gap, vertical_spacing=gap)
+    fig = make_subplots(1, len(titles), subplot_titles=titles, horizontal_spacing=gap)
     font = {"size": 12, "color": style.INK}
     fig.update_annotations(font=font, xanchor="left", align="left", yanchor="bottom", yshift=4)
     for title, axis in zip(fig.layout.annotations, fig.select_xaxes(), strict=True):
@@ -69,7 +73,7 @@ def panels(
     sides = dict(zip("lrtb", margin, strict=True))
     fig.update_layout(height=height, margin=sides, showlegend=False)
     fig.layout.template = {"layout": STYLE}  # in place of plotly's own, of 7 kB
-    return fig, [{"row": 1 + k // columns, "col": 1 + k % columns} for k in range(len(titles))]
+    return fig, [{"row": 1, "col": 1 + k} for k in range(len(titles))]
 
 
 def _label(law: str) -> str:
@@ -187,55 +191,6 @@ def _margin(margin: "Margin", end: float) -> list[go.Scatter]:
     return traces
 
 
-def curves(scene: Scene) -> go.Figure:
-    """Draw x and u of every law over time. Where u chatters, a band is its range and the line its running mean."""
-    angle, force = ("angle", "N·m") if scene.unit == "rad" else ("position", "N")
-    titles = [words.bold(f"{angle} x, {scene.unit}"), words.bold(f"control u, {force}")]
-    fig, (left, right) = panels(titles, 305, (48, 12, 62, 46), 0.075)
-    extremes = [np.concatenate([c.u, c.low, c.high]) for c in scene.curves]
-    bound = 1.08 * (max((float(np.abs(u).max()) for u in extremes if u.size), default=0.0) or scene.u_max)
-    fig.update_xaxes(title_text="t, s").update_yaxes(zeroline=True, zerolinecolor=style.RULE)
-    fig.update_xaxes(matches="x", **right).update_yaxes(range=[-bound, bound], **right)
-    for curve in scene.curves:
-        for trace, place in zip(_curve(curve), (left, right, right), strict=False):
-            fig.add_trace(trace, **place)
-    return fig.update_layout(showlegend=True, legend={"y": 1.12})
-
-
-def _curve(curve: Curve) -> list[go.Scatter]:
-    """Return the line of x, the band of u if it chatters, and the line of u."""
-    colour, name = words.colour(curve.law), _label(curve.law)
-    line = {"mode": "lines", "legendgroup": curve.law, "line": {"color": colour, "width": 1.8}}
-    hover = {"hovertemplate": f"<b>{name}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"}
-    traces = [go.Scatter(line | hover, x=rounded(curve.t), y=rounded(curve.x), name=name)]
-    if len(curve.tb):
-        around = np.concatenate([curve.tb, curve.tb[::-1]]), np.concatenate([curve.high, curve.low[::-1]])
-        fill = "rgba({}, {}, {}, 0.18)".format(*style.rgb(colour))
-        band = line | {"fill": "toself", "fillcolor": fill, "line": {"width": 0}, "hoverinfo": "skip"}
-        traces.append(go.Scatter(band, x=rounded(around[0], 4), y=rounded(around[1], 3), showlegend=False))
-    return [*traces, go.Scatter(line | hover, x=rounded(curve.tu), y=rounded(curve.u), showlegend=False)]
-
-
-def record(shown: "Repeated") -> go.Figure:
-    """Draw the columns of a record over time, measured and as its twin repeats them: a panel for each, one below."""
-    names = list(shown.measured)
-    fig, places = panels(
-        [words.bold(name) for name in names], 120 + 120 * len(names), (56, 12, 62, 46), 0.13, rows=len(names)
-    )
-    for place, name in zip(places, names, strict=True):
-        for label, values, line in (
-            ("measured", shown.measured[name], {"color": style.MUTED, "width": 2.4}),
-            ("twin", shown.twin[name], {"color": words.colour(words.PAPER_LAW), "width": 1.2}),
-        ):
-            hover = f"<b>{label}</b> %{{y:.4g}} at %{{x:.3f}} s<extra></extra>"
-            key = {"name": label, "legendgroup": label, "showlegend": place["row"] == 1, "hovertemplate": hover}
-            fig.add_scatter(**key, x=rounded(shown.t), y=rounded(values), line=line, mode="lines", **place)
-    fig.update_xaxes(showticklabels=False).update_xaxes(showticklabels=True, title_text="t, s", **places[-1])
-    for place in places[1:]:
-        fig.update_xaxes(matches="x", **place)
-    return fig.update_layout(showlegend=True, legend={"y": 1.0 + 30 / (120 * len(names))})
-
-
 def meanings(drawn: "Sequence[Basin]") -> dict[str, str]:
     """Return colour -> its meaning, for the colours that occur in any of the maps."""
     after = region.convergence_times(drawn)
@@ -286,3 +241,27 @@ def fields(drawn: "Sequence[Field]") -> go.Figure:
         unit = known_plants()[field.plant].unit if field.plant in known_plants() else ""
         fig.update_xaxes(title_text=f"x, {unit}", showgrid=False, nticks=4, **place)
     return fig.update_yaxes(showgrid=False, nticks=5).update_yaxes(title_text="x′, rad/s or m/s", **places[0])
+
+
+def picture(draw: Callable[[Path], object]) -> bytes:
+    """Return the SVG file that a function draws."""
+    with scratch() as folder:
+        draw(folder / "picture.svg")
+        return (folder / "picture.svg").read_bytes()
+
+
+def orders(table: "AccuracyTable") -> bytes:
+    """Draw the largest errors over the control period, with theory's slopes."""
+    return picture(lambda path: table.plot(path, format="svg"))
+
+
+def record(shown: "Repeated") -> bytes:
+    """Draw the columns of a record, measured and as its twin repeats them, and the residuals."""
+    fits, title = {"twin": shown.fits["the twin’s"]}, f"{shown.rig.name}: {shown.name}"
+    units, twin = shown.rig.units, {"twin": shown.twin}
+    return picture(lambda path: residual_figure(title, shown.t, shown.measured, twin, fits, units, path))
+
+
+def curves(traces: "Sequence[Trace]", title: str) -> bytes:
+    """Draw x and u of every law over time."""
+    return picture(lambda path: figure(traces, path, title=title, panels=("x", "u"), format="svg"))

@@ -17,16 +17,13 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, TypeVar
 
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common.files import scratch
 from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
-from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, charts, oscillation, rigs, words
 from smc_mujoco.evidence.report.plan import GAINS
 from smc_mujoco.evidence.report.stages import Findings
-from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.board import relevance
 
@@ -69,7 +66,7 @@ def environment() -> "Environment":
         "margin_kind": words.kind,
         "law_name": words.law,
     }
-    made.globals |= {"words": words, "checks": checks, "white": style.WHITE_SHARE}
+    made.globals |= {"words": words, "checks": checks, "uri": uri, "white": style.WHITE_SHARE}
     return made
 
 
@@ -89,9 +86,6 @@ def page(findings: Findings) -> str:
         "rigs": rigs,
         "oscillation": oscillation,
         "link": link,
-        "uri": uri,
-        "orders": orders(findings.accuracies),
-        "plants": plants(),
     }
     return made.get_template("page.jinja").render(
         css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
@@ -111,15 +105,6 @@ def page(findings: Findings) -> str:
         relevance=relevance(share, ((s.metric, s.floor) for s in findings.scores)),
         metrics={metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n") for metric in metrics()},
     )
-
-
-def orders(table: AccuracyTable) -> bytes:
-    """Return the figure of the orders of accuracy, an SVG file; nothing of no laws."""
-    if not table:
-        return b""
-    with scratch() as folder:
-        table.plot(folder / "orders.svg")
-        return (folder / "orders.svg").read_bytes()
 
 
 def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, Cell]]:

@@ -71,7 +71,7 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
         sections=SECTIONS,
         link=lambda what: "verdict",
         badge=uri("image/svg+xml", badge(done.paper.name, done.claims).encode()),
-        figure=uri("image/svg+xml", figure),
+        figure=figure,
         runs=runs,
         seal=seal,
         varying=[id for id, entry in done.paper.claims.items() if entry.varies and id in done.used],

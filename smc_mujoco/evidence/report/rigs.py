@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -68,9 +68,9 @@ class Repeated:
     rig: Rig
     name: str  # of the record's file
     fits: Mapping[str, Mapping[str, float]] = frozen({})  # quantities, or "do nothing" -> column -> percent
-    t: Sequence[float] | np.ndarray = ()  # s, (K,), in few points
-    measured: Mapping[str, np.ndarray] = frozen({})  # column -> values, (K,)
-    twin: Mapping[str, np.ndarray] = frozen({})
+    t: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0))  # s, (K,), in few points
+    measured: records.Record = dataclasses.field(default_factory=dict)  # column -> values, (K,)
+    twin: records.Record = dataclasses.field(default_factory=dict)
     why: str = ""  # why it could not be repeated
 
 

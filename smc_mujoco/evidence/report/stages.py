@@ -27,7 +27,7 @@ from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import about, charts, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -266,6 +266,7 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
 
     def compute(scene: tuple[str, str], report: Report) -> films.Scene:
         plant, condition = scene
+        title = f"{words.plant(plant)}, {words.condition(condition)}"
         runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
         traces = run(list(runs.values()), work.threads)
         film = None
@@ -273,17 +274,15 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
             film = cached(
                 work.folder / f"film-{plant}-{condition}.webm",
                 [plan.scene_laws, plan.scene, GAINS, films.SIZE, films.FPS],
-                lambda: films.film(traces, f"{words.plant(plant)}, {words.condition(condition)}", report),
+                lambda: films.film(traces, title, report),
                 lambda data, path: path.write_bytes(data),
                 Path.read_bytes,
             )
-        first = traces[0].scenario
         return films.Scene(
             plant=plant,
             condition=condition,
-            unit=first.plant.unit,
-            u_max=float(np.max(first.resolved.u_max)),
-            curves=tuple(films.curve(trace) for trace in traces),
+            laws=plan.scene_laws,
+            curves=charts.curves(traces, title),
             film=film,
             seconds=plan.scene,
         )

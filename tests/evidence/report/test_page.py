@@ -20,7 +20,7 @@ from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.report import answer, page, rigs, words
 from smc_mujoco.evidence.report.about import About, Gains
-from smc_mujoco.evidence.report.films import Curve, Scene
+from smc_mujoco.evidence.report.films import Scene
 from smc_mujoco.evidence.report.oscillation import Oscillation
 from smc_mujoco.evidence.report.plan import Plan
 from smc_mujoco.evidence.report.scores import Score
@@ -274,8 +274,8 @@ def machines():
 
 def repeated():
     t = np.linspace(0.0, 1.0, 5)
-    columns = {"theta": np.sin(t), "u": t**2}
-    fits = {"the twin’s": {"theta": 94.06, "u": 88.0}, "quanser": {"theta": Fall(8.44), "u": Fall(8.44)}}
+    columns = {"theta": np.sin(t), "alpha": t**2}
+    fits = {"the twin’s": {"theta": 94.06, "alpha": 88.0}, "quanser": {"theta": Fall(8.44), "alpha": Fall(8.44)}}
     yield rigs.Repeated(
         rig=smc.rig("qube_servo"),
         name="a.npz",
@@ -288,22 +288,8 @@ def repeated():
 
 
 def scenes():
-    t, empty = np.linspace(0.0, 2.0, 5), np.empty(0)
-    for plant, unit, film in (("duffing", "m", b"film"), ("pendulum_network", "rad", None)):
-        curves = []
-        for m, law in enumerate(LAWS[:2]):
-            u = (3.0 - m) * np.cos(3.0 * t)
-            band = (t[::2], u[::2] - 0.5, u[::2] + 0.5) if m else (empty,) * 3
-            curves.append(Curve(law=law, t=t, x=np.exp(-t), tu=t, u=u, tb=band[0], low=band[1], high=band[2]))
-        yield Scene(
-            plant=plant,
-            condition="nominal",
-            unit=unit,
-            u_max=6.0,
-            curves=tuple(curves),
-            film=film,
-            seconds=2.0,
-        )
+    for plant, film in (("duffing", b"film"), ("pendulum_network", None)):
+        yield Scene(plant=plant, condition="nominal", laws=LAWS[:2], curves=b"<svg/>", film=film, seconds=2.0)
 
 
 def about():
@@ -354,7 +340,7 @@ def drawn(plot):
     figure = json.loads(plot[2], parse_float=lambda text: float(f"{float(text):.9g}"), parse_constant=pytest.fail)
     if plot[1] != "plot-field":  # the first; all have the same
         figure["layout"].pop("template")
-    if plot[1] in ("plot-margin-mass", "plot-scene-2"):
+    if plot[1] == "plot-margin-mass":
         figure = {"data": [], "layout": {"annotations": figure["layout"]["annotations"]}}
     traces = [f"  {json.dumps(trace, ensure_ascii=False)}" for trace in figure["data"]]
     parts = [f"  {name}: {json.dumps(part, ensure_ascii=False)}" for name, part in figure["layout"].items()]

@@ -48,12 +48,15 @@ def test_records_find_the_twin_of_their_columns(shown):
     assert "sampled every 0.002 s" in shown[1].why
 
 
-def test_a_chart_has_what_was_measured_beside_the_twin(shown):
-    figure = charts.record(shown[0])
-    assert [trace.name for trace in figure.data] == ["measured", "twin"] * 2
-    measured = figure.data[0]
-    assert len(measured["x"]) == len(measured["y"]) <= rigs.MAX_CURVE_POINTS
-    assert measured["x"][-1] == pytest.approx(0.4, abs=1e-3)
+def test_a_picture_has_what_was_measured_beside_the_twin(shown, monkeypatch):
+    given = []
+    monkeypatch.setattr(charts, "residual_figure", lambda *those: given.extend(those) or those[-1].write_bytes(b"svg"))
+    assert charts.record(shown[0]) == b"svg"
+    title, t, measured, predicted, fits, units, _ = given
+    assert title == "emps: run.npz"
+    assert len(t) == len(measured["x"]) == len(predicted["twin"]["u"]) <= rigs.MAX_CURVE_POINTS
+    assert t[-1] == pytest.approx(0.4, abs=1e-3)
+    assert (fits["twin"], units) == (shown[0].fits["the twin’s"], AXIS.units)
 
 
 def test_a_folder_without_records_of_a_rig_is_refused_before_any_run(work, tmp_path):

@@ -236,15 +236,6 @@ def test_v_rises_where_its_rate_is_positive_off_the_surface():
     assert (own.plant, own.vdot.shape, own.x.shape, own.v.shape) == ("duffing", (121, 121), (121,), (121,))
 
 
-def test_a_curve_is_of_the_channel_that_starts_farthest_out():
-    trace = made(smc.Scenario(plant="pendulum_network", law="pid", duration=2.0, x0=(0.1, -0.4, 0.3, 0.2, 0.1)))
-    curve = films.curve(trace)
-    assert curve.law == "pid"
-    np.testing.assert_array_equal(curve.x[[0, -1]], trace.x[[0, -1], 1])
-    assert (curve.t[0], curve.t[-1]) == (0.0, 2.0)
-    assert len(curve.tb) == 0
-
-
 def test_a_film_has_every_frame(tmp_path, monkeypatch):
     written, reached, count = [], [], 30
 

@@ -19,8 +19,7 @@
     if (/^#[0-9a-f]{6}$/i.test(text)) {
       return `#${[1, 3, 5].map((k) => lighter(parseInt(text.slice(k, k + 2), 16)).toString(16).padStart(2, "0")).join("")}`;
     }
-    const band = text.match(/^rgba\((\d+), (\d+), (\d+), (0\.\d+)\)$/);
-    return band ? `rgba(${band.slice(1, 4).map((c) => lighter(Number(c))).join(", ")}, ${band[4]})` : text;
+    return text;
   };
   const night = (part) => {
     if (typeof part === "string") return shade(part);
