@@ -45,24 +45,16 @@ class System(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class LinearLaw:
-    """The function of a linear controller's law. It is equal to another one with the same numbers.
+    """The function of a linear controller's law. It is equal to another one with the same numbers."""
 
-    Attributes:
-      a, b, c, d: its matrices; a is in real Schur form if the controller is of continuous time.
-      inputs: keys of INPUTS.
-      name: of the law.
-      discrete: whether the matrices are those of a step.
-      control_period: s, for which they are; None for any.
-    """
-
-    a: Matrix
+    a: Matrix  # in real Schur form if the controller is of continuous time
     b: Matrix
     c: tuple[float, ...]
     d: tuple[float, ...]
-    inputs: tuple[str, ...]
-    name: str
-    discrete: bool
-    control_period: float | None
+    inputs: tuple[str, ...]  # keys of INPUTS
+    name: str  # of the law
+    discrete: bool  # whether the matrices are those of a step
+    control_period: float | None  # s, for which they are; None for any
 
     @property
     def __name__(self) -> str:

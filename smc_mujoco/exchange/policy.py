@@ -48,17 +48,11 @@ _arithmetic = functools.cache(Arithmetic)  # of this process
 
 @dataclasses.dataclass(frozen=True)
 class Policy(Uncompiled):
-    """The function of a policy's law.
-
-    Attributes:
-      act: the policy as a callable.
-      name: of the law.
-      reference: whether r, r' and r'' are at the end of the observation.
-    """
+    """The function of a policy's law."""
 
     act: Act
-    name: str
-    reference: bool
+    name: str  # of the law
+    reference: bool  # whether r, r' and r'' are at the end of the observation
 
     why = "is a policy, which is Python: several times slower than a law that compiles, and on one core"
 
@@ -145,15 +139,10 @@ def _torch(torch: ModuleType, path: Path) -> Act:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Network:
-    """A copy of a torch module, on the CPU and in evaluation mode. Further training does not change it.
+    """A copy of a torch module, on the CPU and in evaluation mode. Further training does not change it."""
 
-    Attributes:
-      module: the copy.
-      predicts: whether to call its method `predict`, as of a policy of stable-baselines3, instead of itself.
-    """
-
-    module: Any
-    predicts: bool = False
+    module: Any  # the copy
+    predicts: bool = False  # whether to call its method `predict`, as of a policy of stable-baselines3
 
     def __call__(self, observation: np.ndarray) -> Any:
         """Return the action."""

@@ -19,7 +19,7 @@ from smc_mujoco.common.progress import Bar
 from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.commands import tables
-from smc_mujoco.evidence.rigs.identified import Identified
+from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.rig import Fall
 
 ROWS = (boards.Row("mine", 1.234, 8.08, 1.8, 0.0104, 88.52, 0.6549), boards.Row("SAC", 2.5, 10.0, 3.0, 0.1, 99.0, 0.5))

@@ -39,6 +39,3 @@ def cascade(y, gains, memory):
     Source: the drive of EMPS (Janot, Gautier and Brunot 2019), whose gains are the defaults: 1/s, and V s/m.
     """
     return gains.kv * (-gains.kp * y.e - y.v), 0.0
-
-
-CONTROLLERS = {law.name: law for law in (state_feedback, cascade)}

@@ -11,7 +11,7 @@ from scipy.signal import butter, freqz
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import inverse, records, replays, search, uncertainty
-from smc_mujoco.evidence.rigs.controllers import CONTROLLERS, cascade
+from smc_mujoco.evidence.rigs.controllers import cascade, state_feedback
 from smc_mujoco.evidence.rigs.replays import Piece, Point, Replays, Slopes
 from smc_mujoco.evidence.rigs.rig import Fall, Quantity, fallen, percentages
 from smc_mujoco.simulation.reference import Measurement, Values
@@ -329,6 +329,6 @@ def test_the_cascade_of_the_axis_is_its_formula():
     y = Measurement(0.0, 1e-3, 0.3, 0.2, 0.1, 0.2, 0.2, 0.0, 0.0, 0.0, 0.0)
     u, _ = cascade.function(y, Values(kp=3.0, kv=5.0), np.zeros(0))
     assert u == pytest.approx(5.0 * (3.0 * (0.2 - 0.3) - 0.2))
-    assert {name: one.label for name, one in CONTROLLERS.items()} == {
+    assert {one.name: one.label for one in (state_feedback, cascade)} == {
         "state_feedback": "Rig's state feedback", "cascade": "Rig's cascade"
     }  # fmt: skip

@@ -10,7 +10,7 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs import records
-from smc_mujoco.evidence.rigs.identified import Identified
+from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.records import Columns, checked
 from smc_mujoco.evidence.rigs.rig import Fall
 
