@@ -102,7 +102,7 @@ print(json.dumps({"ends": ends, "wrote": wrote, "undisturbed": undisturbed, "sam
 """
 FULL = """
 import resource
-from smc_mujoco.cli.commands.studies import compare
+from smc_mujoco.cli.main import main
 
 def filling(self, rows, add=store.Store.add, parts=[]):
     parts.append(rows)
@@ -111,7 +111,8 @@ def filling(self, rows, add=store.Store.add, parts=[]):
     add(self, rows)
 
 store.Store.add = filling
-compare(["duffing"], ["classical"], ["noise"], seeds=20, gains="study", duration=0.05, out=out)
+words = "compare duffing --law classical --condition noise --seeds 20 --gains study --duration 0.05 --out"
+main([*words.split(), str(out)])
 """
 
 
