@@ -568,7 +568,7 @@ def check_names(s: Resolved) -> None:
 
 def check_mechanism(s: Resolved) -> None:
     """Check that the integrator suits the parts, and that mechanism and contact suit the parameters at any time."""
-    if s.integrator == "RK4" and (states := [p for p in s.friction if p.stateful]):
+    if s.integrator == "RK4" and (states := [p for p in s.friction if p.bristles]):
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
         )

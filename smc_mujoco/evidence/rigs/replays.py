@@ -307,7 +307,7 @@ def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
     state.
     """
     integrator, step = "RK4", scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9)
-    if scenario.input_delay or any(part.stateful for part in scenario.friction):
+    if scenario.input_delay or any(part.bristles for part in scenario.friction):
         integrator, step = scenario.resolved.integrator, scenario.resolved.physics_step
     return {"integrator": integrator, "physics_step": step / 2**halvings}
 

@@ -32,7 +32,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -58,21 +58,12 @@ NOMINAL = floats(
 DYNAMICS = floats(
     ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves", "site")
 )
-# Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator.
+# Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels come first.
 PLACE = np.dtype([(name, "i8") for name in ("qpos", "qvel", "ctrl")])
 nominal_at, dynamics_at, seen_at, place_at = map(record_at, (NOMINAL, DYNAMICS, SEEN, PLACE))
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
 _lock = threading.Lock()  # held while Python computes with the mjData of a model
 free_after_fork(_lock)
-
-
-class Places(NamedTuple):
-    """Indices of the channels in qpos and qvel, (n,) each, and of the driven ones in ctrl, (driven,)."""
-
-    qpos: np.ndarray
-    qvel: np.ndarray
-    ctrl: np.ndarray
-    table: np.ndarray  # the same as an array of channels, (n,) PLACE
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,37 +78,39 @@ class NominalModel:
     ) -> tuple[float, float]:
         """Return f and g of channel i, given the last commands u, (n,), of the others."""
         with self._placed(x, p) as (model, places, data):
-            data.qvel[places.qvel], driven = v, len(places.ctrl)
-            data.ctrl[places.ctrl] = 0.0 if u is None else np.asarray(u)[:driven]
-            data.ctrl[places.ctrl[i % driven]] = 0.0
+            data.qvel[places["qvel"]], ctrl = v, driven(places)
+            j = i % len(ctrl)  # the driven channel that moves channel i
+            data.ctrl[ctrl] = 0.0 if u is None else np.asarray(u)[: len(ctrl)]
+            data.ctrl[ctrl[j]] = 0.0
             mujoco.mj_fwdVelocity(model, data)
             mujoco.mj_fwdActuation(model, data)
             mujoco.mj_fwdAcceleration(model, data)
             unit, moved = np.zeros((1, model.nv)), np.zeros((1, model.nv))
-            unit[0, places.qvel[i % driven]] = 1.0
+            unit[0, places["qvel"][j]] = 1.0
             mujoco.mj_solveM(model, data, moved, unit)
-            return float(data.qacc_smooth[places.qvel[i]]), float(moved[0, places.qvel[i]])
+            dof = places["qvel"][i]
+            return float(data.qacc_smooth[dof]), float(moved[0, dof])
 
     @contextlib.contextmanager
-    def _placed(self, x: np.ndarray, p: Any) -> Iterator[tuple[mujoco.MjModel, Places, mujoco.MjData]]:
+    def _placed(self, x: np.ndarray, p: Any) -> Iterator[tuple[mujoco.MjModel, np.ndarray, mujoco.MjData]]:
         """Yield the model, its channels' indices and an mjData at rest at positions x, which no other thread has."""
         model, places, data, _ = prepared(self, frozen(vars(p)))
         with _lock:
             data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
-            data.qpos[places.qpos] = x
+            data.qpos[places["qpos"]] = x
             mujoco.mj_fwdPosition(model, data)
             yield model, places, data
 
     def native(self, parameters: Mapping[str, float]) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
-        data, seen, solved = borrowed.data, np.full((2, len(places.qpos)), np.nan), np.zeros((2, model.nv))
-        arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places.table, *seen, *solved
+        data, seen, solved = borrowed.data, np.full((2, len(places)), np.nan), np.zeros((2, model.nv))
+        arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places, *seen, *solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
-        sizes = len(places.qpos), len(places.ctrl), model.nv
+        sizes = len(places), len(driven(places)), model.nv
         return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays))
 
-    def _borrow(self, parameters: Mapping[str, float]) -> "tuple[mujoco.MjModel, Places, BorrowedData]":
+    def _borrow(self, parameters: Mapping[str, float]) -> "tuple[mujoco.MjModel, np.ndarray, BorrowedData]":
         """Return the model, its channels' indices, and an mjData for one simulation."""
         model, places, _, spare = prepared(self, frozen(parameters))
         try:
@@ -132,20 +125,20 @@ class NominalModel:
             dense, forces = np.zeros((model.nv, model.nv)), {}
             mujoco.mj_fullM(model, data, dense)
             for name, velocity in (("g", np.zeros(len(x))), ("h", v)):
-                data.qvel[places.qvel] = velocity
+                data.qvel[places["qvel"]] = velocity
                 mujoco.mj_fwdVelocity(model, data)
                 mujoco.mj_fwdActuation(model, data)
-                forces[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places.qvel]
-        return Dynamics(dense[np.ix_(places.qvel, places.qvel)], forces["h"], forces["g"])
+                forces[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places["qvel"]]
+        return Dynamics(dense[np.ix_(places["qvel"], places["qvel"])], forces["h"], forces["g"])
 
     def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
         """Return C(x, v) w, (n,), with the C of Christoffel's symbols."""
         forces = np.zeros(len(x))
         with self._placed(x, p) as (model, places, data):
             for sign in (1.0, -1.0):
-                data.qvel[places.qvel] = v + sign * w
+                data.qvel[places["qvel"]] = v + sign * w
                 mujoco.mj_fwdVelocity(model, data)
-                forces += sign * 0.25 * data.qfrc_bias[places.qvel]
+                forces += sign * 0.25 * data.qfrc_bias[places["qvel"]]
         return forces
 
     def jacobian(self, x: np.ndarray, p: Any, tip: str) -> np.ndarray:
@@ -153,19 +146,19 @@ class NominalModel:
         with self._placed(x, p) as (model, places, data):
             rows = np.zeros((3, model.nv))
             mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
-        return rows[:, places.qvel]
+        return rows[:, places["qvel"]]
 
     def native_dynamics(self, parameters: Mapping[str, float], tip: str) -> Native:
         """Return the C function of `dynamics` for one simulation. The tip is a site or ""."""
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = 0.0
-        dense, v, moves = np.zeros(model.nv**2), np.zeros(len(places.qpos)), np.zeros(3 * model.nv)
+        dense, v, moves = np.zeros(model.nv**2), np.zeros(len(places)), np.zeros(3 * model.nv)
         forces = data.qfrc_bias, data.qfrc_passive, data.qfrc_actuator
-        arrays = data.qpos, data.qvel, *forces, places.table, dense, v, moves
+        arrays = data.qpos, data.qvel, *forces, places, dense, v, moves
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         site = model.site(tip).id if tip else -1
-        values = (len(places.qpos), model.nv, *addresses, site)
+        values = (len(places), model.nv, *addresses, site)
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
 
 
@@ -183,7 +176,7 @@ class BorrowedData:
 @functools.lru_cache(maxsize=32)
 def prepared(
     nominal: NominalModel, parameters: Mapping[str, float]
-) -> tuple[mujoco.MjModel, Places, mujoco.MjData, list[mujoco.MjData]]:
+) -> tuple[mujoco.MjModel, np.ndarray, mujoco.MjData, list[mujoco.MjData]]:
     """Return the model with nominal parameters, its channels' indices, an MjData for Python, and the pool."""
     model = compiled_for_runs(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
@@ -194,10 +187,15 @@ def prepared(
     mujoco.mj_resetData(model, data)
     data.warning.number[:] = 1  # MuJoCo tells only the first; telling it inside a control callback would never end
     joints = joint_ids(model)
-    columns = model.jnt_qposadr[joints], model.jnt_dofadr[joints], model.actuator_ctrladr[drive_ids(model)]
-    table = np.full(len(joints), -1, PLACE)
-    table["qpos"], table["qvel"], table["ctrl"][: len(columns[2])] = columns
-    return model, Places(*columns, table), data, []
+    ctrl, places = model.actuator_ctrladr[drive_ids(model)], np.full(len(joints), -1, PLACE)
+    places["qpos"], places["qvel"] = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    places["ctrl"][: len(ctrl)] = ctrl
+    return model, places, data, []
+
+
+def driven(places: np.ndarray) -> np.ndarray:
+    """Return the indices of the driven channels in ctrl, (driven,)."""
+    return places["ctrl"][places["ctrl"] >= 0]
 
 
 def _mujoco(name: str, more: int = 0) -> Callable:

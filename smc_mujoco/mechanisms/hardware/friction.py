@@ -94,7 +94,6 @@ class LuGre(Friction):
     """
 
     bristles = True
-    stateful = True  # the bend of the bristles
     forces = "coulomb", "static"
 
     coulomb: float

@@ -61,8 +61,8 @@ class Part:
 class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
-    stateful: ClassVar[bool] = False  # whether it has a state that MuJoCo integrates, inaccurately under RK4
-    bristles: ClassVar[bool] = False  # whether it holds a joint at rest by bristles; at most one friction may
+    # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most one friction may.
+    bristles: ClassVar[bool] = False
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
     def scaled(self, factor: float) -> "Friction":

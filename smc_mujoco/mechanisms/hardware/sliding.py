@@ -49,8 +49,7 @@ class Sliding(Friction):
     A class states its numbers as fields. Each is one number for all channels, or a sequence with one for each channel.
     """
 
-    bristles = True
-    stateful = True  # its force is held over each physics step, so RK4 would not make it more accurate
+    bristles = True  # their force is held over each physics step
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -81,7 +81,6 @@ ABOUT = (
     "unit",
     "nominal",
     "stall",
-    "stateful",
     "bristles",
     "forces",
 )
