@@ -113,9 +113,10 @@ class Comparison:
         ran = ~np.isnan(cells[0])
         # (laws, blocks), number of sets of gains of a law's runs
         self.sets = np.array([[np.unique(of_law[k, ran[k]]).size for k in blocks] for of_law in gains])
-        # (blocks, laws, laws), whether differences are logarithms of ratios
-        ratios = [_ratios_make_sense(cells[:, k], self.floors[k], self.relevant) for k in blocks]
-        self.relative = np.array(ratios) & (not shares)
+        # (blocks, laws, laws), whether differences are logarithms of ratios: if the relevant shares exceed the floor
+        large = middle(cells).T * (self.relevant or RELEVANT) >= np.maximum(self.floors, ROUNDING)[:, None]
+        large &= ~np.any(cells < 0, axis=2).T
+        self.relative = large[:, :, None] & large[:, None, :] & (not shares)
         # (blocks, laws, laws, seeds), second law's value minus the first's by sample, then NaN
         of_block = [None] * len(blocks) if results is None else results.swapaxes(0, 1)
         self.differences = np.stack(
@@ -238,13 +239,6 @@ def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | 
             row[:] = _by_sample(row, sets[a], sets[b])
         differences[a, a + 1 :], differences[a + 1 :, a] = pairs, -pairs
     return differences
-
-
-def _ratios_make_sense(cells: np.ndarray, floor: float, relevant: float) -> np.ndarray:
-    """Return for which laws (laws, laws) the relevant share of both medians of a block is above the floor."""
-    smallest = middle(cells) * (relevant or RELEVANT) >= max(floor, ROUNDING)
-    smallest &= ~np.any(cells < 0, axis=1)
-    return smallest[:, None] & smallest
 
 
 def _pairwise(law: np.ndarray, rivals: np.ndarray, relative: np.ndarray) -> np.ndarray:
@@ -385,14 +379,6 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
 # the signed-rank test
 
 
-class Centre(NamedTuple):
-    """The centre of paired differences, with its interval."""
-
-    value: float
-    low: float
-    high: float
-
-
 def p_values(differences: ArrayLike) -> np.ndarray:
     """Return the one-sided p-values with which differences (..., n), NaN for none, lie above 0; 1 without any.
 
@@ -414,26 +400,26 @@ def p_values(differences: ArrayLike) -> np.ndarray:
     return p.reshape(shape)
 
 
-def interval(differences: ArrayLike, error: float) -> Centre:
-    """Return the centre of differences (n,), NaN for none, and an interval that misses it on a side by chance `error`.
+def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]:
+    """Return the centre of differences (n,), NaN for none, and the ends of its interval.
 
-    An end is infinite where the sample is too small for `error`.
+    The interval misses the centre on a side by chance `error`. An end is infinite where the sample is too small.
     """
     known = np.asarray(differences, float)
     known = known[~np.isnan(known)]
     n = known.size
     if not n:
-        return Centre(math.nan, math.nan, math.nan)
+        return math.nan, math.nan, math.nan
     i, j = np.triu_indices(n)
     with np.errstate(invalid="ignore"):
         means = (known[i] + known[j]) / 2  # NaN of two opposite infinite values
     value = float(np.median(np.where(np.isnan(means), 0.0, means)))
     tails = _tail(tuple(range(2, 2 * n + 1, 2)), 2 * np.arange(means.size + 1))
     if not (enough := np.flatnonzero(tails <= error)).size:
-        return Centre(value, -math.inf, math.inf)
+        return value, -math.inf, math.inf
     low = np.sort(np.where(np.isnan(means), -math.inf, means))[means.size - enough[0]]
     high = np.sort(np.where(np.isnan(means), math.inf, means))[enough[0] - 1]
-    return Centre(value, float(low), float(high))
+    return value, float(low), float(high)
 
 
 def min_p(n: int) -> float:

@@ -4,23 +4,20 @@ A need is a metric to compare (fast, accurate, calm ...) or a property that a la
 With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
 Every law that suits gets gains by one rule, and runs in each condition from the same seeds. Laws are compared by the
-rules of `ranking`. A block is a need in a condition, so every need weighs the same in every condition. No law is left
-out after fewer runs: a few seeds would decide which law may be first. A law that settles in less than half as many runs
-of some condition as the law that settles most often is not fit, and not compared: else a law that does nothing would be
-the calmest. A law is reliable if it settles in 90 % of the runs of every condition.
+rules of `ranking`; a block is a need in a condition. No law is left out after fewer runs: a few seeds would decide
+which law may be first. A law that settles in less than half as many runs of some condition as the law that settles most
+often is not fit, and not compared: else a law that does nothing would be the calmest. For "robust" an adversary attacks
+each law. There is no test then, because a worst case is no sample.
 
 A law dominates another if it is better in some block and worse in none. Laws with fewer runs that fail come first, then
-laws by mean rank, but none before a law that dominates it. Laws that tie with the next law in this order stand by their
-overshoot, and then by their energy of u, less first. The first law is advised, unless all are level.
-
-For "robust" an adversary attacks each law. A law is better if its worst case is smaller by more than the least relevant
-difference. There is no test, because a worst case is no sample.
+laws by mean rank, but none before a law that dominates it. Laws that tie with the next law in this order stand by
+`ties`, less first. The first law is advised, unless all are level.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -51,15 +48,8 @@ MIN_BUDGET = 16  # runs of an adversary in a condition, and as many random ones;
 MIN_SETTLED = 0.5  # of the largest share of runs that settle under a law; chosen
 
 
-class Extent(NamedTuple):
-    """How much is run."""
-
-    duration: float  # s, of a run
-    budget: int  # sets of gains that a tuning tries
-    parts: int  # in how many parts the budget of an adversary is shared
-
-
-FULL, QUICK = Extent(duration=5.0, budget=96, parts=1), Extent(duration=3.0, budget=32, parts=3)
+# s, of a run; sets of gains that a tuning tries; in how many parts the budget of an adversary is shared
+FULL, QUICK = (5.0, 96, 1), (3.0, 32, 3)
 
 
 def which(
@@ -99,16 +89,16 @@ def which(
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
-    extent, machine = QUICK if quick else FULL, as_plant(plant)
+    (length, tries, parts), machine = QUICK if quick else FULL, as_plant(plant)
     count, relevant = whole("seeds", seeds, 1, 10_000), checked_share(relevant)
     compared, properties = _needs(needs, machine)
-    length = extent.duration if duration is None else number("duration", duration, above=0.0)
+    length = length if duration is None else number("duration", duration, above=0.0)
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
-    candidates = _candidates(trial, _suited(machine, wanted, laws), extent.budget)
+    candidates = _candidates(trial, _suited(machine, wanted, laws), tries)
     table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
-    worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
+    worst = _worst(trial, candidates, duration, within, parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
     return Advice(
         plant=machine,

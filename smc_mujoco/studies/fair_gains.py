@@ -48,34 +48,6 @@ class Candidate(NamedTuple):
         return self.sets[seed % len(self.sets)]
 
 
-def fair_gains(
-    plant: Plant,
-    laws: Sequence[Component | Template],
-    folder: Path,
-    budget: int = search.BUDGET,
-    starts: Starts | None = None,
-    threads: int | None = None,
-    progress: bool = False,
-    tune: bool = True,
-    gains: str = "tuned",
-    shipped_budget: bool = True,
-) -> list[Candidate]:
-    """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
-
-    If some laws have shipped gains, the others are tuned like these, from the same starts, and if `shipped_budget` with
-    the same budget. Laws without given gains come as templates. The folder keeps the results of searches.
-    """
-    candidates = [_known(plant, law, gains) for law in laws]
-    if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in candidates):
-        starts = None
-        budget = search.BUDGET if shipped_budget else budget
-
-    def missing(law: Component | Template) -> Candidate:
-        return _tuned(plant, law, budget, starts, folder, threads, progress) if tune else _default(law)
-
-    return [candidate or missing(law) for law, candidate in zip(laws, candidates, strict=True)]
-
-
 def law_or_template(law: Component | Template | str) -> Component | Template:
     """Return the law if the user gave its gains, else its template."""
     if isinstance(law, str):
@@ -107,41 +79,6 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
     return Candidate(made, (made,), remark)
 
 
-def _tuned(
-    plant: Plant,
-    law: Component | Template,
-    budget: int,
-    starts: Starts | None,
-    folder: Path,
-    threads: int | None,
-    progress: bool,
-) -> Candidate:
-    """Return a law with gains from `tune`, or from the file of an earlier call; its defaults if it cannot be tuned."""
-    usual, default = Objective(), coerce.law(law)
-    conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
-    goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
-    try:
-        (first, *_) = goal.scenarios(plant, default, 0)
-        template = law if isinstance(law, Template) else default.template
-        ranges = template and (dict(template.gains), dict(template.conditions))
-        depends = [run_key.key(first), goal.describe(), fingerprint.of((default.function, ranges))]
-        with warnings.catch_warnings():
-            for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
-                warnings.filterwarnings("ignore", words, ScenarioWarning)
-            tuned = cached(
-                folder / f"{plant.name}-{law.name}-{budget}.json",
-                depends,
-                lambda: search.tune(plant, law, budget, objective=goal, threads=threads, progress=progress),
-                lambda made, path: made.save(path),
-                result.load,
-            )
-    except search.BrokenLawError:
-        raise
-    except ScenarioError as error:
-        return _default(law, f"not tuned: {error}")
-    return _candidate(default, tuned)
-
-
 def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
     """Return a law, given with its defaults, with the gains of a search."""
     its = tuned.law.source
@@ -170,9 +107,57 @@ class Trial(NamedTuple):
     def gains(
         self, laws: Mapping[str, Sequence[Component | Template]], budget: int, **options: Any
     ) -> dict[str, list[Candidate]]:
-        """Return plant -> its laws with gains by one rule, see `fair_gains` for the options."""
-        given = self.folder / "gains", budget, self.starts, self.threads, self.progress
-        return {plant.name: fair_gains(plant, laws[plant.name], *given, **options) for plant in self.plants}
+        """Return plant -> its laws with gains, see `gains_on` for the options."""
+        return {plant.name: self.gains_on(plant, laws[plant.name], budget, **options) for plant in self.plants}
+
+    def gains_on(
+        self,
+        plant: Plant,
+        laws: Sequence[Component | Template],
+        budget: int,
+        tune: bool = True,
+        gains: str = "tuned",
+        shipped_budget: bool = True,
+    ) -> list[Candidate]:
+        """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
+
+        If some laws have shipped gains, the others are tuned like these, from the same starts, and if `shipped_budget`
+        with the same budget. Laws without given gains come as templates. The folder keeps the results of searches.
+        """
+        known, starts = [_known(plant, law, gains) for law in laws], self.starts
+        if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known):
+            starts, budget = None, search.BUDGET if shipped_budget else budget
+
+        def missing(law: Component | Template) -> Candidate:
+            return self.tuned(plant, law, budget, starts) if tune else _default(law)
+
+        return [candidate or missing(law) for law, candidate in zip(laws, known, strict=True)]
+
+    def tuned(self, plant: Plant, law: Component | Template, budget: int, starts: Starts | None) -> Candidate:
+        """Return a law with gains of `tune`, or of the file of an earlier call; its defaults if it cannot be tuned."""
+        usual, default = Objective(), coerce.law(law)
+        conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
+        goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
+        try:
+            (first, *_) = goal.scenarios(plant, default, 0)
+            template = law if isinstance(law, Template) else default.template
+            ranges = template and (dict(template.gains), dict(template.conditions))
+            depends = [run_key.key(first), goal.describe(), fingerprint.of((default.function, ranges))]
+            with warnings.catch_warnings():
+                for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
+                    warnings.filterwarnings("ignore", words, ScenarioWarning)
+                tuned = cached(
+                    self.folder / "gains" / f"{plant.name}-{law.name}-{budget}.json",
+                    depends,
+                    lambda: search.tune(plant, law, budget, 0, goal, self.threads, self.progress),
+                    lambda made, path: made.save(path),
+                    result.load,
+                )
+        except search.BrokenLawError:
+            raise
+        except ScenarioError as error:
+            return _default(law, f"not tuned: {error}")
+        return _candidate(default, tuned)
 
     def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any) -> Table:
         """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""

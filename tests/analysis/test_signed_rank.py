@@ -37,9 +37,9 @@ def test_a_p_value_is_the_share_of_signs_with_as_large_a_rank_sum(differences):
 @pytest.mark.parametrize("error", [0.025, 0.1])
 def test_an_interval_has_the_centres_that_the_test_does_not_reject(error):
     differences = np.random.default_rng(5).standard_normal(9) ** 3
-    centre = interval(differences, error)
-    assert centre.low < centre.value < centre.high
-    for end, side in ((centre.low, 1.0), (centre.high, -1.0)):
+    centre, low, high = interval(differences, error)
+    assert low < centre < high
+    for end, side in ((low, 1.0), (high, -1.0)):
         outside, inside = (p_values(side * (differences - end) + shift)[0] for shift in (1e-9, -1e-9))
         assert outside <= error < inside
 

@@ -354,14 +354,20 @@ def test_every_law_runs_from_the_same_seeds_and_none_is_left_out(folder):
 # gains
 
 
+def trial(folder, starts=None):
+    return fair_gains.Trial([], [], 1.0, starts, folder, None, False)
+
+
 def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(monkeypatch):
     asked = []
-    monkeypatch.setattr(fair_gains, "_tuned", lambda plant, law, budget, starts, *rest: asked.append((budget, starts)))
-    known, other = adviser.QUICK.budget, smc.starts(x0=0.5)
+    monkeypatch.setattr(
+        fair_gains.Trial, "tuned", lambda self, plant, law, budget, starts: asked.append((budget, starts))
+    )
+    known, other = adviser.QUICK[1], smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (smc.plant("duffing"), smc.plant("duffing", M=2.0)):
-        fair_gains.fair_gains(plant, laws, Path("gains"), known, other)
+        trial(Path("gains"), other).gains_on(plant, laws, known)
     assert asked == [(search.BUDGET, None), (known, other), (known, other)]
 
 
@@ -381,7 +387,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
 
     heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
     monkeypatch.setattr(search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1])
-    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=16))
+    monkeypatch.setattr(adviser, "FULL", (5.0, 16, 1))
     monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
     options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
@@ -423,7 +429,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         (duffing, held),
         (dataclasses.replace(duffing, build=build), my_spring),
     ):
-        fair_gains._tuned(plant, law, 4, None, folder, None, False)
+        trial(folder).tuned(plant, law, 4, None)
     assert asked[0] == asked[1]
     assert len({str(depends) for depends in asked}) == 3
 
@@ -431,12 +437,12 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeypatch):
     tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
-    own = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None, False)
+    own = trial(folder).tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None)
     assert (own.law, own.remark) == (smc.law("observer_free"), "its defaults, better than those tried")
     assert own.law.source.kind == FAST.source.kind
     tuned.before, tuned.bounds = 3.0, FAST.gains
     tuned.sets = [types.SimpleNamespace(gains=tuple(FAST.gains.values())), types.SimpleNamespace(gains=(5.0, 2.5))]
-    found = fair_gains._tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None, folder, None, False)
+    found = trial(folder).tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None)
     assert (found.law, found.remark) == (FAST, "")
     assert [found(seed).gains["k1"] for seed in range(3)] == [2.0, 2.5, 2.0]
 

@@ -26,9 +26,9 @@ def reached(*given: object, **options: object) -> None:
 def stopped(monkeypatch):
     """What gains, combinations of runs and a study were given; none is searched or run."""
 
-    def gains(plant, laws, folder, *given, **options):
-        names = [law.name for law in laws]
-        calls.append(f"gains {plant.name} {names} {folder.name} {told(given)} {told(options)}")
+    def gains(trial, plant, laws, budget, **options):
+        names, given = [law.name for law in laws], [budget, trial.starts, trial.threads, trial.progress]
+        calls.append(f"gains {plant.name} {names} {trial.folder.name} {told(given)} {told(options)}")
         return [Candidate(coerce.law(law), (coerce.law(law),), "a remark") for law in laws]
 
     def combinations(plants, laws, conditions, seeds, *given):
@@ -41,7 +41,7 @@ def stopped(monkeypatch):
         raise Reached
 
     calls: list[str] = []
-    monkeypatch.setattr(fair_gains, "fair_gains", gains)
+    monkeypatch.setattr(fair_gains.Trial, "gains_on", gains)
     monkeypatch.setattr(fair_gains, "all_combinations", combinations)
     monkeypatch.setattr(fair_gains, "study", runs)
     return calls

@@ -157,7 +157,7 @@ def test_a_plant_on_which_laws_cannot_be_tuned_says_so(tmp_path):
 
 
 def test_what_cannot_run_is_refused_before_any_gains_are_searched(tmp_path, monkeypatch):
-    monkeypatch.setattr(fair_gains, "_tuned", None)
+    monkeypatch.setattr(fair_gains.Trial, "tuned", None)
     for arguments, said in (
         (([my_law], "duffing", "noisy"), "did you mean 'noise'"),
         (([my_law], "duffing", "nominal", 0), "seeds is 0"),

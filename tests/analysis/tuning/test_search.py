@@ -23,7 +23,7 @@ from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.metrics.catalogue import itae, tv
-from smc_mujoco.studies.fair_gains import fair_gains
+from smc_mujoco.studies.fair_gains import Trial
 
 SHORT = Objective(duration=0.5)
 LEAN = Objective(conditions=("nominal",), duration=0.25)
@@ -415,7 +415,7 @@ def mistyped(y, gains, memory):
 def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, monkeypatch, tmp_path, refused):
     law = smc.law_function(gains={"k": 3.0})(function)
     monkeypatch.setattr(search, "_search", None)
-    refused(lambda: fair_gains(smc.plant("duffing"), [law], tmp_path, budget=4))
+    refused(lambda: Trial([], [], 1.0, None, tmp_path, None, False).gains_on(smc.plant("duffing"), [law], 4))
 
 
 @pytest.mark.filterwarnings("ignore:.* no unit")
