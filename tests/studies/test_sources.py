@@ -71,7 +71,7 @@ def test_boards_print_the_sources(folder):
         words = " ".join(printed.split())  # lines of a terminal may end anywhere
         assert "slow default" in words
         assert "fast yours" in words
-    assert "slow & default &" in boards.to_latex()
+    assert "slow [default] &" in boards.to_latex()
 
 
 def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(folder):
