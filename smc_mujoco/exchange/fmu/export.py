@@ -74,8 +74,13 @@ def export_fmu(
       ScenarioError: a law in C or of many joints, Python without translation into C, a surface that does not fit, no
         compiler.
     """
-    chosen = {"surface": surface, "velocity": velocity, "control_period": control_period, "u_max": u_max}
-    chosen |= {"model": model}
+    chosen = {
+        "surface": surface,
+        "velocity": velocity,
+        "control_period": control_period,
+        "u_max": u_max,
+        "model": model,
+    }
     if isinstance(law, Scenario):
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:
@@ -106,14 +111,7 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
     return own | {"u_max": limits.pop()}, "slide" if s.plant.unit == "m" else "hinge"
 
 
-def _controller(
-    law: Law | Template | str,
-    surface: Surface | Template | str | None,
-    velocity: Estimator | Template | str | None,
-    control_period: float | None,
-    u_max: float | None,
-    model: str | None,
-) -> Controller:
+def _controller(law: Any, surface: Any, velocity: Any, control_period: Any, u_max: Any, model: Any) -> Controller:
     """Return the controller, checked. Arguments and errors as in `export_fmu`."""
     sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
