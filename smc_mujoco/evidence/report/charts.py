@@ -4,18 +4,16 @@ Numbers have five digits. The pictures are those of the suite's other commands.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from smc_mujoco.common.files import scratch
 from smc_mujoco.draw import region
-from smc_mujoco.draw.figure import figure
 from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.films import picture
 from smc_mujoco.evidence.report.words import style
 from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.mechanisms.plant import catalogue as known_plants
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Field, Front
-    from smc_mujoco.simulation.trace import Trace
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 KEYS_PER_LINE = 5  # laws in a line of a legend
@@ -243,13 +240,6 @@ def fields(drawn: "Sequence[Field]") -> go.Figure:
     return fig.update_yaxes(showgrid=False, nticks=5).update_yaxes(title_text="x′, rad/s or m/s", **places[0])
 
 
-def picture(draw: Callable[[Path], object]) -> bytes:
-    """Return the SVG file that a function draws."""
-    with scratch() as folder:
-        draw(folder / "picture.svg")
-        return (folder / "picture.svg").read_bytes()
-
-
 def orders(table: "AccuracyTable") -> bytes:
     """Draw the largest errors over the control period, with theory's slopes."""
     return picture(lambda path: table.plot(path, format="svg"))
@@ -260,8 +250,3 @@ def record(shown: "Repeated") -> bytes:
     fits, title = {"twin": shown.fits["the twin’s"]}, f"{shown.rig.name}: {shown.name}"
     units, twin = shown.rig.units, {"twin": shown.twin}
     return picture(lambda path: residual_figure(title, shown.t, shown.measured, twin, fits, units, path))
-
-
-def curves(traces: "Sequence[Trace]", title: str) -> bytes:
-    """Draw x and u of every law over time."""
-    return picture(lambda path: figure(traces, path, title=title, panels=("x", "u"), format="svg"))

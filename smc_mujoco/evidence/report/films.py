@@ -1,9 +1,11 @@
-"""Films of a report's scenes, runs side by side: WebM, and small, as they are part of the page."""
+"""Films and pictures of a report's scenes, runs side by side. They are small, as they are part of the page."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from smc_mujoco.common.files import scratch
+from smc_mujoco.draw.figure import figure
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.encoder import encoder
@@ -35,3 +37,15 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
                 write(picture)
                 report(k, len(shown.times))
         return path.read_bytes()
+
+
+def picture(draw: Callable[[Path], object]) -> bytes:
+    """Return the SVG file that a function draws."""
+    with scratch() as folder:
+        draw(folder / "picture.svg")
+        return (folder / "picture.svg").read_bytes()
+
+
+def curves(traces: Sequence[Trace], title: str) -> bytes:
+    """Draw x and u of every law over time."""
+    return picture(lambda path: figure(traces, path, title=title, panels=("x", "u"), format="svg"))

@@ -27,7 +27,7 @@ from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, charts, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -282,7 +282,7 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
             plant=plant,
             condition=condition,
             laws=plan.scene_laws,
-            curves=charts.curves(traces, title),
+            curves=films.curves(traces, title),
             film=film,
             seconds=plan.scene,
         )

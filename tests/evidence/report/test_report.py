@@ -211,7 +211,7 @@ def test_the_first_line_counts_what_was_run(text, findings):
 
 def test_a_scene_has_the_gains_of_the_report(folder, findings, monkeypatch):
     drawn = []
-    monkeypatch.setattr(stages.charts, "curves", lambda traces, title: drawn.extend(traces) or b"")
+    monkeypatch.setattr(films, "curves", lambda traces, title: drawn.extend(traces) or b"")
     work = Work(plan=dataclasses.replace(TINY, filmed=0), folder=folder, threads=None, bars=Bars(False))
     (scene,) = stages.all_scenes(work)
     assert scene.laws == findings.scenes[0].laws == TINY.scene_laws
