@@ -25,7 +25,7 @@ scene = smc.Scene(
             "3 N m": {"u_max": 3.0},
             "heavy bob": {
                 "disturbance": smc.paper.SINE,
-                "jump": smc.Jump(3.0, smc.paper.JUMP_HARD["inverted_pendulum"]),
+                "jump": smc.Jump(3.0, smc.plant("inverted_pendulum").jumps["hard"]),
             },
         }.items()
     },

@@ -65,12 +65,6 @@ SINE = Sine(amplitude=0.2, omega=5.0)
 SENSOR_NOISE = Noise(position=0.01, velocity=0.05)
 DIFFERENCED = estimator("filtered_difference", tau=5e-3)
 
-# Plant of the library -> parameter -> factor, of the jump at half time in "jump_mild" and "jump_hard".
-JUMP_MILD, JUMP_HARD = (
-    {name: dict(plant.jumps[size]) for name, plant in plants().own.items() if size in plant.jumps}
-    for size in ("mild", "hard")
-)
-
 
 @dataclasses.dataclass(frozen=True)
 class Condition:

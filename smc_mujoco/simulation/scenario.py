@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import mujoco
 import numpy as np
 
+from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Template, gain_text
@@ -234,10 +235,16 @@ class Scenario:
         vars(resolved).update(self.__getstate__() | _defaults(self))
         return resolved
 
-    def _repr_html_(self) -> str:
-        from smc_mujoco.simulation import notebook
-
-        return notebook.scenario(self)
+    def _repr_html_(self) -> html.Html:
+        """Return plant, law, duration and the fields that differ from their defaults, in SI units."""
+        parameters = ", ".join(f"{name} = {value:g}" for name, value in self.plant.parameters.items())
+        rows = {"plant": f"{self.plant.name} ({parameters})", "law": self.law, "gains": self.law.source}
+        absent = None, (), {}, Noise(), Clock(), Contact("none")  # values of fields that were left out
+        for f in dataclasses.fields(self):
+            value = getattr(self, f.name)
+            if f.name == "duration" or (f.name not in rows and value != f.default and value not in absent):
+                rows[f.name.replace("_", " ")] = shown(value)
+        return html.fields(rows, "Scenario")
 
     @classmethod
     def fields(cls) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.lib import format as npy
 
-from smc_mujoco.common import annexes
+from smc_mujoco.common import annexes, html
 from smc_mujoco.common.errors import ScenarioError, find, one_line, words
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
@@ -81,10 +81,19 @@ class Trace:
         law = self.scenario.law
         return f"Trace({self.scenario.plant.name}, {law}, gains: {law.source}, {len(self.t)} samples{end})"
 
-    def _repr_html_(self) -> str:
-        from smc_mujoco.simulation import notebook
-
-        return notebook.trace(self)
+    def _repr_html_(self) -> html.Html:
+        """Return what was run, how it failed if it did, and the range of x and u in each unit."""
+        s = self.scenario
+        rows = {"plant": s.plant.name, "law": s.law, "gains": s.law.source}
+        rows["samples"] = f"{len(self.t)}, every {s.control_period:g} s"
+        if self.failure:
+            rows["failed"] = self.failure
+        for name, units in (("x", s.plant.units), ("u", s.efforts[: s.plant.driven])):
+            for unit in dict.fromkeys(units):
+                values = getattr(self, name)[:, [i for i, other in enumerate(units) if other == unit]]
+                known = values[np.isfinite(values)].tolist() or [math.nan]
+                rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
+        return html.fields(rows, "Trace")
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .npz file that `smc.load` reads back. Make missing folders, and replace an old file atomically."""

@@ -222,7 +222,7 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     """From each logged state, one step with the logged control ends in the next logged state."""
     fields = CONDITIONS[condition]
     if condition == "jump":
-        fields = {"jump": smc.Jump(time=HALF, factors=smc.paper.JUMP_MILD[plant]), "disturbance": SINE}
+        fields = {"jump": smc.Jump(time=HALF, factors=smc.plant(plant).jumps["mild"]), "disturbance": SINE}
     scenarios = [dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in STUDIED]
     for trace in smc.run(scenarios):
         s = trace.scenario

@@ -20,8 +20,6 @@ from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has th
     CONTROL_PERIOD,
     DIFFERENCED,
     DURATION,
-    JUMP_HARD,
-    JUMP_MILD,
     NAMED,
     PLANTS,
     REAL,
