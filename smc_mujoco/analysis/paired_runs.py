@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from smc_mujoco.analysis.ranking import first_of_kind, without_rounding
-from smc_mujoco.common.errors import ScenarioError, items_of, one_line, unknown
+from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
@@ -77,10 +77,10 @@ class Scores(NamedTuple):
 
 
 class Group:
-    """The runs that share a plant, a condition, or both. Arrays are (laws, blocks, seeds), -1 where there is no run."""
+    """The runs on a plant, or in one condition on it. Arrays are (laws, blocks, seeds), -1 where there is no run."""
 
     def __init__(self, name: Mapping[str, str], rows: np.ndarray, columns: Mapping[str, np.ndarray]):
-        self.name = name  # the plant or condition that they share, or both, as column -> value
+        self.name = name  # the plant that they share, or plant and condition, as column -> value
         laws, law = np.unique(columns["law"], return_inverse=True)
         keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
         self.laws, self.blocks = tuple(laws.tolist()), tuple(dict.fromkeys(keys))  # names; (plant, condition)
@@ -114,9 +114,8 @@ class Group:
             return Scores([], {}, {}, {})
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
-            where = f" of {', '.join(self.name.values())}" if self.name else ""
-            laws = ", ".join(self.laws)
-            raise ScenarioError(f"{laws} have no run{where} in common: run them in the same conditions and seeds")
+            laws, where = ", ".join(self.laws), ", ".join(self.name.values())
+            raise ScenarioError(f"{laws} have no run of {where} in common: run them in the same conditions and seeds")
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
@@ -127,11 +126,9 @@ class Group:
 
 
 def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
-    """Return the groups of a table, in the order of its rows; () is the whole table."""
-    by = items_of("by", by)
-    for name in by:
-        if name not in GROUPS:
-            raise unknown("group of a leaderboard", name, GROUPS)
+    """Return the groups of a table, one for each plant, or for each plant and condition, in the order of its rows."""
+    if tuple(items_of("by", by)) not in (GROUPS[:1], GROUPS):
+        raise ScenarioError(f"by is {shown(by)}: give ('plant',) or ('plant', 'condition')")
     columns = {name: np.asarray(table.column(name), str) for name in (*GROUPS, "law")}
     seeds = np.asarray(table.column("seed"), int)
     if not seeds.size:

@@ -96,8 +96,8 @@ class Board(Tables):
     group: Mapping[str, str]  # what the runs have in common, such as {"plant": "duffing"}
     metric: str  # its name, or "settles"
     unit: str  # of the medians, with {x} and {u} as in `Metric.unit`; "" for "settles", which is 0 to 1
-    entries: tuple[Entry, ...]  # lowest mean rank first; no median over several plants where their units differ
-    blocks: tuple[Block, ...]  # the same laws on each plant in each condition
+    entries: tuple[Entry, ...]  # lowest mean rank first
+    blocks: tuple[Block, ...]  # the same laws in each condition
     family: int  # number of blocks of the table for which winners are corrected
     relevant: float  # share of a value that is relevant
     resolution: float  # the largest lower bound on the least relevant difference, in the unit of the board
@@ -121,26 +121,16 @@ class Board(Tables):
 
     @property
     def about(self) -> str:
-        """What the runs have in common, such as "duffing, nominal"; "all runs" if nothing."""
-        return ", ".join(self.group.values()) or "all runs"
+        """What the runs have in common, such as "duffing, nominal"."""
+        return ", ".join(self.group.values())
 
     def wins(self, law: str) -> list[str]:
-        """Return the names of the blocks in which a law wins, see `name`."""
-        return [self.name(block) for block in self.blocks if block.winner == law]
+        """Return the conditions in which a law wins."""
+        return [block.condition for block in self.blocks if block.winner == law]
 
     def losses(self, law: str) -> list[str]:
-        """Return the names of the blocks in which another law is better, or in which runs of this law fail."""
-        return [self.name(block) for block in self.blocks if law not in (*block.best, *block.undecided)]
-
-    def name(self, block: Block) -> str:
-        """Return the name of a block within the board: its condition, its plant, or both."""
-        place = {"plant": block.plant, "condition": block.condition}
-        return ", ".join(value for what, value in place.items() if what not in self.group)
-
-    @property
-    def kind(self) -> str:
-        """The kind of the blocks: "conditions", "plants", or "cells" if plants and conditions differ."""
-        return {"plant": "conditions", "condition": "plants"}.get("".join(self.group), "cells")
+        """Return the conditions in which another law is better, or in which runs of this law fail."""
+        return [block.condition for block in self.blocks if law not in (*block.best, *block.undecided)]
 
     @property
     def label(self) -> str:
@@ -149,19 +139,18 @@ class Board(Tables):
 
     @property
     def where(self) -> str:
-        """The plants and conditions in words, such as " on duffing under noise"."""
-        parts = {"on": [block.plant for block in self.blocks], "under": [block.condition for block in self.blocks]}
-        return "".join(f" {preposition} {first_of(dict.fromkeys(names))}" for preposition, names in parts.items())
+        """The plant and the conditions in words, such as " on duffing under noise"."""
+        return f" on {self.group['plant']} under {first_of(block.condition for block in self.blocks)}"
 
     @property
     def verdict(self) -> str:
-        """The metric, the plants, the conditions and the `result`."""
+        """The metric, the plant, the conditions and the `result`."""
         return f"{self.label}{self.where}: {self.result}"
 
     @property
     def result(self) -> str:
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
-        blocks = f"in {every(len(self.blocks))} {self.kind}"
+        blocks = f"in {every(len(self.blocks))} conditions"
         these = ", for these gains" * all(block.sets == 1 for block in self.blocks)
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
@@ -253,7 +242,7 @@ def _percent(share: float) -> str:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return names in a row, between semicolons if a name has a comma in it, as that of a plant with a condition."""
+    """Return names in a row, between semicolons if a name has a comma in it, as that of a condition may have."""
     return "; ".join(names) if any("," in name for name in names) else joined(names)
 
 
@@ -305,9 +294,9 @@ def heading(board: Board) -> str:
     """Return a metric's label with its unit, if that is known."""
     if board.metric == SETTLES:
         return "settles (%)"
-    units = {plant.unit for block in board.blocks if (plant := catalogue().get(block.plant))}
+    plant = catalogue().get(board.group["plant"])
     metric = dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)  # in V where commands are voltages
-    unit = metric.unit_for(units.pop()) if len(units) == 1 else "" if "{" in metric.unit else metric.unit
+    unit = metric.unit_for(plant.unit) if plant else "" if "{" in metric.unit else metric.unit
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
@@ -326,8 +315,9 @@ def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -
         rows.append([name_cell, *(cells.get((i, law), "") for i in range(len(boards))), *case])
     units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
-    name = ", ".join(filter(None, [name, largest.name(largest.blocks[0]) if len(largest.blocks) == 1 else ""]))
-    samples = {block.sample: largest.name(block) for block in reversed(largest.blocks)}
+    if len(largest.blocks) == 1:
+        name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
+    samples = {block.sample: block.condition for block in reversed(largest.blocks)}
     several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
     return Tabular(
         headings=["law", *map(heading, boards), *units],

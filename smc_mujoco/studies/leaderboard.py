@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
+from smc_mujoco.analysis.bootstrap import median_of, share_interval
 from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import depends_on_step
@@ -49,7 +49,7 @@ def leaderboard(
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
       metrics: names of metrics, for which lower is better, or "settles".
-      by: what the runs of a group have in common, of "plant" and "condition"; () for one group of all runs.
+      by: what the runs of a group have in common: ("plant",), or ("plant", "condition").
       defaults: whether a winner may be named over laws whose gains are their defaults.
       relevant: the least relevant difference, as a share of the larger value. `paired_runs.floor` is its lower bound.
       worst: plant -> law -> its `worst_case`, for a column of the tables of a plant.
@@ -109,12 +109,11 @@ def _board(
     blocks = tuple(
         _block(group, comparison, at, k, untuned, _unit(metric, unit, ran[k])) for at, k in enumerate(scores.blocks)
     )
-    mixed = "{" in unit and len({block.plant for block in blocks}) > 1
     return Board(
         group=group.name,
         metric=metric,
         unit=unit,
-        entries=_entries(comparison, scores.sets, sources, mixed),
+        entries=_entries(comparison, scores.sets, sources),
         blocks=blocks,
         family=family,
         relevant=comparison.relevant,
@@ -191,18 +190,16 @@ def _lead(comparison: Comparison, at: int, unit: str) -> Lead | None:
 
 
 def _entries(
-    comparison: Comparison, sets: Mapping[str, np.ndarray], sources: Mapping[str, tuple[Source, ...]], mixed: bool
+    comparison: Comparison, sets: Mapping[str, np.ndarray], sources: Mapping[str, tuple[Source, ...]]
 ) -> tuple[Entry, ...]:
-    """Return the entries of all laws. If `mixed`, values have several units, so there is no median."""
+    """Return the entries of all laws."""
     entries = []
     for rank in ranks(comparison):
         at = comparison.laws.index(rank.law)
         values, samples = comparison.cells[at], linked(*sets[rank.law])
-        n = values.shape[1] if samples is None else max(samples) + 1
         if comparison.shares:
+            n = values.shape[1] if samples is None else max(samples) + 1
             interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n)
-        elif mixed:
-            interval = Interval(math.nan, math.nan, math.nan, n)
         else:
             interval = median_of(values, samples)
         failed, runs = int(comparison.without_value[at].sum()), int((~np.isnan(values)).sum())

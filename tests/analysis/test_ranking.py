@@ -424,9 +424,9 @@ def test_the_verdict_on_a_block_does_not_depend_on_how_runs_are_grouped_into_boa
         cells = spreading(3, 4, 0.08, rng)
         cells[0] *= np.array([0.85, 0.9, 0.95, 1.0])[:, None]
         table = stand({f"law{i}": own for i, own in enumerate(cells)})
-        parts = [leaderboard(table, ["itae"], by) for by in (("plant",), ("plant", "condition"), ())]
+        parts = [leaderboard(table, ["itae"], by) for by in (("plant",), ("plant", "condition"))]
         winners = [[block.winner for board in boards for block in board.blocks] for boards in parts]
-        assert winners[0] == winners[1] == winners[2]
+        assert winners[0] == winners[1]
         assert {board.family for boards in parts for board in boards} == {4}
 
 
@@ -579,17 +579,10 @@ def test_the_order_of_rows_and_the_names_of_laws_change_nothing():
             assert new[name].rank.place == old[law].rank.place
 
 
-def test_groups_may_be_conditions_or_all_runs_where_units_allow():
-    table = study()
-    (all_runs,) = leaderboard(table, ["itae"], by=())
-    assert [block.runs for block in all_runs.blocks] == [20] * 4
-    assert math.isnan(all_runs.entries[0].interval.median)  # rad and m, N and N m
-    assert all_runs.winner == "a"
-    assert leaderboard(table, ["itae"], by=np.array([]))[0] == all_runs  # pyright: ignore[reportArgumentType]
-    (times,) = leaderboard(table, ["settling_time"], by=())
-    assert math.isfinite(times.entries[0].interval.median)
-    both = leaderboard(table, ["itae"], by=("plant", "condition"))
-    assert [tuple(b.group.values()) for b in both[:2]] == [("van_der_pol", "nominal"), ("van_der_pol", "noise")]
+def test_groups_may_be_plants_in_conditions():
+    boards = leaderboard(study(), ["itae"], by=["plant", "condition"])
+    assert [block.runs for board in boards for block in board.blocks] == [20] * 4
+    assert [tuple(b.group.values()) for b in boards[:2]] == [("van_der_pol", "nominal"), ("van_der_pol", "noise")]
 
 
 def test_only_runs_that_all_laws_have_are_compared():
@@ -615,6 +608,7 @@ def test_what_cannot_be_compared_is_refused(refused):
         (table, {"metrics": ["speed"]}),
         (table, {"metrics": ()}),
         (table, {"by": ("law",)}),
+        (table, {"by": ()}),
         (table.taken(np.r_[0:240, 0]), {}),
         (table.taken(first), {}),
     ):
@@ -681,7 +675,7 @@ def checked(boards: list[Board]) -> int:
             assert first.failed == 0
             if board.metric != "settles" and not math.isnan(first.interval.median):
                 assert not any(exceeds(first.interval.median, entry.interval.median) for entry in rest)
-            assert set(board.wins(board.winner)) == {board.name(block) for block in board.blocks}
+            assert set(board.wins(board.winner)) == {block.condition for block in board.blocks}
         for entry in board.entries:
             assert not set(board.wins(entry.law)) & set(board.losses(entry.law))
             told = all(entry.law not in block.undecided for block in board.blocks)
@@ -869,7 +863,6 @@ def test_no_board_of_real_runs_has_a_verdict_that_contradicts_it(real):
     names = [metric.name for metric in every_metric()]
     named = checked(leaderboard(real, [*METRICS, *names]))
     named += checked(leaderboard(real, by=("plant", "condition")))
-    named += checked(leaderboard(real, by=()))
     assert named > 5
 
 
