@@ -16,7 +16,6 @@ import io
 import math
 import os
 import sys
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -32,12 +31,8 @@ from smc_mujoco.control.law import Law, Measurement, law_function
 
 Act = Callable[[np.ndarray], Any]
 CALLABLE_CURE = "give a callable from an observation to an action"
-TORCHSCRIPT_CURE = "give TorchScript, as torch.jit.script(module).save writes it, and no state_dict"
 FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
     ".onnx": ("onnxruntime", "give what torch.onnx.export writes"),
-    ".pt": ("torch", TORCHSCRIPT_CURE),
-    ".pth": ("torch", TORCHSCRIPT_CURE),
-    ".ts": ("torch", TORCHSCRIPT_CURE),
     ".pt2": ("torch", "give what torch.export.save writes"),
 }
 LOAD_TIMEOUT = 120.0  # s in which a library must read a file; chosen
@@ -127,14 +122,8 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
 
 
 def _torch(torch: ModuleType, path: Path) -> Act:
-    """Return the network in a torch file."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # TorchScript is deprecated
-        if path.suffix == ".pt2":
-            module = torch.export.load(str(path)).module()  # it keeps the mode of its export and refuses eval()
-        else:
-            module = torch.jit.load(str(path), map_location="cpu").eval()
-    return functools.partial(_forward, torch, module)
+    """Return the network in a torch file, in the mode of its export."""
+    return functools.partial(_forward, torch, torch.export.load(str(path)).module())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -172,7 +161,7 @@ def policy(act: Any, *, reference: bool = False) -> Law:
         - a callable from an observation to an action, a fraction of u_max that is clipped to -1 .. 1;
         - an object with a method `predict`, such as a model of stable-baselines3, called for its deterministic action;
         - a torch module, which is copied and put in evaluation mode, as is the policy of a model;
-        - the path of a file of ONNX (.onnx), torch.export (.pt2) or TorchScript (.pt, .pth, .ts).
+        - the path of a file of ONNX (.onnx) or of torch.export (.pt2).
       reference: whether r, r' and r'' are at the end of the observation, as in the task `track`.
 
     The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.

@@ -359,7 +359,7 @@ def test_what_does_not_say_whether_it_can_be_called_is_no_policy():
         smc.policy(Broken())
 
 
-@pytest.mark.parametrize(("file", "library"), [("a.onnx", "onnxruntime"), ("a.pt", "torch"), ("a.pt2", "torch")])
+@pytest.mark.parametrize(("file", "library"), [("a.onnx", "onnxruntime"), ("a.pt2", "torch")])
 def test_a_library_that_is_missing_is_named(file, library, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
     (tmp_path / file).write_bytes(b"x")
@@ -402,15 +402,13 @@ def test_torch_s_modules_control_and_are_told_apart(network):
     assert run_key.key(smc.Scenario(plant="duffing", law=smc.policy(module))) != key
 
 
-@pytest.mark.parametrize("kind", [".pt", ".pt2", ".onnx"])
+@pytest.mark.parametrize("kind", [".pt2", ".onnx"])
 def test_what_torch_writes_is_read(kind, network, tmp_path):
     torch, module, expected = network
     path, given = tmp_path / f"net{kind}", (torch.zeros(1, 2),)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if kind == ".pt":
-            torch.jit.script(module).save(path)
-        elif kind == ".pt2":
+        if kind == ".pt2":
             torch.export.save(torch.export.export(module.eval(), given), path)
         else:
             for library in ("onnx", "onnxruntime"):
@@ -422,7 +420,7 @@ def test_what_torch_writes_is_read(kind, network, tmp_path):
 def test_torch_s_weights_alone_are_no_policy(network, tmp_path):
     torch, module, _ = network
     torch.save(module.state_dict(), tmp_path / "weights.pt")
-    with pytest.raises(smc.ScenarioError, match="give TorchScript"):
+    with pytest.raises(smc.ScenarioError, match=r"'weights\.pt': give a callable, or a file of \.onnx, \.pt2"):
         smc.policy(tmp_path / "weights.pt")
 
 

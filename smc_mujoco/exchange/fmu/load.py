@@ -37,18 +37,6 @@ from smc_mujoco.exchange.fmu import slave
 from smc_mujoco.exchange.fmu.controller import MAX_DOUBLE, OUTPUTS
 from smc_mujoco.exchange.fmu.slave import CONSTANT_TYPES, REAL_TYPES, Slave
 
-# Our name -> names of an FMU's variables with that meaning; case is ignored.
-VARIABLE_NAMES = {
-    "x": ("x", "position", "pos", "q", "phi", "theta", "angle", "y", "measurement", "feedback"),
-    "v": ("v", "velocity", "vel", "speed", "omega", "dx", "xdot", "x_dot", "dq", "qdot", "w"),
-    "r": ("r", "ref", "reference", "setpoint", "x_ref", "xref", "xd", "x_d", "desired", "u_s"),
-    "dr": ("dr", "rdot", "ref_dot", "dref", "v_ref", "vd", "v_d"),
-    "ddr": ("ddr", "rddot", "ref_ddot", "ddref", "a_ref"),
-    "e": ("e", "error", "err"),
-    "de": ("de", "edot", "error_dot", "derror"),
-    "u": ("u", "control", "command", "torque", "tau", "force", "u_c", "manipulated"),
-    "s": ("s", "sigma", "sliding", "sliding_variable"),
-}
 INPUT_FIELDS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
 PERIOD_TOLERANCE = 1e-6  # relative difference below which two periods are equal
 MAX_TIMEOUT = 86_400.0  # s: a day
@@ -179,8 +167,8 @@ def law_from_fmu(
     Args:
       path: of an .fmu file: FMI 2.0 or 3.0, Co-Simulation, with a binary for this machine.
       variables: our name -> the FMU's name, as {"x": "theta", "u": "torque"}. Ours are those of a law's measurement (x,
-        v, e, de, r, dr, ddr, f, g, ...), u and s. Default: recognised by their names, such as position, speed,
-        reference and torque; case is ignored.
+        v, e, de, r, dr, ddr, f, g, ...), u and s. Default: those that have our names, such as plant.x; a single output
+        is u.
       constants: name -> value of the FMU's inputs that have none of these meanings.
       period: s; the FMU steps this often, and u is held in between. Default: its own period if it has a fixed one, else
         the control period.
@@ -310,14 +298,9 @@ def _meanings(
 
 
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
-    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours or in VARIABLE_NAMES."""
+    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours; case is ignored."""
     words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
-    meanings = {}
-    for name in ours:
-        word = next((word for word in (name, *VARIABLE_NAMES.get(name, ())) if word in words), None)
-        if word is not None:
-            meanings[name] = words.pop(word)
-    return meanings
+    return {name: words[name] for name in ours if name in words}
 
 
 def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:

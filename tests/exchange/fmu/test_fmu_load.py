@@ -34,7 +34,8 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::smc_mujoco.PlainLoopWarning"),
 ]
 FMI1 = 'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
-RENAMED = {"constants": {"mode": 0.0}}
+VARIABLES = {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
+RENAMED = {"variables": VARIABLES, "constants": {"mode": 0.0}}
 
 
 @pytest.fixture(scope="module")
@@ -195,15 +196,15 @@ def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
 @pytest.mark.slow
 def test_inputs_that_are_not_real_may_be_held(folder):
     """FMI 3.0: a Boolean and an Int32. It holds u for 5 samples."""
-    path = helper.fmi3(folder)
+    path, names = helper.fmi3(folder), {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
     for held, said, first in (({}, "enable, mode", "enable"), ({"enable": 1}, "mode", "mode")):
         with pytest.raises(smc.ScenarioError) as error:
-            smc.law_from_fmu(path, constants=held)
+            smc.law_from_fmu(path, variables=names, constants=held)
         assert str(error.value) == (
             f"servo.fmu has inputs that mean nothing that a law measures, {said}: hold each, "
             f"constants={{{first!r}: 0.0}}"
         )
-    laws = [smc.law_from_fmu(path, constants={"enable": on, "mode": 2}) for on in (1, 0)]
+    laws = [smc.law_from_fmu(path, variables=names, constants={"enable": on, "mode": 2}) for on in (1, 0)]
     trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
     seen = slice(None, None, 5)
     total = 0.005 * np.cumsum(trace.x[seen, 0])
@@ -234,7 +235,7 @@ def test_periods_that_do_not_fit_are_said(foreign):
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
     with pytest.raises(smc.ScenarioError, match=rf"^controller\.fmu: {said}") as error:
-        smc.law_from_fmu(foreign, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0)
+        smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0)
     assert "\n" not in str(error.value)
 
 
@@ -251,7 +252,7 @@ def test_processes_that_an_fmu_starts_end_with_its_trial(foreign):
 
     before = children()
     with pytest.raises(smc.ScenarioError, match=r"the step from t = 0 s died of SIGABRT"):
-        smc.law_from_fmu(foreign, constants={"mode": 6.0})
+        smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 6.0})
     for _ in range(500):
         if children() <= before:
             return
@@ -267,7 +268,7 @@ def test_a_trial_has_the_parameters_of_the_run(foreign, tmp_path):
 
 
 def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
-    law = smc.law_from_fmu(foreign, constants={"mode": 4.0}, isolate=False)()
+    law = smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 4.0}, isolate=False)()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
     assert fine.failure is None
@@ -275,7 +276,7 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
 
 def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(foreign):
     one, alone = 1.0, smc.run(scenario("pid"))
-    law = smc.law_from_fmu(foreign, constants={"mode": 5.0}, isolate=False)()
+    law = smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False)()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "changes the arithmetic of its thread" in str(trace.failure)
     assert one / 3.0 == float.fromhex("0x1.5555555555555p-2")
@@ -302,7 +303,7 @@ def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(f
 )
 def test_a_mistake_in_the_call_is_one_sentence(foreign, settings, said):
     with pytest.raises(smc.ScenarioError) as error:
-        smc.law_from_fmu(foreign, **settings)
+        smc.law_from_fmu(foreign, **{"variables": VARIABLES} | settings)
     assert str(error.value).startswith(said.replace("\\.", ".").replace("\\n", "\\n"))
     assert "\n" not in str(error.value)
 
