@@ -28,9 +28,9 @@ from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.simulation import cfunctions
-from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.callback import callback, installed
 from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.state import FINE
 
 QUICK = "--quick" in sys.argv

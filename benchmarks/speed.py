@@ -29,9 +29,9 @@ from rich.table import Table
 import smc_mujoco as smc
 from smc_mujoco.common import mjcb
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import ScenarioBatch
 
 QUICK = "--quick" in sys.argv
 ROUNDS = 3 if QUICK else 9

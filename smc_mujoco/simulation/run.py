@@ -7,25 +7,40 @@ grouping or the other runs.
 """
 
 import contextlib
+import copy
 import ctypes
+import itertools
 import os
 import sys
 import warnings
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import overload
 
 import mujoco
+import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
-from smc_mujoco.simulation import callback, reference
-from smc_mujoco.simulation.batch import Report, ScenarioBatch
-from smc_mujoco.simulation.prepare import Prepared, prepare
-from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.control import joint_law
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.mechanisms.plant import field_array
+from smc_mujoco.simulation import callback, reference, state
+from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.prepare import Packed, Prepared, pack, prepare
+from smc_mujoco.simulation.scenario import Resolved, Scenario
+from smc_mujoco.simulation.trace import Trace, from_log
+
+# isort: split
+from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
 MIN_TRIM_RUNS = 64  # runs of a batch; its memory is returned to the system only if it had as many; chosen
+SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
+USER_MODEL_STEPS = 200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
+FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
+LOST_CONTACTS = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
+
+Report = Callable[[int], None]  # called with the number of steps since its last call
 
 
 class PlainLoopWarning(UserWarning):
@@ -134,3 +149,153 @@ def cores(threads: int | None = None) -> int:
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return whole("threads", threads, 1, 1024)
+
+
+class ScenarioBatch:
+    """Scenarios of one key (`Prepared.key`) in one Batch. Make and run it while the callback is installed."""
+
+    def __init__(self, prepared: Sequence[Prepared], threads: int):
+        self.prepared = prepared
+        self.scenarios = scenarios = [item.scenario.resolved for item in prepared]
+        first, count = scenarios[0], len(scenarios)
+        self.base, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
+        set_fields = models.put_values(self.model, self.base, first, 0)
+        self.scratch = mujoco.MjData(self.model)
+        mujoco.mj_setConst(self.model, self.scratch)
+        # The shared model has the first scenario's values. Scenarios that do not set these fields need the base values.
+        self.base_values = {name: field_array(self.base, name) for name in set_fields}
+        self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]
+        self.records = np.zeros(count, state.SIMULATION)
+        self.packed = []  # the arrays whose addresses are in the records
+        for i, (item, log) in enumerate(zip(prepared, self.logs, strict=True)):
+            self.records[i], packed = pack(item, log)
+            self.packed.append(packed)
+        # persistent: at a sample, mjData still holds the forces of this simulation's last step
+        self.batch = Batch(self.model, count, min(threads, count), persistent=True)
+        self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
+        self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
+        self.put_initial_states()
+        self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
+        self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
+        self.calls = 0  # callbacks that each simulation should have had by now
+        self.set_parameters(0, range(count))
+
+    def run(self, report: Report) -> list[Trace]:
+        """Simulate all of them to the end."""
+        total = self.scenarios[0].samples * self.scenarios[0].steps
+        jumps = sorted({s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
+        for step, next_step in itertools.pairwise([0, *jumps, total]):
+            if step:
+                self.set_parameters(step, [i for i, s in enumerate(self.scenarios) if s.jump_step == step])
+            self.advance(next_step - step, report)
+        self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
+        return [self.trace(i) for i in range(len(self.scenarios))]
+
+    def set_parameters(self, step: int, indices: Sequence[int]) -> None:
+        """Set the true parameters that hold from a step on."""
+        changed = []
+        for i in indices:
+            values = self.base_values | models.field_values(self.base, self.scenarios[i], step)
+            for name, value in values.items():
+                before = self.fields[name][i] if name in self.fields else field_array(self.model, name)
+                if np.any(before != value):
+                    self.fields[name] = self.batch.expand(name)
+                    self.fields[name][i] = value
+                    changed.append(i)
+        if changed:
+            self.batch.set_const(np.unique(changed).astype(np.int32))
+
+    def put_initial_states(self) -> None:
+        """Put all simulations at t = 0, with the past readings of delayed sensors."""
+        delayed = bool(self.model.nhistory)
+        arrays = {name: self.batch.bind(name) for name in ("qpos", "qvel", *["history"] * delayed)}
+        model, data = copy.copy(self.model) if delayed else self.model, self.scratch
+        for i, scenario in enumerate(self.scenarios):
+            if delayed:  # the periods of the readings differ between scenarios
+                models.put_values(model, self.base, scenario, 0)
+            models.put_initial_state(model, data, scenario)
+            for name, array in arrays.items():
+                array[i] = getattr(data, name)
+
+    def advance(self, steps: int, report: Report) -> None:
+        """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
+        first = self.scenarios[0]
+        channels = len(self.scenarios) * first.plant.n
+        slice_steps = USER_MODEL_STEPS if first.plant.own else max(1, SLICE_STEPS // channels)
+        while steps:
+            count = min(steps, slice_steps)
+            self.run_alive(lambda alive, count=count: self.batch.step(alive, nstep=count), count * first.stages)
+            report(count * channels)
+            steps -= count
+
+    def run_alive(self, action: Callable[[np.ndarray], None], calls: int) -> None:
+        """Apply an action to the simulations that still run, and mark those that fail.
+
+        The action is a function of their indices; MuJoCo should call the callback `calls` times in each.
+        """
+        records = self.records
+        alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
+        before, self.calls = self.calls, self.calls + calls
+        try:
+            action(alive)
+        except SimulationError as error:
+            for i in error.ids:
+                self.errors[int(i)] = " ".join(self.batch.error(int(i)).split())
+                records["failure"][i] = state.DIVERGED
+                records["failed_step"][i] = records["calls"][i] // records["stages"][i]
+        except (ValueError, mujoco.UnexpectedError) as error:
+            if "allocate memory" in str(error):
+                raise
+            # another Python callback replaced ours; the count of calls shows it below
+        interrupted = [i for i in alive if i not in self.errors and records["calls"][i] != self.calls]
+        records["failure"][interrupted] = state.INTERRUPTED
+        records["failed_step"][interrupted] = before // self.scenarios[0].stages
+
+    def trace(self, i: int) -> Trace:
+        """Return the Trace of simulation i."""
+        code, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
+        failure = None if code == state.FINE else self.failure(i, code)
+        if failure is None and (self.model.npair or self.scenarios[i].plant.own):
+            warnings = self.batch.get_data(i, self.scratch).warning
+            if any(warnings[kind].number for kind in FULL_WARNINGS):
+                failure, step = LOST_CONTACTS, 0
+        return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
+
+    def failure(self, i: int, code: int) -> str:
+        """Return the failure of simulation i in words."""
+        if code == state.DIVERGED:
+            return self.errors.get(i, reference.PLANT_DIVERGED)
+        if code == state.INTERRUPTED:
+            return reference.INTERRUPTED
+        scenario = self.scenarios[i]
+        of_law = code in (state.LAW_RAISED, state.NOT_FINITE)
+        if of_law and (told := law_failure(scenario, self.records[i], self.packed[i])):
+            return told
+        told = reference.run(scenario).failure
+        return told.rpartition(", at t = ")[0] if told else "a function of the run failed, though not in Python"
+
+
+def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
+    """Call the law that failed again, in Python, and return its exception, or its u and s in the record, in words.
+
+    Compiled functions have no text of an exception. Return None for a law that had already changed its memory.
+    """
+    n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
+    function = reference.PythonComponent(s.law, n)
+    function.memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
+    try:
+        if s.law.joint:
+            dtype = joint_law.stored_dtype(n)
+            numbers = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,))
+            stored = numbers.copy().view(dtype)[0]
+            dynamics = reference.NominalDynamics(s, stored["x"], stored["v"])
+            function.call_joint(joint_law.measurement_of(stored, dynamics))
+        else:
+            function(i, Measurement(*record["y"].tolist()))
+    except reference.Failure as failure:
+        return str(failure)
+    if record["failure"] == state.LAW_RAISED:
+        return None
+    u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[:, i % width].tolist()
+    return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"

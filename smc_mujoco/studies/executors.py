@@ -19,9 +19,8 @@ from typing import TYPE_CHECKING, Any
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.metrics.catalogue import score
-from smc_mujoco.simulation.batch import Report
 from smc_mujoco.simulation.prepare import Prepared, prepare
-from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.run import Report, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import run_key

@@ -27,7 +27,7 @@ from smc_mujoco.common.text import capital
 from smc_mujoco.draw.film import film
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.metrics.catalogue import metrics, score
-from smc_mujoco.simulation import batch
+from smc_mujoco.simulation import run as runs
 
 LABEL = "a label that is forty characters in all."
 SCENE = f'''"""Does a user's scene run?"""
@@ -791,8 +791,8 @@ scene = smc.Scene(title="Long", conditions={"nominal": {"long": run}})
 if __name__ == "__main__":
     import threading
     from smc_mujoco.cli import scene as show
-    from smc_mujoco.simulation import batch
-    batch.SLICE_STEPS = 40_000  # a tenth of a second
+    from smc_mujoco.simulation import run as runs
+    runs.SLICE_STEPS = 40_000  # a tenth of a second
     simulate = show.simulate
     def announced(*arguments):
         threading.Timer(0.3, lambda: print("simulating", flush=True)).start()
@@ -812,7 +812,7 @@ def test_ctrl_c_in_mid_simulation_is_one_sentence_and_exit_code_130(call, folder
         return simulate(*arguments)
 
     monkeypatch.setattr(show, "simulate", stopped)
-    monkeypatch.setattr(batch, "SLICE_STEPS", 40_000)  # a tenth of a second
+    monkeypatch.setattr(runs, "SLICE_STEPS", 40_000)  # a tenth of a second
     try:
         code, out, err = call("run", "long.py", "--no-film")
     finally:

@@ -22,7 +22,8 @@ from smc_mujoco.envs.vector_env import BatchEnv
 from smc_mujoco.mechanisms import fidelity
 from smc_mujoco.mechanisms.custom import mjcf, nominal_model
 from smc_mujoco.mechanisms.custom.nominal_model import prepared
-from smc_mujoco.simulation import batch, callback, scenario
+from smc_mujoco.simulation import callback, scenario
+from smc_mujoco.simulation import run as runs
 
 pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
 
@@ -312,7 +313,7 @@ def test_timers_are_off_while_a_callback_is_installed_and_on_afterwards():
 @pytest.mark.parametrize("control", [None, foreign], ids=["none", "a Python function"])
 @pytest.mark.parametrize("at", [10, 15, 20])
 def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monkeypatch):
-    monkeypatch.setattr(batch, "SLICE_STEPS", 10)  # 5 of each of two runs
+    monkeypatch.setattr(runs, "SLICE_STEPS", 10)  # 5 of each of two runs
     two = [smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed) for seed in range(2)]
     whole, done = smc.run(two), []
 

@@ -27,7 +27,6 @@ from smc_mujoco.simulation import reference
 PLANTS = pytest.mark.parametrize("plant", smc.plants())
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
-batch_module = importlib.import_module("smc_mujoco.simulation.batch")
 
 
 def shortened(s, duration):
@@ -351,7 +350,7 @@ def test_company_changes_no_bit(together):
 @pytest.mark.parametrize(("batch_bytes", "slice_steps"), [(1, 10**9), (300_000, 777), (10**9, 1)])
 def test_batches_and_slices_change_no_bit(together, monkeypatch, batch_bytes, slice_steps):
     monkeypatch.setattr(runner, "BATCH_BYTES", batch_bytes)
-    monkeypatch.setattr(batch_module, "SLICE_STEPS", slice_steps)
+    monkeypatch.setattr(runner, "SLICE_STEPS", slice_steps)
     assert digest(smc.run(batch(), threads=2)) == digest(together)
 
 

@@ -11,8 +11,8 @@ from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.batch import ScenarioBatch
 from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
