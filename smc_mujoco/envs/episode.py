@@ -15,9 +15,8 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.custom.channels import check_ranges
-from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.mechanisms.named import as_plant
-from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
@@ -63,13 +62,13 @@ class Setting:
         fixed = np.array(self.scenario.x0)
         # bounds of the initial positions, (n,) each
         self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
-        self.model = _compiled(self.scenario, edit)
+        spec = models.spec(self.scenario)
+        edit(spec)
+        self.model = models.with_values(models.compiled(spec, self.scenario), self.scenario)
         table = channels(self.model)
         self.qpos, self.qvel = table["qpos"], table["qvel"]  # addresses of the channels, (n,) each
         # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,) each
         self.ctrl, self.shafts = (table[name][: plant.driven] for name in ("ctrl", "shaft"))
-        self.rotors = _rotors(self.model)
-        self.initial_state = models.initial_state(self.model, self.scenario)  # qpos (nq,) and qvel (nv,)
         # the largest commands, (driven,), and the actuators' inputs per unit of them
         self.limits, self.scale = np.array(self.scenario.limits), math.prod(p.scale for p in self.scenario.actuator)
         # the channels that the task treats differently, (n,) of bool, and from where positions count in errors, (n,)
@@ -130,13 +129,6 @@ class Setting:
             x, v = (state, v) if name == "x0" else (x, state)
         return x, v
 
-    def write_start(self, qpos: np.ndarray, qvel: np.ndarray, x: np.ndarray, v: np.ndarray) -> None:
-        """Write a start into qpos (nq,) and qvel (nv,)."""
-        qpos[:], qvel[:] = self.initial_state
-        qpos[self.qpos], qvel[self.qvel] = x, v
-        channel, rotor_qpos, rotor_qvel = self.rotors
-        qpos[rotor_qpos], qvel[rotor_qvel] = x[channel], v[channel]
-
     def reference(self, k: Any) -> np.ndarray:
         """Return all r, r' and r'' at sample k, (..., 3 m), as a copy."""
         return np.take(self.references, k, axis=0, mode="clip")
@@ -165,9 +157,8 @@ class Episode:
 
     def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
-        x, v = self.setting.draw_start(random, options)
         mujoco.mj_resetData(self.setting.model, data)
-        self.setting.write_start(data.qpos, data.qvel, x, v)
+        data.qpos[:], data.qvel[:] = models.state_with(self.setting.model, *self.setting.draw_start(random, options))
         self.episodes, self.sample = self.episodes + 1, 0
         self.drive_states[:] = self.setting.drive_start(data.qvel)
         self.read_state(data)
@@ -206,16 +197,6 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
     return dict(changes)
 
 
-def _rotors(model: mujoco.MjModel) -> np.ndarray:
-    """Return the channels with a separate rotor, and its addresses in qpos and qvel, (3, rotors)."""
-    rotors = []
-    for i, joint in enumerate(joint_ids(model)):
-        rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
-        if rotor >= 0:
-            rotors.append((i, model.jnt_qposadr[rotor], model.jnt_dofadr[rotor]))
-    return np.array(rotors, int).reshape(-1, 3).T
-
-
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
     """Return r, r' and r'' at every sample, (K + 1, 3 m), of m references: one, or one for each driven channel."""
     if samples == 1:  # the task has none
@@ -233,13 +214,3 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
             raise ScenarioError(f"reference {shown(signal)} is not a finite number at {at}: give another")
         columns.append(values)
     return np.stack(columns, axis=2).reshape(samples, -1)
-
-
-def _compiled(scenario: Resolved, edit: Callable[[mujoco.MjSpec], None]) -> mujoco.MjModel:
-    """Return the model of a scenario. `edit` changes its mechanism before."""
-    spec = models.spec(scenario)
-    edit(spec)
-    model = compiled_for_runs(spec, 0)
-    model.opt.timestep = scenario.physics_step
-    model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{scenario.integrator.upper()}")
-    return models.with_values(model, scenario)

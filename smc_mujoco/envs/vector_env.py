@@ -20,7 +20,7 @@ from smc_mujoco.envs.gymnasium_env import TimeLimited, action_space, observation
 from smc_mujoco.envs.tasks import Pair, reward
 from smc_mujoco.mechanisms.custom.plant_from import smooth
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant
-from smc_mujoco.simulation.model import without_scenery
+from smc_mujoco.simulation.model import state_with, without_scenery
 from smc_mujoco.simulation.run import cores  # also imports mujoco.batch without a callback
 
 # isort: split
@@ -115,7 +115,8 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         with mjcb.installed(None):
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
-            self.setting.write_start(self.qpos[i], self.qvel[i], *self.setting.draw_start(self.randoms[i], options))
+            start = self.setting.draw_start(self.randoms[i], options)
+            self.qpos[i], self.qvel[i] = state_with(self.setting.model, *start)
         self.samples[mask], self.ended[mask] = 0, False
         self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
 

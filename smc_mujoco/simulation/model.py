@@ -9,7 +9,7 @@ import copy
 import dataclasses
 import itertools
 import weakref
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 
 import mujoco
 import numpy as np
@@ -167,12 +167,17 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
     It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at each compilation,
     in three quarters of its time. Users' models always keep their scenery: a fixed part may be a floor.
     """
-    edited, resolved = spec(scenario), scenario.resolved
+    edited = spec(scenario)
     if not (scenery or scenario.plant.direct):
         without_scenery(edited)
     for texture in edited.textures:
         texture.width, texture.height = 1, 6  # a skybox has six sides
-    model = compiled_for_runs(edited, nuserdata)
+    return compiled(edited, scenario, nuserdata)
+
+
+def compiled(spec: mujoco.MjSpec, scenario: Scenario, nuserdata: int = 0) -> mujoco.MjModel:
+    """Return the model of a mechanism, with the step and the integrator of a scenario, and without its values."""
+    model, resolved = compiled_for_runs(spec, nuserdata), scenario.resolved
     model.opt.timestep = resolved.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
     return model
@@ -206,13 +211,17 @@ def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[st
 
 
 def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel at t = 0: channels and their rotors at x0 and v0, other joints as in `initial_pose`."""
+    """Return qpos and qvel at t = 0, see `state_with`."""
+    return state_with(model, scenario.resolved.x0, scenario.resolved.v0)
+
+
+def state_with(model: mujoco.MjModel, x: Iterable[float], v: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos and qvel with channels and their rotors at x and v, and other joints as in `initial_pose`."""
     qpos, qvel = initial_pose(model), np.zeros(model.nv)
-    resolved = scenario.resolved
-    for joint, x, v in zip(joint_ids(model), resolved.x0, resolved.v0, strict=True):
+    for joint, position, velocity in zip(joint_ids(model), x, v, strict=True):
         rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
         for moved in (joint, rotor) if rotor >= 0 else (joint,):
-            qpos[model.jnt_qposadr[moved]], qvel[model.jnt_dofadr[moved]] = x, v
+            qpos[model.jnt_qposadr[moved]], qvel[model.jnt_dofadr[moved]] = position, velocity
     return qpos, qvel
 
 

@@ -408,9 +408,9 @@ def test_an_environment_clips_actions_at_the_motors_limits_and_starts_in_the_key
     rest = ACTUATED + '<keyframe><key name="home" qpos="0.2 -0.5"/></keyframe>'
     found = episode.Setting(arm(["shoulder"], rest, keyframe="home"), changes={"u_max": 50.0})
     np.testing.assert_array_equal(found.command([-3.0]), [-4.0])
-    qpos, qvel = np.empty(2), np.empty(2)
-    found.write_start(qpos, qvel, np.array([0.1]), np.array([0.0]))
-    np.testing.assert_array_equal(qpos, [0.1, -0.5])
+    data = mujoco.MjData(found.model)
+    episode.Episode(found).begin(data, np.random.default_rng(0), {"x0": 0.1})
+    np.testing.assert_array_equal(data.qpos, [0.1, -0.5])
 
 
 def test_joints_without_a_channel_keep_the_actuators_of_the_model(arm):
