@@ -84,11 +84,6 @@ def _plants(plants: Sequence[str]) -> list[str]:
     return [name.replace(" network", "<br>network") for name in names] if len(names) > 3 else names
 
 
-def _quantity(value: float, unit: str) -> str:
-    """Return a number with its unit, in words; "never" has none."""
-    return f"{words.number(value)} {unit * math.isfinite(value)}".strip()
-
-
 def rounded(values: Sequence[float] | np.ndarray, digits: int = 5) -> list[float | None]:
     """Return numbers with few digits; None for what is not finite."""
     return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]
@@ -100,20 +95,27 @@ def fronts(drawn: "Sequence[Front]") -> go.Figure:
     laws = list(dict.fromkeys(front.law for front in drawn))
     legend = LINE_HEIGHT * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
     fig, places = panels(_plants(plants), 380 + legend, (60, 12, 62 + legend, 54), 0.035)
+    named: set[str] = set()  # laws in the legend, where a click switches all their curves
+    for front in drawn:
+        place, colour = places[plants.index(front.plant)], words.colour(front.law)
+        common = {"name": _label(front.law), "legendgroup": front.law, **place}
+        common["hovertemplate"] = "variation %{x:.3g} 1/s<br>tracking %{y:.3g} s²"
+        across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # steps to the right
+        line, small = {"color": colour, "width": 1.5, "shape": "hv"}, {"size": 4, "color": colour}
+        key = {"mode": "lines+markers", "line": line, "marker": small, "showlegend": front.law not in named}
+        fig.add_scatter(**common, **key, x=rounded(across), y=rounded(up))
+        dot = {"size": 12, "color": colour, "line": {"width": 2, "color": "#FFFFFF"}}
+        tracking, variation = front.chosen
+        fig.add_scatter(**common, x=[variation], y=[tracking], mode="markers", marker=dot, showlegend=False)
+        named.add(front.law)
     for place, plant in zip(places, plants, strict=True):
         on_plant = [front for front in drawn if front.plant == plant]
-        for trace in (trace for front in on_plant for trace in _front(front)):
-            fig.add_trace(trace, **place)
         across = _span([v for f in on_plant for v in (*f.variation, f.chosen[1])], 1e-3)
         up = _span([v for f in on_plant for v in (*f.tracking, f.chosen[0])], None)
         tick = max(1, math.ceil((across[1] - across[0]) / 4))
         fig.update_xaxes(LOG_AXIS, title_text="variation, 1/s", range=across, tickangle=0, dtick=tick, **place)
         fig.update_yaxes(LOG_AXIS, range=up, dtick=1, **place)
     fig.update_yaxes(title_text="tracking, s²", row=1, col=1)
-    for law in laws:  # an entry of the legend, which switches all curves of the law
-        colour = words.colour(law)
-        key = {"name": _label(law), "legendgroup": law, "marker": {"size": 8, "color": colour}}
-        fig.add_scatter(**key, x=[None], y=[None], mode="lines+markers", line={"color": colour, "width": 2})
     return fig.update_layout(showlegend=True, legend={"y": 1 + 52 / 264})
 
 
@@ -128,26 +130,10 @@ def _span(values: Sequence[float], floor: float | None) -> list[float]:
     return [math.log10(low) - 0.15, math.log10(high) + 0.15]
 
 
-def _front(front: "Front") -> list[go.Scatter]:
-    """Return the staircase of a law, and the dot at the study's gains."""
-    colour = words.colour(front.law)
-    common = {"legendgroup": front.law, "showlegend": False}
-    hover = f"<b>{_label(front.law)}</b><br>variation %{{x:.3g}} 1/s<br>tracking %{{y:.3g}} s²<extra></extra>"
-    across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # for steps to the right
-    line = {"mode": "lines+markers", "line": {"color": colour, "width": 1.5, "shape": "hv"}}
-    line["marker"] = {"size": 4, "color": colour}
-    dot = {"mode": "markers", "marker": {"size": 12, "color": colour, "line": {"width": 2, "color": "#FFFFFF"}}}
-    chosen = {"x": [front.chosen[1]], "y": [front.chosen[0]], "hovertemplate": "The study's gains: " + hover}
-    return [
-        go.Scatter(common | line, x=rounded(across), y=rounded(up), hovertemplate=hover),
-        go.Scatter(common | dot | chosen),
-    ]
-
-
 def margins(drawn: "Sequence[Margin]", kind: str) -> go.Figure:
     """Draw the largest level of one kind that each law tolerates: a panel per plant; a bar marks linear theory.
 
-    A triangle means that the search ended there without a failure.
+    A triangle means that the search ended there without a failure, a cross that not even none is tolerated.
     """
     plants = list(dict.fromkeys(margin.plant for margin in drawn))
     laws = list(dict.fromkeys(margin.law for margin in drawn))
@@ -156,36 +142,21 @@ def margins(drawn: "Sequence[Margin]", kind: str) -> go.Figure:
     fig.update_yaxes(categoryarray=names, categoryorder="array", range=[-0.6, len(laws) - 0.4], showgrid=False, dtick=1)
     fig.update_yaxes(showticklabels=False).update_yaxes(showticklabels=True, tickfont=NAME_FONT, **places[0])
     for place, plant in zip(places, plants, strict=True):
-        on_plant = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
-        sizes = [v for margin in on_plant for v in (margin.value, margin.theory or 0.0) if math.isfinite(v)]
+        its = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
+        theory = [margin for margin in its if margin.theory is not None and math.isfinite(margin.theory)]
+        sizes = [v for margin in its for v in (margin.value, margin.theory or 0.0) if math.isfinite(v)]
         end = 1.15 * (max(sizes, default=0.0) or 1.0)
-        for trace in (trace for margin in on_plant for trace in _margin(margin, end)):
-            fig.add_trace(trace, **place)
+        symbols = ["x" if math.isnan(m.value) else "circle" if m.value < m.searched else "triangle-right" for m in its]
+        x = [0.0 if math.isnan(margin.value) else min(margin.value, end) for margin in its]
+        marker = {"size": 10, "color": [words.colour(margin.law) for margin in its], "symbol": symbols}
+        stems = {"array": [0.0] * len(x), "arrayminus": x, "symmetric": False, "color": style.RULE, "width": 0}
+        common = {"mode": "markers", "cliponaxis": False, **place}
+        common["hovertemplate"] = "<b>%{y}</b><br>%{x:.3g}<extra></extra>"
+        fig.add_scatter(**common, x=x, y=[_label(margin.law) for margin in its], marker=marker, error_x=stems)
+        bar = {"size": 15, "symbol": "line-ns", "line": {"width": 2.5, "color": style.INK}}
+        fig.add_scatter(**common, x=[m.theory for m in theory], y=[_label(m.law) for m in theory], marker=bar)
         fig.update_xaxes(range=[-0.03 * end, end], nticks=4, rangemode="tozero", **place)
     return fig
-
-
-def _margin(margin: "Margin", end: float) -> list[go.Scatter]:
-    """Return the point of a law with its stem, and the bar of linear theory; a cross without any margin."""
-    colour, name = words.colour(margin.law), _label(margin.law)
-    common = {"mode": "markers", "y": [name], "cliponaxis": False}
-    if math.isnan(margin.value):
-        cross = {"size": 8, "symbol": "x-thin", "line": {"width": 2, "color": colour}}
-        hover = f"<b>{name}</b><br>not within bounds without any, either<extra></extra>"
-        return [go.Scatter(common, x=[0.0], marker=cross, hovertemplate=hover)]
-    unit = words.either([margin.unit])
-    beyond, at = margin.value >= margin.searched, min(margin.value, end)
-    marker = {"size": 10, "color": colour, "symbol": "triangle-right" if beyond else "circle"}
-    hover = f"<b>{name}</b><br>{'at least ' if beyond else ''}{_quantity(margin.value, unit)}"
-    hover += f" (to {words.number(margin.resolution)})<extra></extra>"
-    stem = {"array": [0], "arrayminus": [at], "symmetric": False, "type": "data"}
-    stem |= {"color": colour, "thickness": 1.5, "width": 0}
-    traces = [go.Scatter(common, x=[at], marker=marker, error_x=stem, hovertemplate=hover)]
-    if margin.theory is not None and math.isfinite(margin.theory):
-        bar = {"size": 15, "symbol": "line-ns", "line": {"width": 2.5, "color": style.INK}}
-        hover = f"linear theory<br>{_quantity(margin.theory, unit)}<extra></extra>"
-        traces.append(go.Scatter(common, x=[margin.theory], marker=bar, hovertemplate=hover))
-    return traces
 
 
 def meanings(drawn: "Sequence[Basin]") -> dict[str, str]:

@@ -8,8 +8,10 @@ or list of claims that is missing.
 
 import contextlib
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -164,13 +166,12 @@ def grid(work: Work) -> Table:
 def judged_claims(work: Work, table: Table) -> Claims:
     """Return the claims with their verdicts; the table's runs are not made again."""
     plan = work.plan
+    options: dict[str, Any] = {"quick": plan.quick, "threads": work.threads}
     with work.bars.stage("claims", "quick" * plan.quick) as bar:
         return cached(
             work.folder / "claims.json",
             [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
-            lambda: (
-                audit(only=plan.claims, quick=plan.quick, threads=work.threads, table=table, report=bar.reached).claims
-            ),
+            lambda: audit(only=plan.claims, **options, table=table, report=bar.reached).claims,
             lambda claims, path: write_json(path, [dataclasses.asdict(claim) for claim in claims]),
             lambda path: Claims(Claim(**entry) for entry in read_json(path)),
         )
@@ -185,7 +186,7 @@ def worst_cases(work: Work) -> tuple[WorstCase, ...]:
         scenario = case(plant, law, "nominal", DURATION, GAINS)
         return cached_worst_case(work.folder / f"worst-{plant}-{law}.json", scenario, None, plan.attacks, work.threads)
 
-    return tuple(work.each("worst", "searches", [(p, law) for p in plan.attacked for law in plan.laws], compute))
+    return tuple(work.each("worst", "searches", list(itertools.product(plan.attacked, plan.laws)), compute))
 
 
 def all_margins(work: Work) -> tuple[Margin, ...]:
@@ -211,52 +212,38 @@ def _margins(
     work: Work, stage: str, gains: str, laws: Mapping[str, tuple[str, ...]], kinds: tuple[str, ...]
 ) -> tuple[Margin, ...]:
     """Return margins of kinds under a set of gains; `laws`: plant -> laws."""
-    quick, threads, search = work.plan.quick, work.threads, margin_search.margins
-    by_plant = work.kept(
-        stage,
-        "plants",
-        [(plant,) for plant in laws],
-        [laws, kinds, quick, gains],
-        lambda plant, report: search(
-            [plant], laws[plant], kinds, gains=gains, quick=quick, threads=threads, report=report
-        ),
-        margin_search.save,
-        margin_search.load,
-    )
+    options: dict[str, Any] = {"gains": gains, "quick": work.plan.quick, "threads": work.threads}
+
+    def search(plant: str, report: Report) -> list[Margin]:
+        return margin_search.margins([plant], laws[plant], kinds, **options, report=report)
+
+    plants, depends = [(plant,) for plant in laws], [laws, kinds, work.plan.quick, gains]
+    by_plant = work.kept(stage, "plants", plants, depends, search, margin_search.save, margin_search.load)
     return tuple(margin for margins in by_plant for margin in margins)
 
 
 def all_basins(work: Work) -> tuple[Basin, ...]:
     """Return the maps of regions of attraction, one for each plant and law."""
     plan = work.plan
-    options = {"gains": GAINS, "duration": plan.region, "threads": work.threads}
-    maps = work.kept(
-        "regions",
-        "maps",
-        [(plant, law) for plant in plan.basins for law in plan.basin_laws],
-        [plan.points, plan.region, GAINS],
-        lambda plant, law, report: regions.basin(plant, law, plan.points, **options, report=report),
-        Basin.save,
-        regions.load,
-    )
-    return tuple(maps)
+    options: dict[str, Any] = {"gains": GAINS, "duration": plan.region, "threads": work.threads}
+
+    def search(plant: str, law: str, report: Report) -> Basin:
+        return regions.basin(plant, law, plan.points, **options, report=report)
+
+    pairs, depends = list(itertools.product(plan.basins, plan.basin_laws)), [plan.points, plan.region, GAINS]
+    return tuple(work.kept("regions", "maps", pairs, depends, search, Basin.save, regions.load))
 
 
 def accuracies(work: Work) -> AccuracyTable:
     """Return the accuracy of all laws on the plan's plants, condition by condition."""
     plan = work.plan
-    asked = plan.periods, plan.accuracy_starts
-    tables = work.kept(
-        "accuracy",
-        "tables",
-        [(plant, condition) for plant in plan.accurate for condition in ACCURACY_CONDITIONS],
-        [plan.laws, *asked, GAINS],
-        lambda plant, condition, report: accuracy(
-            plan.laws, plant, asked[0], condition, asked[1], GAINS, threads=work.threads, report=report
-        ),
-        AccuracyTable.save,
-        load_accuracy,
-    )
+    periods, starts = plan.periods, plan.accuracy_starts
+
+    def measure(plant: str, condition: str, report: Report) -> AccuracyTable:
+        return accuracy(plan.laws, plant, periods, condition, starts, GAINS, threads=work.threads, report=report)
+
+    pairs, depends = list(itertools.product(plan.accurate, ACCURACY_CONDITIONS)), [plan.laws, periods, starts, GAINS]
+    tables = work.kept("accuracy", "tables", pairs, depends, measure, AccuracyTable.save, load_accuracy)
     return AccuracyTable(row for rows in tables for row in rows)
 
 
@@ -269,7 +256,7 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
         title = f"{words.plant(plant)}, {words.condition(condition)}"
         runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
         traces = run(list(runs.values()), work.threads)
-        film = None
+        film, its = None, {"plant": plant, "condition": condition, "laws": plan.scene_laws, "seconds": plan.scene}
         if scene in plan.scenes[: plan.filmed] and video.missing() is None:
             film = cached(
                 work.folder / f"film-{plant}-{condition}.webm",
@@ -278,14 +265,7 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
                 lambda data, path: path.write_bytes(data),
                 Path.read_bytes,
             )
-        return films.Scene(
-            plant=plant,
-            condition=condition,
-            laws=plan.scene_laws,
-            curves=films.curves(traces, title),
-            film=film,
-            seconds=plan.scene,
-        )
+        return films.Scene(**its, curves=films.curves(traces, title), film=film)
 
     return tuple(work.each("scenes", "scenes", plan.scenes, compute))
 
