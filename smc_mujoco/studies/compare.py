@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.ranking import RELEVANT, checked_share
 from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, whole
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
@@ -37,13 +38,11 @@ from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, Extent
 from smc_mujoco.studies.table import Table
+from smc_mujoco.studies.worst_case import DURATION, WorstCase, WorstCases
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
-
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-    from smc_mujoco.studies.worst_case import WorstCase
 
 MAX_BLOCKS = 12  # plants times conditions with a table each; beyond, each plant has one table over all conditions
 
@@ -57,7 +56,7 @@ class Compared(Tables):
     candidates: Mapping[str, Sequence[Candidate]]
     # A board for each metric on each plant in each condition, or on each plant if these are more than 12
     leaderboard: Boards
-    worst: "Mapping[str, Mapping[str, WorstCase]]"  # plant -> law -> its `worst_case`; empty if it was not searched
+    worst: Mapping[str, Mapping[str, WorstCase]]  # plant -> law -> its `worst_case`; empty if it was not searched
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -101,10 +100,6 @@ class Compared(Tables):
 
     @property
     def _worst_tables(self) -> list[Tabular]:
-        if not self.worst:
-            return []
-        from smc_mujoco.studies.worst_case import WorstCases
-
         return [table for worst_cases in self.worst.values() for table in WorstCases(worst_cases.values()).tables]
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
@@ -176,7 +171,7 @@ def compare(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: int = 16,
     tune: bool = True,
-    worst: "bool | Uncertainty" = False,
+    worst: bool | Uncertainty = False,
     executor: "executors.Workers | None" = None,
     *,
     out: str | os.PathLike[str] = "compared",
@@ -268,12 +263,11 @@ def _candidates(
 
 
 def _worst_cases(
-    trial: Trial, candidates: Mapping[str, Sequence[Candidate]], within: "Uncertainty | None", duration: float | None
-) -> "dict[str, dict[str, WorstCase]]":
+    trial: Trial, candidates: Mapping[str, Sequence[Candidate]], within: Uncertainty | None, duration: float | None
+) -> dict[str, dict[str, WorstCase]]:
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
-    from smc_mujoco.studies.worst_case import DURATION
 
-    def attacked(plant: Plant, law: Law) -> "WorstCase":
+    def attacked(plant: Plant, law: Law) -> WorstCase:
         scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts)
         return trial.attack(f"{plant.name}-{law.name}", scenario, within)
 

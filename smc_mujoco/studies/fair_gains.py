@@ -10,10 +10,11 @@ import dataclasses
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.common.text import joined
@@ -30,10 +31,7 @@ from smc_mujoco.studies import run_key
 from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
-
-if TYPE_CHECKING:
-    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-    from smc_mujoco.studies.worst_case import WorstCase
+from smc_mujoco.studies.worst_case import WorstCase, cached_worst_case
 
 
 class Candidate(NamedTuple):
@@ -165,11 +163,7 @@ class Trial(NamedTuple):
         runs = all_combinations(*grid, self.duration, self.starts)
         return study(runs, self.folder, replay=True, threads=self.threads, progress=self.progress, **options)
 
-    def attack(
-        self, name: str, scenario: Scenario, within: "Uncertainty | None", budget: int | None = None
-    ) -> "WorstCase":
+    def attack(self, name: str, scenario: Scenario, within: Uncertainty | None, budget: int | None = None) -> WorstCase:
         """Return the worst case of a scenario, which the folder keeps under a name."""
-        from smc_mujoco.studies.worst_case import cached_worst_case
-
         file = self.folder / "worst" / f"{name}.json"
         return cached_worst_case(file, scenario, within, budget, self.threads, self.progress)

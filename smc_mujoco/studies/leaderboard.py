@@ -9,7 +9,6 @@ for the plants and conditions of the table, over initial states and noise, and o
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,11 +20,9 @@ from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
-
-if TYPE_CHECKING:
-    from smc_mujoco.simulation.scenario import Scenario
-    from smc_mujoco.studies.worst_case import WorstCase
+from smc_mujoco.studies.worst_case import WorstCase
 
 UNITS = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
@@ -37,7 +34,7 @@ def leaderboard(
     by: Sequence[str] = ("plant",),
     defaults: bool = False,
     relevant: float = RELEVANT,
-    worst: "Mapping[str, Mapping[str, WorstCase]] | None" = None,
+    worst: Mapping[str, Mapping[str, WorstCase]] | None = None,
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
@@ -83,7 +80,7 @@ def leaderboard(
     return boards
 
 
-def _check_worst(table: Columns, worst: "Mapping[str, Mapping[str, WorstCase]]") -> None:
+def _check_worst(table: Columns, worst: Mapping[str, Mapping[str, WorstCase]]) -> None:
     """Raise ScenarioError for the worst case of a law that has no run on the plant."""
     ran = set(zip(table.column("plant").tolist(), table.column("law").tolist(), strict=True)) if worst else set()
     for plant, cases in worst.items():
@@ -95,7 +92,7 @@ def _check_worst(table: Columns, worst: "Mapping[str, Mapping[str, WorstCase]]")
 def _board(
     group: Group,
     scores: Scores,
-    ran: "Sequence[Scenario | None]",
+    ran: Sequence[Scenario | None],
     metric: str,
     comparison: Comparison,
     untuned: tuple[str, ...],
@@ -123,7 +120,7 @@ def _board(
 
 
 def _compared(
-    scores: Scores, ran: "Sequence[Scenario | None]", metric: str, relevant: float, limits: Limits
+    scores: Scores, ran: Sequence[Scenario | None], metric: str, relevant: float, limits: Limits
 ) -> Comparison:
     """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
     floors = [paired_runs.floor(ran[k], UNITS[metric]) for k in scores.blocks]
@@ -146,7 +143,7 @@ def _family(
     return corrected_limits(comparisons), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
 
 
-def _unit(metric: str, unit: str, scenario: "Scenario | None") -> str:
+def _unit(metric: str, unit: str, scenario: Scenario | None) -> str:
     """Return the unit of a board for the plant of a run; "" where it is not known."""
     if metric == SETTLES or scenario is None:
         return "" if "{" in unit else unit
