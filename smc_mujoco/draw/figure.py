@@ -130,8 +130,8 @@ def _composed_page(
     (width, height), traces = size, runs.traces
     early = [drawing.until(trace, runs.span[0]) for trace in traces]
     overview = _overview(early, chosen)
-    by_group = style.split(early) if "channels" in chosen else ()
-    small = [row for group in by_group for row in drawing.small(early, group)]
+    by_group = style.split(early) if "channels" in chosen else {}
+    small = [row for group, parts in by_group.items() for row in drawing.small(parts, group)]
     small.sort(key=lambda row: row[0].channel or 0)
     groups = [Panel("x", *each) for each in style.split(traces).items()]
     places = _by_joint(groups)

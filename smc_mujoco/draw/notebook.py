@@ -25,31 +25,30 @@ CELL_SIZE = 800, 450  # px, of a film in a cell
 class Frames:
     """Pictures of a film, each (height, width, 3) uint8. They are made while you iterate, as often as you do.
 
-    `mediapy.show_video` and `mediapy.write_video` take them as they are; `numpy.stack(list(frames))` is an array.
+    `mediapy.show_video` and `mediapy.write_video` take them as they are, such as `mediapy.show_video(smc.frames(trace))`;
+    `numpy.stack(list(frames))` is an array. `clock` has the times of the run at each picture, s. Arguments: as `film`.
 
-    Attributes:
-      fps: pictures a second.
-      times: of the run at each picture, (frames,) s.
+    Raises:
+      ScenarioError: as `film`; what concerns the size or OpenGL when the first picture is made.
     """
 
     traces: Trace | Sequence[Trace]
-    labels: Sequence[str] | None
-    title: str | None
-    size: tuple[int, int]
-    fps: float
-    speed: float | None
-    camera: Camera | None
+    labels: Sequence[str] | None = None
+    title: str | None = None
+    size: tuple[int, int] = CELL_SIZE
+    fps: float = film.FPS
+    speed: float | None = None
+    camera: Camera | None = None
 
     def __post_init__(self) -> None:
         checked(self.camera)
-        self._clock = pace.clock(self.traces, self.fps, self.speed)
-        self.times = self._clock.times
+        self.clock = pace.clock(self.traces, self.fps, self.speed)
 
     def __len__(self) -> int:
-        return len(self.times)
+        return len(self.clock.times)
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        return film.frames(self.traces, self._clock, self.labels, self.title, self.size, self.camera)
+        return film.frames(self.traces, self.clock, self.labels, self.title, self.size, self.camera)
 
     def __repr__(self) -> str:
         return f"Frames({len(self)} of {self.size[0]} x {self.size[1]} px, {self.fps:g} a second)"
@@ -66,21 +65,7 @@ class Frames:
         return self.labels, self.title, self.size, self.fps, self.speed, self.camera
 
 
-def frames(
-    traces: Trace | Sequence[Trace],
-    labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: tuple[int, int] = CELL_SIZE,
-    fps: float = film.FPS,
-    speed: float | None = None,
-    camera: Camera | None = None,
-) -> Frames:
-    """Return the pictures of a film, as `mediapy.show_video(smc.frames(trace))` takes them. Arguments: as `film`.
-
-    Raises:
-      ScenarioError: as `film`; what concerns the size or OpenGL when the first picture is made.
-    """
-    return Frames(traces, labels, title, size, fps, speed, camera)
+frames = Frames
 
 
 def show(

@@ -96,43 +96,34 @@ def blank(width: float, height: float, fig: Figure | SubFigure | None = None) ->
     return fig
 
 
-def legend_columns(labels: Sequence[str], width: float) -> int:
-    """Return the number of columns of a legend on a page of `width` inches: as many as fit."""
-    room, size = 72 * width - 16, style.points(TEXT_SIZE)
-    widths = [_widest(words, size) + (ENTRY_SAMPLE + ENTRY_SPACE) * size for words in labels]
-    fitting = (n for n in range(len(widths), 1, -1) if sum(map(max, np.array_split(widths, n))) < room)
-    return next(fitting, 1)
-
-
 def head_height(width: float, handles: Sequence[Handle]) -> float:
     """Return the height of the title and the legend, in inches."""
-    labels = _wrapped(handles, width)
+    labels, columns = _legend(handles, width)
     lines = [words.count("\n") + 1 for words in labels]
-    rows = max((sum(part) for part in np.array_split(lines, legend_columns(labels, width))), default=0)
+    rows = max((sum(part) for part in np.array_split(lines, columns)), default=0)
     return style.points(1.9 * TITLE_SIZE + 1.45 * TEXT_SIZE * rows) / 72
 
 
-def _wrapped(handles: Sequence[Handle], width: float) -> list[str]:
-    """Return the labels of a legend, each on up to two lines. In a single column they may be as wide as the page."""
-    size, labels = style.points(TEXT_SIZE), [str(handle.get_label()) for handle in handles]
+def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
+    """Return a legend's labels, each on up to two lines, and its columns: as many as fit on a page of `width` inches.
 
-    def wrapped(share: float) -> list[str]:
-        room = share * 72 * width - (ENTRY_SAMPLE + ENTRY_SPACE) * size
-        return [style.wrapped(label, room, size, lines=2) for label in labels]
-
-    narrow = wrapped(MAX_SHARE)
-    return narrow if legend_columns(narrow, width) > 1 else wrapped(MAX_SINGLE_SHARE)
-
-
-def _widest(words: str, size: float) -> float:
-    """Return the width of the longest line of a text."""
-    return max(style.width(line, size) for line in words.split("\n"))
+    In a single column labels may be as wide as the page.
+    """
+    page, size, labels = 72 * width, style.points(TEXT_SIZE), []
+    beside = (ENTRY_SAMPLE + ENTRY_SPACE) * size  # of a label
+    for share in (MAX_SHARE, MAX_SINGLE_SHARE):
+        labels = [style.wrapped(str(one.get_label()), share * page - beside, size, lines=2) for one in handles]
+        widths = [max(style.width(line, size) for line in label.split("\n")) + beside for label in labels]
+        for columns in range(len(widths), 1, -1):
+            if sum(map(max, np.array_split(widths, columns))) < page - 16:
+                return labels, columns
+    return labels, 1
 
 
 def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = "") -> None:
     """Draw the title with the legend below it, in as few rows as fit, and a note at the right of the title."""
-    size, big, words = style.points(TEXT_SIZE), style.points(TITLE_SIZE), _wrapped(handles, width)
-    room = 72 * width - 16
+    size, big, room = style.points(TEXT_SIZE), style.points(TITLE_SIZE), 72 * width - 16
+    words, columns = _legend(handles, width)
     if note:
         note = style.cropped(note, MAX_SHARE * room, size)
         room -= style.width(note, size) + big
@@ -147,7 +138,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         title_fontproperties={"size": big, "weight": "bold"},
         alignment="left",
         loc="outside upper left",
-        ncols=max(legend_columns(words, width), 1),
+        ncols=columns,
         fontsize=size,
         borderpad=0.2,
         handlelength=ENTRY_SAMPLE,

@@ -28,7 +28,6 @@ LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
 MAX_DRAWN_CHANNELS = 9  # channels of a network that are drawn one by one
 LASTING_QUANTILE = 0.98  # quantile of |reaction|, or of what an arrow shows: larger values are short peaks; chosen
-POINT_SPACING = 1 / 200  # of points in a phase portrait, as a share of its diagonal
 MAX_SMALL = 12  # channels that each have small panels
 CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
@@ -150,20 +149,19 @@ def _of_tip(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
-    """Return small panels for each channel of a group: x with its reference, e if a reference moves, u if driven."""
+    """Return small panels for each channel of a group: x with its reference, e if a reference moves, u if driven.
+
+    The traces are of the group.
+    """
     chosen = np.linspace(0, len(group.channels) - 1, min(len(group.channels), MAX_SMALL)).round().astype(int)
     moving = any(np.ptp(trace.r, axis=0).any() for trace in traces)
-    names, rows = ["x", *["e"] * moving, *["u"] * group.driven], []
-    for i in (group.channels[k] for k in chosen):
-        channel = dataclasses.replace(group, channels=(i,))
-        parts = [group_trace(trace, channel) for trace in traces]
-        rows.append(tuple(Panel(name, channel, parts, i) for name in names))
-    return rows
+    columns = [by_channel(Panel(name, group, traces)) for name in ["x", *["e"] * moving, *["u"] * group.driven]]
+    return [tuple(column[k] for column in columns) for k in chosen]
 
 
 def by_channel(panel: Panel) -> list[Panel]:
     """Return a panel for each channel of a panel's group."""
-    if len(panel.group.channels) == 1 or panel.quantity in SINGLE:
+    if panel.quantity in SINGLE:
         return [panel]
     panels = []
     for k, i in enumerate(panel.group.channels):
@@ -188,7 +186,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
         errors = errors[: len(groups) < CROWDED_STRIP]
         return [*(Panel("x", *each) for each in groups), *errors, *(Panel("u", *each) for each in driven)]
     if plant.direct and plant.n == plant.driven == 2:
-        return [panel for group, _ in groups for row in small(traces, group) for panel in (row[0], row[-1])]
+        return [panel for group, parts in groups for row in small(parts, group) for panel in (row[0], row[-1])]
     names = ("settling", "largest") if plant.direct else ("spread", "settling")
     return [Panel(name, *each) for each in driven for name in names]
 
@@ -414,7 +412,7 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
     for trace, colour, dash in reversed(list(zip(traces, colours, dashes(lines, 1.0), strict=True))):
         shown, width = drawn_channels(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
         for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
-            ax.plot(*thinned(x, v), color=colour, lw=width, ls=dash)
+            ax.plot(x, v, color=colour, lw=width, ls=dash)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         if trace.diverged_at is not None:
             ax.plot(trace.x[-1, 0], trace.v[-1, 0], "X", color=colour, zorder=5, **cross())
@@ -469,15 +467,6 @@ def crowded(panel: Panel) -> bool:
 def drawn_channels(n: int) -> np.ndarray:
     """Return the indices of the channels, of n, that are drawn one by one."""
     return np.unique(np.linspace(0, n - 1, min(n, MAX_DRAWN_CHANNELS)).round().astype(int))
-
-
-def thinned(x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a curve with points evenly apart on paper."""
-    step = np.hypot(np.diff(x) / (np.ptp(x) or 1.0), np.diff(v) / (np.ptp(v) or 1.0))
-    place = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / POINT_SPACING)
-    keep = np.append(np.flatnonzero(np.diff(place, prepend=-1.0)), len(x) - 1)
-    keep = keep[:: max(1, len(keep) // 4000)]
-    return x[keep], v[keep]
 
 
 def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:

@@ -55,7 +55,7 @@ def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> l
     """Return the state at each time, s; None for a machine without states, and after its run failed."""
     dry, gap = has_dry_friction(trace.scenario), backlash_gap(trace.scenario)
     contact = np.any(np.stack([extended(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
-    sliding = np.array([extended(also_at_start(~on, trace.t, hold), trace.t, hold) for on in at_rest(trace).T])
+    sliding = np.array([extended(~on, trace.t, hold) for on in at_rest(trace).T])
     sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T]) if gap else None
     states: list[State | None] = []
     for time in times.tolist():
@@ -165,12 +165,6 @@ def extended(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
     for off, again in zip(edges[1::2], edges[2::2], strict=False):
         on[off:again] |= t[again] - t[off] < hold
     return on
-
-
-def also_at_start(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return the signal, on from the start if it is on within `hold` s: a machine that starts at rest slides."""
-    early = t < t[0] + hold
-    return on | (early & on[early].any())
 
 
 def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:

@@ -76,7 +76,7 @@ def test_show_takes_any_figure(cell, trace):
 def test_frames_are_those_of_the_film_again_and_again(trace):
     frames = smc.frames(trace, title="twice", **FILM)
     assert len(frames) == 5
-    assert np.allclose(frames.times, [0.0, 0.05, 0.1, 0.15, 0.2])
+    assert np.allclose(frames.clock.times, [0.0, 0.05, 0.1, 0.15, 0.2])
     first, second = list(frames), list(frames)
     wanted = list(film.frames(trace, pace.clock(trace, 20.0, 1.0), None, "twice", SIZE))
     assert np.array_equal(first, second)

@@ -95,18 +95,10 @@ def mounts(
     ]
 
 
-class Loads(NamedTuple):
-    """Forces and torques on a machine, frame by frame."""
-
-    control: Envelope
-    disturbance: Envelope
-    reaction: Envelope
-    force: Envelope
-
-
-def loads(trace: Trace, edges: np.ndarray) -> Loads:
-    """Return ranges and means between consecutive edges, s."""
-    return Loads(*(windows(trace.t, y, edges) for y in (trace.applied, trace.d, trace.reaction, trace.force)))
+def loads(trace: Trace, edges: np.ndarray) -> dict[str, Envelope]:
+    """Return ranges and means of forces and torques on a machine between consecutive edges, s, by their names."""
+    signals = {"control": trace.applied, "disturbance": trace.d, "reaction": trace.reaction, "force": trace.force}
+    return {name: windows(trace.t, y, edges) for name, y in signals.items()}
 
 
 class Scale(NamedTuple):
@@ -132,31 +124,24 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
         control, force, push, reaction = (_sizes(parts, name) for name in ("applied", "force", "d", "reaction"))
-        longest = min(reaction.peak, control.lasting) if control.lasting and same else reaction.peak
+        longest = min(reaction[0], control[1]) if control[1] and same else reaction[0]
         if drive:
-            control = Sizes(*map(max, control, force))
-        sizes = {"control": control, "disturbance": push, "reaction": Sizes(reaction.peak, longest)}
-        exceeded = tuple(name for name, size in sizes.items() if size.peak > 1.01 * size.lasting)
-        by_group[group] = Scale(control.lasting, push.lasting, longest, exceeded, drive)
+            control = max(control[0], force[0]), max(control[1], force[1])
+        sizes = {"control": control, "disturbance": push, "reaction": (reaction[0], longest)}
+        exceeded = tuple(name for name, (peak, lasting) in sizes.items() if peak > 1.01 * lasting)
+        by_group[group] = Scale(control[1], push[1], longest, exceeded, drive)
     return by_group
 
 
-class Sizes(NamedTuple):
-    """The largest magnitude of a quantity, at its peak and without values of twice as much that are brief."""
-
-    peak: float
-    lasting: float
-
-
-def _sizes(traces: Sequence[Trace], name: str) -> Sizes:
-    """Return the sizes of a quantity in runs that last.
+def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
+    """Return the largest magnitude of a quantity in runs that last, and that without brief values of twice as much.
 
     A brief value takes at most 1 - LASTING_QUANTILE of the time.
     """
     peak = max(map(abs, panels.span(traces, name)))
     runs = panels.lasting(traces, name)
     usual = max((float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs), default=0.0)
-    return Sizes(peak, usual if peak > 2.0 * usual > 0.0 else peak)
+    return peak, usual if peak > 2.0 * usual > 0.0 else peak
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
@@ -166,28 +151,22 @@ def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale
     return [of_channel[i] for i in sorted(of_channel)]
 
 
-def arrows(loads: Loads, frame: int, channel: int, scale: Scale, colour: str) -> list[Arrow]:
-    """Return the arrows of one channel in one frame."""
+def arrows(loads: Mapping[str, Envelope], frame: int, channel: int, scale: Scale, colour: str) -> list[Arrow]:
+    """Return the arrows of one channel in one frame, the control's nearest to the body, with its range behind it."""
     law, grey, violet = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE, style.REACTION))
+    others = [
+        ("control", scale.control * scale.drive, (*law, COMMAND_OPACITY), 0.65),
+        ("disturbance", scale.disturbance, (*grey, 1.0), 0.65),
+        ("reaction", scale.reaction, (*violet, 1.0), 0.8),
+    ]
+    first = ("force" if scale.drive else "control", scale.control, (*law, 1.0), 1.0)
     drawn = []
-    layer = 1
-    if scale.control:
-        shown = loads.force if scale.drive else loads.control
-        low, mean, high = (float(part[frame, channel]) / scale.control for part in shown[1:])
-        drawn.append(Arrow(0.0, mean, (*law, 1.0)))
-        if high - low > MIN_BAR:
-            drawn.append(Arrow(low, high, (*law, 0.4), head=False))
-    if scale.control and scale.drive:
-        command = float(loads.control.mean[frame, channel]) / scale.control
-        drawn.append(Arrow(0.0, command, (*law, COMMAND_OPACITY), layer=layer, size=0.65))
-        layer += 1
-    if scale.disturbance:
-        mean = float(loads.disturbance.mean[frame, channel]) / scale.disturbance
-        drawn.append(Arrow(0.0, mean, (*grey, 1.0), layer=layer, size=0.65))
-        layer += 1
-    if scale.reaction:
-        mean = float(loads.reaction.mean[frame, channel]) / scale.reaction
-        drawn.append(Arrow(0.0, mean, (*violet, 1.0), layer=layer, size=0.8))
+    for layer, (name, longest, rgba, size) in enumerate([first, *(other for other in others if other[1])]):
+        if longest:
+            low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
+            drawn.append(Arrow(0.0, mean, rgba, layer, size))
+            if layer == 0 and high - low > MIN_BAR:
+                drawn.append(Arrow(low, high, (*law, 0.4), head=False))
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 
 
