@@ -25,8 +25,8 @@ CELL_SIZE = 800, 450  # px, of a film in a cell
 class Frames:
     """Pictures of a film, each (height, width, 3) uint8. They are made while you iterate, as often as you do.
 
-    `mediapy.show_video` and `mediapy.write_video` take them as they are, such as `mediapy.show_video(smc.frames(trace))`;
-    `numpy.stack(list(frames))` is an array. `clock` has the times of the run at each picture, s. Arguments: as `film`.
+    `mediapy.show_video` and `mediapy.write_video` take them as they are; `numpy.stack(list(frames))` is an array.
+    `clock` has the times of the run at each picture, s. Arguments: as `film`.
 
     Raises:
       ScenarioError: as `film`; what concerns the size or OpenGL when the first picture is made.

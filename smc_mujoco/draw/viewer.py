@@ -69,14 +69,7 @@ def aim(model: mujoco.MjModel, data: mujoco.MjData, cam: mujoco.MjvCamera) -> No
 
 
 class Live:
-    """A run that a viewer shows, frame by frame.
-
-    Attributes:
-      loop: the run.
-      step: number of its physics steps that are over.
-      model, data: those on screen.
-      paused: whether the run is paused.
-    """
+    """A run, `loop`, of which `step` physics steps are over; `model` and `data` are those on screen."""
 
     def __init__(self, scenario: Scenario, say: Callable[[str], None] = print):
         self.model = model_with_sliders(scenario)

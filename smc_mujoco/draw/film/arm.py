@@ -79,13 +79,9 @@ class Trail:
 
 
 class Overlay:
-    """What is drawn over the pictures of arms.
+    """What is drawn over pictures of `size` px of arms at `places`, (machines, 3) m, between `edges`, (frames + 1,) s.
 
-    Args:
-      places: of the machines, (machines, 3) m.
-      project: from the scene to the picture, whose `size` is in px.
-      edges: of the frames' times, (frames + 1,) s.
-      room: places of what is shown below each label, (machines, 4) px.
+    `project` leads from the scene to the picture; `room` has what is shown below each label, (machines, 4) px.
     """
 
     def __init__(

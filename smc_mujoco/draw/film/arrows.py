@@ -55,24 +55,14 @@ class Arrow(NamedTuple):
 
 
 class Mount(NamedTuple):
-    """Place and size of the arrows at a joint.
-
-    Attributes:
-      joint: of the film's scene.
-      beyond: whether the arrows of a hinge are on the other side of it than the body: the pendulums of a network swing
-        past each other.
-      unit: length of the longest arrow at a slide, m; its factor at a hinge, over HINGE_LENGTH of the pendulum's.
-      thick: thickness at a slide, m.
-      front: direction to the camera, (3,), of arrows before a slide that carries something; None for those above it.
-      radius: of bent arrows, m; 0 for straight ones.
-    """
+    """Place and size of the arrows at a joint of the film's scene."""
 
     joint: int
-    unit: float
-    thick: float
-    front: np.ndarray | None
-    beyond: bool = False
-    radius: float = 0.0
+    unit: float  # length of the longest arrow at a slide, m; its factor at a hinge, over HINGE_LENGTH of the pendulum's
+    thick: float  # thickness at a slide, m
+    front: np.ndarray | None  # direction to the camera, (3,), of arrows before a slide that carries something
+    beyond: bool = False  # whether on the other side of a hinge than the body: a network's pendulums pass each other
+    radius: float = 0.0  # of bent arrows, m; 0 for straight ones
 
 
 def mounts(

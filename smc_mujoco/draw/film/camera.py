@@ -38,9 +38,7 @@ def checked(chosen: Camera | None) -> Camera | None:
 def turn(azimuth: float, elevation: float) -> np.ndarray:
     """Return the turn of a camera that looks as MuJoCo's free camera does.
 
-    Args:
-      azimuth: direction of the view about the vertical, degrees: 0 along x, 90 along y.
-      elevation: direction of the view above the horizon, degrees: below 0 it looks down.
+    The azimuth, degrees, is 0 along x and 90 along y; at an elevation, degrees, below 0 it looks down.
     """
     a, e = np.radians([azimuth, elevation])
     ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])

@@ -32,8 +32,7 @@ Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bott
 class Canvas:
     """A picture of `size` px of a model, from its camera `film`, which does not move.
 
-    Args:
-      arms: whether it is of arms: rings around their links cast no shadows, and show all around.
+    Rings around the links of arms cast no shadows, and show all around.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int], arms: bool = False):
@@ -66,9 +65,7 @@ class Canvas:
     def draw(self, add: Add = lambda scene: None, whole: bool = False) -> np.ndarray:
         """Return the picture of `data` as it is, (height, width, 3) uint8, read-only.
 
-        Args:
-          add: adds shapes to the scene, such as arrows.
-          whole: whether to draw the whole picture, as after a change of colours.
+        `add` adds shapes to the scene, such as arrows. If `whole`, all is drawn again, as after a change of colours.
         """
         shown = self.renderer.scene
         self.renderer.update_scene(self.data, camera="film")
@@ -108,10 +105,8 @@ class Canvas:
     def boxes(self, geoms: Sequence, casting: Sequence[int], shapes: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return the rectangle of each geom of a scene and then of their shadows, (geoms + shadows, 4) px.
 
-        Args:
-          geoms: those of the scene, without shadows.
-          casting: index in `geoms` of what casts each shadow.
-          shapes, others: rectangles of what `seen_shapes` and `seen_others` return, (n, 4) px.
+        `casting` has the index of the geom that casts each shadow; `shapes` and `others` are the rectangles, (n, 4) px,
+        of what `seen_shapes` and `seen_others` return.
         """
         model, remaining, boxes, shadow_boxes = self.model, iter(others), [], {}
         for i, geom in enumerate(geoms):

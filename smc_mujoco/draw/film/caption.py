@@ -25,15 +25,10 @@ STRIP_WIDTH, STRIP_COUNTS = 110, 6  # of an encoder's strip, px and counts
 
 
 class Caption:
-    """The text over the stage of a film.
+    """The text over the stage of a film; `room` is the part of the picture that is free for the machines.
 
-    Attributes:
-      room: the part of the picture that is free for the machines.
-
-    Args:
-      row: whether the machines stand in a row across the picture, and not behind each other.
-      below: width and height of what others draw below each label, in its badge's place, px of a full-size film.
-      parts: of the key; default: what arrows and ghosts mean.
+    Machines stand in a `row` across the picture, or behind each other. `below`, width and height in px of a full-size
+    film, is what others draw in place of badges. The `parts` of the key are by default what arrows and ghosts mean.
     """
 
     def __init__(

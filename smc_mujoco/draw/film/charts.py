@@ -24,11 +24,7 @@ CURSOR = np.array(style.rgb(style.MUTED))
 
 
 class Charts:
-    """The charts as pictures of `size` px; `at` returns a frame of them.
-
-    Args:
-      scale: pixels per px of a film 1280 wide, for letters and lines.
-    """
+    """The charts as pictures of `size` px, letters and lines `scale` times as large as in a film 1280 px wide."""
 
     def __init__(
         self, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], size: tuple[int, int], scale: float

@@ -28,15 +28,10 @@ SPEED_RANGE = 0.01, 100.0
 
 
 class Clock(NamedTuple):
-    """Times of a film's frames.
+    """Times of a film's frames."""
 
-    Attributes:
-      times: of the run, (frames,) s, ascending.
-      speeds: of playback, (frames,), 1 for real time.
-    """
-
-    times: np.ndarray
-    speeds: np.ndarray
+    times: np.ndarray  # of the run, (frames,) s, ascending
+    speeds: np.ndarray  # of playback, (frames,), 1 for real time
 
     def part(self, start: float, stop: float) -> "Clock":
         """Return the frames from `start` to `stop` of the run, s."""
@@ -45,11 +40,7 @@ class Clock(NamedTuple):
 
 
 def clock(traces: Trace | Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
-    """Return the times of a film's frames from t = 0 to the end of the longest trace.
-
-    Args:
-      speed: of playback, 1 for real time; None for the rule above.
-    """
+    """Return the times of a film's frames from t = 0 to the end of the longest trace; `speed` None: the rule above."""
     traces, fps = style.same_plant(traces), number("fps", fps)
     if not 1.0 <= fps <= 120.0:
         raise ScenarioError(f"fps is {fps:g}: give 1 to 120")

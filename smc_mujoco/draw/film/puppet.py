@@ -34,32 +34,23 @@ class Motion(NamedTuple):
 
 
 class Puppet:
-    """The machine of one scenario, with the channels that a film shows.
-
-    Attributes:
-      scenario: with as many channels as are shown.
-      shapes: its compiled mechanism at the start of the run, and after its jump.
-      slides: which channels slide, (shown,).
-      rail: length of the rail on which a cart stays, m; inf without one.
-      links: the bodies that the channels' joints move.
-      whole: whether the channels and their rotors are all of its joints.
-    """
+    """The machine of one scenario, with the channels that a film shows."""
 
     def __init__(self, scenario: Scenario):
         self.scenario = scene.first_channels(scenario)
-        self.shapes = shapes(self.scenario)
+        self.shapes = shapes(self.scenario)  # at the start of the run, and after its jump
         model = self.shapes[0].model
         ids = joint_ids(model)
         rotors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(i).name) for i in ids]
         self.slides = model.jnt_type[ids] == SLIDE
-        self.rail = scene.rail(self.scenario, model)
+        self.rail = scene.rail(self.scenario, model)  # m, on which a cart stays; inf without one
         self._joints = model.jnt_qposadr[ids]
         self._rotors = [(k, model.jnt_qposadr[rotor]) for k, rotor in enumerate(rotors) if rotor >= 0]
         moved = set(model.jnt_bodyid[ids].tolist())
         for body in range(1, model.nbody):
             if model.body_parentid[body] in moved:
                 moved.add(body)
-        self.links = sorted(moved)
+        self.links = sorted(moved)  # the bodies that the channels' joints move
         off_stage = not self.scenario.plant.on_stage
         self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
         self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0
@@ -72,9 +63,8 @@ class Puppet:
     def qpos(self, x: np.ndarray, ahead: np.ndarray | None = None, rest: np.ndarray | None = None) -> np.ndarray:
         """Return the pose, (nq,), with the channels at x, (shown,) rad or m; a cart stays on its rail.
 
-        Args:
-          ahead: lead of the rotors over their joints, (shown,) rad or m; default: none.
-          rest: pose from which joints without a channel are taken, (nq,); default: that of the start.
+        `ahead` is the lead of the rotors over their joints, (shown,) rad or m. Joints without a channel are taken from
+        the pose `rest`, (nq,), by default that of the start.
         """
         pose = (self._start if rest is None else rest).copy()
         x = np.where(self.slides, np.clip(x, -self.rail / 2, self.rail / 2), x)
@@ -87,10 +77,8 @@ class Puppet:
         """Return what must be in the picture, (points, 3) m from the machine's place.
 
         These are the corners of the boxes of all that the channels move, over the poses of its trace. Of other things
-        they are those of the part that is close to them, such as the upper half of a stand.
-
-        Args:
-          motion: of joints without a channel; default: they stay where they start.
+        they are those of the part that is close to them, such as the upper half of a stand. Joints without a channel
+        move as in `motion`, or stay where they start.
         """
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
         model, moved, others, world = self.shapes[0].model, [], [], np.empty((0, 8, 3))

@@ -34,11 +34,7 @@ OTHER = mujoco.mjtObj.mjOBJ_UNKNOWN
 class Stage:
     """The compiled scene and its renderer: a context, which closes the renderer.
 
-    Attributes:
-      shown: number of channels of each machine that are drawn.
-      boxes: place of each machine in the picture, (machines, 4) px: left, top, right, bottom.
-      canvas: draws the pictures.
-      where: places of the machines, (machines, 3) m.
+    The machines are at `where`, (machines, 3) m, in the picture at `boxes`, (machines, 4) px: left, top, right, bottom.
     """
 
     def __init__(
