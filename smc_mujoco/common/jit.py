@@ -23,22 +23,9 @@ from llvmlite import ir
 from numba import from_dtype, njit, typeof, types
 from numba.extending import intrinsic
 
+from smc_mujoco.common import numba_internals as internals
 from smc_mujoco.common.errors import printable
 from smc_mujoco.common.interrupts import delay_ctrl_c
-from smc_mujoco.common.numba_internals import (
-    CFunc,
-    CPUCodeLibrary,
-    Dispatcher,
-    FunctionCache,
-    FunctionIdentity,
-    IndexDataCacheFile,
-    RuntimeLinker,
-    TypingError,
-    dynamic_modname,
-    dynamic_module,
-    global_compiler_lock,
-    normalize_signature,
-)
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.common.rebuild import rebuild
 
@@ -54,9 +41,9 @@ COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEM
 
 # When numba loads a function from its cache, it imports the function's module. If that module cannot be imported, such
 # as a scene file, numba stores the name of a placeholder instead. Registering the placeholder lets numba import it.
-sys.modules.setdefault(dynamic_modname, dynamic_module)
+sys.modules.setdefault(internals.dynamic_modname, internals.dynamic_module)
 
-free_after_fork(global_compiler_lock)
+free_after_fork(internals.global_compiler_lock)
 
 
 class Numbers:
@@ -81,12 +68,12 @@ class Numbers:
     @contextlib.contextmanager
     def given(self) -> Iterator[None]:
         """Let numba give these numbers to the functions that it compiles in the block."""
-        with global_compiler_lock:
-            theirs, FunctionIdentity._unique_ids = FunctionIdentity._unique_ids, self.count
+        with internals.global_compiler_lock:
+            theirs, internals.FunctionIdentity._unique_ids = internals.FunctionIdentity._unique_ids, self.count
             try:
                 yield
             finally:
-                FunctionIdentity._unique_ids = theirs
+                internals.FunctionIdentity._unique_ids = theirs
 
     def foreign(self, symbol: str) -> bool:
         """Return whether a symbol has a number that is not of this count."""
@@ -169,9 +156,9 @@ def attempting(count: int, estimates: bool = False) -> Callable:
         returned = resolved.return_type
         items = list(returned.types if isinstance(returned, types.BaseTuple) else [returned])
         if not all(isinstance(item, types.Integer | types.Float | types.Boolean) for item in items):
-            raise TypingError(f"it returns {returned} instead of numbers")
+            raise internals.TypingError(f"it returns {returned} instead of numbers")
         if len(items) != count and not (estimates and len(items) == 1):
-            raise TypingError(f"it returns {len(items)} numbers instead of {count}")
+            raise internals.TypingError(f"it returns {len(items)} numbers instead of {count}")
 
         def codegen(context, builder, signature, args):
             compiled = body.dispatcher.overloads[resolved.args]
@@ -214,17 +201,17 @@ def loader(kind: type) -> Callable:
     return load
 
 
-def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = False) -> CFunc:
+def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = False) -> internals.CFunc:
     """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
     `cache`: whether to use numba's cache on disk; for a body whose closure holds functions, its name and a hash of all.
     """
-    made = CFunc(body, normalize_signature(signature), {}, {"error_model": "numpy"})
+    made = internals.CFunc(body, internals.normalize_signature(signature), {}, {"error_model": "numpy"})
     _compile(made, body, cache)
     return made
 
 
-def compile_for(made: Dispatcher, arguments: tuple[Any, ...], cache: bool | tuple[str, str]) -> None:
+def compile_for(made: internals.Dispatcher, arguments: tuple[Any, ...], cache: bool | tuple[str, str]) -> None:
     """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
     _compile(made, made.py_func, cache, tuple(map(typeof, arguments)))
 
@@ -241,7 +228,7 @@ def _compile(made: Any, body: Callable, cache: bool | tuple[str, str], *types: A
 
 def _load_numba() -> None:
     """Load numba's array functions without SciPy's linear algebra, which takes a tenth of a process's start."""
-    with global_compiler_lock:
+    with internals.global_compiler_lock:
         if "numba.np.arraymath" not in sys.modules:
             from numba.np import linalg
 
@@ -252,7 +239,7 @@ def _load_numba() -> None:
                 linalg.ensure_blas = ensure_blas
 
 
-class Cache(FunctionCache):
+class Cache(internals.FunctionCache):
     """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error."""
 
     def __init__(self, body: Callable, name: str = "", content: str = ""):
@@ -283,7 +270,7 @@ class Cache(FunctionCache):
                 path.unlink()
 
 
-def _complete(library: CPUCodeLibrary) -> bool:
+def _complete(library: internals.CPUCodeLibrary) -> bool:
     """Return whether code is complete before it is linked, so that another process can load it, beside any other.
 
     Numba fills in some addresses while it links, such as that of a function that calls itself, and only in the process
@@ -291,11 +278,11 @@ def _complete(library: CPUCodeLibrary) -> bool:
     one of numba's own numbers.
     """
     module = library._final_module
-    linked = any(variable.name.startswith(RuntimeLinker.PREFIX) for variable in module.global_variables)
+    linked = any(variable.name.startswith(internals.RuntimeLinker.PREFIX) for variable in module.global_variables)
     return not linked and not any(NUMBERS.foreign(f.name) for f in module.functions if not f.is_declaration)
 
 
-class Sealed(IndexDataCacheFile):
+class Sealed(internals.IndexDataCacheFile):
     """Files of numba's cache, sealed with a hash of content and source; one that does not fit counts as missing."""
 
     def _load_index(self) -> dict:
@@ -362,7 +349,7 @@ _shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once f
 @functools.cache
 def jit(function: Callable) -> Callable:
     """Compile a function, and the compiled functions that it calls, to raise out of bounds and at division by zero."""
-    with global_compiler_lock:
+    with internals.global_compiler_lock:
         copies = dict(_shared)
         try:
             made = rebuild(function, checked, copies)

@@ -163,7 +163,7 @@ def _measurement_error(address, sim, function, t):
     if function.address == 0:
         return -0.0
     sim.instant.t = t
-    if _call(function, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
+    if _call(function, 0, address + record.AT.instant, address + record.AT.motion) != 0:
         return math.nan
     return sim.motion.value
 
@@ -183,7 +183,7 @@ def _measure(address, sim, data, k, t):
         position, velocity = data.sensordata[channel.x_sensor] + x_error, data.sensordata[channel.v_sensor] + v_error
         reading.x, reading.v = _read_sensor(sim, state, i, position, velocity, j, channel.hinge_body >= 0)
         sim.seen.i = i
-        if _call(sim.estimator, i, address + record.READING_AT, address + record.ESTIMATE_AT) != 0:
+        if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
     return record.FINE
@@ -193,7 +193,7 @@ def _measure(address, sim, data, k, t):
 def _evaluate_model(address, sim, i):
     """Write nominal f and g of channel i into the record. Return 1 if the model raised, or 0."""
     sim.seen.i = i
-    return _call(sim.nominal, 0, address + record.SEEN_AT, address + record.MODEL_AT)
+    return _call(sim.nominal, 0, address + record.AT.seen, address + record.AT.model)
 
 
 @njit(error_model="numpy")
@@ -204,11 +204,11 @@ def update_law(address, sim, k, t):
     """
     n, width, last_u, limits, feedforward = sim.n, sim.width, pointer(sim.seen.u), pointer(sim.limits), 0.0
     joint, commands = sim.joint.head != 0, pointer(sim.commands)
-    y = sim.joint.head if joint else address + record.MEASUREMENT_AT
+    y = sim.joint.head if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
     if sim.feedforward.address != 0:
-        if _call(sim.feedforward, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
+        if _call(sim.feedforward, 0, address + record.AT.instant, address + record.AT.motion) != 0:
             return record.RAISED
         feedforward = sim.motion.value
     for first in range(0, sim.driven, width):
@@ -236,9 +236,9 @@ def update_law(address, sim, k, t):
 def _evaluate_reference(address, sim, k, i):
     """Write the reference of channel i into the record and the log. Return 1 if it raised, or 0."""
     if sim.references != 0:
-        if _call(function_at(sim.references, i), 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
+        if _call(function_at(sim.references, i), 0, address + record.AT.instant, address + record.AT.motion) != 0:
             return 1
-    elif i == 0 and _call(sim.reference, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
+    elif i == 0 and _call(sim.reference, 0, address + record.AT.instant, address + record.AT.motion) != 0:
         return 1
     log_at(sim.log, k * sim.n + i).r = sim.motion.value
     return 0
@@ -267,7 +267,7 @@ def _measure_channel(address, sim, k, t, i):
     y.limit, y.model = pointer(sim.limits)[i], sim.uses_model
     y.has_surface, y.s, y.v_eq = 0.0, 0.0, 0.0
     if sim.surface.address != 0:
-        if _call(sim.surface, i, address + record.MEASUREMENT_AT, address + record.SLIDING_AT) != 0:
+        if _call(sim.surface, i, address + record.AT.y, address + record.AT.sliding) != 0:
             return record.RAISED
         y.has_surface, y.s, y.v_eq = 1.0, sim.sliding.s, sim.sliding.v_eq
     return record.FINE
@@ -279,7 +279,7 @@ def _measure_joints(address, sim, k, t):
     y, n, motion, seen = sim.joint, sim.n, sim.motion, sim.seen
     head = head_at(y.head, 0)
     head.t, head.dt, head.model, head.n = t, sim.period, sim.uses_model, n
-    head.dynamics = address + record.HANDLE_AT if sim.handle.coriolis != 0.0 else 0
+    head.dynamics = address + record.AT.handle if sim.handle.coriolis != 0.0 else 0
     for i in range(n):
         if _evaluate_reference(address, sim, k, i) != 0:
             return record.RAISED
@@ -304,7 +304,7 @@ def _measure_dynamics(address, sim):
         return failure
     if sim.dynamics.address == 0:
         failure = _separate_equations(address, sim, M, h, g)
-    elif _call(sim.dynamics, 0, address + record.SEEN_AT, sim.joint.M) != 0:
+    elif _call(sim.dynamics, 0, address + record.AT.seen, sim.joint.M) != 0:
         failure = record.RAISED
     for i in range(n * n):
         M[i] /= sim.drive_gain
@@ -413,7 +413,7 @@ def _apply_pushes(address, sim, data):
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         if signal.body >= 0:
-            if _call(signal.function, 0, address + record.INSTANT_AT, address + record.MOTION_AT) != 0:
+            if _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion) != 0:
                 return record.RAISED
             for k in range(3):
                 data.xfrc_applied[signal.body + k] += sim.motion.value * signal.peak[k]
@@ -441,7 +441,7 @@ def _evaluate_feedback(address, sim, data, signal, i, k):
     before = sample.r if k == 0 else log_at(sim.log, (k - 1) * sim.n).r
     instant.e = data.qpos[channel.qpos] - sample.r
     instant.de, instant.s = data.qvel[channel.qvel] - (sample.r - before) / sim.period, sample.s
-    return _call(signal.function, 0, address + record.INSTANT_AT, address + record.MOTION_AT)
+    return _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion)
 
 
 @njit(error_model="numpy")
@@ -462,7 +462,7 @@ def _apply_disturbances(address, sim, data, t, k):
                 raised = _evaluate_feedback(address, sim, data, signal, i, k)
             elif signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel
                 instant.channel = i
-                raised = _call(signal.function, i, address + record.INSTANT_AT, address + record.MOTION_AT)
+                raised = _call(signal.function, i, address + record.AT.instant, address + record.AT.motion)
             else:
                 raised = 0
             if raised != 0:
@@ -509,7 +509,7 @@ def _apply_friction(address, sim, data):
         inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
         inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
         sim.seen.i = i
-        if _call(function, 0, address + record.FRICTION_INPUT_AT, address + record.FRICTION_OUTPUT_AT) != 0:
+        if _call(function, 0, address + record.AT.friction_input, address + record.AT.friction_output) != 0:
             return record.RAISED
         f, low, high = outputs.f, outputs.low, outputs.high
         if state.stuck == 0.0:

@@ -7,6 +7,7 @@ which has their addresses.
 """
 
 import itertools
+from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -127,16 +128,8 @@ simulation_at, channel_at, state_at, log_at, disturbance_at, function_at = map(
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
-(
-    MEASUREMENT_AT, READING_AT, INSTANT_AT, SLIDING_AT, ESTIMATE_AT, MOTION_AT, MODEL_AT, SEEN_AT, HANDLE_AT,
-    FRICTION_INPUT_AT, FRICTION_OUTPUT_AT,
-) = (
-    SIMULATION.fields[name][1]  # pyright: ignore[reportOptionalSubscript]
-    for name in (
-        "y", "reading", "instant", "sliding", "estimate", "motion", "model", "seen", "handle", "friction_input",
-        "friction_output",
-    )
-)  # fmt: skip
+At = namedtuple("At", "y reading instant sliding estimate motion model seen handle friction_input friction_output")
+AT = At(*((SIMULATION.fields or {})[name][1] for name in At._fields))
 
 # Values of `failure`. RAISED: another function than the law raised an exception.
 FINE, DIVERGED, NOT_FINITE, LAW_RAISED, RAISED, DISTURBANCE_NOT_FINITE, INTERRUPTED = range(7)
