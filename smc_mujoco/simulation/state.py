@@ -129,7 +129,7 @@ simulation_at, channel_at, state_at, log_at, disturbance_at, function_at = map(
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
 At = namedtuple("At", "y reading instant sliding estimate motion model seen handle friction_input friction_output")
-AT = At(*((SIMULATION.fields or {})[name][1] for name in At._fields))
+AT = At(*(SIMULATION.fields[name][1] for name in At._fields))  # pyright: ignore[reportOptionalSubscript, reportArgumentType]
 
 # Values of `failure`. RAISED: another function than the law raised an exception.
 FINE, DIVERGED, NOT_FINITE, LAW_RAISED, RAISED, DISTURBANCE_NOT_FINITE, INTERRUPTED = range(7)
