@@ -22,7 +22,6 @@ from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.plant import Plant
 
 CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 # Relative degree -> what a law acts on.
@@ -60,13 +59,12 @@ def print_lists(console: Console) -> None:
     console.print(Text.assemble("One law in full: ", page, ". Only some laws: ", some))
 
 
-def print_suitable(needs: Sequence[str], plant: Plant | str | None, console: Console) -> None:
+def print_suitable(needs: Sequence[str], plant: str | None, console: Console) -> None:
     """Print a line about each law that has all these PROPERTIES and suits a plant."""
     names = [law.name for law in suitable(needs, plant)]
     filters = " and ".join(PROPERTIES[need].words for need in needs)
-    machine = plant if plant is None or isinstance(plant, str) else plant.name
     title = f"{len(names)} of {len(laws())} laws" + f" that {filters}" * bool(filters)
-    title += f" for {machine}" * (machine is not None)
+    title += f" for {plant}" * (plant is not None)
     if "no-velocity" in needs:
         text = 'Every law runs without a velocity sensor if the scenario estimates the velocity: velocity="levant".'
         console.print(text, highlight=False)

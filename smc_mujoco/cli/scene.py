@@ -8,7 +8,7 @@ from pathlib import Path
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
-from smc_mujoco.common.errors import ScenarioError, printable
+from smc_mujoco.common.errors import printable
 from smc_mujoco.common.files import slug
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.camera import Camera
@@ -34,10 +34,7 @@ def perform(
     """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`."""
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ScenarioError(f"cannot make the folder {out} ({error.strerror}): choose another with --out") from error
+    out.mkdir(parents=True, exist_ok=True)
     traces = simulate(scene, threads, clock)
     for condition, runs in traces.items():
         for table in [*tables.scores(_title(scene, condition), runs), *tables.tips(_title(scene, condition), runs)]:

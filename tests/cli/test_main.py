@@ -314,7 +314,8 @@ def test_timing_names_the_stretches_and_they_add_up(call, scene, monkeypatch):
 def test_without_a_renderer_only_the_film_is_missing_and_one_line_says_the_cure(
     call, undrawn, scene, folder, monkeypatch
 ):
-    monkeypatch.setattr(gl, "choice", lambda: gl.Choice(wish="", backend="disabled"))
+    monkeypatch.setattr(gl, "choice", lambda: ("", "disabled"))
+    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
     gl.missing.cache_clear()
     code, out, err = call("run", scene, "--out", "out")
     gl.missing.cache_clear()
@@ -580,8 +581,8 @@ def test_what_a_user_s_file_raises_is_shown_from_that_file_on(line, said, call, 
 def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(call, scene, folder, monkeypatch):
     monkeypatch.setattr(show, "run", lambda *_, **__: pytest.fail("it ran"))
     (folder / "taken").write_text("")
-    refused(call("run", scene, "--no-film", "--out", "taken"), "taken", "--out")
-    refused(call("run", scene, "--no-film", "--out", "taken/below"), "taken", "--out")
+    refused(call("run", scene, "--no-film", "--out", "taken"), "taken", "choose another folder")
+    refused(call("run", scene, "--no-film", "--out", "taken/below"), "taken", "choose another folder")
 
 
 def test_a_file_that_cannot_be_written_is_named(call, scene, folder):

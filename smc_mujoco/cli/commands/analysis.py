@@ -56,7 +56,7 @@ def tune(
     writable(out and with_ending(out, ".json"))
     terminal, start = Terminal(), options.starts(x0)
     tries, tested = budget or search.BUDGET, options.conditions(condition) or None
-    tuned = search.tune(options.plant(plant), law, tries, seed, objective, threads, True, tested, start)
+    tuned = search.tune(plant, law, tries, seed, objective, threads, True, tested, start)
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if out:
@@ -96,11 +96,12 @@ def margins(
         from smc_mujoco.cli import tables
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
+        from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.simulation.conditions import PLANTS
 
     terminal = Terminal()
     options.check_files(json)
-    machines = [options.plant(text) for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS)]
+    machines = [as_plant(text) for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS)]
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
     with bar("margins") as progress:
@@ -204,6 +205,7 @@ def _attacked_cases(
     """Return the laws to attack, and the scenarios of each: one on a plant, one for each parameter set of a rig."""
     from smc_mujoco.common import annexes
     from smc_mujoco.control import gain_sets
+    from smc_mujoco.mechanisms.named import as_plant
     from smc_mujoco.simulation.grid import case
 
     rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig") if annexes.installed("evidence") else None
@@ -213,8 +215,8 @@ def _attacked_cases(
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
         cases = [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
         return [runs[0].law for runs in cases], cases
-    chosen = options.laws(law, gain_sets.LAWS)
-    return chosen, [[case(options.plant(plant), attacked, condition, duration, gains)] for attacked in chosen]
+    chosen, machine = options.laws(law, gain_sets.LAWS), as_plant(plant)
+    return chosen, [[case(machine, attacked, condition, duration, gains)] for attacked in chosen]
 
 
 def basin(
@@ -247,7 +249,7 @@ def basin(
     options.check_files(json, *pictures)
     with bar(f"{law} on {plant}") as progress:
         region = search(
-            options.plant(plant), chosen, (points, points), gains=gains, duration=duration, threads=threads,
+            plant, chosen, (points, points), gains=gains, duration=duration, threads=threads,
             report=progress.reached, condition=condition,
         )  # fmt: skip
     terminal.note(f"{region.law} on {region.plant}: {100 * region.share:.3g} % of the states converge")
@@ -293,6 +295,7 @@ def chatter(
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
+        from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.metrics.limit_cycle import channel_cycle
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
@@ -300,7 +303,8 @@ def chatter(
     terminal, pictures, chosen = Terminal(), files(out), options.laws(law, gain_sets.LAWS)
     options.check_files(json, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
-    cases = [case(options.plant(plant), law, condition, duration, gains, changes=fields) for law in chosen]
+    machine = as_plant(plant)
+    cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
     with bar("chattering") as progress:
         cycles = []
         for done, scenario in enumerate(cases):

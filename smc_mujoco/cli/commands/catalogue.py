@@ -71,8 +71,7 @@ def laws(
     if name is not None and filtered:
         raise ScenarioError(f"laws {name} shows one law: leave it out, or leave out --needs and --plant")
     if filtered:
-        chosen = None if plant is None else options.plant(plant)
-        law_pages.print_suitable(options.names(needs), chosen, Terminal())
+        law_pages.print_suitable(options.names(needs), plant, Terminal())
     elif name is None:
         law_pages.print_lists(Terminal())
     else:

@@ -15,7 +15,6 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
     from smc_mujoco.mechanisms.hardware.part import Actuator
-    from smc_mujoco.mechanisms.plant import Plant
     from smc_mujoco.simulation import conditions as named
     from smc_mujoco.simulation.grid import Starts
 
@@ -212,13 +211,6 @@ def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
     return f"{words or 'no gains'}, set {gains!r}" if named else words or "no gains"
 
 
-def plant(text: str) -> "str | Plant":
-    """Return a plant's name, or the plant of FILE.xml:joint+joint."""
-    from smc_mujoco.mechanisms.named import from_text
-
-    return from_text(text) if ".xml" in text else text
-
-
 def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
     """Return the conditions of the option --condition: names and files, as a,b, or a text with a colon."""
     from smc_mujoco.simulation.conditions import find_condition, from_file
@@ -231,9 +223,7 @@ def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
     return chosen
 
 
-def compared_laws(
-    texts: Sequence[str] | None, plants: "Sequence[str | Plant]", gains: str
-) -> "Sequence[str | Law] | None":
+def compared_laws(texts: Sequence[str] | None, plants: Sequence[str], gains: str) -> "Sequence[str | Law] | None":
     """Return the laws of the option --law of `compare`; None if it is not given; all general ones for "all"."""
     from smc_mujoco.control import gain_sets
     from smc_mujoco.simulation.conditions import PLANTS

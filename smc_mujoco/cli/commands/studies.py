@@ -56,7 +56,7 @@ def which(
 
     terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0)
     advice = advise(
-        options.plant(plant), tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
+        plant, tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
         quick, threads, progress=True, defaults=defaults, relevant=relevant,
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )  # fmt: skip
@@ -109,7 +109,7 @@ def compare(
         _compare_on_rig(rig, law, seeds, duration, start, relevant, defaults, out, executor, key, threads, terminal)
         return
     options.check_files(None, latex, *files(figure))
-    machines = [options.plant(text) for text in options.names(plants)]
+    machines = options.names(plants)
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,

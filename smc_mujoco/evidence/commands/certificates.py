@@ -89,7 +89,7 @@ def _certified(
     from smc_mujoco.simulation.grid import case
     from smc_mujoco.studies.worst_case import worst_case
 
-    scenario = case(options.plant(plant), options.law(law), condition, gains=gains)
+    scenario = case(plant, options.law(law), condition, gains=gains)
     within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
     if worst and within is None:
         raise ScenarioError("--worst needs a bound to search within: give --disturbance")

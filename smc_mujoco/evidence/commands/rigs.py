@@ -51,7 +51,7 @@ def identify(
     terminal, named = Terminal(), options.columns(columns)
     options.check_files(json, figure)
     identified = find(
-        as_plant(options.plant(rig)) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
+        as_plant(rig) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
         [load(file, named) for file in files],
         options.names(quantities) or None,
         start=options.numbers(start, "--set", "M=5,b=8"),
