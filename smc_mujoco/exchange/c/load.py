@@ -27,7 +27,7 @@ from smc_mujoco.common import errors
 from smc_mujoco.common.errors import ScenarioError, number, shown, whole
 from smc_mujoco.common.guard import Arithmetic, computed
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
-from smc_mujoco.control.component import Template, as_gains, gain_text, template_decorator
+from smc_mujoco.control.component import Template, as_gains, gain_at, gain_text, template_decorator
 from smc_mujoco.control.from_text import parsed_gains
 from smc_mujoco.control.joint_law import ARRAYS
 from smc_mujoco.control.law import Measurement
@@ -202,10 +202,11 @@ def law_from_c(
 
 
 def _try(library: sandbox.Library, about: "About") -> None:
-    """Call a law in a separate process, as `sandbox.call` does."""
-    fields = ARRAYS if about.joints else Measurement._fields
-    gains = [gain.default for gain in about.gains.values()]
-    sandbox.call(library, fields, gains, about.memory, about.modelled, about.joints)
+    """Call a law in a separate process."""
+    fields, channels = (ARRAYS, about.joints) if about.joints else (Measurement._fields, 1)
+    gains = [gain_at(gain.default, i) for gain in about.gains.values() for i in range(channels)]
+    trial = {"fields": fields, "gains": gains, "memory": about.memory, "modelled": about.modelled}
+    sandbox.load(library, trial | {"joints": about.joints})
 
 
 def check(
@@ -244,12 +245,12 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
     if path.suffix == ".c":
         file, warnings = build.library(path, symbol, flags, timeout)
-        return sandbox.Library(file, path, symbol, flags, timeout, warnings)
+        return sandbox.Library(file, path, symbol, timeout, warnings)
     try:
         copy = shutil.copy(path, build.fresh(path.suffix))  # so that a rebuilt library is loaded again
     except OSError as error:
         raise ScenarioError(f"{path} cannot be read ({error.strerror}): give one that can") from None
-    return sandbox.Library(Path(copy), path, symbol, flags, timeout)
+    return sandbox.Library(Path(copy), path, symbol, timeout)
 
 
 class About(NamedTuple):

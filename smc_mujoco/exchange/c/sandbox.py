@@ -34,7 +34,6 @@ FAULTS = {  # code -> fault, formatted with the size of memory, and cure
     OVERRUN + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
     ALTERED_ARITHMETIC: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
-SHARED_WORDS = "which all channels and simulations share, on several threads"
 INT_NAMES = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_mujoco_joints")
 TEXT_NAMES = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -47,37 +46,16 @@ class Library(NamedTuple):
     file: Path  # the library, compiled or copied
     path: Path  # the user's file
     symbol: str  # name of the law's function
-    flags: Sequence[str]  # additional, of the compiler
     timeout: float  # of a trial, s
     warnings: Sequence[str] = ()  # of the compiler
 
 
-def load(library: Library) -> dict[str, Any]:
-    """Load, set up and unload a library in a separate process, and return the constants that describe its law."""
-    return _run(library, None)
+def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Load, set up, try and unload a library in a separate process, and return the constants that describe its law.
 
-
-def call(
-    library: Library,
-    fields: Sequence[str],
-    gains: Sequence[float | tuple[float, ...]],
-    memory: int,
-    modelled: bool,
-    joints: int = 0,
-) -> None:
-    """Call a law in a separate process.
-
-    `fields`: names of the numbers in a measurement, or of the arrays in one of many `joints`. `gains`: each is one
-    number, or one for each joint.
+    `trial`: "fields", names of the numbers in a measurement, or of the arrays in one of many "joints"; "gains", each
+    gain's number for each channel; "memory" and "modelled" as in smc_law.h. None: the law is not called.
     """
-    from smc_mujoco.control.component import gain_at
-
-    numbers = [gain_at(gain, i) for gain in gains for i in range(max(1, joints))]
-    _run(library, {"fields": fields, "gains": numbers, "memory": memory, "modelled": modelled, "joints": joints})
-
-
-def _run(library: Library, trial: dict | None) -> dict[str, Any]:
-    """Make `attempt` in a separate process, and return the constants of the library."""
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.exchange.c import build
 
@@ -185,7 +163,7 @@ class Fenced:
 class Trial:
     """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
 
-    `order`: fields, memory, modelled and joints as in `call`; "gains", each gain's number for each channel.
+    `order`: the trial of `load`.
     """
 
     def __init__(self, law, order):
@@ -231,7 +209,10 @@ class Trial:
                     cure = "fix it, or name all gains that it reads in smc_law_gains, or give gains="
                     raise Fault(f"returned {what}{joint} at {where}: {cure}")
             if k % 50 == 0 and repr(self.call(y, self.state(before))) != repr((code, us, ss)):
-                raise Fault(f"gave two answers to one measurement, as from state {SHARED_WORDS}: keep it in memory")
+                raise Fault(
+                    "gave two answers to one measurement, as from state which all channels and simulations share, on "
+                    "several threads: keep it in memory"
+                )
             for i, u in enumerate(us):
                 vs[i] += dt * min(max(u, -6.0), 6.0)
                 xs[i] += dt * vs[i]
