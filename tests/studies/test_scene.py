@@ -11,6 +11,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import scene as show
 from smc_mujoco.draw import page
+from smc_mujoco.simulation.conditions import NAMED, REAL
 from smc_mujoco.studies import scene as scenes
 
 FOLDER = Path(smc.__file__).parents[1] / "scenes"
@@ -253,7 +254,7 @@ def stated(plant: str, condition: str) -> dict:
 
 
 def test_the_study_has_these_conditions_and_no_other():
-    assert set(smc.paper.CONDITIONS) == {*CONDITIONS, *JUMPS, *smc.paper.REALISTIC}
+    assert set(NAMED) == {*CONDITIONS, *JUMPS, *REAL}
 
 
 @pytest.mark.parametrize(

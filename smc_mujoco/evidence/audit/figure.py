@@ -23,20 +23,11 @@ from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
-from smc_mujoco.evidence.audit.verdict import (
-    ANSWERS,
-    MARKS,
-    PARTLY,
-    REFUTED,
-    SUPPORTED,
-    VERDICTS,
-    Check,
-    Claim,
-    totals,
-)  # fmt: skip
+from smc_mujoco.evidence.audit.verdict import ANSWERS, MARKS, VERDICTS, Check, Claim, totals
 
-COLOURS: dict[str, str] = dict.fromkeys(VERDICTS, "#6a6a6a")  # white on each: 5:1
-COLOURS |= {SUPPORTED: "#2b7a3d", PARTLY: "#8a6100", REFUTED: "#b3322b"}
+COLOURS = dict(
+    zip(VERDICTS, ("#2b7a3d", "#8a6100", "#b3322b", "#6a6a6a", "#6a6a6a"), strict=True)
+)  # white on each: 5:1
 COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # of a question
 LABEL_COLOUR = "#444"
 HEIGHT, FONT_SIZE, MARGIN = 20, 11, 6  # px

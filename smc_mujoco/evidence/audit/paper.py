@@ -31,17 +31,7 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
 from smc_mujoco.control.source import STUDY
-from smc_mujoco.evidence.audit.verdict import (
-    DERIVED,
-    EXISTENTIAL,
-    NAMED,
-    OURS,
-    PAPER,
-    UNIVERSAL,
-    WHOSE_WORDS,
-    Statement,
-    Threshold,
-)  # fmt: skip
+from smc_mujoco.evidence.audit.verdict import DERIVED, OURS, QUANTIFIERS, WHOSE_WORDS, Statement, Threshold
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -52,12 +42,10 @@ from smc_mujoco.simulation.scenario import Scenario
 
 PAPER_FILE, CODE_FILE = "paper.toml", "claims.py"
 SHIPPED_PACKAGE = "smc_mujoco.evidence.papers"
-QUANTIFIERS = {"universal": UNIVERSAL, "existential": EXISTENTIAL, "named": NAMED}
+KINDS_OF_CLAIM = {"paper": "of its sentences", "derived": "derived", "ours": "beside it"}
 NO_FIELDS: Mapping[str, Any] = frozen({})
 # What of a paper was read.
 READ_PARTS: dict[str, None] = dict.fromkeys(("full text", "abstract", "textbook", "second hand", "nothing"))
-KINDS_OF_CLAIM = {PAPER: "of its sentences", DERIVED: "derived", OURS: "beside it"}
-SUITE_SETS: dict[str, None] = dict.fromkeys((*gain_sets.SETS, "default"))  # of the suite
 TEXT_FIELDS = ("title", "authors", "source", "read", "access", "note")  # of a paper
 A_TEXT, A_LIST, FIELDS_CURE = (str, "a text"), (list, "a list of names"), 'fields of a scenario, as "duration=5.0"'
 PAPER_FIELDS = {  # field of a paper -> its type and what to write
@@ -429,11 +417,11 @@ def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:
 def _sets(tables: Mapping[str, Any], listed: list[str]) -> dict[str, Any]:
     """Return set of gains -> plant -> law -> gains; None for a set of the suite."""
     for key in tables:
-        if key in SUITE_SETS:
+        if key in gain_sets.KNOWN_SETS:
             raise ScenarioError(f"gains.{key} is a set of the suite: give yours another name, such as gains.paper")
     sets: dict[str, Any] = {}
     for key in listed or list(tables) or ["default"]:
-        sets[key] = find("set of gains in sets", key, {**tables, **SUITE_SETS})
+        sets[key] = find("set of gains in sets", key, {**tables, **gain_sets.KNOWN_SETS})
         if sets[key] is None:
             continue
         of_set: dict[str, dict[str, Any]] = {}

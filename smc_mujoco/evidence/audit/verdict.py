@@ -17,7 +17,7 @@ import dataclasses
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from smc_mujoco.common import html
@@ -25,7 +25,7 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 
 SUPPORTED, PARTLY, REFUTED = "supported", "partly supported", "refuted"
 NOT_SHOWN, NOT_TESTABLE = "not shown", "not testable"
-VERDICTS = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
+VERDICTS: tuple[str, ...] = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
 ANSWERS: dict[str, str] = dict(zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True))
 MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌–■◧□◇–", strict=True))
 
@@ -33,19 +33,15 @@ PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
 WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
 DISTANCE_WORDS = ", distance from "  # in a range check's name, between number and range
-UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"  # quantifiers
+UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"
+QUANTIFIERS = {"universal": UNIVERSAL, "existential": EXISTENTIAL, "named": NAMED}  # as a paper's file names them
 
 NUMBER_PATTERN = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|inf)\s*"
 LIMIT_PATTERN = re.compile(rf"\s*(<=|>=|<|>){NUMBER_PATTERN}")
 TOLERANCE_PATTERN = re.compile(rf"{NUMBER_PATTERN}(?:\+-|±){NUMBER_PATTERN}")
 RANGE_PATTERN = re.compile(rf"{NUMBER_PATTERN}to{NUMBER_PATTERN}")
 CURE = 'write it as "< 1", "<= 1", "> 1", ">= 1", "2 +- 0.1" or "2 to 15"'
-RELATIONS: dict[str, Callable[[float, float], bool]] = {
-    "<": operator.lt,
-    "<=": operator.le,
-    ">": operator.gt,
-    ">=": operator.ge,
-}
+RELATIONS = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 
 
 class Check(NamedTuple):

@@ -27,15 +27,9 @@ BOARDS = {  # board of RealAIGym -> title and headings of columns
         ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
     ),
 }
-# Verdicts have a colour beside their mark, from a palette for the colour-blind.
-COLOURS = {
-    verdicts.SUPPORTED: "blue",
-    verdicts.PARTLY: "yellow",
-    verdicts.REFUTED: "red",
-    verdicts.NOT_SHOWN: "dim",
-    verdicts.NOT_TESTABLE: "dim",
-    **dict.fromkeys(verdicts.ANSWERS.values(), "cyan"),  # to a question
-}
+# Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to questions have their own.
+COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim"), strict=True))
+COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
 
 

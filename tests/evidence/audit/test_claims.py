@@ -342,7 +342,7 @@ def along(name, period):
     )
     trace = smc.run(scenario)
     x, v = trace.x[:, 0], trace.v[:, 0]
-    height = lyapunov.value(plant, lam, k1, x, v)
+    height = lyapunov.surface(plant, lam, k1, x, v) ** 2 / 2.0
     measured = (height[2:] - height[:-2]) / (2 * period)
     mapped = lyapunov.vdot(plant, lam, k1, x, v)[1:-1]
     return np.abs(measured - mapped).max() / np.abs(mapped).max()

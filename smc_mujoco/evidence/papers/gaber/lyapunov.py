@@ -34,11 +34,6 @@ def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -
     return alpha + lam / _model(plant, x, v)[1] * np.tanh(alpha)
 
 
-def value(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V = s^2 / 2 in the states (x, v)."""
-    return surface(plant, lam, k1, x, v) ** 2 / 2.0
-
-
 def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return V' by (2) in the states (x, v), in the unit of s, squared, per s; gains lam, k1 are not saturated."""
     x, v = np.asarray(x, float), np.asarray(v, float)

@@ -16,26 +16,14 @@ from typing import Any
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.simulation.conditions import (  # noqa: F401  # smc.paper has the numbers of the study, too
-    CONTROL_PERIOD,
-    DIFFERENCED,
-    DURATION,
-    NAMED,
-    PLANTS,
-    REAL,
-    SENSOR_NOISE,
-    SINE,
-    Condition,
-)
+from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, NAMED, PLANTS, SINE, Condition  # noqa: F401
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.scenario import U_MAX, Scenario  # noqa: F401
 
 # The four laws that the paper compares; its higher-order one is the last.
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 GAINS = sets.STUDY
-
 CONDITIONS = NAMED  # of the whole suite
-REALISTIC = REAL
 
 
 def scenario(
