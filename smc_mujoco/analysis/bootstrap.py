@@ -45,6 +45,8 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
     The interval reaches from the resampled lower of the two middle values of an even number to the resampled higher.
     Every column has a run. `samples` has the sample of each column, see `ranking.linked`; None if each is one.
     """
+    from scipy.special import ndtr, stdtrit
+
     n = values.shape[1] if samples is None else max(samples) + 1
     centre = float(middle(middle(values)))
     if n < 2:
@@ -59,7 +61,9 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
         total = counted[-1] // 2
         lower[:, k] = ordered[(counted < total).sum(axis=0)]
         upper[:, k] = ordered[(counted <= total).sum(axis=0)]
-    at = _outermost(n)
+    # T. C. Hesterberg's expanded percentile, with Student's t of n - 1 degrees of freedom
+    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2))
+    at = max(1, math.floor(tail * (RESAMPLES + 1)))  # index of the resample at which the interval ends, from either end
     lower, upper = np.sort(middle(lower)), np.sort(middle(upper))
     return Interval(centre, float(lower[at - 1]), float(upper[RESAMPLES - at]), n)
 
@@ -89,14 +93,3 @@ def draws(n: int) -> np.ndarray:
     """Return how often each of n seeds is drawn in each resample, (n, RESAMPLES)."""
     drawn = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
     return np.ascontiguousarray(drawn.T, np.int32)
-
-
-def _outermost(n: int) -> int:
-    """Return the index of the resample, counted from either end, at which an interval of n >= 2 seeds ends.
-
-    Hesterberg's expanded percentile, Phi(-sqrt(n / (n - 1)) t), t being Student's with n - 1 degrees of freedom.
-    """
-    from scipy.special import ndtr, stdtrit
-
-    tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2))
-    return max(1, math.floor(tail * (RESAMPLES + 1)))

@@ -113,8 +113,6 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
     """
     if isinstance(law, Scenario) and fields:
         raise ScenarioError(f"a Scenario and {', '.join(fields)}: give one of them")
-    if not isinstance(law, Scenario) and "plant" not in fields:
-        raise ScenarioError("chattering lacks plant: give plant=...")
     return predict(law if isinstance(law, Scenario) else Scenario(law=law, **fields), channel)  # type: ignore[arg-type]
 
 

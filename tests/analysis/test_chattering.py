@@ -470,7 +470,6 @@ def test_bad_input_is_one_sentence(refused):
         lambda: chattering("classical", plant="duffing", channel=3),
         lambda: chattering(smc.Scenario(plant="duffing", law="classical"), plant="duffing"),
         lambda: chattering("clasical", plant="duffing"),
-        lambda: chattering("classical"),
         lambda: chattering("classical", plant="panda"),
         lambda: chattering("classical", plant="duffing", clock=smc.Clock(missed=0.1)),
         lambda: describing_function("classical", -1.0, 3.0),

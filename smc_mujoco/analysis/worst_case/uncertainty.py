@@ -83,9 +83,9 @@ class Uncertainty:
         put = vars(self).update  # the class is frozen
         for name in ("disturbance", "position_noise", "velocity_noise", "jitter", "x0"):
             put({name: number(f"Uncertainty's {name}", getattr(self, name), low=0.0)})
-        for name in ("hold", "slope"):
-            if getattr(self, name) is not None:
-                put({name: number(f"Uncertainty's {name}", getattr(self, name), above=0.0)})
+        put(hold=number("Uncertainty's hold", self.hold, above=0.0))
+        if self.slope is not None:
+            put(slope=number("Uncertainty's slope", self.slope, above=0.0))
         for name in ("delay", "mass", "friction", "friction_scale"):
             put({name: _range(name, getattr(self, name), 0.0, strict=name == "mass")})
         if not isinstance(self.parameters, Mapping):
