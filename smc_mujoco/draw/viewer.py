@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.control.law import Law, catalogue
-from smc_mujoco.mechanisms.hardware.part import driven
+from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.callback import installed
@@ -175,7 +175,7 @@ class Pushed(Loop):
 def model_with_sliders(scenario: Scenario) -> mujoco.MjModel:
     """Return the mechanism with a slider for each gain: an actuator of gear 0, which moves nothing."""
     spec = models.spec(scenario)
-    joint = driven(spec)[0].name
+    joint = joints(spec)[0].name
     for name, gain in slider_gains(scenario.law).items():
         spec.add_actuator(
             name=GAIN + name,

@@ -30,7 +30,7 @@ from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Nominal
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -345,9 +345,9 @@ class Scenario:
         return PROCESS + sum(random[:i]) if random[i] else 0
 
     @functools.cached_property
-    def nominal_drive(self) -> Nominal:
+    def nominal_drive(self) -> NominalDrive:
         """The actuator in the nominal model: its force is gain u - drag v."""
-        return Nominal() if self.voltage_motor is None else self.voltage_motor.nominal
+        return NominalDrive() if self.voltage_motor is None else self.voltage_motor.nominal
 
     def factors(self, step: int) -> dict[str, float]:
         """Return the plant's parameter factors, or terms for those of `plant.added`, at a physics step."""

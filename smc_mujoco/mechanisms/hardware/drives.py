@@ -23,7 +23,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, unknown
-from smc_mujoco.mechanisms.hardware.part import Actuator, Nominal, drive_ids, drives
+from smc_mujoco.mechanisms.hardware.part import Actuator, NominalDrive, drive_ids, drives
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
@@ -176,10 +176,11 @@ class DCMotor(Actuator):
         return "V" if self.command == "voltage" else ""
 
     @property
-    def nominal(self) -> Nominal:
+    def nominal(self) -> NominalDrive:
         """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is the torque."""
         per_volt = self.constant / self.resistance
-        return Nominal(per_volt, per_volt * self.constant) if self.command == "voltage" else Nominal()
+        by_voltage = NominalDrive(per_volt, per_volt * self.constant)
+        return by_voltage if self.command == "voltage" else NominalDrive()
 
     @property
     def stall(self) -> float:

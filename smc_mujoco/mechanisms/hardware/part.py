@@ -77,7 +77,7 @@ class Friction(Part):
         """Raise ScenarioError if it does not suit the plant."""
 
 
-class Nominal(NamedTuple):
+class NominalDrive(NamedTuple):
     """Force of an actuator as the law's model knows it: gain u - drag v."""
 
     gain: float = 1.0  # force per unit of u
@@ -95,7 +95,7 @@ class Actuator(Part):
     delay: ClassVar[float] = 0.0  # s, time constant with which the force follows a held u; 0 for none
     limited: ClassVar[bool] = False  # whether the rate of the force is limited
     unit: ClassVar[str] = ""  # of u; "" for that of the joint's force
-    nominal: ClassVar[Nominal] = Nominal()  # what the law's model knows of it
+    nominal: ClassVar[NominalDrive] = NominalDrive()  # what the law's model knows of it
 
 
 def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
@@ -103,14 +103,9 @@ def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
     return [actuator for actuator in spec.actuators if not actuator.name.startswith(PASSIVE)]
 
 
-def driven(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
-    """Return the joints of the driven channels, in the order of `drives`."""
-    return [spec.joint(actuator.target.removeprefix(ROTOR)) for actuator in drives(spec)]
-
-
 def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     """Return the channels' joints: first the driven ones, then those that are only measured."""
-    names = [joint.name for joint in driven(spec)]
+    names = [actuator.target.removeprefix(ROTOR) for actuator in drives(spec)]
     measured = [sensor.objname for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return [spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]]
 
