@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
-from smc_mujoco.common.jit import NotCompilable
+from smc_mujoco.common.jit import Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.plant import Native
+from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import cfunctions, state
 from smc_mujoco.simulation.model import Mechanism, check_start, mechanism, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
@@ -35,8 +35,7 @@ class Prepared:
     """A scenario that is ready to run."""
 
     scenario: Scenario  # not resolved
-    functions: dict[str, Any] | None  # what -> compiled; None if one of them does not compile
-    why_not: str  # what does not compile, in one sentence
+    why_not: str  # what does not compile, in one sentence; "" if all functions are compiled
     mechanism: Mechanism
     key: Hashable  # equal for scenarios that can share a Batch
 
@@ -65,28 +64,31 @@ def prepare(scenario: object) -> Prepared:
     check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
     try:
-        return Prepared(scenario, _compile(scenario.resolved), "", shared, key)
+        _compile(scenario.resolved)
     except NotCompilable as error:
-        return Prepared(scenario, None, str(error), shared, key)
+        return Prepared(scenario, str(error), shared, key)
+    return Prepared(scenario, "", shared, key)
 
 
-def _compile(s: Resolved) -> dict[str, Any]:
-    """Compile every function of a scenario; NotCompilable names the first that numba refuses."""
-    plant, by_mujoco = s.plant, isinstance(s.plant.nominal, NominalModel)
-    optional = [signal for signal in (s.feedforward, *s.noise.errors) if signal]
-    for signal in (*dict.fromkeys(s.references), *s.disturbance, *optional):
+def _compile(s: Resolved) -> None:
+    """Compile every function of a scenario, for `pack`; NotCompilable names the first that numba refuses."""
+    signals = *dict.fromkeys(s.references), *filter(None, (s.feedforward, *s.noise.errors)), *s.disturbance
+    for signal in signals:
         cfunctions.signal_values(signal)  # refuses data that compiled code would misread
-    return {
-        "laws": [cfunctions.compile_component(law) for law in s.law.of_channels(plant.driven)],  # one for all, or each
-        "surface": s.surface and cfunctions.compile_component(s.surface),
-        "estimator": cfunctions.compile_component(s.velocity),
-        "nominal": None if by_mujoco else cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters)),
-        "references": [cfunctions.compile_signal(signal) for signal in references(s)],
-        "feedforward": s.feedforward and cfunctions.compile_signal(s.feedforward),
-        "disturbances": [cfunctions.compile_signal(signal) for signal in s.disturbance],
-        "friction": s.formula_friction and cfunctions.compile_friction(s.formula_friction),  # by a formula
-        "errors": [error and cfunctions.compile_signal(error) for error in s.noise.errors],  # of position and velocity
-    }
+    for component in filter(None, (*s.law.parts, s.surface, s.velocity)):
+        cfunctions.compile_component(component)
+    _compiled_nominal(s.plant)
+    for signal in signals:
+        cfunctions.compile_signal(signal)
+    if s.formula_friction:
+        cfunctions.compile_friction(s.formula_friction)
+
+
+def _compiled_nominal(plant: Plant) -> Function | None:
+    """Return the compiled nominal model of a plant, or None if MuJoCo itself computes it."""
+    if isinstance(plant.nominal, NominalModel):
+        return None
+    return cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters))
 
 
 def references(s: Resolved) -> tuple[Signal, ...]:
@@ -114,7 +116,7 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, state.Buffer()
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
-    values = _shared_functions(prepared, nominal, buffer) | _settings(s) | _arrays(s, buffer)
+    values = _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, buffer)
     if s.law.joint:
         values |= _joint_measurement(s, nominal, values, buffer)
     for name, shared in (("laws", "law"), ("references", "reference")):
@@ -140,52 +142,44 @@ def _function(compiled: Any, values: Any, buffer: state.Buffer, memory: int = 0,
 
 def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str, Any]]]:
     """Return the laws, references and frictions of the channels, and the disturbances, as fields of records."""
-    s, functions = prepared.scenario.resolved, prepared.functions
-    assert functions is not None
+    s = prepared.scenario.resolved
     n, memory = s.plant.n, {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
     each = range(n if s.law.joint else 1)  # numbers of a gain
-    laws = zip(functions["laws"], s.law.of_channels(s.plant.driven), strict=True)
-    signals = zip(functions["references"], references(s), strict=True)
-    disturbances = enumerate(zip(functions["disturbances"], s.disturbance, strict=True))
+    laws = [
+        (cfunctions.compile_component(law), [gain_at(value, i) for value in law.gains.values() for i in each])
+        for law in s.law.of_channels(s.plant.driven)
+    ]
     return {
-        "laws": [
-            _function(compiled, [gain_at(value, i) for value in law.gains.values() for i in each], buffer) | memory
-            for compiled, law in laws
-        ],
-        "references": [_signal(compiled, signal, buffer) for compiled, signal in signals],
+        "laws": [_function(compiled, gains, buffer) | memory for compiled, gains in laws],
+        "references": [_signal(signal, buffer) for signal in references(s)],
         "frictions": _frictions(prepared, buffer),
         "disturbances": [
-            {"function": _signal(compiled, d, buffer, n), "stream": s.noise_stream(i)}
+            {"function": _signal(d, buffer, n), "stream": s.noise_stream(i)}
             | {"cartesian": d.cartesian, "sees": d.sees, "peak": (d.x, d.y, d.z) if isinstance(d, Push) else (0.0,) * 3}
             | {"body": 6 * prepared.mechanism.model.body(d.body).id if isinstance(d, Push) else -1}
-            for i, (compiled, d) in disturbances
+            for i, d in enumerate(s.disturbance)
         ],
     }
 
 
-def _shared_functions(prepared: Prepared, nominal: Native | None, buffer: state.Buffer) -> dict[str, Any]:
+def _shared_functions(s: Resolved, nominal: Native | None, buffer: state.Buffer) -> dict[str, Any]:
     """Return the functions of a record that all channels share, but law and reference."""
-    s, functions = prepared.scenario.resolved, prepared.functions
-    assert functions is not None
-    fields, n = {}, s.plant.n
-    fields["estimator"] = _function(functions["estimator"], s.velocity.gains.values(), buffer, s.velocity.memory, n)
-    if s.surface is not None:
-        fields["surface"] = _function(functions["surface"], s.surface.gains.values(), buffer, s.surface.memory, n)
+    fields = {}
+    for c in filter(None, (s.velocity, s.surface)):
+        compiled = cfunctions.compile_component(c)
+        fields[c.kind] = _function(compiled, c.gains.values(), buffer, c.memory, s.plant.n)
     if nominal is not None:
         fields["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
-    elif functions["nominal"] is not None:
-        fields["nominal"] = _function(functions["nominal"], s.plant.parameters.values(), buffer)
-    names = "feedforward", "position_error", "velocity_error"
-    signals, compiled = (s.feedforward, *s.noise.errors), (functions["feedforward"], *functions["errors"])
-    return fields | {
-        name: _signal(function, signal, buffer)
-        for name, function, signal in zip(names, compiled, signals, strict=True)
-        if signal
-    }
+    elif compiled := _compiled_nominal(s.plant):
+        fields["nominal"] = _function(compiled, s.plant.parameters.values(), buffer)
+    signals = {"feedforward": s.feedforward}
+    signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
+    return fields | {name: _signal(signal, buffer) for name, signal in signals.items() if signal}
 
 
-def _signal(compiled: Any, signal: Signal, buffer: state.Buffer, channels: int = 1) -> dict[str, int]:
+def _signal(signal: Signal, buffer: state.Buffer, channels: int = 1) -> dict[str, int]:
     """Return the fields of a signal's FUNCTION."""
+    compiled = cfunctions.compile_signal(signal)
     return _function(compiled, cfunctions.signal_values(signal), buffer, signal.memory, channels)
 
 
@@ -264,10 +258,9 @@ def _native_nominal(s: Resolved) -> Native | None:
 
 def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:
     """Return the FUNCTIONs of a friction by a formula, one for each joint. Their numbers go into the buffer."""
-    compiled, friction = prepared.functions and prepared.functions["friction"], prepared.scenario.formula_friction
-    if compiled is None or friction is None:
+    if (friction := prepared.scenario.formula_friction) is None:
         return []
-    shared = prepared.mechanism
+    compiled, shared = cfunctions.compile_friction(friction), prepared.mechanism
     inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
     numbers = [(buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))) for i, a in enumerate(inertia)]
     return [{"address": compiled.address, "parameters": first, "memory": second} for first, second in numbers]

@@ -9,7 +9,6 @@ import copy
 import dataclasses
 import functools
 import hashlib
-import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -190,7 +189,7 @@ class Scenario:
         check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
         check_inertia(self.resolved)
         check_names(self.resolved)
-        for doubt in itertools.islice(_doubts(self.resolved), 1):
+        if doubt := next(_doubts(self.resolved), None):
             warnings.warn(doubt, ScenarioWarning, users_stacklevel())
 
     @classmethod
