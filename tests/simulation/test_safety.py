@@ -33,8 +33,7 @@ from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
 
 import smc_mujoco as smc
-from smc_mujoco.common import fingerprint
-from smc_mujoco.common import jit as compiled_module
+from smc_mujoco.common import fingerprint, numba_internals
 from smc_mujoco.common.jit import compiled
 from smc_mujoco.control.law import Measurement, catalogue
 from smc_mujoco.simulation import callback, controller, reference, state
@@ -996,7 +995,7 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
             done.append(True)
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-    monkeypatch.setattr(compiled_module, "CFunc", lambda *arguments: Pressed())
+    monkeypatch.setattr(numba_internals, "CFunc", lambda *arguments: Pressed())
     with pytest.raises(KeyboardInterrupt):
         compiled(numba.types.float64(numba.types.float64), math.sin)
     assert done == [True]
