@@ -24,6 +24,7 @@ TASKS = re.compile(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE)  # o
 OTHERS = {  # title -> names of modules that are no public names
     "Types that are returned": """
     studies.compare.Compared
+    draw.notebook.Frames
     studies.advice.Advice
     analysis.tuning.result.Tuned
     analysis.gains_for.Design

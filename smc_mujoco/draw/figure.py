@@ -22,7 +22,7 @@ from smc_mujoco.draw.panels import Panel
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.simulation.trace import Trace
 
-TIME_PANELS = {  # panel -> quantity
+TIME_PANELS = {  # panel -> quantity, from top to bottom
     "x": "x", "error": "e", "spread": "spread", "v": "v", "u": "u", "delivered": "force", "reaction": "reaction",
     "d": "d", "tip": "tip", "contact": "contact", "s": "s",
 }  # fmt: skip
@@ -129,7 +129,8 @@ def _composed_page(
     """Return a page with the chosen panels of traces."""
     (width, height), traces = size, runs.traces
     early = [drawing.until(trace, runs.span[0]) for trace in traces]
-    overview = _overview(early, chosen)
+    shown = (quantity for name, quantity in TIME_PANELS.items() if name in chosen)
+    overview = _by_joint([panel for quantity in shown for panel in drawing.over_groups(early, quantity)])
     by_group = style.split(early) if "channels" in chosen else {}
     small = [row for group, parts in by_group.items() for row in drawing.small(parts, group)]
     small.sort(key=lambda row: row[0].channel or 0)
@@ -198,19 +199,6 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
         return [*names, "settling"]
     names += ["s"] * any(np.nan_to_num(trace.s).any() for trace in traces)
     return [*names, "settling"] if width < pages.NARROW else [*names, *SIDE_PANELS]
-
-
-def _overview(traces: Sequence[Trace], chosen: Sequence[str]) -> list[Panel]:
-    """Return the chosen panels over time, from top to bottom: the plant's default ones first."""
-    by_default = drawing.overview(traces)
-    panels = [panel for panel in by_default if any(TIME_PANELS.get(name) == panel.quantity for name in chosen)]
-    if_there = {"spread", "force", "reaction", "tip", "contact"}  # only if the plant has them
-    for name in chosen:
-        quantity = TIME_PANELS.get(name)
-        if quantity and quantity not in {panel.quantity for panel in by_default} | if_there:
-            parts = style.split(traces).items()
-            panels += [Panel(quantity, *each) for each in parts if each[0].driven or name in ("v", "error")]
-    return _by_joint(panels)
 
 
 def _by_joint(panels: Sequence[Panel]) -> list[Panel]:

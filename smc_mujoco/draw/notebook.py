@@ -66,6 +66,7 @@ class Frames:
 
 
 frames = Frames
+"""Pictures of a film for other packages, such as `mediapy.show_video(smc.frames(traces))`, see `Frames`."""
 
 
 def show(

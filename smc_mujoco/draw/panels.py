@@ -119,33 +119,21 @@ def _is_baseline(law: Law) -> bool:
     return law.template is not None and law.template.family == "baseline"
 
 
-def overview(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the default panels of a figure, from top to bottom.
-
-    Realistic mechanisms have forces on their joints, arms their tip; s is left out if no law is a sliding mode.
-    """
-    groups = style.split(traces)
-    driven = {group: parts for group, parts in groups.items() if group.driven}
-    panels = []
-    for group, parts in groups.items():
-        spread = ["spread"] * (group.driven and len(group.channels) > 1)
-        panels += [Panel(name, group, parts) for name in ("x", *spread)]
-    for group, parts in driven.items():
-        force = ["force"] * any(trace.scenario.actuator for trace in traces)
-        panels += [Panel(name, group, parts) for name in ("u", *force)]
-    for group, parts in groups.items():
-        panels += [Panel("reaction", group, parts)] * any(np.nan_to_num(part.reaction).any() for part in parts)
-    panels += _of_tip(traces)
-    if all(_is_baseline(trace.scenario.law) for trace in traces):
+def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
+    """Return the panels of a quantity over time, one for each group of channels that has it; tips have one of arms."""
+    groups, scenarios = style.split(traces), [trace.scenario for trace in traces]
+    if quantity in ("tip", "contact"):
+        has = [tip.knows_contacts(one) if quantity == "contact" else bool(one.plant.tip) for one in scenarios]
+        return [Panel(quantity, next(iter(groups)), traces)] * all(has)
+    panels = [Panel(quantity, group, parts) for group, parts in groups.items()]
+    if quantity == "reaction":
+        return [panel for panel in panels if any(np.nan_to_num(part.reaction).any() for part in panel.traces)]
+    if quantity in ("x", "e", "v"):
         return panels
-    return panels + [Panel("s", group, parts) for group, parts in driven.items()]
-
-
-def _of_tip(traces: Sequence[Trace]) -> list[Panel]:
-    """Return the panels of an arm's tip: how far it is off its path, and the force of its contact."""
-    names = ["tip"] * all(bool(trace.scenario.plant.tip) for trace in traces)
-    names += ["contact"] * all(tip.knows_contacts(trace.scenario) for trace in traces)
-    return [Panel(name, next(iter(style.split(traces))), traces) for name in names]
+    if quantity == "force" and not any(one.actuator for one in scenarios):
+        return []
+    several = 2 if quantity == "spread" else 1
+    return [panel for panel in panels if panel.group.driven and len(panel.group.channels) >= several]
 
 
 def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
@@ -180,7 +168,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     groups, plant = list(style.split(traces).items()), traces[0].scenario.plant
     driven = [each for each in groups if each[0].driven]
     errors = [Panel("settling", *each) for each in driven]
-    if of_tip := _of_tip(traces):
+    if of_tip := [panel for name in ("tip", "contact") for panel in over_groups(traces, name)]:
         return of_tip if len(of_tip) > 1 else [*of_tip, *errors]
     if all(len(group.channels) == 1 for group, _ in groups):
         errors = errors[: len(groups) < CROWDED_STRIP]

@@ -57,12 +57,6 @@ def pareto(
         ax.set_ylabel("variation: TV / (u_max T), summed over conditions (1/s)")
         ax.tick_params(which="both", length=0)
         ax.margins(0.04, 0.06)
-        goal = best[0].definition
-        limit = 2 / goal.control_period * len(goal.conditions)  # of a command from bound to bound at every sample, 1/s
-        if ax.get_ylim()[1] > 0.1 * limit:
-            dashed = {"color": style.RULE, "lw": style.points(1.0), "ls": (0, (4, 3))}
-            ax.axhline(limit, **dashed)
-            handles.append(Line2D([], [], **dashed, label="from bound to bound at every sample"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", label="large: chosen gains", **_ring()))
         pages.set_head(page, width, title or f"{style.plant_name(best[0].plant)}: tracking against variation", handles)
         pages.write(page, paths)

@@ -151,7 +151,7 @@ def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
 
 def test_the_band_around_each_joint_is_that_of_its_own_scale():
     trace = cart_and_pole()
-    shown = panels.overview([trace])
+    shown = [panel for name in ("x", "spread", "u", "force", "s") for panel in panels.over_groups([trace], name)]
     widths = []
     for row in shown[:2]:
         ax = Figure().subplots()
@@ -476,7 +476,7 @@ def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same
 def test_the_close_up_shows_no_round_off(pair, level):
     """Of a run that ends in 1 part of 1e9 around a level; or that never leaves it."""
     held = level + 1e-9 * np.random.default_rng(0).normal(size=pair[0].u.shape)
-    (shown, *_) = panels.overview(pair[:1])
+    (shown,) = panels.over_groups(pair[:1], "x")
     ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
     for u in (ends, held, np.full_like(held, level)):
         ax = Figure().subplots()

@@ -420,7 +420,7 @@ def test_sizes_of_rounding_are_drawn_at_its_bound():
 
 @pytest.mark.parametrize(("law", "unit"), [("classical", " (m/s)"), ("twisting", ""), ("pid", "")])
 def test_only_an_s_that_is_a_velocity_has_its_unit(law, unit, one):
-    shown = panels.overview([one, under(one, law, 0.9)])[-1]
+    (shown,) = panels.over_groups([one, under(one, law, 0.9)], "s")
     assert shown.label == f"sliding variable s{unit}"
 
 

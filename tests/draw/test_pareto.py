@@ -91,15 +91,6 @@ def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_dr
     assert page[0].axes[0].lines[0].get_ydata()[0] == MIN_VARIATION
 
 
-@pytest.mark.parametrize(("variation", "marked"), [(1.0, False), (1900.0, True)])  # of 2000 1/s
-def test_a_line_marks_the_largest_variation_where_a_front_comes_near_it(pair, page, tmp_path, variation, marked):
-    varied = [one._replace(variation=variation) for one in pair[0].history]
-    svg, _ = pareto([dataclasses.replace(pair[0], history=tuple(varied))], tmp_path / "fronts")
-    assert ("from bound to bound at every sample" in svg.read_text()) == marked
-    levels = [line.get_ydata()[0] for line in page[0].axes[0].lines if line.get_linestyle() == "--"]
-    assert levels == [2.0 / 1e-3] * marked
-
-
 def test_unfair_comparisons_and_no_tunings_are_refused(pair, tmp_path):
     for unlike in ([], [pair[0], dataclasses.replace(pair[1], seed=1)]):
         with pytest.raises(smc.ScenarioError):

@@ -180,7 +180,7 @@ class Caption:
 
     def _badge(self, draw: ImageDraw.ImageDraw, state: State, box: np.ndarray) -> None:
         """Draw a machine's state: pale while it moves, dark while friction holds it, bright in contact."""
-        looks = {CALM: (style.PAPER, style.MUTED), STUCK: (style.INK,) * 2, STRUCK: (style.REACTION,) * 2}
+        looks = {CALM: (style.PAPER, style.MUTED), STUCK: (style.INK, style.PAPER), STRUCK: (style.REACTION,) * 2}
         fill, rim = looks[state.mood]
         s, middle = self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
         draw.rounded_rectangle(tuple(box), radius=5 * s, fill=fill, outline=rim, width=max(1, round(s)))
