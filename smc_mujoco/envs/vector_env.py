@@ -86,7 +86,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             for random, number in zip(generators, self._seeds(seed), strict=True)
         ]
         self.begin(np.ones(self.num_envs, bool), options)
-        return self.observe(), self.infos(self.errors()[0])
+        return self.observe(self.setting.diverged(*self.state())), self.infos(self.errors()[0])
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Take one control period in every copy; copies at the end of an episode begin the next one."""
@@ -132,12 +132,9 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
                 ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
         return failed
 
-    def observe(self, diverged: np.ndarray | None = None) -> np.ndarray:
-        """Return the observations of all copies, (num_envs, observation_size)."""
-        x, v = self.state()
-        if diverged is None:
-            diverged = np.asarray(self.setting.diverged(x, v))
-        observations = self.setting.observe(x, v, self.samples)
+    def observe(self, diverged: np.ndarray) -> np.ndarray:
+        """Return the observations of all copies, (num_envs, observation_size); those of `diverged` ones are bounded."""
+        observations = self.setting.observe(*self.state(), self.samples)
         if diverged.any():
             observations[diverged] = bounded(observations[diverged])
         return observations

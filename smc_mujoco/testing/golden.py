@@ -60,8 +60,8 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
         raise ScenarioError(f"{file.name}, {key}: {error}; or {UPDATE}") from None
     limits = []
     for name in names:
-        (value, unit), golden = response.value(name), _recorded(file, key, name, known, "value")
-        tolerance = tolerances[name] if tolerances else _recorded(file, key, name, known, "tolerance")
+        (value, unit), golden = response.value(name), known[name]["value"]
+        tolerance = tolerances.get(name, known[name]["tolerance"])
         within = value == golden or abs(value - golden) <= tolerance or (math.isnan(value) and math.isnan(golden))
         limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
@@ -81,23 +81,17 @@ def _tolerance(value: float) -> float:
     return float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}") if math.isfinite(value) else 0.0
 
 
-def _recorded(file: Path, key: str, name: str, known: Mapping[str, Any], what: str) -> float:
-    """Return a metric's "value" or "tolerance" from `known`, the file's metric -> entry of this key."""
-    try:
-        return float(known[name][what])
-    except (TypeError, KeyError, ValueError):
-        raise ScenarioError(f"{file.name} has no {what} of {name} for {key}: {UPDATE}") from None
-
-
-def read(file: Path) -> dict[str, dict[str, Any]]:
-    """Return the content of a golden file; {} if there is no file."""
+def read(file: Path) -> dict[str, dict[str, dict[str, Any]]]:
+    """Return the content of a golden file, test -> metric -> value, tolerance and unit; {} if there is no file."""
     try:
         stored = read_json(file)
-        if isinstance(stored, dict) and all(isinstance(entry, dict) for entry in stored.values()):
-            return stored
-        why = "it is not test -> metric -> value"
+        for golden in (golden for entry in stored.values() for golden in entry.values()):
+            golden.update(value=float(golden["value"]), tolerance=float(golden["tolerance"]))
+        return stored
     except FileNotFoundError:
         return {}
+    except (AttributeError, KeyError, TypeError):
+        why = "it is not test -> metric -> value and tolerance"
     except (OSError, ValueError) as error:
         why = str(error)
     raise ScenarioError(f"{file} cannot be read ({why}): delete it and {UPDATE}")

@@ -51,9 +51,8 @@ def tune(
     """
     with delay_ctrl_c():
         from smc_mujoco.analysis.tuning import search
-        from smc_mujoco.common.files import with_ending, writable
 
-    writable(out and with_ending(out, ".json"))
+    options.check_files(out)
     terminal, start = Terminal(), options.starts(x0)
     tries, tested = budget or search.BUDGET, options.conditions(condition) or None
     tuned = search.tune(plant, law, tries, seed, objective, threads, True, tested, start)
