@@ -68,7 +68,7 @@ class Case:
     torque_noise: float = 0.0  # standard deviation, N m
     response: float = 1.0  # r of the motor
     delay: int = 0  # of the measurement, in control periods
-    pulses: tuple[tuple[float, float, float], ...] = ()  # centre s, standard width s, amplitude N m, driven joint
+    pulses: tuple[tuple[float, float, float], ...] = ()  # centre (s), standard width (s) and amplitude (N m) of each
     seed: int = 0  # of the noise
 
 
@@ -106,16 +106,17 @@ def cases(key: int = 0) -> list[Case]:
         unit = MODEL_1_1[parameter] if name in SCALED_PARAMETERS else 1.0
         cases_of = [(value, {parameter: unit * value}) for value in levels(*ends)]
         listed += [Case(test="model", name=name, value=value, parameters=changed) for value, changed in cases_of]
+
+    def case(test: str, value: float, **fields: Any) -> Case:
+        return Case(test=test, name=test, value=value, **fields)
+
     for test, most in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
         for seed, value in enumerate(np.repeat(levels(0.0, most), REPEATS).tolist()):
-            noise: dict[str, Any] = {test: value}
-            listed.append(Case(test=test, name=test, value=value, seed=seed, **noise))
-    test = "torque_response"
-    listed += [Case(test=test, name=test, value=value, response=value) for value in levels(0.1, 2.0)]
-    listed += [Case(test="delay", name="delay", value=count * STEP, delay=count) for count in range(LEVELS)]
+            listed.append(case(test, value, seed=seed, **{test: value}))
+    listed += [case("torque_response", value, response=value) for value in levels(0.1, 2.0)]
+    listed += [case("delay", count * STEP, delay=count) for count in range(LEVELS)]
     rng = np.random.default_rng([SEED, key])
-    test = "perturbations"
-    return listed + [Case(test=test, name=test, value=float(k), pulses=_pulses(rng)) for k in range(PROFILES)]
+    return listed + [case("perturbations", float(k), pulses=_pulses(rng)) for k in range(PROFILES)]
 
 
 def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
