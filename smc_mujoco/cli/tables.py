@@ -78,12 +78,11 @@ def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
         units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
         shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
-        table = _by_label(", ".join(filter(None, (title, heading))), heads, traces.values())
-        for label, trace in traces.items():
-            numbers = values[label][group.name] if label in values else {}
-            cells = [_score_text(name, numbers[name]) for name in shown.values()] if numbers else [FAILED]
-            table.add_row(_label(label, trace), *cells)
-        tables.append(table)
+        rows = {
+            label: [_score_text(name, its[group.name][name]) for name in shown.values()]
+            for label, its in values.items()
+        }
+        tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
     tables[-1].caption, tables[-1].caption_justify = in_words(gains) or None, "left"
     return tables
@@ -97,12 +96,11 @@ def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
     known = {name for its in values.values() for name in its}
     shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
-    table = _by_label(f"{title}, tip", heads, traces.values())
-    for label, trace in traces.items():
-        its = values.get(label)
-        cells = [number(factor * its.get(name, math.nan)) for name, _, factor in shown.values()] if its else [FAILED]
-        table.add_row(_label(label, trace), *cells)
-    return [table]
+    rows = {
+        label: [number(factor * its.get(name, math.nan)) for name, _, factor in shown.values()]
+        for label, its in values.items()
+    }
+    return [_by_label(f"{title}, tip", heads, traces, rows)]
 
 
 def headings(scenario: Scenario) -> dict[Group, str]:
@@ -136,12 +134,10 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]]]) -> Table:
     """Return a table with a line for every label; each column has a heading, a metric and labelled runs."""
-    traces = [trace for _, _, runs in columns for trace in runs.values()]
-    table = _by_label(title, [Text(head) for head, _, _ in columns], traces, 30)
+    traces = {label: trace for _, _, runs in columns for label, trace in runs.items()}
+    rows = {label: [_cell(metric, runs.get(label)) for _, metric, runs in columns] for label in traces}
+    table = _by_label(title, [Text(head) for head, _, _ in columns], traces, rows, 30)
     table.min_width = len(title)  # a narrower table would break the title
-    first = {label: trace for _, _, runs in reversed(columns) for label, trace in runs.items()}
-    for label in dict.fromkeys(label for _, _, runs in columns for label in runs):
-        table.add_row(_label(label, first[label]), *(_cell(metric, runs.get(label)) for _, metric, runs in columns))
     return table
 
 
@@ -158,17 +154,22 @@ def _score_text(metric: str, value: float) -> str:
     return f"> {MAX_PRINTED_OVERSHOOT}" if large else number(value)
 
 
-def _by_label(title: str, heads: Iterable[Text], traces: Iterable[Trace], width: int = 16) -> Table:
-    """Return an empty table with a column for labels of traces, up to `width` wide, and columns for numbers."""
-    laws = [trace.scenario.law.name for trace in traces]
+def _by_label(
+    title: str,
+    heads: Iterable[Text],
+    traces: Mapping[str, Trace],
+    rows: Mapping[str, Iterable[Text | str]],
+    width: int = 16,
+) -> Table:
+    """Return a table with a row of cells for each labelled run, or "failed"; labels are up to `width` wide."""
+    laws = [trace.scenario.law.name for trace in traces.values()]
     head = "run" if len(set(laws)) == 1 < len(laws) else "law"  # labels of runs of one law say what differs
     label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
-    return titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
-
-
-def _label(label: str, trace: Trace) -> Text:
-    return Text(label, style=style.law_colour(trace.scenario.law.name))
+    table = titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
+    for label, trace in traces.items():
+        table.add_row(Text(label, style.law_colour(trace.scenario.law.name)), *rows.get(label, [FAILED]))
+    return table
 
 
 def trace_summary(trace: Trace) -> list[Table]:

@@ -61,7 +61,7 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
     limits = []
     for name in names:
         (value, unit), golden = response.value(name), known[name]["value"]
-        tolerance = tolerances.get(name, known[name]["tolerance"])
+        tolerance = tolerances[name] if tolerances else known[name]["tolerance"]
         within = value == golden or abs(value - golden) <= tolerance or (math.isnan(value) and math.isnan(golden))
         limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within))
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
