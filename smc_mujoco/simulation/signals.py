@@ -233,11 +233,6 @@ class Push(Signal):
     cartesian = True
     positive = ("width",)
 
-    def __post_init__(self):
-        if not isinstance(self.body, str):
-            raise ScenarioError(f"Push's body is {shown(self.body)}: give the name of a body")
-        super().__post_init__()
-
     def parameters(self) -> dict[str, float]:
         return {name: getattr(self, name) for name in ("x", "y", "z", "time", "width")}
 

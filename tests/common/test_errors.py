@@ -86,7 +86,6 @@ REFUSED = [  # call, what the sentence says
     (lambda: items_of("runs", Silent()), "runs is <Silent>: give a list"),
     (lambda: find("law", "lqrr", dict.fromkeys(LAWS)), "unknown law 'lqrr': did you mean 'lqr'?"),
     (lambda: find("law", 3, dict.fromkeys(LAWS)), "unknown law 3: choose from lqr, super_twisting, terminal"),
-    (lambda: frozen([("a", 1)]), "[('a', 1)] is no mapping: give a dict"),
 ]
 NAMES = {  # what is typed -> what is said of it
     "STA": "did you mean 'super_twisting'?",

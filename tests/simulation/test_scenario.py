@@ -327,7 +327,7 @@ def test_an_error_of_measurement_is_a_known_signal(refused):
 
 
 def test_a_push_is_on_a_body_that_has_a_name(refused):
-    refused(lambda: smc.Push(3))
+    refused(lambda: scenario(disturbance=smc.Push(3)))
 
 
 def test_a_mismatch_that_is_no_mapping_is_refused(refused):
