@@ -20,20 +20,19 @@ def super_twisting_margins(gains):
 
 def behind(runs, law, lag, **changes):
     """Return the scenario of a law behind two lags, long enough for its cycle."""
-    (plant,) = runs.plants
     fields = {"duration": 2.0 + 60.0 * lag, "control_period": lag / SAMPLES_PER_ATC}
-    return runs.scenario(plant, law.name, law=law, actuator=(smc.Lag(lag), smc.Lag(lag)), **(fields | changes))
+    return runs.scenario(runs.plant, law.name, law=law, actuator=(smc.Lag(lag), smc.Lag(lag)), **(fields | changes))
 
 
 def super_twisting(runs, slope):
     """Return super-twisting with the gains of |d'| <= 1, scaled to |d'| <= slope."""
-    gains = runs.law(runs.plants[0], "super_twisting").gains
-    return runs.law(runs.plants[0], "super_twisting", k1=gains["k1"] * math.sqrt(slope), k2=gains["k2"] * slope)
+    gains = runs.law(runs.plant, "super_twisting").gains
+    return runs.law(runs.plant, "super_twisting", k1=gains["k1"] * math.sqrt(slope), k2=gains["k2"] * slope)
 
 
 def relay(runs, bound):
     """Return the classical law for |d| <= bound."""
-    return runs.law(runs.plants[0], "classical", k=RELAY_GAIN_RATIO * bound)
+    return runs.law(runs.plant, "classical", k=RELAY_GAIN_RATIO * bound)
 
 
 def predicted(k1, k2, lag):
@@ -55,13 +54,13 @@ def compared(runs, law, expected):
 
 def relay_cycle(runs):
     """Amplitude and frequency of s at ATCs of 1 to 10 ms, over 2 M mu / pi and 1 / (2 pi mu)."""
-    law = runs.law(runs.plants[0], "classical")
+    law = runs.law(runs.plant, "classical")
     return compared(runs, law, lambda lag: (2.0 * law.gains["k"] * lag / math.pi, 1.0 / (math.tau * lag)))
 
 
 def twisting_cycle(runs):
     """Amplitude and frequency of s at ATCs of 1 to 10 ms, over the prediction."""
-    law = runs.law(runs.plants[0], "super_twisting")
+    law = runs.law(runs.plant, "super_twisting")
     return compared(runs, law, lambda lag: predicted(law.gains["k1"], law.gains["k2"], lag))
 
 
@@ -73,38 +72,34 @@ def size_and_power(trace):
     return float(np.ptp(s)) / 2.0, float(np.mean((np.diff(s) / trace.scenario.control_period) ** 2))
 
 
+def ratios(runs, which, cases):
+    """Return size and power under one law over those under another; cases: name -> both laws, a lag and changes."""
+    grid = [behind(runs, law, lag, **changes) for laws, lag, changes in cases.values() for law in laws]
+    measured = [size_and_power(trace) for trace in runs.traces(grid)]
+    sizes, powers = np.divide(measured[::2], measured[1::2]).T
+    by_measure = {"amplitude": sizes, "power": powers}
+    return {f"{what}, {which}": dict(zip(cases, shares, strict=True)) for what, shares in by_measure.items()}
+
+
 def some_disturbance(runs):
     """Half the range of s, and the mean square of s', under d = D sin(omega t) with omega = 1 / (2 ATC).
 
     STA has the gains for L = D omega, as its theory asks for; bounds D of 0.5 and 2, ATCs of 1 and 10 ms.
     """
-    lags, scenarios = runs.values["lags"][QUICK_LAG if runs.quick else 0 :], []
-    cases = [(bound, lag) for bound in runs.values["bounds"] for lag in lags]
-    for bound, lag in cases:
-        omega = runs.values["pace"] / lag
-        for law in (relay(runs, bound), super_twisting(runs, bound * omega)):
-            scenarios.append(behind(runs, law, lag, disturbance=smc.Sine(bound, omega)))
-    measured = [size_and_power(trace) for trace in runs.traces(scenarios)]
-    names = [f"|d| <= {bound:g} N, {1e3 * lag:g} ms" for bound, lag in cases]
-    ratios = np.divide(measured[::2], measured[1::2])
-    return {
-        "amplitude, FOSMC / STA": dict(zip(names, ratios[:, 0], strict=True)),
-        "power, FOSMC / STA": dict(zip(names, ratios[:, 1], strict=True)),
-    }
+    cases = {}
+    for bound in runs.values["bounds"]:
+        for lag in runs.values["lags"][QUICK_LAG if runs.quick else 0 :]:
+            omega = runs.values["pace"] / lag
+            laws, d = (relay(runs, bound), super_twisting(runs, bound * omega)), smc.Sine(bound, omega)
+            cases[f"|d| <= {bound:g} N, {1e3 * lag:g} ms"] = laws, lag, {"disturbance": d}
+    return ratios(runs, "FOSMC / STA", cases)
 
 
 def small_lags(runs):
     """Half the range of s, and the mean square of s', under d = sin t, L = 1, at ATCs of 1 to 10 ms."""
     bound, lags = runs.values["bound"], runs.values["lags"][QUICK_LAG if runs.quick else 0 :]
-    d = smc.Sine(bound, 1.0)
-    laws = (super_twisting(runs, bound), relay(runs, bound))
-    scenarios = [behind(runs, law, lag, disturbance=d, duration=8.0) for lag in lags for law in laws]
-    ratios = np.reshape([size_and_power(trace) for trace in runs.traces(scenarios)], (len(lags), 2, 2))
-    names = [f"{1e3 * lag:g} ms" for lag in lags]
-    return {
-        "amplitude, STA / FOSMC": dict(zip(names, ratios[:, 0, 0] / ratios[:, 1, 0], strict=True)),
-        "power, STA / FOSMC": dict(zip(names, ratios[:, 0, 1] / ratios[:, 1, 1], strict=True)),
-    }
+    laws, changes = (super_twisting(runs, bound), relay(runs, bound)), {"disturbance": smc.Sine(bound, 1.0)}
+    return ratios(runs, "STA / FOSMC", {f"{1e3 * lag:g} ms": (laws, lag, changes | {"duration": 8.0}) for lag in lags})
 
 
 def crossover(runs):
@@ -126,7 +121,7 @@ def redesigned(runs):
     """Amplitude of s at k1 = sqrt(16 k2 / pi) / c, and at half and twice of that, at an ATC of 5 ms."""
     k2 = runs.values["k2"]
     best = math.sqrt(16.0 * k2 / math.pi) / FIRST_HARMONIC
-    laws = [runs.law(runs.plants[0], "super_twisting", k1=factor * best, k2=k2) for factor in (1.0, 0.5, 2.0)]
+    laws = [runs.law(runs.plant, "super_twisting", k1=factor * best, k2=k2) for factor in (1.0, 0.5, 2.0)]
     scenarios = [behind(runs, law, runs.values["lag"]) for law in laws]
     as_designed, half, twice = (cycle(trace)[0] for trace in runs.traces(scenarios))
     return {
