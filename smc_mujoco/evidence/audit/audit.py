@@ -107,7 +107,7 @@ def audit(
     used: dict[str, dict[str, dict[str, Used]]] = {entry.id: {} for entry in entries}
     late_last = sorted(entries, key=lambda entry: entry.late)
     for k, name in enumerate(names):
-        runs = Runs(audited, name, quick, None, threads, rows, shared)
+        runs = Runs(audited, name, quick, {}, threads, rows, shared)
         for done, entry in enumerate(late_last, 1 + k * len(entries)):
             its_runs = runs.of(entry)
             evidence[entry.id][name] = measure(entry, its_runs)

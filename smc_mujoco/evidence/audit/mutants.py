@@ -48,9 +48,9 @@ def survivors(
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
         """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
         shared: dict[str, Result] = {}
-        replaced = {law: functools.partial(variant, name=MUTANTS[mutant])} if mutant else None
+        replaced = {law: functools.partial(variant, name=MUTANTS[mutant])} if mutant else {}
         for name in names:
-            runs = Runs(audited, name, quick, replaced, threads, None, shared)
+            runs = Runs(audited, name, quick, replaced, threads, {}, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):
                 try:
                     yield entry.id, name, measure(entry, runs.of(entry))

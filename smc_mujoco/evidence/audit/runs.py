@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import from_json
+from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.component import Component
 from smc_mujoco.evidence.audit.paper import Entry, Paper
 from smc_mujoco.evidence.audit.verdict import Check, Threshold, check
@@ -63,48 +64,41 @@ class Used(NamedTuple):
     trace: str = ""
 
 
+@dataclasses.dataclass(eq=False)
 class Runs:
     """Runs of a paper under one set of gains, made when they are needed and kept by their scenario's key."""
 
-    def __init__(
-        self,
-        paper: Paper,
-        gains: str,
-        quick: bool = False,
-        substitute: Substitute | None = None,
-        threads: int | None = None,
-        table: dict[str, Result] | None = None,
-        shared: dict[str, Result] | None = None,
-    ):
-        self.paper, self.gains, self.threads = paper, gains, threads
-        self.quick = quick  # whether a claim measures less: coarser grids, shorter runs
-        self.used: dict[str, Used] = {}  # key -> run that the claim has used
-        self.checked: set[str] = set()  # measures whose thresholds the claim's function has asked for, see `check`
-        self.plants: tuple[str, ...] = ()  # names of the claim's plants
-        self.laws: tuple[str, ...] = ()  # names of the claim's laws
-        self.conditions: tuple[str, ...] = ("nominal",)  # names of the claim's conditions
-        self.values: Mapping[str, Any] = {}  # the claim's numbers, such as the levels of a sweep
-        self.thresholds: dict[str, Threshold] = {}  # of the claim, by measure
-        self._fields: Mapping[str, Any] = {}  # of the claim's scenarios
-        self._searched: dict[str, dict[str, float]] = {}  # law -> gains in place of the set's
-        self._substitute = substitute or {}
-        self._table = table or {}
-        self._known = ChainMap({} if shared is None else shared, self._table)  # shared with the Runs of other sets
-        self._used: dict[str, Result] = {}
+    paper: Paper
+    gains: str
+    quick: bool = False  # whether a claim measures less: coarser grids, shorter runs
+    substitute: Substitute = dataclasses.field(default_factory=dict)
+    threads: int | None = None
+    table: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run that is not made again
+    shared: dict[str, Result] = dataclasses.field(default_factory=dict)  # with the Runs of other sets
+    used: dict[str, Used] = dataclasses.field(default_factory=dict)  # key -> run that the claim has used
+    checked: set[str] = dataclasses.field(default_factory=set)  # measures whose thresholds the claim has asked for
+    scored: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run whose scores any claim has used
+    plants: tuple[str, ...] = ()  # names of the claim's plants, as laws and conditions
+    laws: tuple[str, ...] = ()
+    conditions: tuple[str, ...] = ("nominal",)
+    values: Mapping[str, Any] = frozen({})  # the claim's numbers, such as the levels of a sweep
+    thresholds: Mapping[str, Threshold] = frozen({})  # of the claim, by measure
+    fields: Mapping[str, Any] = frozen({})  # of the claim's scenarios
+    searched: Mapping[str, Mapping[str, float]] = frozen({})  # law -> gains in place of the set's
 
     def of(self, entry: Entry) -> "Runs":
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
         runs.used, runs.checked = {}, set()
         runs.plants, runs.laws, runs.conditions = entry.plants, entry.laws, entry.conditions or ("nominal",)
-        runs.values, runs._fields = entry.values, entry.fields
+        runs.values, runs.fields = entry.values, entry.fields
         runs.thresholds = {threshold.measure: threshold for threshold in entry.thresholds}
         return runs
 
     def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
         """Return the claim's runs with some gains of a law in place of the set's; they count as used by the claim."""
         runs = copy.copy(self)
-        runs._searched, runs.quick = {law: dict(gains)}, quick
+        runs.searched, runs.quick = {law: dict(gains)}, quick
         return runs
 
     def on(self, plant: str) -> "Runs":
@@ -131,14 +125,14 @@ class Runs:
     def law(self, plant: str, name: str, **gains: float) -> Component:
         """Return a law, or its mutant in this audit, with the set's gains for a plant and some of them changed."""
         law = self.paper.law(plant, name, self.gains)
-        gains = {**self._searched.get(name, {}), **gains}
+        gains = {**self.searched.get(name, {}), **gains}
         for gain in gains:
             find(f"gain of {name}", gain, law.gains)
         return self.mutated(dataclasses.replace(law, gains={**law.gains, **gains}))
 
     def mutated(self, law: Component) -> Component:
         """Return the law, or its mutant in this audit under the law's name, by which a claim may look for its run."""
-        mutant = self._substitute.get(law.name)
+        mutant = self.substitute.get(law.name)
         return dataclasses.replace(mutant(law), name=law.name) if mutant else law
 
     def scenario(
@@ -149,7 +143,7 @@ class Runs:
         The fields are the paper's, the condition's, the claim's and then the changes. A change of `plant` may have
         other parameters or another size; the gains stay those of the named plant.
         """
-        paper, its = self.paper, self._fields
+        paper, its = self.paper, self.fields
         machine = paper.plant(plant)
         duration = {"duration": DURATION, **paper.fields, **its, **changes}["duration"]
         fields: dict[str, Any] = {"plant": machine, **paper.fields}
@@ -170,17 +164,17 @@ class Runs:
 
     def scores(self, scenarios: Iterable[Scenario]) -> list[Scores]:
         """Return every metric of every scenario, in order; a run that fails has inf in every metric."""
-        wanted = self._keyed(scenarios)
-        new = {name: scenario for name, scenario in wanted if name not in self._known}
+        wanted, known = self._keyed(scenarios), ChainMap(self.shared, self.table)
+        new = {name: scenario for name, scenario in wanted if name not in known}
         names = list(new)
         for index, trace in stream(list(new.values()), self.threads):
             law = trace.scenario.law
-            self._known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
+            known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
         for name, scenario in wanted:
-            self._used[name] = result = self._known[name]
+            self.scored[name] = result = known[name]
             text = ",".join(f"{metric}={float(value).hex()}" for metric, value in sorted(result.scores.items()))
             self.used[name] = self.used.get(name, Used(scenario))._replace(scores=_hash(text.encode()))
-        return [self._known[name].scores for name, _ in wanted]
+        return [known[name].scores for name, _ in wanted]
 
     def score(self, plant: str, law_name: str, condition: str = "nominal") -> Scores:
         """Return every metric of one run."""
@@ -210,7 +204,7 @@ class Runs:
 
     def results(self) -> Iterator[Result]:
         """Yield every run of the audit whose scores were used, and every run of the table."""
-        yield from (self._used | self._table).values()
+        yield from (self.scored | self.table).values()
 
 
 def of_table(table: "Table") -> dict[str, Result]:
