@@ -8,10 +8,11 @@ nothing of the law. `controller.c` computes, like the callback,
 """
 
 import dataclasses
+import functools
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.control.component import Component
@@ -78,18 +79,20 @@ class Controller:
         parts = {"law": self.law, "surface": self.surface, "estimator": self.estimator}
         return {kind: part for kind, part in parts.items() if part is not None}
 
+    @functools.cached_property
     def code(self) -> dict[str, tuple[int, str]]:
-        """Return kind -> number of memory slots, and C code, of each component."""
+        """Kind -> number of memory slots, and C code, of each component."""
         return {kind: export.translated(part) for kind, part in self.parts.items()}
 
 
-def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> list[Variable]:
-    """Return the variables in the order of their value references. `code` is `controller.code()`."""
-    wanted = inputs(controller, code)
+def variables(controller: Controller) -> list[Variable]:
+    """Return the variables in the order of their value references."""
+    wanted = inputs(controller)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in INPUTS.items():
-        if name in wanted:  # laws divide by g
-            listed.append(Variable(name, "SMC_INPUT", words, unit, float(name in ("g", "gq"))))
+        if name in wanted:
+            start = float(name in ("g", "gq"))  # laws divide by these two
+            listed.append(Variable(name, "SMC_INPUT", words, unit, start))
     listed.append(Variable("u", "SMC_COMPUTED", "command, within u_max", FORCE))
     listed.append(Variable("s", "SMC_COMPUTED", "sliding variable"))
     if controller.surface:
@@ -101,17 +104,17 @@ def variables(controller: Controller, code: Mapping[str, tuple[int, str]]) -> li
     for kind, part in controller.parts.items():
         listed += [parameter(kind, part, name, value) for name, value in part.gains.items()]
     listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period))
-    for kind, (slots, _) in code.items():
+    for kind, (slots, _) in controller.code.items():
         words = f"of the memory of the {kind}"
         listed += [Variable(f"{kind}.memory[{k}]", "SMC_STATE", f"number {k} {words}") for k in range(1, slots + 1)]
     return listed
 
 
-def inputs(controller: Controller, code: Mapping[str, tuple[int, str]]) -> set[str]:
+def inputs(controller: Controller) -> set[str]:
     """Return the names of the inputs that the components read."""
-    reached = code.values() if controller.modelled else [(n, UNREACHED.sub(r"\1", text)) for n, text in code.values()]
-    read, wanted = reads(reached), {*REQUIRED_INPUTS}
-    if controller.estimator is None or "v" in reads([code["estimator"]]):
+    texts = [text if controller.modelled else UNREACHED.sub(r"\1", text) for _, text in controller.code.values()]
+    read, wanted = reads("".join(texts)), {*REQUIRED_INPUTS}
+    if controller.estimator is None or "v" in reads(controller.code["estimator"][1]):
         wanted.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
         wanted.add("ddr")
@@ -120,9 +123,9 @@ def inputs(controller: Controller, code: Mapping[str, tuple[int, str]]) -> set[s
     return wanted | (read & {"q", "dq"})
 
 
-def reads(code: Iterable[tuple[int, str]]) -> set[str]:
+def reads(code: str) -> set[str]:
     """Return the fields of the measurement that some functions read."""
-    return {name for _, text in code for name in re.findall(r"->(\w+)", text)}  # a function may call it other than y
+    return set(re.findall(r"->(\w+)", code))  # a function may call the measurement other than y
 
 
 def parameter(kind: str, part: Component, name: str, value: float) -> Variable:
@@ -202,9 +205,9 @@ int smc_controller(double *value, double t)
 """
 
 
-def body(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterator[str]:
+def body(controller: Controller) -> Iterator[str]:
     """Yield the statements of smc_controller, without indentation."""
-    wanted = inputs(controller, code)
+    wanted = inputs(controller)
 
     def value(name: str, absent: str = "0.0") -> str:
         return absent if name in INPUTS and name not in wanted else f"value[{place(name)}]"
@@ -214,7 +217,7 @@ def body(controller: Controller, code: Mapping[str, tuple[int, str]]) -> Iterato
         yield from (f"    number({value(f'{kind}.{plain(name)}')})," for name in part.gains)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
-        first = f"&{value(f'{kind}.memory[1]')}" if code[kind][0] else "NULL"
+        first = f"&{value(f'{kind}.memory[1]')}" if controller.code[kind][0] else "NULL"
         yield f"double *{kind}_memory = {first};"
     yield "smc_measurement y = {0};"
     yield "double out[2];"

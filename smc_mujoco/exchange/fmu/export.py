@@ -135,13 +135,11 @@ def _controller(law: Any, surface: Any, velocity: Any, control_period: Any, u_ma
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
     """Return path in the archive -> text, for all files but the binary."""
-    code = controller.code()
-    listed = inside.variables(controller, code)
-    body = inside.body(controller, code)
-    files = {"controller.c": inside.source(listed, body)}
-    law = with_head(controller.law, "double", *code["law"], 0, measured=False)
+    listed = inside.variables(controller)
+    law = with_head(controller.law, "double", *controller.code["law"], 0, measured=False)
+    files = {"controller.c": inside.source(listed, inside.body(controller))}
     files["law.c"] = f'#include "controller.h"\n{law}'
-    for kind, (slots, text) in code.items():
+    for kind, (slots, text) in controller.code.items():
         if kind != "law":
             files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
     files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8"), **files}
