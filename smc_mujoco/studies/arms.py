@@ -9,6 +9,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -133,25 +134,19 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         every seed at the wall, in front of which the tip must begin.
       payload: kg that the arm carries from the start, unknown to the law.
     """
-    panda = arm()
-    references: dict[str, Callable[[], tuple[Waypoints, ...]]] = {
-        "sway": sway,
-        "blow": sway,
-        "payload": pick_and_place,
-        "wall": wall_path,
-        "behind": lambda: wall_path(PATH_BEHIND),
+    panda, push = arm(), Push("link5", y=400.0, time=BLOW, width=0.02)
+    tasks: dict[str, tuple[Callable[[], tuple[Waypoints, ...]], dict[str, Any]]] = {
+        "sway": (sway, {"duration": 3.5}),
+        "blow": (sway, {"duration": 3.5, "disturbance": push}),
+        "payload": (pick_and_place, {"duration": 4.2, "jump": Jump(1.0, {"payload": 2.0})}),
+        "wall": (wall_path, {"duration": 3.8, "contact": "wall"}),
+        "behind": (lambda: wall_path(PATH_BEHIND), {"duration": 3.8, "contact": "wall"}),
     }
-    wanted = find("task of the arm", task, references)()
+    references, fields = find("task of the arm", task, tasks)
+    wanted = references()
     start = np.array([signal.values[0] for signal in (wall_path() if task == "behind" else wanted)])
     if seed and task not in ("wall", "behind"):
         start = start + np.random.default_rng(seed).uniform(-SPREAD, SPREAD, panda.n)
-    fields = {
-        "sway": {"duration": 3.5},
-        "blow": {"duration": 3.5, "disturbance": Push("link5", y=400.0, time=BLOW, width=0.02)},
-        "payload": {"duration": 4.2, "jump": Jump(1.0, {"payload": 2.0})},
-        "wall": {"duration": 3.8, "contact": "wall"},
-        "behind": {"duration": 3.8, "contact": "wall"},
-    }[task]
     return Scenario(
         plant=panda,
         law=law,
