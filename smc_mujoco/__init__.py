@@ -55,17 +55,13 @@ __all__ = [*_ORIGINS, "arms", "boards", "paper"]  # noqa: PLE0604  # pyright: ig
 
 
 def __getattr__(name: str) -> object:
+    """Return a public function, class or module."""
     if name not in _ORIGINS and name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = _load(name)
-    return value
-
-
-def _load(name: str) -> object:
-    """Return a public function, class or module."""
     with delay_ctrl_c():
         value = annexes.module(_MODULES.get(name) or _ORIGINS[name], f"smc.{name}")
-        return value if name in _MODULES else getattr(value, name)
+    globals()[name] = value if name in _MODULES else getattr(value, name)
+    return globals()[name]
 
 
 def __dir__() -> list[str]:

@@ -278,9 +278,8 @@ def public(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.ClassDef]:
 
 
 def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> bool:
-    """A catalogue's file explains itself at its top; overloads and a signal's formula are explained by their class."""
-    decorators = {ast.unparse(decorator) for decorator in node.decorator_list}
-    if path.parent.name in CATALOGUES or "overload" in decorators:
+    """A catalogue's file explains itself at its top; a class its protocol's methods, overloads, a signal's formula."""
+    if path.parent.name in CATALOGUES or ast.unparse(node.body[0]) == "...":
         return True
     return node.name in ("value", "bounds", "parameters", "edit", "fields", "structure")  # of a signal, of a part
 

@@ -48,15 +48,10 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         max_episode_steps: int | None = None,
         render_mode: None = None,
     ):
-        """Plant, task and changes are those of `episode.Setting`.
+        """Make copies of a plant with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`.
 
-        Args:
-          threads: None for one per available core.
-          max_episode_steps: control samples after which an episode is truncated, if the duration is not shorter.
-          render_mode: None, because copies are not rendered.
-
-        Raises:
-          ScenarioError: what `episode.Setting` raises, or another value of these.
+        `threads`: None for one per available core. `max_episode_steps`: control samples after which an episode is
+        truncated, if the duration is not shorter. `render_mode`: None, because copies are not rendered.
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")

@@ -32,16 +32,11 @@ class StepResponse:
     pole on a cart: `r.scores["free"]["ultimate_bound"]`. In `check` that metric is named "free ultimate_bound".
 
     A failed run has no metrics: reading one raises a ScenarioError that says when and why the run failed.
-
-    Attributes:
-      trace: the Trace of the run.
-      step: height of the step, rad or m.
-      condition: the condition and the scenario fields that the test gave, as text; "" for the nominal condition alone.
     """
 
     trace: Trace
-    step: float
-    condition: str = ""
+    step: float  # height, rad or m
+    condition: str = ""  # with the scenario fields that the test gave; "" for the nominal condition alone
 
     @property
     def scenario(self) -> Scenario:
@@ -126,12 +121,7 @@ class StepResponse:
     def check(self, **limits: float | tuple[float, float]) -> None:
         """Assert several limits on metrics: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
 
-        Args:
-          limits: metric -> highest value, or (lowest, highest) value, in the metric's unit.
-
-        Raises:
-          AssertionError: a limit is violated, or the run failed; the message has a table of all limits.
-          ScenarioError: an unknown metric, or a limit that is neither a number nor a pair.
+        A limit is the highest value, or (lowest, highest), in the metric's unit. The AssertionError has a table of all.
         """
         __tracebackhide__ = True
         if not limits:
