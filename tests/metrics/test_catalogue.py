@@ -405,6 +405,8 @@ def test_a_sliding_block_sticks_from_the_time_at_which_coulomb_friction_has_stop
 def test_a_stuck_joint_may_creep_and_bristles_may_bend():
     t = clock(10, 1e-2)
     assert m.stick_time(run(t, v=1e-7, reaction=1.0)) == pytest.approx(10.0)  # it never moved: |v| <= 1e-5
+    assert m.stick_time(run(t, v=0.9e-5, reaction=1.0)) == pytest.approx(10.0)
+    assert m.stick_time(run(t, v=1.1e-5, reaction=1.0)) == 0.0
     v = np.where(t < 2, 1.0, 1e-3)  # a hundredth of a millimetre in a hundredth of a second is rest after 1 m/s
     assert m.stick_time(run(t, v=v, reaction=1.0)) == pytest.approx(8.0)
     assert m.stick_time(run(t, v=1.01 * v, reaction=1.0)) == pytest.approx(8.0)  # relative to the run's largest
@@ -434,6 +436,14 @@ def test_peak_reaction_is_the_largest_of_either_sign_and_any_channel():
     assert m.peak_reaction(run(t)) == 0.0
 
 
+def test_the_sample_at_which_a_part_begins_belongs_to_it():
+    """Also where rounding puts it a little before."""
+    t = 0.007 * np.arange(21)
+    at = np.eye(21)
+    assert [m.rms_error(run(t, at[k])) for k in (4, 5)] == [0.0, 0.25]
+    assert [m.ultimate_bound(run(t, at[k])) for k in (15, 16)] == [0.0, 1.0]
+
+
 @pytest.mark.parametrize("frequency", [1.0, 2.5, 20.0])
 def test_a_limit_cycle_reverses_twice_a_period(frequency):
     t = clock(10, 1e-3)
@@ -454,12 +464,14 @@ def test_small_teeth_on_a_cycle_are_no_reversals_and_large_ones_are():
 def test_a_way_back_that_ends_the_run_is_a_reversal():
     assert turns(np.array([0.0, 1.0, 0.5, 0.2]), 0.0) == 1
     assert turns(np.array([0.0, 0.3, 1.0]), 0.0) == 0
+    assert turns(np.array([0.0, 1.0, 0.5, 1.0]), 0.0) == 2  # by half of its range
 
 
 def test_what_creeps_or_decays_does_not_hunt():
     t = clock(10, 1e-3)
-    for x in (np.exp(-t), 1e-7 * np.sin(20 * t) + (t < 1), 0.2 + 0.01 * t, np.ones(t.size)):
+    for x in (np.exp(-t), 0.45e-6 * np.sin(20 * t) + (t < 1), 0.2 + 0.01 * t, np.ones(t.size)):
         assert m.reversal_rate(run(t, x)) == 0.0
+    assert m.reversal_rate(run(t, 0.55e-6 * np.sin(20 * t) + (t < 1))) > 5.0  # its ripple is above 1e-6 of the scale
 
 
 def test_reversals_are_those_of_the_channel_that_hunts_fastest():

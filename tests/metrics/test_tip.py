@@ -164,6 +164,8 @@ def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
     scores = smc.tip_scores(pressed)
     assert abs(scores["force_error"]) < 1.0
     assert scores["mean_force"] == pytest.approx(20.0 * (1.0 + scores["force_error"] / 100.0))
+    late = tip.contacts(pressed).force[pressed.t >= 0.2 * pressed.t[-1]]
+    assert scores["mean_force"] == pytest.approx(late.mean(), rel=1e-12)
     assert scores["touching"] == 100.0
     assert 0.0 < scores["depth"] < 1e-3
     assert scores["max_error"] < 2e-3
