@@ -204,7 +204,8 @@ class Rig:
         if duration is not None:
             shortest = round(records.MIN_SAMPLES * period, 9)
             last = min(last, first + round(number("duration", duration, low=shortest) / period))
-        self.long_enough(data, last - first >= records.MIN_SAMPLES, "repeat", first + records.MIN_SAMPLES + 1)
+        if last - first < records.MIN_SAMPLES:
+            raise self._too_short(data, "repeat", first + records.MIN_SAMPLES + 1)
         times = (period * np.arange(last + 1 - first)).tolist()
 
         def signal(values: np.ndarray) -> TimeSeries:
@@ -223,14 +224,13 @@ class Rig:
         zero = self.zero(Values(**self.values), data) if self.zero else {}
         return Part(fields=fields, state=state, largest_u=largest, zero=zero)
 
-    def long_enough(self, data: Record, enough: bool, what: str, samples: int) -> None:
-        """Refuse a record that is too short to repeat or to score."""
-        if not enough:
-            period, count = self.step(data), len(data[self.columns.time])
-            raise ScenarioError(
-                f"the record of {self.name} lasts {count * period:.3g} s, too short to {what} it: give at least "
-                f"{samples * period:.3g} s"
-            )
+    def _too_short(self, data: Record, what: str, samples: int) -> ScenarioError:
+        """Return the error for a record of fewer samples than it takes to repeat or to score it."""
+        period, count = self.step(data), len(data[self.columns.time])
+        return ScenarioError(
+            f"the record of {self.name} lasts {count * period:.3g} s, too short to {what} it: give at least "
+            f"{samples * period:.3g} s"
+        )
 
     def repeated(self, part: Part, rounded: bool = False, state: np.ndarray | None = None, **changes: Any) -> Scenario:
         """Return the scenario that repeats a part of a record.
@@ -396,8 +396,8 @@ class Rig:
         for columns, trace in zip(data, traces, strict=True):
             period = trace.scenario.control_period
             first, after = round(self.score_from / period), round((self.score_from - self.start) / period)
-            enough = len(trace.t) >= after + records.MIN_SAMPLES
-            self.long_enough(columns, enough, "score", first + records.MIN_SAMPLES)
+            if len(trace.t) < after + records.MIN_SAMPLES:
+                raise self._too_short(columns, "score", first + records.MIN_SAMPLES)
             predicted = {name: values[after:] for name, values in self.predicted(trace).items()}
             parts = {name: columns[name][first : first + len(values)] for name, values in predicted.items()}
             replayed.append((predicted, parts, columns[names.time][first : first + len(trace.t) - after]))

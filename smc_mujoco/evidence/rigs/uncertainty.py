@@ -136,7 +136,7 @@ def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
     calm = [rig.repeated(part, state=state) for part, state in known]
     noise = [records.noise(rig.checked(replays.data[piece.record]), rig.columns) for piece in pieces]
     noisy = [
-        dataclasses.replace(rig.repeated(part, True, state), noise=Noise(noise[k]), seed=repeat)
+        dataclasses.replace(rig.repeated(part, rounded=True, state=state), noise=Noise(noise[k]), seed=repeat)
         for repeat in range(REPEATS)
         for k, (part, state) in enumerate(known)
     ]
