@@ -75,11 +75,6 @@ def leaders(by_cell: Cells, plant: str, condition: str, metric: str) -> list[str
     return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
 
 
-def winner(by_cell: Cells, plant: str, condition: str, metric: str) -> str | None:
-    """Return the law that wins, as on a board, if there is one."""
-    return next((score.law for score in by_cell.get((plant, condition, metric), ()) if score.wins), None)
-
-
 def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
     """Return whether a law settles in the median of a cell; True where that was not measured."""
     return all(s.median < math.inf for s in by_cell.get((plant, condition, "settling_time"), ()) if s.law == law)
@@ -87,8 +82,8 @@ def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
 
 def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     """Return how many comparisons have no winner, and how many comparisons there are."""
-    winners = [winner(by_cell, *key) for key in by_cell if key[2] in metrics]
-    return winners.count(None), len(winners)
+    won = [any(score.wins for score in scores) for key, scores in by_cell.items() if key[2] in metrics]
+    return won.count(False), len(won)
 
 
 def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
@@ -172,7 +167,7 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return whether there is one best law."""
     by_cell = {key: scores for key, scores in cells(findings.scores).items() if key[2] in metrics}
     best = Counter(law for key in by_cell for law in leaders(by_cell, *key))
-    wins = Counter(winner(by_cell, *key) for key in by_cell)
+    wins = Counter(score.law for scores in by_cell.values() for score in scores if score.wins)
     if winners := [law for law in findings.laws if by_cell and wins[law] == len(by_cell)]:
         return f"{words.law(winners[0])} wins in every respect compared here, on every plant in every condition."
     if unbeaten := [law for law in sorted(findings.laws) if by_cell and best[law] == len(by_cell)]:
