@@ -184,11 +184,10 @@ def sure(findings: "Findings", metrics: Sequence[str]) -> str:
     compared = len({(s.plant, s.condition) for s in findings.scores})
     repeated = len({(s.plant, s.condition) for s in findings.scores if s.runs < s.seeds})
     samples = list(dict.fromkeys(s.sample for s in findings.scores if s.runs == s.seeds)) or ["distinct runs only"]
-    return (
-        f"In {open} of {of} comparisons no single winner can be declared; each has {samples[0]}, and the tests of a "
-        f"metric are corrected for all {compared} cells."
-        + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
-        * bool(repeated)
+    text = f"In {open} of {of} comparisons no single winner can be declared; each has {samples[0]}, and the tests of a "
+    text += f"metric are corrected for all {compared} cells."
+    return text + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once." * bool(
+        repeated
     )
 
 
@@ -198,7 +197,5 @@ def orders(table: AccuracyTable) -> Iterator[str]:
         promised = [row.s for row in rows if row.s.theory is not None]
         kept = sum(order.as_promised for order in promised)
         plant, _, condition = title.partition(", ")
-        yield (
-            f"{words.plant(plant)}, {condition}: the order of s is within {ORDER_BAND:g} of theory’s for {kept} of "
-            f"{len(promised)} laws."
-        )
+        of = f"{kept} of {len(promised)} laws"
+        yield f"{words.plant(plant)}, {condition}: the order of s is within {ORDER_BAND:g} of theory’s for {of}."
