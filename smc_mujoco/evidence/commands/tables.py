@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from statistics import median_low
 
-from rich import box
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Column, Table
@@ -76,15 +75,8 @@ def _claims_overview(claims: Sequence[Claim]) -> Table:
     sets = list(claims[0].verdicts) if claims else []
     shown = sets if len(sets) > 1 else []
     words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains" if sets else "claim"
-    table = Table(
-        Column("id", justify="right", style="cyan"),
-        *(Column(name, justify="center") for name in shown),
-        Column(words),
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-        pad_edge=False,
-    )
+    columns = [Column("id", justify="right", style="cyan"), *(Column(name, justify="center") for name in shown), words]
+    table = titled("", *columns, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
     for claim in claims:
         marks = [MARKS[claim.verdicts[name]] for name in shown]
         verdict = f"{claim.verdict}{', flips' * claim.flips}", COLOURS[claim.verdict]
