@@ -150,10 +150,8 @@ class Catalogue(Mapping[str, T_co]):
             return default
 
     def __or__(self, other: Mapping[str, U]) -> "Catalogue[T_co | U]":
-        """Return the entries of both. Those of a plain mapping replace entries of the same name."""
-        if not isinstance(other, Catalogue):
-            left = {name: entries for name, entries in self.added.items() if name not in other}
-            return Catalogue({**self.own, **other}, left)
+        """Return the entries of both. The library's own of `other` replace those of the same name."""
+        other = other if isinstance(other, Catalogue) else Catalogue(other)
         names = {*self.added, *other.added}
         both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
         return Catalogue({**self.own, **other.own}, both)

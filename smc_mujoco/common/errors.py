@@ -60,15 +60,9 @@ def _brief(value: object) -> str:
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
     """Return the error for a name that is not in `known`. It suggests the nearest name, or lists all."""
     names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))  # claims have numbers
-    near = _nearest(name, names) if isinstance(name, str) else []
-    listed = one_line(", ".join(names), MAX_LISTED)
-    hint = (
-        f"did you mean {' or '.join(map(repr, near))}?"
-        if near
-        else f"choose from {listed}"
-        if names
-        else "there are none"
-    )
+    hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}" if names else "there are none"
+    if near := _nearest(name, names) if isinstance(name, str) else []:
+        hint = f"did you mean {' or '.join(map(repr, near))}?"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
 

@@ -33,12 +33,10 @@ def table(
     """Return a table: caption above, note below, the columns `numbers` aligned to the right."""
     width = len(headings or rows[0]) if headings or rows else 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
-    parts = [
-        '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">',
-        f'<caption style="caption-side:top;text-align:left;color:inherit;padding:2px 10px">{strong(caption)}</caption>'
-        if caption
-        else "",
-    ]
+    parts = ['<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">']
+    if caption:
+        style = "caption-side:top;text-align:left;color:inherit;padding:2px 10px"
+        parts.append(f'<caption style="{style}">{strong(caption)}</caption>')
     if headings:
         cells = _cells("th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;")
         parts.append(f"<thead><tr>{cells}</tr></thead>")

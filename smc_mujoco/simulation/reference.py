@@ -48,13 +48,9 @@ class Failure(Exception):
     """Why a run ended early."""
 
 
-def run(scenario: Scenario) -> Trace:
-    """Return the trace of a scenario, simulated in the reference loop."""
-    return simulate(scenario, models.mechanism(scenario))
-
-
-def simulate(scenario: Scenario, mechanism: models.Mechanism) -> Trace:
-    """Return the trace of a scenario with its mechanism."""
+def run(scenario: Scenario, mechanism: models.Mechanism | None = None) -> Trace:
+    """Return the trace of a scenario, simulated in the reference loop, with its mechanism if that is made already."""
+    mechanism = mechanism or models.mechanism(scenario)
     with installed():
         loop = Loop(scenario, mechanism)
     with installed(loop.control), np.errstate(all="ignore"):  # the loop itself checks for NaN and inf

@@ -103,7 +103,7 @@ def stream(
             yield from zip((index for index, _ in batch), traces, strict=True)
     for index, prepared in uncompiled:
         with memory_for([prepared]):
-            trace = reference.simulate(prepared.scenario, prepared.mechanism)
+            trace = reference.run(prepared.scenario, prepared.mechanism)
         yield index, trace
         report(prepared.scenario.work)
 

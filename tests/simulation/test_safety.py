@@ -1012,7 +1012,7 @@ def test_memory_that_runs_out_is_said_in_one_sentence(monkeypatch, refused):
         with monkeypatch.context() as patch:
             patch.setattr(RUN, "ScenarioBatch", runs_out)
             refused(lambda: smc.run([scenario(), scenario(seed=1)]))
-            patch.setattr(reference, "simulate", runs_out)
+            patch.setattr(reference, "run", runs_out)
             refused(lambda: plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0)))))
 
 
