@@ -62,9 +62,8 @@ def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
         return None
     K = loop.d0 / at
     gain = float(loop.sigma(np.array(loop.c * at))) / (loop.c * at)
-    A = np.array([[-loop.c, 1.0], [0.0, 0.0]])
-    A[1] = [loop.c * (gain + float(loop.D(np.zeros(())))) / loop.M - K / loop.M - loop.c**2, 0.0]
-    A[1, 1] = loop.c - (gain + float(loop.D(np.zeros(())))) / loop.M
+    damping = gain + float(loop.D(np.zeros(())))  # of the loop
+    A = np.array([[-loop.c, 1.0], [loop.c * damping / loop.M - K / loop.M - loop.c**2, loop.c - damping / loop.M]])
     slow, best, push = -max(np.linalg.eigvals(A).real), None, np.array([0.0, loop.d0 / loop.M])
     for rate in np.linspace(0.02, 1.98, 99) * slow if slow > 0.0 else ():
         Q = solve_continuous_lyapunov(A + rate / 2.0 * np.eye(2), -np.outer(push, push) / rate)
