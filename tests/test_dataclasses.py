@@ -14,9 +14,9 @@ from smc_mujoco.simulation.signals import Signal
 pytestmark = pytest.mark.quick
 
 OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have it
-    "frozen": {"margins.Search", "_Ledger", "Frames", "BorrowedData", "Tip"},
+    "frozen": {"margins.Search", "_Ledger", "Frames", "BorrowedData", "Tip", "runs.Runs"},
     "eq": {
-        *("Linear", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData"),
+        *("Linear", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData", "runs.Runs"),
         *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse", "Mechanism"),
     },
     "repr": {

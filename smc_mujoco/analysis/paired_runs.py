@@ -24,13 +24,15 @@ GAIN_ENTRIES = ("law", "surface", "velocity")  # those of them that have gains
 
 
 class Columns(Protocol):
-    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at, and every metric.
+    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at, and every metric."""
 
-    Missing values are None or NaN. `scenario` raises ScenarioError if that of the row cannot be restored.
-    """
+    def column(self, name: str) -> np.ndarray:
+        """Return the values of a column, with None or NaN for missing ones."""
+        ...
 
-    def column(self, name: str) -> np.ndarray: ...
-    def scenario(self, i: int) -> Scenario: ...
+    def scenario(self, i: int) -> Scenario:
+        """Return the scenario of row i. Raise ScenarioError if it cannot be restored."""
+        ...
 
 
 def values(table: Columns, metric: str) -> np.ndarray:
