@@ -116,16 +116,12 @@ class TimeSeries(Signal):
                     cure = "give a finite number, or cut the file there"
                     raise ScenarioError(f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}")
         times, values = ([float(row[i]) for _, row in rows] for i in places)
-
-        def where(i: int) -> str:
-            return f"line {rows[i][0]}"
-
-        _check(str(path), times, where)
+        _check(str(path), times, lambda i: f"line {rows[i][0]}")
         steps = np.diff(times)
         median = np.quantile(steps, 0.5, method="lower")  # of two steps the shorter, because the other has the gap
         for i in np.flatnonzero(steps > MAX_GAP_STEPS * median)[:1]:
             raise ScenarioError(
-                f"{path} has a gap after {where(i)}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
+                f"{path} has a gap after line {rows[i][0]}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
                 f"{median:g} s apart: fill it in, or cut the file there"
             )
         return cls(times, values)
