@@ -154,7 +154,7 @@ def _both(case: WorstCase) -> str:
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
     own = [s for s in findings.scores if s.law == words.PAPER_LAW and s.metric in metrics]
-    lost, wins, parts = sum(s.beaten for s in own), sum(s.wins for s in own) or "none", []
+    lost, wins, parts = len(losses(cells(findings.scores), metrics)), sum(s.wins for s in own) or "none", []
     if own:
         parts.append(f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}")
     if counts := totals(findings.claims):

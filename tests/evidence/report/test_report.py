@@ -385,6 +385,9 @@ def test_the_papers_verdict_is_one_line_that_counts(findings):
         "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims, "
         "1 is supported and 2 are refuted."
     )
+    failing = [s._replace(best=False, beaten=True) for s in scores("step", observer_free=math.inf, classical=math.inf)]
+    with_failing = dataclasses.replace(few, scores=(*cells, *failing), claims=())
+    assert "beaten in 1 of 4 comparisons" in answer.verdict(with_failing, ["settling_time"])  # as the table of losses
     none = dataclasses.replace(few, scores=(), claims=())
     assert answer.verdict(none, ["settling_time"]) == ""
 
