@@ -3,11 +3,11 @@
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
 swings that switches faster than the film. Behind a drive they are those of its force, and a pale arrow is the command.
 Arrows lie along a pendulum's arc, beyond the bob; and along the rail, above the cart, or before it if it carries
-something. At a hinge of a user's model, whose links may have any shape, they bend around its axis, and are drawn over
+something. At a hinge of a user's model, whose links may have any shape, they bend around its axis. They are drawn over
 the picture, so that no link hides them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -26,6 +26,7 @@ HINGE_LENGTH, SLIDE_LENGTH = 0.425, 0.08  # longest arrow, as a share of the pen
 RADIUS_SHARE, LENGTH_SHARE = 0.16, 0.024  # of the bob's radius and of the pendulum's length: their sum is the thickness
 LONG_PENDULUM = 0.5  # m: longer pendulums have arrows as thick as one of this length
 ARC_DISTANCE, RAIL_DISTANCE = 1.6, 2.2  # thicknesses between a body and its nearest arrow
+LAYER_DISTANCE = 2.6  # thicknesses between two arrows
 SLIDE_THICKNESS, MAX_RAIL_SHARE = 0.035, 0.008  # m, and largest share of the rail, of an arrow's thickness
 USER_LENGTH, USER_THICKNESS = 0.25, 0.012  # at slides of a user's model, of its extent
 USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its extent
@@ -38,7 +39,6 @@ NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the s
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.2  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-DRAWN_SHARE = 0.5  # part of an arrow's length that MuJoCo draws; of a capsule it draws all: measured, 3.17.0
 COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -160,63 +160,41 @@ def arrows(loads: Mapping[str, Envelope], frame: int, channel: int, scale: Scale
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 
 
-def draw(scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow) -> None:
-    """Add an arrow to a scene that already has the machines."""
+def path(model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow) -> tuple[np.ndarray, float] | None:
+    """Return the line of an arrow, (m, 3) m, and the width of its shaft, m; None where it has no place."""
+    axis, anchor = data.xaxis[mount.joint], data.xanchor[mount.joint]
+    low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
+    along = np.linspace(low, high, 40)[:, None]  # of the longest
+    if mount.radius:
+        right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
+        if not np.linalg.norm(right):
+            return None
+        right /= np.linalg.norm(right)
+        out = np.cos(MAX_SWEEP * along) * np.cross(right, axis) + np.sin(MAX_SWEEP * along) * right
+        return anchor + mount.radius * (1.0 + BENT_DISTANCE * arrow.layer) * out, arrow.size * BENT_WIDTH * mount.radius
     body = arrow_geom(model, model.jnt_bodyid[mount.joint])
-    if body < 0 or scene.ngeom >= scene.maxgeom:
-        return
+    if body < 0:
+        return None
     place, radius = data.geom_xpos[body], model.geom_rbound[body]
     if model.jnt_type[mount.joint] == mujoco.mjtJoint.mjJNT_HINGE:
-        arm = place - data.xanchor[mount.joint]
+        arm = place - anchor
         length = np.linalg.norm(arm)
         if length < MIN_LEVER:
-            return
+            return None
         reach, out = mount.unit * HINGE_LENGTH * length, arm / length
         width = RADIUS_SHARE * radius + LENGTH_SHARE * mount.unit * min(length, LONG_PENDULUM)
-        along, start = np.cross(data.xaxis[mount.joint], out), radius + ARC_DISTANCE * width
+        way, start = np.cross(axis, out), radius + ARC_DISTANCE * width
         if mount.beyond:
             out = np.array([0.0, 0.0, -1.0 if out[2] > 0.0 else 1.0])
-            place, along = data.xanchor[mount.joint], np.cross(out, data.xaxis[mount.joint])
+            place, way = anchor, np.cross(out, axis)
     else:
-        reach, width, along, out = mount.unit, mount.thick, data.xaxis[mount.joint], np.array([0.0, 0.0, 1.0])
+        reach, width, way, out = mount.unit, mount.thick, axis, np.array([0.0, 0.0, 1.0])
         if mount.front is not None:
-            across = np.cross(mount.front, along)
+            across = np.cross(mount.front, way)
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
-            place = place + (half_extent(model, data, body, mount.front) + width) * mount.front
         start = half_extent(model, data, body, out) + RAIL_DISTANCE * width
-    foot = place + (start + 2.6 * width * arrow.layer) * out
-    low, high = (arrow.size * reach * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
-    width = min(arrow.size * width, 0.006 + MAX_THICKNESS * abs(high - low))
-
-    kind = mujoco.mjtGeom.mjGEOM_ARROW if arrow.head else mujoco.mjtGeom.mjGEOM_CAPSULE
-    geom, zero, end = scene.geoms[scene.ngeom], np.zeros(3), low + (high - low) / (DRAWN_SHARE if arrow.head else 1.0)
-    mujoco.mjv_initGeom(geom, kind, zero, zero, np.zeros(9), np.array(arrow.rgba, np.float32))
-    mujoco.mjv_connector(geom, kind, width if arrow.head else 0.5 * width, foot + low * along, foot + end * along)
-    geom.specular, geom.objtype = 0.0, mujoco.mjtObj.mjOBJ_UNKNOWN  # mjv_initGeom leaves that of an earlier shape
-    scene.ngeom += 1
-
-
-def bend(
-    image: Image.Image, project: Callable[[np.ndarray], np.ndarray], data: mujoco.MjData, mount: Mount, arrow: Arrow
-) -> None:
-    """Draw an arrow that bends around a hinge's axis over a picture; `project` is from (m, 3) m to (m, 2) px."""
-    axis, middle = data.xaxis[mount.joint], data.xanchor[mount.joint]
-    right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
-    if not np.linalg.norm(right):
-        return
-    right /= np.linalg.norm(right)
-    near = np.cross(right, axis)
-
-    def around(low: float, high: float) -> np.ndarray:
-        angle = np.linspace(low, high, 40)[:, None]
-        return project(middle + mount.radius * (np.cos(angle) * near + np.sin(angle) * right))
-
-    low, high = (MAX_SWEEP * arrow.size * np.clip(end, -1.0, 1.0) for end in (arrow.low, arrow.high))
-    centre = project(middle[None])
-    radius = np.linalg.norm(around(0.0, 2.0 * np.pi) - centre, axis=1).max()
-    line = centre + (1.0 + BENT_DISTANCE * arrow.layer) * (around(low, high) - centre)
-    paint(image, outline(line, arrow.size * BENT_WIDTH * radius, arrow.head), arrow.rgba)
+    return place + (start + LAYER_DISTANCE * width * arrow.layer) * out + reach * along * way, arrow.size * width
 
 
 def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:

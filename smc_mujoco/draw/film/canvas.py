@@ -13,7 +13,6 @@ import numpy as np
 
 from smc_mujoco.common import gl
 from smc_mujoco.draw.film import camera, scene, shadows
-from smc_mujoco.draw.film.arrows import DRAWN_SHARE
 
 MIN_MOTION = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
 EDGE_MARGIN = 3  # px around what has changed, for smoothed edges
@@ -65,7 +64,7 @@ class Canvas:
     def draw(self, add: Add = lambda scene: None, whole: bool = False) -> np.ndarray:
         """Return the picture of `data` as it is, (height, width, 3) uint8, read-only.
 
-        `add` adds shapes to the scene, such as arrows. If `whole`, all is drawn again, as after a change of colours.
+        `add` adds shapes to the scene, such as ghosts. If `whole`, all is drawn again, as after a change of colours.
         """
         shown = self.renderer.scene
         self.renderer.update_scene(self.data, camera="film")
@@ -131,7 +130,7 @@ class Canvas:
         return self.seen(np.concatenate([*boxes, self.cast(boxes[0])]))
 
     def seen_others(self, others: Sequence) -> np.ndarray:
-        """Return the same of geoms of the scene that are not the model's, such as arrows and tendons."""
+        """Return the same of geoms of the scene that are not the model's, such as ghosts and tendons."""
         points = [corners(*reach(geom)) @ geom.mat.T + geom.pos for geom in others]
         boxes = np.array(points).reshape(-1, 8, 3)
         return self.seen(np.concatenate([boxes, self.cast(boxes[[geom.objtype == TENDON for geom in others]])]))
@@ -235,8 +234,6 @@ def outside(boxes: np.ndarray, area: Area) -> np.ndarray:
 def reach(geom: mujoco.MjvGeom) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest corner of a box in a geom's frame, (3,) m, that has all of the geom in it."""
     width, _, long = geom.size
-    if geom.type == mujoco.mjtGeom.mjGEOM_ARROW:  # its head is 1.75 times as wide
-        return np.array([-2.0 * width, -2.0 * width, 0.0]), np.array([2.0 * width, 2.0 * width, DRAWN_SHARE * long])
     if geom.type == mujoco.mjtGeom.mjGEOM_CAPSULE:
         half = np.array([width, width, long + width])
     else:

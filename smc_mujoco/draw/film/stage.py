@@ -162,18 +162,18 @@ class Stage:
         def add(shown: mujoco.MjvScene) -> None:
             for k in np.flatnonzero(self.aimed):
                 self.ghost(shown, self.links[k])
-            for k, i, arrow in drawn:
-                if not self.mounts[k][i].radius:
-                    arrows.draw(shown, self.model, self.data, self.mounts[k][i], arrow)
 
         whole, self.changed = self.changed, False
         picture = self.canvas.draw(add, whole)
-        bent = [(self.mounts[k][i], arrow) for k, i, arrow in drawn if self.mounts[k][i].radius]
-        if not bent:
+        if not drawn:
             return picture
         image = Image.fromarray(picture)
-        for mount, arrow in bent:
-            arrows.bend(image, self.project, self.data, mount, arrow)
+        for k, i, arrow in sorted(drawn, key=lambda one: one[2].head):  # bars are behind arrows
+            if found := arrows.path(self.model, self.data, self.mounts[k][i], arrow):
+                points, width = found
+                sizes = self.project(np.array([points[0], points[0] + width * self.turn[:, 1]]))
+                outline = arrows.outline(self.project(points), float(np.ptp(sizes[:, 1])), arrow.head)
+                arrows.paint(image, outline, arrow.rgba)
         return np.asarray(image)
 
     def project(self, points: np.ndarray) -> np.ndarray:
