@@ -652,6 +652,11 @@ def test_a_model_whose_limits_are_off_has_no_constraint(bounded):
         assert bounded(more=f'<option><flag {off}="disable"/></option>').smooth
 
 
+def test_a_model_with_dry_friction_is_not_smooth(arm):
+    dry = arm(rest=ACTUATED + '<default><joint frictionloss="0.1"/></default>')
+    assert (arm().smooth, dry.smooth) == (True, False)
+
+
 def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
     plant = bounded()
     for x0 in (MOST + 5e-4, LEAST - 5e-4):
@@ -824,6 +829,7 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
     assert smc.run(smc.Scenario(plant=plant, law=TORQUE, duration=0.1)).failure is None
     tied = '<equality><joint joint1="elbow" joint2="shoulder"/></equality>' + ACTUATED
     assert "equality" in arm(rest=tied).unmodelled
+    assert arm(rest=tied.replace("<joint joint1", '<joint active="false" joint1')).unmodelled == ""
     across = '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED  # couples, perhaps
     assert "a joint without a name moves with" in arm(rest=across, bodies=BALL.replace(' name="ball"', "")).unmodelled
     assert "make it a channel, or the partner of one if nothing drives it, or give a law" in plant.unmodelled
