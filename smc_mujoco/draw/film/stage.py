@@ -171,9 +171,10 @@ class Stage:
         for k, i, arrow in sorted(drawn, key=lambda one: one[2].head):  # bars are behind arrows
             if found := arrows.path(self.model, self.data, self.mounts[k][i], arrow):
                 points, width = found
-                sizes = self.project(np.array([points[0], points[0] + width * self.turn[:, 1]]))
-                outline = arrows.outline(self.project(points), float(np.ptp(sizes[:, 1])), arrow.head)
-                arrows.paint(image, outline, arrow.rgba)
+                line, sizes = map(self.project, (points, np.array([points[0], points[0] + width * self.turn[:, 1]])))
+                if np.ptp(line, axis=0).max() > 1.0:  # else it points at the camera
+                    outline = arrows.outline(line, float(np.ptp(sizes[:, 1])), arrow.head)
+                    arrows.paint(image, outline, arrow.rgba)
         return np.asarray(image)
 
     def project(self, points: np.ndarray) -> np.ndarray:

@@ -114,6 +114,21 @@ def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp
             assert (x.mean() > centre[0]) == (push > 0.0)  # seen from the front, the near side goes right
 
 
+def test_an_arrow_that_points_at_the_camera_is_not_drawn():
+    plant = smc.plant_from(
+        """<mujoco><worldbody><body pos="0 0 .5"><joint name="j" type="slide" axis="0 1 0"/><geom size=".1"/></body>
+        </worldbody><actuator><motor joint="j"/></actuator></mujoco>""",
+        ["j"],
+    )
+    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
+    push = (0, 0, Arrow(0.0, 0.8, (1.0, 0.0, 0.0, 1.0)))
+    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340), (0.0, 0.0)) as scene:
+        bare = scene.render()
+        assert (scene.render([push]) != bare).any()
+        scene.project = lambda points: np.full((len(points), 2), 100.0)  # exactly at it
+        assert (scene.render([push]) == bare).all()
+
+
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0)))
