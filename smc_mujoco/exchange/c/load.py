@@ -201,12 +201,16 @@ def law_from_c(
     return template_decorator("law", about.gains, about.memory, (), (), about.degree, None, plants, **words)(law)
 
 
-def _try(library: sandbox.Library, about: "About") -> None:
-    """Call a law in a separate process."""
+def _try(library: sandbox.Library, about: "About") -> str:
+    """Call a law in a separate process, then with sanitizers. Return why there were none, or an empty text."""
     fields, channels = (ARRAYS, about.joints) if about.joints else (Measurement._fields, 1)
     gains = [gain_at(gain.default, i) for gain in about.gains.values() for i in range(channels)]
     trial = {"fields": fields, "gains": gains, "memory": about.memory, "modelled": about.modelled}
-    sandbox.load(library, trial | {"joints": about.joints})
+    calls = build.fresh(".calls")
+    sandbox.load(library, trial | {"joints": about.joints, "calls": str(calls)})
+    why = sandbox.sanitize(library, calls, len(about.gains), about.memory)
+    calls.unlink()
+    return why
 
 
 def check(
@@ -217,11 +221,12 @@ def check(
     flags: Sequence[str],
     timeout: float,
 ) -> Iterator[str]:
-    """Try a law without loading it, and yield lines: warnings, gains and memory."""
+    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory."""
     library = _library(source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout)
     about = _about(library, gains, memory)
     yield from library.warnings
-    _try(library, about)
+    if why := _try(library, about):
+        yield f"{source.name} is tried without address and undefined-behaviour sanitizers: {why}"
     gains_text = ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()) or "none"
     joints = f"{about.joints} joints; " * bool(about.joints)
     yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
@@ -245,12 +250,12 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: flo
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
     if path.suffix == ".c":
         file, warnings = build.library(path, symbol, flags, timeout)
-        return sandbox.Library(file, path, symbol, timeout, warnings)
+        return sandbox.Library(file, path, symbol, flags, timeout, warnings)
     try:
         copy = shutil.copy(path, build.fresh(path.suffix))  # so that a rebuilt library is loaded again
     except OSError as error:
         raise ScenarioError(f"{path} cannot be read ({error.strerror}): give one that can") from None
-    return sandbox.Library(Path(copy), path, symbol, timeout)
+    return sandbox.Library(Path(copy), path, symbol, flags, timeout)
 
 
 class About(NamedTuple):

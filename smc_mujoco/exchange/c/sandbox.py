@@ -38,6 +38,10 @@ INT_NAMES = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modell
 TEXT_NAMES = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
+# Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
+UNDEFINED_LINE = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
+ACCESS_LINE = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
+FRAME_LINE = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
 
 
 class Library(NamedTuple):
@@ -46,6 +50,7 @@ class Library(NamedTuple):
     file: Path  # the library, compiled or copied
     path: Path  # the user's file
     symbol: str  # name of the law's function
+    flags: Sequence[str]  # of the compiler
     timeout: float  # of a trial, s
     warnings: Sequence[str] = ()  # of the compiler
 
@@ -54,7 +59,8 @@ def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any
     """Load, set up, try and unload a library in a separate process, and return the constants that describe its law.
 
     `trial`: "fields", names of the numbers in a measurement, or of the arrays in one of many "joints"; "gains", each
-    gain's number for each channel; "memory" and "modelled" as in smc_law.h. None: the law is not called.
+    gain's number for each channel; "memory" and "modelled" as in smc_law.h; "calls", a new file for the gains and the
+    measurement of each call, which `sanitize` reads. None: the law is not called.
     """
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.exchange.c import build
@@ -67,6 +73,39 @@ def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any
         if library.symbol in why and failed.stage == "loading" and re.search("undefined symbol|not found", why):
             raise ScenarioError(build.undefined(library.path, library.symbol)) from None
         raise ScenarioError(f"{file} {why}" if why.startswith("cannot") else f"{file}: {why}") from None
+
+
+def sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
+    """Repeat the calls of a trial with sanitizers. Return why this is not possible, or an empty text."""
+    from smc_mujoco.common.errors import ScenarioError
+    from smc_mujoco.common.process import TimedOut, timed
+    from smc_mujoco.exchange.c import build
+
+    compiler = build.compiler()
+    if library.path.suffix != ".c":
+        return "give its .c file"
+    if (program := build.replayer(tuple(compiler))) is None:
+        return f"{compiler[0]} has none that work here"
+    try:
+        file, _ = build.library(library.path, library.symbol, (*library.flags, *build.SANITIZER_FLAGS), library.timeout)
+    except ScenarioError:
+        return f"{compiler[0]} has none with these flags"
+    try:
+        done = timed([str(n) for n in (program, file, calls, gains, memory)], library.timeout)
+    except TimedOut:
+        late = f"{library.symbol} did not end within {library.timeout:g} s with sanitizers"
+        raise ScenarioError(f"{library.path.name}: {late}: give timeout=") from None
+    if done.returncode == 0:
+        return ""
+    what, places = "it does not end as without sanitizers", []
+    if report := UNDEFINED_LINE.search(done.stderr):
+        what, places = report["what"], [report]
+    elif report := ACCESS_LINE.search(done.stderr):
+        what = ", ".join(filter(None, report.group("what", "size")))
+        places = [frame for frame in FRAME_LINE.finditer(done.stderr) if Path(frame["file"]).exists()]
+    name = Path(places[0]["file"]).name if places else library.path.name
+    where = f"line {places[0]['line']}" if places else library.symbol
+    raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
 
 
 # libraries through ctypes, in the script and in the process that runs the law
@@ -163,16 +202,18 @@ class Fenced:
 class Trial:
     """Runs of a law on a double integrator x'' = u for each channel, and calls far outside of them.
 
-    `order`: the trial of `load`.
+    `order`: the trial of `load`. `calls`: its open file.
     """
 
-    def __init__(self, law, order):
+    def __init__(self, law, order, calls):
+        self.calls = calls
         self.law, self.fields, self.size, self.modelled = law, order["fields"], order["memory"], order["modelled"]
         self.joints, self.channels = order["joints"], max(1, order["joints"])
         self.requests = Requests(self.joints, lambda w: [0.1 * element for element in w], self.jacobian)
         self.y, self.out = Fenced(self.measurement([{}] * self.channels)), Fenced([0.0] * (2 * self.channels))
         self.gains = Fenced(order["gains"], math.nan)  # a gain without a name is NaN
         self.gains_before = bytes(self.gains.whole)
+        calls.write(bytes(self.gains.values))
         self.random, self.arithmetic = random.Random(0), Arithmetic()
 
     def all(self) -> None:
@@ -239,6 +280,7 @@ class Trial:
 
     def call(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
         """Return the law's code, u and s. Raise Fault if it writes anything but memory and out."""
+        self.calls.write(struct.pack(f"{len(y)}d", *y))
         self.y.values[:], self.out.values[:] = y, [math.nan] * len(self.out.values)
         y_before = bytes(self.y.whole)
         code = self.law(self.y.values, self.gains.values, memory.values, self.out.values)
@@ -278,7 +320,8 @@ def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
         say(symbol)
         set_sizes(library, len(trial["gains"]) // max(1, trial["joints"]), trial["memory"])
         try:
-            Trial(law, trial).all()
+            with Path(trial["calls"]).open("wb") as calls:
+                Trial(law, trial, calls).all()
         except Fault as fault:
             raise Fault(f"{symbol} {fault}") from None
     return facts(library)

@@ -373,6 +373,66 @@ def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
     assert "\n" not in str(error.value)
 
 
+HARM = {
+    "double a[4]; double *volatile p = a; p[-1] = y->e; out[0] = 0.0;": "stack-buffer-overflow, WRITE of size 8",
+    "static const double T[3] = {1, 2, 3}; volatile int i = 3; out[0] = T[i] > 0.0;": "index 3 out of bounds for type",
+    "out[0] = -y->e; if (gains[1] > 5.0) out[0] = 0.0;": "heap-buffer-overflow, READ of size 8",
+}
+
+
+@pytest.fixture(scope="module")
+def sanitizers():
+    """Skip where the compiler has none."""
+    if build.replayer(tuple(build.compiler())) is None:
+        pytest.skip("the C compiler here has no sanitizers")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a shell script")
+@pytest.mark.parametrize(("compiler_ends", "program_ends"), [(0, 0), (0, 1), (1, 0)])
+def test_sanitizers_work_where_a_program_with_them_compiles_and_runs(tmp_path, compiler_ends, program_ends):
+    compiler = tmp_path / "cc"
+    program = f"'#!/bin/sh\\nexit {program_ends}\\n'"
+    compiler.write_text(f"""#!/bin/sh
+while [ "$1" != -o ]; do shift; done
+printf {program} > "$2"; chmod +x "$2"; exit {compiler_ends}
+""")
+    compiler.chmod(0o755)
+    assert (build.replayer((str(compiler),)) is None) == (compiler_ends + program_ends > 0)
+
+
+@pytest.mark.parametrize(("body", "words"), HARM.items())
+@pytest.mark.usefixtures("sanitizers")
+def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
+    """Nothing of it changes a number that the trial itself looks at."""
+    text = law(body, "#include <stdlib.h>\n#include <string.h>")
+    line = text[: text.index(body)].count("\n") + 1
+    with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c makes an error in line {line}: {words}")) as error:
+        smc.law_from_c(file(text), gains={"k": 3.0}, isolate=True, timeout=60.0)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.usefixtures("sanitizers")
+def test_isolated_harm_is_told_of_the_file_that_does_it(file):
+    other = file("int over(const double *a) { return a[3] > 0.0; }", "filter.c")
+    text = law("static const double T[3] = {1, 2, 3}; out[0] = over(T);", "int over(const double *);")
+    with pytest.raises(smc.ScenarioError, match=r"^filter\.c makes an error in line 1: global-buffer-overflow, READ"):
+        smc.law_from_c(file(text), flags=[str(other)], isolate=True, timeout=60.0)
+
+
+def test_check_c_says_what_it_could_not_see(call, file, tmp_path, monkeypatch):
+    out = call("check-c", file(MINE))[1]
+    wrapper = tmp_path / "cc"
+    wrapper.write_text(f'#!/bin/sh\ncase "$*" in *-fsanitize*) exit 1;; esac\nexec {" ".join(build.compiler())} "$@"\n')
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("CC", str(wrapper))
+    told = call("check-c", file(MINE))[1].splitlines()
+    without = f"my_law.c is tried without address and undefined-behaviour sanitizers: {wrapper} has none that work here"
+    assert told == [without, out.splitlines()[-1]]
+    library = build.library(tmp_path / "my_law.c", "smc_law", [], 60.0)[0].rename(tmp_path / "my_law.so")
+    without = "my_law.so is tried without address and undefined-behaviour sanitizers: give its .c file"
+    assert call("check-c", library)[1].splitlines()[0] == without
+
+
 FLUSHES = """#include <fenv.h>
 __attribute__((constructor)) static void start(void)
 {
