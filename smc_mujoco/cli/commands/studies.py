@@ -83,6 +83,7 @@ def compare(
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     rig: Annotated[str | None, typer.Option(help="A machine: its sets replace plants and conditions.")] = None,
+    traces: Annotated[str, typer.Option(help="Traces to save: none, all, or the worst per plant and condition.")] = "none",
     noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
@@ -103,8 +104,8 @@ def compare(
 
     terminal, key, start = Terminal(), "drawn" if noise_key is None else noise_key, options.starts(x0)
     if rig is not None:
-        if plants or condition or gains != "tuned" or worst or figure or latex:
-            others = "the plants, --condition, --gains, --worst, --figure and --latex"
+        if plants or condition or gains != "tuned" or worst or figure or latex or traces != "none":
+            others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
             raise ScenarioError(f"--rig brings its own plant, parameter sets and gains: leave out {others}")
         _compare_on_rig(rig, law, seeds, duration, start, relevant, defaults, out, executor, key, threads, terminal)
         return
@@ -113,7 +114,7 @@ def compare(
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        relevant=relevant, noise_key=key, threads=threads,
+        relevant=relevant, traces=traces, noise_key=key, threads=threads,
     )  # fmt: skip
     terminal.print(comparison)
     if latex:
