@@ -83,7 +83,7 @@ def compare(
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     rig: Annotated[str | None, typer.Option(help="A machine: its sets replace plants and conditions.")] = None,
-    traces: Annotated[str, typer.Option(help="Traces to save: none, all or worst, one a plant and condition.")] = "none",
+    traces: Annotated[str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")] = "none",
     noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
