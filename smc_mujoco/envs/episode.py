@@ -67,6 +67,7 @@ class Setting:
         self.model = models.with_values(models.compiled(spec, self.scenario), self.scenario)
         table = channels(self.model)
         self.qpos, self.qvel = table["qpos"], table["qvel"]  # addresses of the channels, (n,) each
+        self.joints = models.moving_joints(self.model)
         # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,) each
         self.ctrl, self.shafts = (table[name][: plant.driven] for name in ("ctrl", "shaft"))
         # the largest commands, (driven,), and the actuators' inputs per unit of them
@@ -158,7 +159,8 @@ class Episode:
     def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         mujoco.mj_resetData(self.setting.model, data)
-        data.qpos[:], data.qvel[:] = models.state_with(self.setting.model, *self.setting.draw_start(random, options))
+        start = self.setting.draw_start(random, options)
+        data.qpos[:], data.qvel[:] = models.state_with(self.setting.model, self.setting.joints, *start)
         self.episodes, self.sample = self.episodes + 1, 0
         self.drive_states[:] = self.setting.drive_start(data.qvel)
         self.read_state(data)

@@ -111,7 +111,7 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             self.batch.reset(ids.astype(np.int32), stage=0)
         for i in ids:
             start = self.setting.draw_start(self.randoms[i], options)
-            self.qpos[i], self.qvel[i] = state_with(self.setting.model, *start)
+            self.qpos[i], self.qvel[i] = state_with(self.setting.model, self.setting.joints, *start)
         self.samples[mask], self.ended[mask] = 0, False
         self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
 

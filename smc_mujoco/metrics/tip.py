@@ -172,7 +172,7 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
     if knows_contacts(trace.scenario):
         wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)
         pressed = contacts(trace)
-        late = pressed.force[trace.t >= trace.t[0] + FORCE_START * np.ptp(trace.t)]
+        late = pressed.force[trace.t >= trace.t[0] + FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)]
         values["mean_force"] = late.mean()
         values |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)} if wanted else {}
         values |= {"force_ripple": late.std(), "touching": 100.0 * (late > 0.0).mean(), "depth": pressed.depth.max()}

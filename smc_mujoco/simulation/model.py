@@ -9,7 +9,8 @@ import copy
 import dataclasses
 import itertools
 import weakref
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, ROTOR, Part, drive_ids, initial_pose, joint_ids
+from smc_mujoco.mechanisms.hardware.part import PASSIVE, Part, drive_ids, initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.state import CHANNEL
@@ -212,16 +213,19 @@ def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[st
 
 def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """Return qpos and qvel at t = 0, see `state_with`."""
-    return state_with(model, scenario.resolved.x0, scenario.resolved.v0)
+    return state_with(model, moving_joints(model), scenario.resolved.x0, scenario.resolved.v0)
 
 
-def state_with(model: mujoco.MjModel, x: Iterable[float], v: Iterable[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel with channels and their rotors at x and v, and other joints as in `initial_pose`."""
+def moving_joints(model: mujoco.MjModel) -> np.ndarray:
+    """Return the joints of the channels and those that their actuators drive, rotors or the same joints, (2, n)."""
+    joints, driven = joint_ids(model), model.actuator_trnid[drive_ids(model), 0]
+    return np.array([joints, [*driven, *joints[len(driven) :]]])
+
+
+def state_with(model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in `initial_pose`."""
     qpos, qvel = initial_pose(model), np.zeros(model.nv)
-    for joint, position, velocity in zip(joint_ids(model), x, v, strict=True):
-        rotor = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(joint).name)
-        for moved in (joint, rotor) if rotor >= 0 else (joint,):
-            qpos[model.jnt_qposadr[moved]], qvel[model.jnt_dofadr[moved]] = position, velocity
+    qpos[model.jnt_qposadr[joints]], qvel[model.jnt_dofadr[joints]] = x, v
     return qpos, qvel
 
 
