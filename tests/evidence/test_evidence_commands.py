@@ -46,6 +46,10 @@ CLAIMS = Claims(
             numbers={"study": {}, "tuned": {}}, beside={"study": {}, "tuned": {}},
             verdicts={"study": "not testable", "tuned": "not testable"}, flips=False, note="Nothing says how.",
         ),
+        Claim(
+            id="5", text="of one set", where="p. 6", measured="runs", holds_if="calm", verdict="not testable",
+            numbers={"study": {}}, beside={"study": {}}, verdicts={"study": "not testable"}, flips=False,
+        ),
     ]
 )  # fmt: skip
 
@@ -171,6 +175,7 @@ LINES = (
     "certify duffing --worst",
     "claims 3 --gains study,tuned --quick --threads 2",
     "claims --mutants --evidence e.json --badge b.svg",
+    "claims 5 --quick",
     "claims 4 --json --quick",
     "claims --json --mutants",
     "papers",

@@ -66,7 +66,9 @@ def claims(
         return
     tables.print_claims(done.claims, terminal, full=bool(ids))
     kept = mutants and _kept(done, asked, terminal)
-    notes = [f"{terminal.seconds:.0f} s", "quick: coarser grids than the claims say" * quick]
+    one = len({name for claim in done.claims for name in claim.verdicts}) == 1 < len(about.sets)
+    less = "quick: coarser grids than the claims say" + f", and one set of gains of {len(about.sets)}" * one
+    notes = [f"{terminal.seconds:.0f} s", less * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
     if kept:

@@ -159,7 +159,10 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
         parts.append(f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}")
     if counts := totals(findings.claims):
         verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in counts.items())
-        parts.append(f"of its {sum(counts.values())} checked claims, {verdicts}")
+        sets = {name for claim in findings.claims for name in claim.verdicts}
+        gains = "one set of gains" if len(sets) == 1 else f"{len(sets)} sets of gains"
+        less = f" audited quickly under {gains}," * findings.about.plan.quick
+        parts.append(f"of its {sum(counts.values())} checked claims,{less} {verdicts}")
     return f"The paper: {'; '.join(parts)}." if parts else ""
 
 

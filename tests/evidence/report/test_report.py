@@ -381,10 +381,12 @@ def test_the_papers_verdict_is_one_line_that_counts(findings):
     claims = [dataclasses.replace(findings.claims[0], verdict=v) for v in ("supported", "refuted", "refuted")]
     beside = dataclasses.replace(claims[0], whose="derived")  # not counted
     few = dataclasses.replace(findings, scores=tuple(cells), claims=(*claims, beside))
-    assert answer.verdict(few, ["settling_time"]) == (
-        "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims, "
-        "1 is supported and 2 are refuted."
-    )
+    for quick, less in ((False, ""), (True, " audited quickly under one set of gains,")):
+        about = dataclasses.replace(findings.about, plan=dataclasses.replace(findings.about.plan, quick=quick))
+        assert answer.verdict(dataclasses.replace(few, about=about), ["settling_time"]) == (
+            "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims,"
+            f"{less} 1 is supported and 2 are refuted."
+        )
     failing = [s._replace(best=False, beaten=True) for s in scores("step", observer_free=math.inf, classical=math.inf)]
     with_failing = dataclasses.replace(few, scores=(*cells, *failing), claims=())
     assert "beaten in 1 of 4 comparisons" in answer.verdict(with_failing, ["settling_time"])  # as the table of losses
