@@ -79,10 +79,8 @@ def export_c(
     with delay_ctrl_c():
         from smc_mujoco.exchange.c.export import law_to_c
 
-    try:
+    with options.joints_as_option():
         text = law_to_c(options.law_with(law, gains), numbers, joints)
-    except ScenarioError as error:
-        raise ScenarioError(str(error).replace("joints=", "--joints ")) from None
     print(text, end="")
 
 
@@ -103,6 +101,7 @@ def export_fmu(
         typer.Option(metavar="none|nominal", help="nominal: f and g of x'' = f + g u are inputs; default as needed."),
     ] = None,
     joint: Annotated[str, typer.Option(metavar="hinge|slide", help="Units: rad and N m, or m and N.")] = "hinge",
+    joints: options.Joints = None,
     binary: Annotated[bool, typer.Option(help="Whether to compile a binary for this machine.")] = True,
     out: Annotated[Path | None, typer.Option(help="The file to write; default the law's name with .fmu.")] = None,
 ) -> None:
@@ -114,16 +113,21 @@ def export_fmu(
     it gives the bits of `smc-mujoco run`. LAW may also be a file: my_law.py with one law, made by
     @smc.law_function, or gains.json that `smc-mujoco tune --out` wrote.
 
+    A law of many joints has a variable for each element: x[1], x[2], M[1,1]. Its inputs are also those of M, h, g, the
+    matrix C of Coriolis forces and the tip's Jacobian J that it reads. Its gains may have one value for each joint, as
+    in --gains "k=8 20 15,c=5".
+
     Example: smc-mujoco export-fmu super_twisting --gains k1=5,k2=8 --velocity levant --u-max 6 --out controller.fmu
     """
     with delay_ctrl_c():
         from smc_mujoco.exchange.fmu.export import export_fmu as export
 
     chosen = options.law_with(law, gains)
-    path = export(
-        chosen, out, surface=surface, velocity=velocity, control_period=period, u_max=u_max, model=model, joint=joint,
-        binary=binary,
-    )  # fmt: skip
+    with options.joints_as_option():
+        path = export(
+            chosen, out, surface=surface, velocity=velocity, control_period=period, u_max=u_max, model=model,
+            joint=joint, joints=joints, binary=binary,
+        )  # fmt: skip
     print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
 
 

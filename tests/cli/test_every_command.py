@@ -75,7 +75,7 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "check-c law.c --gains a=1 --memory 3 --symbol f --flag=-Ia --flag=-Ib --timeout 4": ["exchange.c.load.check"],
     "export-fmu pid": ["exchange.fmu.export.export_fmu"],
     "export-fmu pid --gains kp=50 --surface linear(c=4) --velocity levant --period 0.002 --u-max 6 --model nominal "
-    "--joint slide --no-binary --out p.fmu": ["exchange.fmu.export.export_fmu"],
+    "--joint slide --joints 2 --no-binary --out p.fmu": ["exchange.fmu.export.export_fmu"],
 }
 
 

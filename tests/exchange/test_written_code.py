@@ -12,6 +12,7 @@ from smc_mujoco.exchange.c import export as c_export
 FMUS = {  # name of a snapshot -> law, options of export_fmu
     "one joint": ("super_twisting", {"surface": "integral", "velocity": "levant", "u_max": 3.0, "joint": "slide"}),
     "with its model": ("pid", {"model": "nominal", "control_period": 2e-3}),
+    "two joints": ("hybrid_sliding", {"joints": 2, "u_max": (3.0, 5.0)}),
 }
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 

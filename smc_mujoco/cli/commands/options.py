@@ -1,10 +1,11 @@
 """Options and arguments that several commands have, and functions that parse them."""
 
+import contextlib
 import importlib
 import itertools
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -125,6 +126,15 @@ SceneName = Annotated[
 ]
 Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
 X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
+
+
+@contextlib.contextmanager
+def joints_as_option() -> Iterator[None]:
+    """Write the argument joints= as the option --joints in sentences of errors."""
+    try:
+        yield
+    except ScenarioError as error:
+        raise ScenarioError(re.sub(r"\bjoints=", "--joints ", str(error))) from None
 
 
 def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:

@@ -5,46 +5,62 @@ results, parameters, the control period, and the memories of law, surface and es
 nothing of the law. `controller.c` computes, like the callback,
 
     estimator -> surface -> law -> saturation
+
+With a law of many joints, every vector and matrix is one variable for each element, x[1], x[2], M[1,1], M[1,2], counted
+from 1 as in FMI's structured names. The arrays of FMI 3.0 are not used, because FMPy's `simulate_fmu` takes no inputs
+of several shapes. The elements follow each other in the array of variables, so C reads them as an array.
 """
 
 import dataclasses
 import functools
+import itertools
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from smc_mujoco.control.component import Component
+from smc_mujoco.control import units
+from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.control.units import ACCELERATION, FORCE, INPUT_GAIN, POSITION, SPEED, TIME, Unit
+from smc_mujoco.control.units import FORCE, POSITION, SPEED, TIME, Unit
 from smc_mujoco.exchange.c import export
-from smc_mujoco.exchange.c.translate import plain
+from smc_mujoco.exchange.c.translate import JOINTS, plain
 from smc_mujoco.simulation.controller import MAX_CONTROL
 
 MAX_DOUBLE = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
-INPUTS: dict[str, tuple[Unit | None, str]] = {  # input -> its unit and description, in the order of the variables
+# Input -> its unit and description, in the order of the variables: of every FMU, and of one channel or of many joints.
+COMMON_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "x": (POSITION, "measured position"),
     "v": (SPEED, "measured velocity"),
     "r": (POSITION, "reference"),
     "dr": (SPEED, "first derivative of the reference"),
-    "ddr": (ACCELERATION, "second derivative of the reference"),
-    "f": (ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
-    "g": (INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
+    "ddr": (units.ACCELERATION, "second derivative of the reference"),
+}
+CHANNEL_INPUTS: dict[str, tuple[Unit | None, str]] = {
+    "f": (units.ACCELERATION, "nominal f of x'' = f + g u, at the measured x and v"),
+    "g": (units.INPUT_GAIN, "nominal g of x'' = f + g u, at the measured x and v"),
     "q": (None, "measured position of the joint without actuator that this one moves"),
     "dq": (None, "velocity of the joint without actuator"),
     "fq": (None, "nominal fq of q'' = fq + gq u"),
     "gq": (None, "nominal gq of q'' = fq + gq u"),
 }
-MODEL_INPUTS = {"f", "g", "fq", "gq"}  # of the nominal model
+JOINT_INPUTS: dict[str, tuple[Unit | None, str]] = {
+    "h": (FORCE, "nominal h of M x'' + h = u, at the measured x and v"),
+    "g": (FORCE, "nominal gravity and springs, at the measured x"),
+    "M": (units.INERTIA, "nominal mass matrix of M x'' + h = u, at the measured x"),
+    "C": (units.FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
+    "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
+}
+MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}  # of the nominal model; C and J are what coriolis and jacobian need
 REQUIRED_INPUTS = ("x", "r", "dr")  # inputs of every FMU
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
     "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
-    "smc_law_real", "smc_law_degree", "smc_law_modelled",
+    "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared",
 )  # fmt: skip
 # In C, the rest of a function that returns where there is no model.
 UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL)
@@ -64,14 +80,20 @@ class Variable(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Controller:
-    """A law with all that it needs to control a joint."""
+    """A law with all that it needs to control one joint, or many."""
 
     law: Law
     surface: Surface | None  # None: the law's own
     estimator: Estimator | None  # None: a measured velocity
     period: float  # control period, s
-    u_max: float  # bound on |u|; may be infinite
+    u_max: tuple[float, ...]  # bound on |u| of each joint; may be infinite
     modelled: bool  # whether the law reads the nominal model
+    joints: int = 0  # of a law of many joints; 0 for a law of one channel
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """What follows the name of a quantity: "", or "[1]", "[2]", ... for each joint."""
+        return tuple(f"[{i + 1}]" for i in range(self.joints)) or ("",)
 
     @property
     def parts(self) -> dict[str, Component]:
@@ -82,36 +104,57 @@ class Controller:
     @functools.cached_property
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
-        return {kind: export.translated(part) for kind, part in self.parts.items()}
+        joints = {"law": self.joints}
+        return {kind: export.translated(part, joints=joints.get(kind, 0)) for kind, part in self.parts.items()}
 
 
 def variables(controller: Controller) -> list[Variable]:
     """Return the variables in the order of their value references."""
+    places, of_model = controller.places, JOINT_INPUTS if controller.joints else CHANNEL_INPUTS
     wanted = inputs(controller)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
-    for name, (unit, words) in INPUTS.items():
-        if name in wanted:
-            start = float(name in ("g", "gq"))  # laws divide by these two
-            listed.append(Variable(name, "SMC_INPUT", words, unit, start))
-    listed.append(Variable("u", "SMC_COMPUTED", "command, within u_max", FORCE))
-    listed.append(Variable("s", "SMC_COMPUTED", "sliding variable"))
+    for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
+        starts = _starts(name, controller) if name in wanted else {}
+        listed += [Variable(f"{name}{place}", "SMC_INPUT", words, unit, start) for place, start in starts.items()]
+    computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
     if controller.surface:
-        listed.append(Variable("v_eq", "SMC_COMPUTED", "acceleration of the error that keeps s constant"))
+        computed.append(("v_eq", "acceleration of the error that keeps s constant", None))
     if controller.estimator:
-        listed.append(Variable("v_estimated", "SMC_COMPUTED", "estimated velocity", SPEED))
-    bound = controller.u_max if math.isfinite(controller.u_max) else MAX_DOUBLE
-    listed.append(Variable("u_max", "SMC_PARAMETER", "bound on the magnitude of u", FORCE, bound, 0.0, True))
+        computed.append(("v_estimated", "estimated velocity", SPEED))
+    for name, words, unit in computed:
+        listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
+    words = "bound on the magnitude of u"
+    for place, bound in zip(places, controller.u_max, strict=True):
+        start = bound if math.isfinite(bound) else MAX_DOUBLE
+        listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
     for kind, part in controller.parts.items():
-        listed += [parameter(kind, part, name, value) for name, value in part.gains.items()]
+        for name, value in part.gains.items():
+            indices = places if kind == "law" and name not in part.shared else ("",)
+            listed += [parameter(kind, part, name, gain_at(value, i), place) for i, place in enumerate(indices)]
     listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period))
     for kind, (slots, _) in controller.code.items():
-        words = f"of the memory of the {kind}"
-        listed += [Variable(f"{kind}.memory[{k}]", "SMC_STATE", f"number {k} {words}") for k in range(1, slots + 1)]
+        for i in range(max(1, controller.joints)):
+            joint, place = (f", joint {i + 1}", f"{i + 1},") if controller.joints else ("", "")
+            listed += [
+                Variable(f"{kind}.memory[{place}{k}]", "SMC_STATE", f"number {k} of the memory of the {kind}{joint}")
+                for k in range(1, slots + 1)
+            ]
     return listed
 
 
+def _starts(name: str, controller: Controller) -> dict[str, float]:
+    """Return what follows the name of an input, of each element -> its value before it is set.
+
+    It is 1 where laws divide by the input, as by g or the diagonal of M, else 0.
+    """
+    if name not in ("M", "C", "J"):
+        return dict.fromkeys(controller.places, float(name in ("g", "gq") and not controller.joints))
+    rows, columns = range(1, 4 if name == "J" else controller.joints + 1), range(1, controller.joints + 1)
+    return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
+
+
 def inputs(controller: Controller) -> set[str]:
-    """Return the names of the inputs that the components read."""
+    """Return the names of the inputs that the components read, without indices."""
     texts = [text if controller.modelled else UNREACHED.sub(r"\1", text) for _, text in controller.code.values()]
     read, wanted = reads("".join(texts)), {*REQUIRED_INPUTS}
     if controller.estimator is None or "v" in reads(controller.code["estimator"][1]):
@@ -120,6 +163,7 @@ def inputs(controller: Controller) -> set[str]:
         wanted.add("ddr")
     if controller.modelled:
         wanted |= read & MODEL_INPUTS
+        wanted |= {name for name, needs in (("C", "coriolis"), ("J", "jacobian")) if needs in read}
     return wanted | (read & {"q", "dq"})
 
 
@@ -128,16 +172,16 @@ def reads(code: str) -> set[str]:
     return set(re.findall(r"->(\w+)", code))  # a function may call the measurement other than y
 
 
-def parameter(kind: str, part: Component, name: str, value: float) -> Variable:
-    """Return a gain of a component as a parameter."""
+def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
+    """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
     gain = part.template.gains[name] if part.template and name in part.template.gains else None
-    unit = gain.unit_at(part.gains) if gain else None
+    unit = gain.unit_at({key: gain_at(number, 0) for key, number in part.gains.items()}) if gain else None
     positive = bool(gain and gain.positive)
     minimum = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
     limits = ", greater than 0" if positive else ", at least 0" if minimum == 0.0 else ""
     finite = value if math.isfinite(value) else math.copysign(MAX_DOUBLE, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
-    return Variable(f"{kind}.{plain(name)}", "SMC_PARAMETER", words, unit, finite, minimum, positive)
+    return Variable(f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, minimum, positive)
 
 
 # C
@@ -152,6 +196,7 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
     """Return controller.h: the sizes, and the indices of the variables. `identifier`: the model's name in C."""
     memory = next((i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed))
     own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
+    joints = f"\n#define {JOINTS} {controller.joints}" if controller.joints else ""
     indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
     return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
 #ifndef SMC_CONTROLLER_H
@@ -159,7 +204,7 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
 
 /* own names, so that several FMUs can be linked into one program */
 {own_names}
-
+{joints}
 #include "smc_fmu.h"
 
 #define SMC_TOKEN "{token}"
@@ -175,8 +220,8 @@ enum {{
 """
 
 
-def source(listed: Sequence[Variable], body: Iterable[str]) -> str:
-    """Return controller.c: the variables, and a function with the statements `body`."""
+def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str:
+    """Return controller.c: the variables, the functions `helpers`, and a last one with the statements `body`."""
     limits = {0.0: "0.0", -math.inf: "-INFINITY"}
     lines = (f'"{v.name}", {v.kind}, {v.start!r}, {limits[v.minimum]}, {int(v.positive)}' for v in listed)
     table = "\n".join(f"    {{{line}}}," for line in lines)
@@ -198,57 +243,124 @@ static double number(double x)
     return x >= DBL_MAX ? INFINITY : x <= -DBL_MAX ? -INFINITY : x;
 }}
 
-int smc_controller(double *value, double t)
+{helpers}int smc_controller(double *value, double t)
 {{
 {statements}
 }}
 """
 
 
-def body(controller: Controller) -> Iterator[str]:
-    """Yield the statements of smc_controller, without indentation."""
-    wanted = inputs(controller)
+def helpers(controller: Controller) -> str:
+    """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and jacobian."""
+    wanted, needs, functions = inputs(controller), reads(controller.code["law"][1]), ""
+    if "coriolis" in needs:
+        given = "C" in wanted
+        matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}" if given else "(void)plant, (void)w"
+        add = "\n        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];" * given
+        functions += f"""/* out = C w */
+static void coriolis(void *plant, const double *w, double *out)
+{{
+    {matrix};
+    for (int i = 0; i < SMC_JOINTS; i++) {{
+        out[i] = 0.0;{add}
+    }}
+}}
+
+"""
+    if "jacobian" in needs:
+        source, unused = "NAN", "    (void)plant;\n"
+        if "J" in wanted:
+            source, unused = f"((const double *)plant)[{place('J[1,1]')} + i]", ""
+        functions += f"""static void jacobian(void *plant, double *out)
+{{
+{unused}    for (int i = 0; i < 3 * SMC_JOINTS; i++) out[i] = {source};
+}}
+
+"""
+    return functions
+
+
+def body(listed: Sequence[Variable], controller: Controller) -> Iterator[str]:
+    """Yield the statements of smc_controller, without indentation. What is of each joint is in a loop over j."""
+    wanted, many = inputs(controller), controller.joints
+    j, u, s = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
 
     def value(name: str, absent: str = "0.0") -> str:
-        return absent if name in INPUTS and name not in wanted else f"value[{place(name)}]"
+        if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
+            return absent
+        return f"value[{place(name + controller.places[0])}{' + j' * bool(many)}]"
 
-    for kind, part in controller.parts.items():
-        yield f"const double {kind}_gains[] = {{"
-        yield from (f"    number({value(f'{kind}.{plain(name)}')})," for name in part.gains)
-        yield from ("    0.0,",) if not part.gains else ()
-        yield "};"
-        first = f"&{value(f'{kind}.memory[1]')}" if controller.code[kind][0] else "NULL"
-        yield f"double *{kind}_memory = {first};"
+    def for_each(lines: Iterable[str]) -> Iterable[str]:
+        if not many:
+            return lines
+        return itertools.chain(["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"])
+
+    yield from _tables(listed, controller)
     yield "smc_measurement y = {0};"
-    yield "double out[2];"
+    yield f"double out[{'2 * SMC_JOINTS' if many else 2}];"
     yield "int failure;"
     yield f"y.t = t, y.dt = SMC_DT, y.model = {float(controller.modelled)!r};"
-    yield f"y.limit = number({value('u_max')});"
-    yield f"y.x = {value('x')}, y.r = {value('r')}, y.dr = {value('dr')};"
-    yield f"y.ddr = y.a = {value('ddr')};"
-    if controller.estimator:
-        yield f"const smc_reading reading = {{SMC_DT, y.x, {value('v')}}};"
-        yield from _call("estimator", "&reading")
-        yield f"y.v = {value('v_estimated')} = out[0];"
-        yield "if (!isnan(out[1])) y.a = out[1];"
-    else:
-        yield f"y.v = {value('v')};"
-    yield "y.e = y.x - y.r, y.de = y.v - y.dr;"
-    yield f"y.f = {value('f', 'NAN')}, y.g = {value('g', 'NAN')};"
-    yield f"y.q = {value('q')}, y.dq = {value('dq')}, y.fq = {value('fq')}, y.gq = {value('gq')};"
+    if needs := [name for name in ("coriolis", "jacobian") if name in reads(controller.code["law"][1])]:
+        yield f"y.plant = value, {', '.join(f'y.{name} = {name}' for name in needs)};"
+    yield from for_each(_measured(controller, value, j))
+    if many and controller.modelled and "M" in wanted:
+        yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{place('M[1,1]')} + j];"
     if controller.surface:
-        yield from _call("surface", "&y")
+        yield from _call("surface", "&y", "surface_memory")
         yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {value('v_eq')} = out[1];"
-    yield from _call("law", "&y")
-    yield "const double u = fmin(fmax(out[0], -y.limit), y.limit), s = out[1];"
-    yield f"{value('u')} = u, {value('s')} = s;"
-    yield f"if (!(isfinite(out[0]) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;"
+    yield from _call("law", "&y", "law_memory")
+    yield from for_each(
+        [
+            f"const double u = fmin(fmax(out{u}, -y.limit{j}), y.limit{j}), s = out{s};",
+            f"{value('u')} = u, {value('s')} = s;",
+            f"if (!(isfinite(out{u}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
+        ]
+    )
     yield "return 0;"
 
 
-def _call(kind: str, measured: str) -> Iterator[str]:
-    """Yield the call of a component, and the return if it fails. `measured`: its first argument, in C."""
-    yield f"failure = smc_{kind}({measured}, {kind}_gains, {kind}_memory, out);"
+def _tables(listed: Sequence[Variable], controller: Controller) -> Iterator[str]:
+    """Yield the lines that collect the gains of each component, and find its memory."""
+    names = {variable.name for variable in listed}
+    for kind, part in controller.parts.items():
+        yield f"const double {kind}_gains[] = {{"
+        for name in part.gains:
+            shared = f"{kind}.{plain(name)}"
+            elements = [shared] * max(1, controller.joints * (kind == "law"))
+            elements = elements if shared in names else [shared + place for place in controller.places]
+            yield from (f"    number(value[{place(element)}])," for element in elements)
+        yield from ("    0.0,",) if not part.gains else ()
+        yield "};"
+        first = place(f"{kind}.memory[1{',1' * bool(controller.joints)}]")
+        yield f"double *{kind}_memory = {f'&value[{first}]' if controller.code[kind][0] else 'NULL'};"
+
+
+def _measured(controller: Controller, value: Callable[..., str], j: str) -> Iterator[str]:
+    """Yield the statements that fill in the measurement of one joint. `value` returns a variable in C, `j` an index."""
+    yield f"y.limit{j} = number({value('u_max')});"
+    yield f"y.x{j} = {value('x')}, y.r{j} = {value('r')}, y.dr{j} = {value('dr')};"
+    yield f"y.ddr{j} = y.a{j} = {value('ddr')};"
+    if controller.estimator:
+        slots = controller.code["estimator"][0]
+        yield f"const smc_reading reading = {{SMC_DT, y.x{j}, {value('v')}}};"
+        yield from _call("estimator", "&reading", "estimator_memory" + f" + {slots} * j" * bool(j and slots))
+        yield f"y.v{j} = {value('v_estimated')} = out[0];"
+        yield f"if (!isnan(out[1])) y.a{j} = out[1];"
+    else:
+        yield f"y.v{j} = {value('v')};"
+    yield f"y.e{j} = y.x{j} - y.r{j}, y.de{j} = y.v{j} - y.dr{j};"
+    if not j:
+        yield f"y.f = {value('f', 'NAN')}, y.g = {value('g', 'NAN')};"
+        yield f"y.q = {value('q')}, y.dq = {value('dq')}, y.fq = {value('fq')}, y.gq = {value('gq')};"
+    elif controller.modelled:
+        yield f"y.h{j} = {value('h')}, y.g{j} = {value('g')};"
+    else:
+        yield "y.M[j * SMC_JOINTS + j] = 1.0;"
+
+
+def _call(kind: str, measured: str, memory: str) -> Iterator[str]:
+    """Yield the call of a component, and the return if it fails. The arguments are in C."""
+    yield f"failure = smc_{kind}({measured}, {kind}_gains, {memory}, out);"
     yield "if (failure) return failure;"
 
 

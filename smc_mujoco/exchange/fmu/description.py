@@ -76,18 +76,23 @@ def model_description(
     variables, structure = xml.SubElement(root, "ModelVariables"), xml.SubElement(root, "ModelStructure")
     for reference, variable in enumerate(listed):
         variables.append(_variable(reference, variable, joint))
-    outputs = [str(reference) for reference, variable in enumerate(listed) if variable.name in OUTPUTS]
+    outputs = [str(reference) for reference, variable in enumerate(listed) if is_output(variable)]
     for element in ("Output", "InitialUnknown"):
         for reference in outputs:
             xml.SubElement(structure, element, valueReference=reference)
     return written(root)
 
 
+def is_output(variable: Variable) -> bool:
+    """Return whether a variable is u or s, or an element of these."""
+    return variable.name.partition("[")[0] in OUTPUTS
+
+
 def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:
     """Return the element of a variable."""
     causality, variability, initial = VARIABLE_ROLES[variable.kind]
     about = {"name": variable.name, "valueReference": str(reference), "description": variable.description}
-    about |= {"causality": "output" if variable.name in OUTPUTS else causality, "variability": variability}
+    about |= {"causality": "output" if is_output(variable) else causality, "variability": variability}
     if initial is not None:
         about["initial"] = initial
     if variable.unit is not None and any(variable.unit):

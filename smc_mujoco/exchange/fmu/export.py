@@ -12,9 +12,11 @@ import re
 import sys
 import uuid
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import no_room, replacing, scratch, with_ending
@@ -24,14 +26,14 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import build
-from smc_mujoco.exchange.c.export import with_head, writable
+from smc_mujoco.exchange.c.export import number_of_joints, with_head, writable
 from smc_mujoco.exchange.fmu import controller as inside
 from smc_mujoco.exchange.fmu import description
 from smc_mujoco.exchange.fmu.controller import Controller
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
-FOLDER = Path(__file__).parent
+FOLDER, MIXED_JOINTS = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
 FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 COMPILE_TIMEOUT = 120.0  # s
 # Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
@@ -47,32 +49,33 @@ def export_fmu(
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
     control_period: float | None = None,
-    u_max: float | None = None,
+    u_max: float | Sequence[float] | None = None,
     model: str | None = None,
     joint: str | None = None,
+    joints: int | None = None,
     binary: bool = True,
 ) -> Path:
     """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0, Co-Simulation. Return its path.
 
     Args:
-      law: a Law of one channel, its Template, its name, or a Scenario, which then gives surface, velocity,
-        control_period, u_max, model and the joint's units.
+      law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity, control_period, u_max,
+        model, the number of joints and their units.
       path: of the .fmu file. Default: the law's name, in the current folder.
       surface: a Surface or its name. None: the law's own, de + c e.
       velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
       control_period: s; the law runs this often. Default: 1 ms.
-      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. Default: none.
-      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u. Default: "nominal" for a law that requires it,
-        else "none".
+      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. For many joints also one for each. Default: none.
+      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u, or those of M, h, g, C and J that a law of
+        many joints reads. Default: "nominal" for a law that requires it, else "none".
       joint: "hinge" for the units rad and N m, the default, or "slide" for m and N.
+      joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
     Inputs are x, v unless an estimator replaces it, the reference r and dr, and what else the law reads, such as ddr.
-    Outputs are u and s. All gains are tunable parameters.
+    Outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
 
     Raises:
-      ScenarioError: a law in C or of many joints, Python without translation into C, a surface that does not fit, no
-        compiler.
+      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no compiler.
     """
     chosen = {
         "surface": surface,
@@ -80,6 +83,7 @@ def export_fmu(
         "control_period": control_period,
         "u_max": u_max,
         "model": model,
+        "joints": joints,
     }
     if isinstance(law, Scenario):
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
@@ -104,19 +108,26 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
     if given := [name for name, value in chosen.items() if value is not None]:
         raise ScenarioError(f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead")
     s, limits = scenario.resolved, set(scenario.limits)
-    if len(limits) > 1 or s.feedforward is not None:
-        what = "a bound for each channel" if len(limits) > 1 else "a feedforward"
+    several = len(limits) > 1 and not s.law.joint
+    if several or s.feedforward is not None:
+        what = "a bound for each channel" if several else "a feedforward"
         raise ScenarioError(f"the scenario has {what}, which an FMU cannot have: give its law, with u_max=")
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
-    return own | {"u_max": limits.pop()}, "slide" if s.plant.unit == "m" else "hinge"
+    joint = MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
+    if s.law.joint:
+        return own | {"u_max": list(scenario.limits), "joints": s.plant.n}, joint
+    return own | {"u_max": limits.pop(), "joints": None}, joint
 
 
-def _controller(law: Any, surface: Any, velocity: Any, control_period: Any, u_max: Any, model: Any) -> Controller:
+def _controller(
+    law: Any, surface: Any, velocity: Any, control_period: Any, u_max: Any, model: Any, joints: int | None
+) -> Controller:
     """Return the controller, checked. Arguments and errors as in `export_fmu`."""
     sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
-    if chosen.joint:
-        raise ScenarioError(f"law {chosen.name!r} is of many joints, and an FMU of one: write it in C, by smc.law_to_c")
+    count = number_of_joints(chosen, joints)
+    if sliding is not None and count:
+        raise ScenarioError(f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out")
     if sliding is not None:
         check_surface(sliding, chosen)
     if model not in (None, *coerce.MODELS):
@@ -128,16 +139,29 @@ def _controller(law: Any, surface: Any, velocity: Any, control_period: Any, u_ma
         surface=sliding,
         estimator=None if estimator is None or estimator.name == "measured" else estimator,
         period=1e-3 if control_period is None else number("control_period", control_period, above=0.0),
-        u_max=math.inf if u_max is None else number("u_max", u_max, above=0.0, infinite=True),
+        u_max=_bounds(math.inf if u_max is None else u_max, count),
         modelled=chosen.requires_model or model == "nominal",
+        joints=count,
     )
+
+
+def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
+    """Return the bound on |u| of each joint, from one for all or one for each."""
+    if not (joints and isinstance(u_max, Sequence | np.ndarray)):
+        return (number("u_max", u_max, above=0.0, infinite=True),) * max(1, joints)
+    if len(u_max) != joints:
+        raise ScenarioError(f"u_max has {len(u_max)} values for {joints} joints: give one, or {joints}")
+    return tuple(number(f"u_max[{i}]", bound, above=0.0, infinite=True) for i, bound in enumerate(u_max))
 
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
     """Return path in the archive -> text, for all files but the binary."""
     listed = inside.variables(controller)
-    law = with_head(controller.law, "double", *controller.code["law"], 0, measured=False)
-    files = {"controller.c": inside.source(listed, inside.body(controller))}
+    if joint == MIXED_JOINTS:
+        joint = "hinge"  # of which no unit is left but powers of the second
+        listed = [v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None) for v in listed]
+    law = with_head(controller.law, "double", *controller.code["law"], controller.joints, measured=False)
+    files = {"controller.c": inside.source(listed, inside.helpers(controller), inside.body(listed, controller))}
     files["law.c"] = f'#include "controller.h"\n{law}'
     for kind, (slots, text) in controller.code.items():
         if kind != "law":

@@ -429,6 +429,7 @@ def test_the_units_are_those_of_the_scenario_s_joint(folder):
 def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
     for call, said in (
         (lambda: smc.export_fmu("twistin"), "unknown law 'twistin'"),
+        (lambda: smc.export_fmu("passivity_based"), "is of many joints: give their number, such as joints=7"),
         (lambda: smc.export_fmu(smc.law("classical", k=[1.0, 2.0])), "has gains by channel"),
         (lambda: smc.export_fmu("pid", "law.zip"), "cannot save to 'law.zip': end the name in .fmu"),
         (lambda: smc.export_fmu("pid", joint="ball"), "unknown joint 'ball'"),
@@ -436,7 +437,6 @@ def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
         (lambda: smc.export_fmu("pid", u_max=-1.0), "u_max is -1"),
         (lambda: smc.export_fmu("pid", model="full"), "model is 'full': give 'none' or 'nominal'"),
         (lambda: smc.export_fmu("hierarchical", model="none"), "needs the nominal model"),
-        (lambda: smc.export_fmu("unit_vector"), "is of many joints, and an FMU of one: write it in C, by smc.law_to_c"),
         (
             lambda: smc.export_fmu("twisting", surface="linear"),
             "surface 'linear' has relative degree 1, and law 'twisting' 2",

@@ -1,0 +1,236 @@
+"""Laws of many joints as FMUs: valid by FMPy, and step by step what smc.run computes."""
+
+import subprocess
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
+
+from fmpy.validation import validate_fmu  # noqa: E402
+from helpers import arms  # noqa: E402
+from helpers.compiler import needs_compiler  # noqa: E402
+from helpers.fmu import Importer  # noqa: E402
+from numba import njit  # noqa: E402
+
+import smc_mujoco as smc  # noqa: E402
+from smc_mujoco.cli import main as cli  # noqa: E402
+from smc_mujoco.control.joint_law import catalogue, product  # noqa: E402
+from smc_mujoco.exchange.c import build  # noqa: E402
+from smc_mujoco.simulation import reference  # noqa: E402
+
+pytestmark = needs_compiler
+
+REFERENCE = smc.Sine(0.2, 5.0)
+JOINTS = (1, 2, 3)
+# Law -> what its scenario has besides: every law once, with and without the model, with an estimator, with own bounds.
+CASES = {name: {"model": "nominal"} for name in catalogue()} | {
+    "time_delay_sliding": {"velocity": "levant", "v0": (0.1, -0.2, 0.3)},
+    "observer_free_joint": {"velocity": "extended_state_observer", "u_max": (3.0, 1.5, 2.0)},
+}
+GAINS = {"computed_torque_sliding": {"k": [10.0, 20.0, 5.0]}, "unit_vector": {"rho": 8.0}}
+
+
+def scenario(name: str, **fields) -> smc.Scenario:
+    common = {"plant": arms.arm(), "duration": 0.1, "reference": REFERENCE, "x0": (0.1, -0.3, 0.2), "u_max": 60.0}
+    return smc.Scenario(law=smc.law(name, **GAINS.get(name, {})), **common | CASES[name] | fields)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("joint_fmu")
+
+
+@pytest.fixture(scope="module")
+def made(folder):
+    """Law -> its FMU, compiled in a third of the time without optimisation, and its trace."""
+    scenarios = [scenario(name) for name in CASES]
+    with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
+        paths = list(pool.map(lambda s: smc.export_fmu(s, folder / f"{s.law.name}.fmu"), scenarios))
+        return dict(zip(CASES, zip(paths, smc.run(scenarios), strict=True), strict=True))
+
+
+def seen(known, trace: smc.Trace, k: int) -> dict[str, float]:
+    """The inputs of an FMU at a sample of a trace without noise."""
+    x, v = trace.x[k], trace.v[k]
+    r, dr, ddr = type(REFERENCE).value(trace.t[k], REFERENCE)
+    M, h, g = reference.dynamics(trace.scenario, x, v)
+    asked = reference.NominalDynamics(trace.scenario, x, v)
+    vectors = {"x": x, "v": v, "r": [r] * 3, "dr": [dr] * 3, "ddr": [ddr] * 3, "h": h, "g": g}
+    values = {f"{name}[{i}]": float(each[i - 1]) for name, each in vectors.items() for i in JOINTS}
+    matrices = {"M": M, "C": np.column_stack([asked.coriolis(unit) for unit in np.eye(3)])}
+    if "J[1,1]" in known:
+        matrices["J"] = asked.jacobian()
+    values |= {
+        f"{name}[{i},{j}]": float(m[i - 1, j - 1]) for name, m in matrices.items() for i in JOINTS for j in JOINTS
+    }
+    return {name: value for name, value in values.items() if name in known}
+
+
+def outputs(fmu: Importer) -> list[float]:
+    return fmu.get(*(f"{name}[{i}]" for name in "us" for i in JOINTS))
+
+
+def stepped(fmu: Importer, trace: smc.Trace, samples: int) -> np.ndarray:
+    """u and s after each step, (samples, 6)."""
+    found = []
+    for k in range(samples):
+        fmu.set(**seen(fmu.at, trace, k))
+        fmu.fmu.doStep(trace.t[k], 1e-3)
+        found.append(outputs(fmu))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_an_fmu_gives_what_a_run_gives(made, folder, name):
+    """To the last bit; but C w is a product here, where smc.run asks MuJoCo for it, so that 1e-12 remains."""
+    path, trace = made[name]
+    assert trace.failure is None
+    assert validate_fmu(str(path)) == []
+    fmu = Importer(path, folder / name)
+    found, expected = stepped(fmu, trace, len(trace.t)), np.hstack([trace.u, trace.s])
+    assert fmu.said == []
+    assert len(np.unique(found, axis=0)) > 50
+    if name == "passivity_based":
+        assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+    else:
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_its_inputs_are_those_that_the_law_reads(made, name):
+    read = {
+        "computed_torque_sliding": "x v r dr ddr M h",
+        "hybrid_sliding": "x v r dr ddr M h J",
+        "observer_free_joint": "x r dr",
+        "passivity_based": "x v r dr ddr M h C",
+        "super_twisting_computed_torque": "x v r dr ddr M h",
+        "time_delay_sliding": "x r dr ddr",
+        "unit_vector": "x v r dr ddr M h",
+    }[name]
+    known = {v.name: v for v in fmpy.read_model_description(str(made[name][0])).modelVariables}
+    inputs = {one.partition("[")[0] for one, v in known.items() if v.causality == "input"}
+    assert inputs == set(read.split())
+    assert [n for n, v in known.items() if v.causality == "output"] == [f"{n}[{i}]" for n in "us" for i in JOINTS]
+
+
+@njit
+def inertia(seen, v):
+    return product(seen.M, v)
+
+
+@smc.law_function(joint=True)
+def other_words(y, gains, memory):
+    return inertia(y, -y.e), y.e
+
+
+def test_what_a_function_reads_is_an_input_whatever_it_calls_the_measurement(folder):
+    path = smc.export_fmu(other_words, folder / "words.fmu", joints=2, model="nominal", binary=False)
+    assert "M[1,2]" in {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
+
+
+def test_gains_and_bounds_are_those_of_the_joints_and_change_while_it_runs(made, folder):
+    path, trace = made["computed_torque_sliding"]
+    fmu = Importer(path, folder / "computed_torque_sliding")
+    assert fmu.get("law.k[1]", "law.k[2]", "law.k[3]", "law.c[2]") == [10.0, 20.0, 5.0, 5.0]
+    before = stepped(fmu, trace, 3)
+    other = Importer(path, folder / "computed_torque_sliding", **{"law__c[2]": 9.0, "u_max[3]": 0.25})
+    after = stepped(other, trace, 3)
+    same = np.all(before == after, axis=0)
+    assert same[3:].tolist() == [True, False, True]  # s of the joint whose slope has changed
+    np.testing.assert_array_equal(np.abs(after[:, 2]), np.minimum(np.abs(after[:, 2]), 0.25))
+    shared = Importer(made["unit_vector"][0], folder / "unit_vector")
+    assert (shared.get("law.rho"), "law.rho[1]" in shared.at) == ([8.0], False)
+    own = Importer(made["observer_free_joint"][0], folder / "observer_free_joint")
+    assert own.get("u_max[1]", "u_max[2]", "u_max[3]") == [3.0, 1.5, 2.0]
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        own.set(**{"u_max[2]": 0.0})
+    assert "u_max[2] = 0 is out of its range" in own.said[-1]
+
+
+def test_each_joint_has_a_memory_of_its_own(made, folder):
+    path, trace = made["time_delay_sliding"]
+    fmu = Importer(path, folder / "time_delay_sliding")
+    stepped(fmu, trace, 3)
+    slots = [fmu.get(*(f"law.memory[{i},{k}]" for k in (1, 2, 3))) for i in JOINTS]
+    np.testing.assert_array_equal([one[0] for one in slots], trace.u[2])
+    assert [one[2] for one in slots] == [1.0] * 3
+    estimates = fmu.get(*(f"v_estimated[{i}]" for i in JOINTS))
+    assert [one[1] for one in slots] == estimates
+    assert len(set(estimates)) == 3
+
+
+def test_fmpy_simulates_it_with_inputs_by_their_names(made):
+    path, trace = made["computed_torque_sliding"]
+    known = {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
+    every = [seen(known, trace, k) for k in range(len(trace.t))]
+    kinds = [("time", float), *((name, float) for name in every[0])]
+    signals = np.array([(t, *one.values()) for t, one in zip(trace.t, every, strict=True)], kinds)
+    outs = [f"u[{i}]" for i in JOINTS]
+    found = fmpy.simulate_fmu(
+        str(path), stop_time=0.05, step_size=1e-3, output_interval=1e-3, input=signals, output=outs
+    )
+    np.testing.assert_array_equal(np.array([[row[name] for name in outs] for row in found])[1:50], trace.u[:49])
+
+
+@pytest.mark.slow
+def test_the_sources_compile_without_a_warning(made, folder):
+    for name in ("passivity_based", "observer_free_joint"):
+        with zipfile.ZipFile(made[name][0]) as archive:
+            archive.extractall(folder / f"{name}-sources")
+        sources = sorted((folder / f"{name}-sources" / "sources").glob("*.c"))
+        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", "-c", *map(str, sources)]
+        done = subprocess.run([*build.compiler(), *flags], cwd=folder, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_units_are_left_out_where_joints_differ(made, folder):
+    known = {v.name: v.unit for v in fmpy.read_model_description(str(made["unit_vector"][0])).modelVariables}
+    # the arm slides and turns
+    assert [known[name] for name in ("x[1]", "u[1]", "dt", "law.c[1]")] == [None, None, "s", "1/s"]
+    path = smc.export_fmu("unit_vector", folder / "turning.fmu", joints=2, binary=False)
+    known = {v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables}
+    assert (known["x[1]"], known["u[2]"], known["M[1,2]"]) == ("rad", "N.m", "N.m.s^2/rad")
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: smc.export_fmu("unit_vector", joints=2, surface="linear"), "has its own surface"),
+        (lambda: smc.export_fmu("unit_vector", joints=2, model="none"), "needs the nominal model"),
+        (lambda: smc.export_fmu("unit_vector", joints=3, u_max=[1.0, 2.0]), "u_max has 2 values for 3 joints"),
+        (lambda: smc.export_fmu("unit_vector", joints=2, u_max=[1.0, -2.0]), r"u_max\[1\] is -2"),
+        (lambda: smc.export_fmu("pid", joints=2), "law 'pid' is of one channel: leave joints=2 out"),
+        (lambda: smc.export_fmu(scenario("unit_vector"), joints=3), "a scenario has its own joints"),
+    ],
+)
+def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(smc.ScenarioError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_it_is_no_law_of_one_channel(made):
+    said = r"unit_vector\.fmu has inputs that mean nothing that a law measures, x\[1\], x\[2\], x\[3\]"
+    with pytest.raises(smc.ScenarioError, match=said) as error:
+        smc.law_from_fmu(made["unit_vector"][0])
+    assert "\n" not in str(error.value)
+
+
+def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
+    out = tmp_path / "c.fmu"
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-fmu", "unit_vector", "--gains", "c=4 6", "--no-binary", "--out", str(out)])
+    assert not end.value.code
+    known = {v.name: v for v in fmpy.read_model_description(str(out)).modelVariables}
+    assert [float(known[name].start) for name in ("law.c[1]", "law.c[2]", "M[2,2]", "M[1,2]")] == [4.0, 6.0, 1.0, 0.0]
+    with pytest.raises(SystemExit) as end:
+        cli.main(["export-fmu", "unit_vector"])
+    assert end.value.code == 2
+    said = "smc-mujoco: law 'unit_vector' is of many joints: give their number, such as --joints 7\n"
+    assert capsys.readouterr().err == said
