@@ -242,7 +242,7 @@ def _contest(
         relevant=relevant,
         untested=[need == ROBUST for need, _ in blocks],
     )
-    order = _order(comparison, _restraint(table, group, ran, plant))
+    order = _order(comparison, _restraint(table, group, ran, plant, relevant))
     order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
     shares = dict(zip(group.laws, settled, strict=True))
     return comparison, tuple(
@@ -286,7 +286,9 @@ def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fil
     return {law: np.concatenate([filled(part[law]) for part in parts]) for law in laws}
 
 
-def _restraint(table: Table, group: Group, ran: Sequence, plant: Plant) -> dict[str, tuple[float, ...]]:
+def _restraint(
+    table: Table, group: Group, ran: Sequence, plant: Plant, relevant: float
+) -> dict[str, tuple[float, ...]]:
     """Return law -> its mean rank on each of the metrics of `ties`."""
     mean_ranks, laws = [], group.laws
     for metric in ties(plant):
@@ -294,7 +296,7 @@ def _restraint(table: Table, group: Group, ran: Sequence, plant: Plant) -> dict[
         if scores.blocks:
             centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in laws])
             floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in scores.blocks])
-            mean_ranks.append(ranked(centres, floors).mean(axis=1))
+            mean_ranks.append(ranked(centres, floors, relevant=relevant).mean(axis=1))
     return {law: tuple(float(mean[i]) for mean in mean_ranks) for i, law in enumerate(laws)}
 
 

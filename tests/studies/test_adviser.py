@@ -256,7 +256,7 @@ def test_an_answer_over_sets_of_gains_counts_them(advice):
 def test_restraint_ranks_laws_by_overshoot_and_by_energy_of_u(advice):
     (group,) = adviser.paired_runs.groups(advice.table, by=("plant",))
     ran = adviser.paired_runs.scenarios(advice.table, group)
-    found = adviser._restraint(advice.table, group, ran, advice.plant)
+    found = adviser._restraint(advice.table, group, ran, advice.plant, ranking.RELEVANT)
     assert set(found) == set(group.laws)
     energies = {law: np.median(advice.table.select(law=law).column("energy")) for law in group.laws}
     overshoots = {law: np.median(advice.table.select(law=law).column("overshoot")) for law in group.laws}
@@ -264,6 +264,17 @@ def test_restraint_ranks_laws_by_overshoot_and_by_energy_of_u(advice):
     assert energies["idle"] == 0.0
     most = max(overshoots, key=overshoots.__getitem__)
     assert found[most][0] == max(rank for rank, _ in found.values())
+
+
+def test_laws_that_tie_are_ordered_by_the_given_least_relevant_difference(folder, monkeypatch):
+    def ranked(*given, relevant, true=adviser.ranked):
+        asked.add(relevant)
+        return true(*given, relevant=relevant)
+
+    asked = set()
+    monkeypatch.setattr(adviser, "ranked", ranked)
+    smc.which("duffing", needs="fast", laws=["classical", FAST], out=folder, relevant=0.2, **COMMON)
+    assert asked == {0.2}
 
 
 def test_the_reason_names_dominance_where_a_better_mean_rank_is_passed_over(advice):
