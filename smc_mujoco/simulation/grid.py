@@ -180,10 +180,17 @@ def case(
     fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
     if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}
-    of_condition, starts = condition.on(plant, duration), starts or Starts()
+    of_condition, starts = condition.on(plant, duration), checked_starts(Starts() if starts is None else starts)
     starts.check_condition(condition.name, of_condition)
     scenario = Scenario(**fields | of_condition | dict(changes))
     return starts.place(scenario, seed).named(condition.name)
+
+
+def checked_starts(given: object) -> Starts:
+    """Return starts. Raise ScenarioError for anything else, such as the number x0."""
+    if not isinstance(given, Starts):
+        raise ScenarioError(f"starts is {shown(given)}: give starts=smc.starts(x0=0.5)")
+    return given
 
 
 def check_moving(runs: Sequence[Scenario]) -> None:

@@ -283,6 +283,14 @@ def test_start_is_set_by_condition_or_starts(refused):
         assert [s.resolved.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
 
 
+def test_starts_that_are_a_number_are_one_sentence(refused, tmp_path):
+    for search in (smc.grid, smc.margins, smc.tune):
+        for x0 in (1.0, 0.0):
+            refused(lambda search=search, x0=x0: search("duffing", "classical", starts=x0))
+    refused(lambda: smc.compare("classical", "duffing", starts=1.0, out=tmp_path))
+    refused(lambda: smc.which("duffing", laws="classical", starts=1.0, out=tmp_path))
+
+
 def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
     law = smc.law("classical")
     refused(lambda: smc.grid(["duffing", arm], law, ["noise", "nominal"], 2))

@@ -26,7 +26,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
-from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts
+from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_starts
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -58,6 +58,7 @@ class Objective:
         if not 0 < len(conditions) <= SEEDS_PER_TUNING:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
+        checked_starts(self.starts)
         number("weight", self.weight, low=0.0)
         for name in ("duration", "control_period", "u_max", "chattering"):
             if getattr(self, name) is not None:

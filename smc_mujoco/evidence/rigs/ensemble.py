@@ -40,7 +40,7 @@ def runs(
     shipped, given = {law.name: law for law in rig.laws}, rig.laws if laws is None else laws
     if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
-    scenarios, around = [], starts or Starts(x0=rig.x0)
+    scenarios, around = [], Starts(x0=rig.x0) if starts is None else starts
     for name, member in rig.members().items():
         fields: dict[str, Any] = {"u_max": None, "physics_step": None} | member.machine(Values(**member.values))
         free = {key: value for key, value in fields.items() if key not in BY_STARTS}
