@@ -38,21 +38,20 @@ def draw(
         across = max(1, min(len(maps), int(width / style.points(3.2)))) if size is not None else len(maps)
         down = -(-len(maps) // across)
         page = pages.blank(width, height or (MAP_SIZE[1] if size is None else down * width / across * 1.08), fig)
-        axes = page.subplots(down, across, squeeze=False).ravel()
+        axes, after = page.subplots(down, across, squeeze=False).ravel(), convergence_times(maps)
         for ax, region in zip(axes, maps, strict=False):
-            draw_map(ax, region)
+            draw_map(ax, region, after)
         for ax in axes[len(maps) :]:
             ax.remove()
         pages.write(page, paths)
     return page
 
 
-def draw_map(ax, region: Basin) -> None:
-    """Fill a matplotlib axes with a map and its legend."""
+def draw_map(ax, region: Basin, after: Sequence[float]) -> None:
+    """Fill a matplotlib axes with a map and its legend; `after` is from `convergence_times` of all maps."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    after = convergence_times([region])
     classes = colour_indices(region, after)
     ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=4.5, rasterized=True)
     ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))

@@ -135,6 +135,14 @@ def test_maps_of_states_that_converge_early_or_late_or_not(size, snapshot):
     assert sketch(region.draw(maps, size=size)) == snapshot
 
 
+def test_equal_blues_of_maps_side_by_side_are_equal_times():
+    names = {"law": "classical", "plant": "van_der_pol", "unit": "m", "duration": 8.0, "x": np.ones(2), "v": np.ones(2)}
+    outcome = np.full((2, 2), CONVERGES, np.int8)
+    maps = [Basin(**names, outcome=outcome, decided_at=np.full((2, 2), time)) for time in (2.0, 8.0)]
+    shades = [ax.collections[0].get_array() for ax in region.draw(maps).axes]
+    assert [np.unique(shade).tolist() for shade in shades] == [[0], [1]]
+
+
 ONE, OTHER = (made(smc.Scenario(plant=name, law="classical", duration=0.01)) for name in ("duffing", "van_der_pol"))
 REFUSED = {  # call -> arguments, and what replaces them
     figure: ({"traces": ONE}, [
