@@ -273,9 +273,7 @@ def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
     return _linked(*(numbers.astype(np.int64).tobytes() for numbers in sets))
 
 
-@functools.lru_cache(
-    maxsize=4096
-)  # two laws use the same sets in all blocks and metrics: boards take a fifth of the time
+@functools.lru_cache(4096)  # laws use the same sets in all blocks and metrics: boards take a fifth of the time
 def _linked(*sets: bytes) -> tuple[int, ...] | None:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

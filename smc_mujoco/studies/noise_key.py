@@ -52,7 +52,8 @@ def _of_folder(file: Path, laws: dict[str, dict[str, str]]) -> int:
     """Return the key in a file if it was drawn for all these laws, else a new one, which is written there."""
     try:
         stored = json.loads(file.read_text(encoding="utf-8"))
-        key, before = whole("noise_key", stored["key"], 1, MAX_SEED), dict(stored["laws"])
+        key = whole("noise_key", stored["key"], 1, MAX_SEED)
+        before = {name: dict(law) for name, law in dict(stored["laws"]).items()}
     except (OSError, ValueError, KeyError, TypeError):
         key, before = 0, {}
     new = [law for name, law in laws.items() if name not in before]
@@ -77,7 +78,7 @@ def _description(scenario: Scenario) -> dict[str, str]:
 
 def _change_in_words(law: dict[str, str], before: list[dict[str, str]]) -> str:
     """Return what has changed of a law since the laws `before`, or that no law of its name was among them."""
-    same_name = [other for other in before if other["name"] == law["name"]]
+    same_name = [other for other in before if other.get("name") == law["name"]]
     if not same_name:
         return f"law {law['name']} is new"
     changed = [name for name, value in law.items() if value != same_name[-1].get(name)]
