@@ -26,7 +26,7 @@ from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import METRIC, WorstCase
 
 ROBUST = "robust"
-TIES = ("no-overshoot", "frugal")  # needs that order laws which tie
+TIES = ("no-overshoot", "frugal")  # needs that decide the order of tied laws
 MAX_ROWS = 12  # laws in the table; chosen
 
 
@@ -35,7 +35,7 @@ NEEDS |= {ROBUST: dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"wo
 
 
 def ties(plant: Plant) -> list[Metric]:
-    """Return the metrics that order laws which tie on a plant."""
+    """Return the metrics that decide the order of tied laws on a plant."""
     return [NEEDS[need] for need in TIES if not NEEDS[need].refusal(plant)]
 
 
@@ -115,13 +115,13 @@ class Advice(Tables):
         return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
 
     def dominated(self, law: str) -> list[str]:
-        """Return the laws that are better than a law in some block, and worse in none."""
+        """Return the laws that dominate a law: better than it in some block, and worse in none."""
         rivals = (name for name in self.compared if name != law)
         return [name for name in rivals if self.wins(name, law) and not self.wins(law, name)]
 
     @property
     def level(self) -> list[str]:
-        """The laws that cannot be told from the advised law in any block."""
+        """The laws that are neither better nor worse than the advised law in any block."""
         first, *others = self.compared
         return [name for name in others if not self.wins(first, name) and not self.wins(name, first)]
 
@@ -272,7 +272,7 @@ class Advice(Tables):
 
     @property
     def _rule(self) -> str:
-        """The order of laws that tie, in words."""
+        """The rule for the order of tied laws, in words."""
         return f"laws that tie stand in the order of {', then of '.join(m.label for m in ties(self.plant))}, less first"
 
     def _standing(self, choice: Choice, need: str) -> str:
@@ -325,7 +325,7 @@ class Advice(Tables):
             f"it dominates {first_of(beaten)}: better somewhere, worse nowhere" if beaten else "",
             f"{it} ties with {first_of(self.tied)}; {self._rule}" if self.tied else "",
             f"{it} is not to be told from {first_of(unsure)}" if unsure else "",
-            f"a matter of what counts against {first_of(mixed)}, better here and worse there" if mixed else "",
+            f"it loses some comparisons to {first_of(mixed)}, so the choice depends on what counts" if mixed else "",
             self._against(others[0]),
         ]
         sure = f"How sure: {'; '.join(filter(None, parts))}. {self._holds}"

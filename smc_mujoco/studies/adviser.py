@@ -4,14 +4,14 @@ A need is a metric to compare (fast, accurate, calm ...) or a property that a la
 With "no-velocity", laws that read a velocity get one that is differentiated from the position.
 
 Every law that suits gets gains by one rule, and runs in each condition from the same seeds. Laws are compared by the
-rules of `ranking`; a block is a need in a condition. No law is left out after fewer runs: a few seeds would decide
-which law may be first. A law that settles in less than half as many runs of some condition as the law that settles most
-often is not fit, and not compared: else a law that does nothing would be the calmest. For "robust" an adversary attacks
-each law. There is no test then, because a worst case is no sample.
+rules of `ranking`; a block is a need in a condition. No law is dropped early, because a few seeds would then decide
+which law may be first. A law is not fit, and not compared, if in some condition it settles in less than half as many
+runs as the law that settles most often: else a law that does nothing would be the calmest. For "robust" an adversary
+attacks each law. There is no test then, because a worst case is no sample.
 
-A law dominates another if it is better in some block and worse in none. Laws with fewer runs that fail come first, then
-laws by mean rank, but none before a law that dominates it. Laws that tie with the next law in this order stand by
-`ties`, less first. The first law is advised, unless all are level.
+A law dominates another if it is better in some block and worse in none. Laws are ordered by their runs that fail, then
+by mean rank, but none comes before a law that dominates it. Laws that tie with the next law are ordered by the metrics
+of `ties`, less first. The first law is advised, unless all are level.
 """
 
 import math
@@ -45,10 +45,10 @@ DEFAULT_CONDITIONS = ("nominal", "noise", "sine")
 NO_VELOCITY = "no-velocity"
 RELIABLE = 0.9  # share of the runs of every condition in which a reliable law settles; chosen
 MIN_BUDGET = 16  # runs of an adversary in a condition, and as many random ones; chosen
-MIN_SETTLED = 0.5  # of the largest share of runs that settle under a law; chosen
+MIN_SETTLED = 0.5  # of the share of runs that settle under the best law; chosen
 
 
-# s, of a run; sets of gains that a tuning tries; in how many parts the budget of an adversary is shared
+# Duration of a run, s; sets of gains that a tuning tries; divisor of an adversary's budget
 FULL, QUICK = (5.0, 96, 1), (3.0, 32, 3)
 
 

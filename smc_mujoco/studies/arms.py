@@ -36,7 +36,7 @@ PATH_BEFORE, PATH_BEHIND = 0.0005, 0.004  # m: distances of paths from the wall'
 PROBE = 0.012  # m: radius of the probe
 SPREAD = 0.05  # rad: largest distance of each joint's start from the task's own start; chosen
 BLOW = 1.0  # s: time of the blow in its task
-MAX_STEP_CHANGE = 0.1  # of an error, relative, with half the physics step; with a larger one runs are unstable; chosen
+MAX_STEP_CHANGE = 0.1  # relative change of an error with half the physics step; more means unstable; chosen
 PRESS = 20.0  # N: wanted force of the tip on the wall; chosen
 WALL_POSE = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved
 
@@ -91,7 +91,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
 
 
 def hybrid(friction: bool = False) -> Law:
-    """Return the law that presses on the wall, gained as computed_torque_sliding; `friction`: whether it knows it."""
+    """Return the law that presses on the wall, with computed_torque_sliding's gains; `friction`: if known to it."""
     gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
     if friction:
         known = arm().friction

@@ -58,13 +58,13 @@ class Block:
     condition: str
     medians: Mapping[str, float]  # law -> median over the seeds; for "settles" the share of runs that do not settle
     lacking: Mapping[str, int]  # law -> number of runs that failed or have no value
-    best: tuple[str, ...]  # laws that no other is better than, without such a run, and with enough samples to tell
+    best: tuple[str, ...]  # laws that no other is better than, with a value in every run and enough samples to tell
     undecided: tuple[str, ...]  # laws that no other is better than, but only because there are too few samples
     ahead: str | None  # the law that is better than every other, laws with default gains included
     lead: Lead | None  # None for one law, for "settles", or if the law in front has runs without a value
     seeds: int  # in which every law ran
-    runs: int  # distinct ones among these; in the others every law has the same result as in an earlier seed
-    samples: int  # largest number of samples of any two laws, see `ranking`; of one law that of its runs
+    runs: int  # distinct runs in these seeds; in the other seeds every law repeats the result of an earlier one
+    samples: int  # largest number of samples of any two laws, see `ranking`; for one law, of its runs
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is named the winner
 
@@ -97,7 +97,7 @@ class Board(Tables):
     family: int  # number of blocks of the table for which winners are corrected
     relevant: float  # share of a value that is relevant
     resolution: float  # the largest lower bound on the least relevant difference, in the unit of the board
-    by_step: bool  # whether it is about chattering without RK4, which half the physics step may change
+    by_step: bool  # whether halving the physics step may change the metric: chattering without RK4
 
     @property
     def best(self) -> tuple[str, ...]:
@@ -200,7 +200,7 @@ class Board(Tables):
         return f"{largest.sample}{samples}, too few" + f" for {self.family} comparisons" * (self.family > 1)
 
     def failures(self, entry: Entry) -> str:
-        """Return how many of a law's runs failed, or never end in a time, such as "2 of 24 failed"; "" if none did."""
+        """Return how many of a law's runs failed, or never reach a time, such as "2 of 24 failed"; "" if none did."""
         return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}" if entry.failed else ""
 
 
@@ -349,7 +349,7 @@ def key(boards: Sequence[Board]) -> str:
 
 
 def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad or m") -> str:
-    """Return the least relevant difference in words: a share, and a lower bound for each metric, of positions in x."""
+    """Return the least relevant difference in words: a share, and lower bounds by unit; `x` is that of positions."""
     of_unit: dict[str, float] = {}
     for metric, floor in floors:
         unit = "" if metric == SETTLES else CATALOGUE[metric].unit.removesuffix("/s")
@@ -363,7 +363,7 @@ def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad o
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:
-    """Return law -> where its gains come from, by name, for every law of some boards."""
+    """Return law -> the sources of its gains, for every law of some boards, in alphabetical order."""
     by_law: dict[str, list[Source]] = {}
     for board in boards:
         for entry in board.entries:

@@ -20,8 +20,8 @@ def cached(
 ) -> T:
     """Return the result of `make`, from its file if there is one.
 
-    The file's name ends in two hashes: of `depends`, as JSON data, code and versions, and of its content, so that a
-    changed file is not read. When a file is written, files with other hashes are removed.
+    The file's name ends in two hashes. One is of `depends` (as JSON), the code and the versions. The other is of the
+    content, so that a changed file is not read. When a file is written, files with other hashes are removed.
     """
     text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
     stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
-MAX_BLOCKS = 12  # plants times conditions with a table each; beyond, each plant has one table over all conditions
+MAX_BLOCKS = 12  # plants times conditions that have a table each; if there are more, each plant has one table
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -54,7 +54,7 @@ class Compared(Tables):
     table: Table  # a row for each run, with all its scores, as `smc.study` returns it
     # Plant -> the laws with all sets of gains that their runs used, and remarks on them
     candidates: Mapping[str, Sequence[Candidate]]
-    # A board for each metric on each plant in each condition, or on each plant if these are more than 12
+    # A board for each metric on each plant in each condition; on each plant, if that makes more than 12 blocks
     leaderboard: Boards
     worst: Mapping[str, Mapping[str, WorstCase]]  # plant -> law -> its `worst_case`; empty if it was not searched
 
@@ -190,8 +190,8 @@ def compare(
 ) -> Compared:
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better and how sure it is.
 
-    A law whose gains you gave keeps them. Any other law, yours too, has those that come with the package for the plant,
-    or is tuned by the same rule. Gains and runs are kept in the folder: after a kill, the same call goes on from there.
+    A law whose gains you gave keeps them. Any other law has those that come with the package for the plant, or is tuned
+    by one rule, yours too. Gains and runs are kept in the folder: after a kill, the same call goes on from there.
     One run of each of your laws on each plant in each condition is replayed, see `replay`.
 
     Args:
@@ -201,14 +201,14 @@ def compare(
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
         law, and the next of the law's sets of gains.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
-      worst: whether to search the worst case of each law on each plant too, in a class, or for True in the default one.
-      executor, noise_key, traces: as in `study`; by default on this machine, with a key that is drawn now.
+      worst: whether to search the worst case of each law on each plant too; or the class in which to search it.
+      executor, noise_key, traces: as in `study`. Default: this machine, a new key, no traces.
       out: folder for gains and runs.
       metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, if quick a third of it.
+      budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, or a third of it if quick.
       quick: shorter runs and searches; by default three plants and three conditions.
       threads, progress: as in `run`.
 
@@ -228,7 +228,7 @@ def compare(
 
 
 def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
-    """Raise ScenarioError for an unknown metric or set of gains, or for what is no path of a folder."""
+    """Raise ScenarioError for an unknown metric or set of gains, or an `out` that is no path."""
     for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     find("set of gains", gains, gain_sets.KNOWN_SETS)
@@ -246,7 +246,7 @@ def _trial(
     threads: int | None,
     progress: bool,
 ) -> Trial:
-    """Return what laws are compared on; what is not given is that of an extent."""
+    """Return the plants and conditions to compare laws on. The extent has the defaults."""
     length = extent.duration if duration is None else checked("duration", duration, above=0.0)
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
     given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)

@@ -29,7 +29,7 @@ from smc_mujoco.studies.pickling import packed
 MAX_WORK_PER_THREAD = 500_000  # of a batch, see `Scenario.work`: 2 to 5 s of a core
 MAX_WORK = 1_000_000  # of a batch: bounds the memory
 MAX_RUNS = 1000  # of a batch
-LOOP_SLOWDOWN = 40  # of the reference loop against compiled laws, roughly
+LOOP_SLOWDOWN = 40  # time of the reference loop over that of compiled laws, roughly
 MAX_BATCHES_SENT = 1000  # to workers, and not finished; chosen
 ADDRESS, DASK_ADDRESS = "dask://", "tcp://"  # beginnings of a scheduler's address, here and in dask
 LOGGERS = "distributed", "distributed.client", "tornado.application"  # of dask, which set their own level
@@ -56,7 +56,7 @@ def result_columns(trace: Trace) -> ResultColumns:
 
 
 def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Prepared]]:
-    """Sort scenarios into batches of one layout, each several seconds of work."""
+    """Yield prepared scenarios in batches of one layout, each several seconds of work."""
     groups: dict[Hashable, list[Prepared]] = {}
     for prepared in map(prepare, scenarios):
         groups.setdefault((prepared.key, bool(prepared.why_not)), []).append(prepared)
@@ -156,7 +156,7 @@ def _threads() -> int:
 
 
 def as_executor(executor: object) -> str | Executor:
-    """Return "local", an address that begins with ADDRESS, or an Executor, also for a dask Client."""
+    """Return "local", an address that begins with ADDRESS, or an Executor. A dask Client becomes an Executor."""
     dask = sys.modules.get("distributed")
     if dask is not None and isinstance(executor, dask.Client):
         return _DaskExecutor(executor)
@@ -176,7 +176,7 @@ def as_executor(executor: object) -> str | Executor:
 
 @contextlib.contextmanager
 def opened(executor: str | Executor) -> Iterator[Executor]:
-    """Yield the Executor, or one with the workers of a dask scheduler."""
+    """Yield a given Executor, or one for the dask scheduler at an address."""
     if isinstance(executor, Executor):
         yield executor
         return

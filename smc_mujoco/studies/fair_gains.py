@@ -38,8 +38,8 @@ class Candidate(NamedTuple):
     """A law with its gains for a plant."""
 
     law: Component  # with the best gains
-    sets: tuple[Component, ...]  # the law with each of the sets of gains that runs have in turn
-    remark: str = ""  # what there is to say of the gains besides their source
+    sets: tuple[Component, ...]  # the law with each set of gains; the runs take them in turn
+    remark: str = ""  # on the gains, besides their source
 
     def __call__(self, seed: int) -> Component:
         """Return the law with the gains of the run with this seed."""
@@ -56,7 +56,7 @@ def law_or_template(law: Component | Template | str) -> Component | Template:
     return given.template if given.template and given.source.kind == source.DEFAULT else given
 
 
-def _known(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
+def _without_search(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
     """Return a law whose gains need no search; None for one that must be tuned."""
     if isinstance(law, Component):
         return Candidate(law, (law,))
@@ -92,7 +92,7 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
 
 
 class Trial(NamedTuple):
-    """What laws are compared on, and the folder of the results; `threads` and `progress` are as in `run`."""
+    """The plants and conditions of a comparison, and its folder; `threads` and `progress` are as in `run`."""
 
     plants: Sequence[Plant]
     conditions: Sequence[Condition]
@@ -119,10 +119,10 @@ class Trial(NamedTuple):
     ) -> list[Candidate]:
         """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
 
-        If some laws have shipped gains, the others are tuned like these, from the same starts, and if `shipped_budget`
-        with the same budget. Laws without given gains come as templates. The folder keeps the results of searches.
+        If some laws have shipped gains, the others are tuned from the starts of those, and with their budget if
+        `shipped_budget`. Laws without given gains come as templates. The folder keeps the results of searches.
         """
-        known, starts = [_known(plant, law, gains) for law in laws], self.starts
+        known, starts = [_without_search(plant, law, gains) for law in laws], self.starts
         if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known):
             starts, budget = None, search.BUDGET if shipped_budget else budget
 
@@ -132,7 +132,7 @@ class Trial(NamedTuple):
         return [candidate or missing(law) for law, candidate in zip(laws, known, strict=True)]
 
     def tuned(self, plant: Plant, law: Component | Template, budget: int, starts: Starts | None) -> Candidate:
-        """Return a law with gains of `tune`, or of the file of an earlier call; its defaults if it cannot be tuned."""
+        """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
         usual, default = Objective(), coerce.law(law)
         conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
         goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)

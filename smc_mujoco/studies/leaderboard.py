@@ -39,7 +39,7 @@ def leaderboard(
     """Compare the laws of a table in each metric within each group.
 
     Only cells (plant, condition, seed) that every law of the group has are compared. A failed run is inf in all
-    metrics. A seed in which two laws both have the same results as in an earlier seed is no further sample of the two.
+    metrics. For two laws, a seed in which both repeat their results of an earlier seed is not counted.
     Runs that share one of several sets of gains of a law are one sample. A metric that does not apply to a group has no
     board for it.
 
@@ -151,7 +151,7 @@ def _unit(metric: str, unit: str, scenario: Scenario | None) -> str:
 
 
 def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple[str, ...], unit: str) -> Block:
-    """Return block k of a group, block `at` of the comparison, with values in `unit`."""
+    """Return block k of a group, which is block `at` of the comparison, with values in `unit`."""
     plant, condition = group.blocks[k]
     sets = comparison.sets[:, at]
     return Block(

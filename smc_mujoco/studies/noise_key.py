@@ -4,8 +4,8 @@ The noise of a run follows from its seed. Seeds are 0, 1, 2, ..., so a law could
 and know every later one. With a key, the noise of a seed is that of a hash of key and seed.
 
 The key is stored in the study's folder, so that a study that was stopped goes on with the same noise. It is valid for
-the user's laws, code and gains, with which it was drawn. The author of another law may have read it: a new key is drawn
-for that law, and all runs are done again.
+the user's laws, with the code and gains that they had when it was drawn. The author of another law may have read it,
+so a new key is drawn for that law, and all runs are done again.
 """
 
 import dataclasses
@@ -32,7 +32,7 @@ def draw_key() -> int:
 
 
 def keyed(scenarios: Iterable[Scenario], wanted: int | str, folder: Path, resume: bool = True) -> Iterator[Scenario]:
-    """Yield the scenarios with a key: a number, 0 for the seeds alone, or DRAWN for that of the folder or a new one."""
+    """Yield the scenarios with the wanted key. 0: noise by the seeds alone; DRAWN: the folder's key, else a new one."""
     if wanted == DRAWN:
         scenarios = list(scenarios)
         if not resume:

@@ -57,7 +57,7 @@ class Outcome:
         return Outcome(traces={name: {x: run for x, run in runs.items() if x in labels} for name, runs in self})
 
     def those(self, holds: Callable[[Trace], bool] = settles) -> "Outcome":
-        """Return the outcome of the runs for which something holds; by default of those that settle."""
+        """Return the outcome of the runs for which `holds` is true; by default, of those that settle."""
         kept = {name: {label: run for label, run in runs.items() if _true(holds, run)} for name, runs in self}
         return Outcome(traces=kept)
 
@@ -70,17 +70,17 @@ class Outcome:
         return {name: {label: value(run) for label, run in runs.items()} for name, runs in self}
 
     def size(self, measure: Measure, unit: str = "") -> str:
-        """Return the value of the run, or the range of all: "0.323 s", "1.12 to 1.13 s, 1 failed", "never".
+        """Return a run's value, or the range over several: "0.323 s", "1.12 to 1.13 s, 1 failed", "never".
 
         Args:
-          unit: of a measure that is a function.
+          unit: unit of the value, if the measure is a function.
         """
         values = [value for by_label in self.values(measure).values() for value in by_label.values()]
         units = {unit or _unit(measure, run) for _, runs in self for run in runs.values()}
         return _range(values, units.pop() if len(units) == 1 else "") if values else "none"
 
     def leaders(self, *measures: Measure) -> list[str]:
-        """Return the labels whose value is smallest, or level with it, in every measure and condition."""
+        """Return the labels whose value is smallest, or tied with the smallest, in every measure and condition."""
         winners = [self._level(name, measure, smallest=True) for name in self.traces for measure in measures]
         return [label for label in self.labels if all(label in level for level in winners)]
 
@@ -96,14 +96,14 @@ class Outcome:
         return self._first(measure, unit, smallest=False)
 
     def who(self, singular: str, plural: str, holds: Callable[[Trace], bool] = settles) -> str:
-        """Return for which runs something holds: "all 4 settle", "a and b settle, c does not".
+        """Return in words for which runs `holds` is true: "all 4 settle", "a and b settle, c does not".
 
         Over several conditions: "a settles in all 3 conditions, b in all but 50 ms, c in none".
 
         Args:
           singular: the verb, such as "settles", with what follows it.
-          plural: the same of several, such as "settle".
-          holds: what must hold; by default that the run settles.
+          plural: the same for several runs, such as "settle".
+          holds: whether a run counts; by default whether it settles.
         """
         where = self._where(holds)
         if len(self.traces) == 1:
@@ -122,8 +122,8 @@ class Outcome:
     def up_to(self, holds: Callable[[Trace], bool] = settles) -> str:
         """Return the last condition that each label tolerates, if the conditions are ordered from weak to strong.
 
-        It is the last one before something does not hold: "a and b 20 ms, c 10 ms, d none". The sentence also names
-        later conditions in which it holds again.
+        It is the last one before `holds` is first false: "a and b 20 ms, c 10 ms, d none". The sentence also names
+        later conditions in which it is true again.
         """
         where, words = self._where(holds), {}
         for label, names in where.items():
@@ -151,7 +151,7 @@ class Outcome:
         return ", ".join(parts) or "none"
 
     def _where(self, holds: Callable[[Trace], bool]) -> dict[str, list[str]]:
-        """Return label -> the conditions in which something holds for it."""
+        """Return label -> the conditions in which `holds` is true for its run."""
         where: dict[str, list[str]] = {label: [] for label in self.labels}
         for name, runs in self:
             for label, run in runs.items():
@@ -160,7 +160,7 @@ class Outcome:
         return where
 
     def _level(self, condition: str, measure: Measure, smallest: bool) -> dict[str, float]:
-        """Return label -> value of the runs with the smallest or largest value, or level with it; none if "never"."""
+        """Return label -> value of the runs with the extreme value, or tied with it; {} if the smallest is "never"."""
         values = self[condition].values(measure)[condition]
         known = {label: value for label, value in values.items() if not math.isnan(value)}
         if not known or (smallest and min(known.values()) == math.inf):
@@ -203,12 +203,12 @@ def _function(measure: Measure) -> Callable[[Trace], float]:
 
 
 def _true(holds: Callable[[Trace], bool], run: Trace) -> bool:
-    """Return whether something holds for a run; nothing holds for a run that failed."""
+    """Return whether `holds` is true for a run; False for a run that failed."""
     return run.failure is None and bool(holds(run))
 
 
 def _one_condition(yes: Sequence[str], no: Sequence[str], singular: str, plural: str) -> str:
-    """Return who does something and who does not, of the labels of one condition."""
+    """Return the sentence of `who` for one condition: who does what the verb says, and who does not."""
     count = len(yes) + len(no)
     if not yes:
         return f"{no[0]} does not {plural}" if count == 1 else f"none of the {count} {singular}"
@@ -240,7 +240,7 @@ def _exceeds(a: float, b: float, resolution: float) -> bool:
 
 
 def _floor(measure: Measure, run: Trace) -> float:
-    """Return the difference of a metric that matters on no machine, as on leaderboards; 0 for a function."""
+    """Return the largest difference of a metric that matters on no machine, as on leaderboards; 0 for a function."""
     return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) else 0.0
 
 

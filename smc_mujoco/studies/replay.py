@@ -8,9 +8,9 @@ with the recorded commands, which gives the sensor's readings. Every control per
 second process has that code and the readings, but no motion, noise or disturbance. Its u and s must be the recorded
 ones.
 
-So a law or an estimator is recognised that reads the plant's true state, a number of the run's noise or the time to a
+This exposes a law or an estimator that reads the plant's true state, a number of the run's noise or the time to a
 fraction of a second, counts its calls, or writes to the plant. It could still pass its commands through a file or a
-connection: no process is a sandbox.
+connection, because a process is no sandbox.
 """
 
 import dataclasses
@@ -34,8 +34,8 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.pickling import packed
 
-ROUNDING = 1e-9  # difference of a state after a control period, or of u or s, relative to the largest value
-# Rms difference of u or s, relative to the largest, of a compiled run: its nominal model's last bit may flip a switch.
+ROUNDING = 1e-9  # tolerance of a state after a control period, and of u and s, relative to the largest value
+# Tolerance of the rms of u and s with a compiled nominal model, whose last bit may flip a switch; relative as above.
 MODEL_RMS = 0.01
 TIMEOUTS = {"verify": 1800.0, "commands_of": 300.0}  # s, of each process; chosen
 # What a law may know of its scenario.
@@ -54,7 +54,7 @@ class Recording(NamedTuple):
 
     scenario: Scenario
     exact: bool  # whether a replay computes u and s to the last bit
-    x: np.ndarray
+    x: np.ndarray  # (samples, n), as the next three
     v: np.ndarray
     u: np.ndarray
     s: np.ndarray
@@ -104,7 +104,7 @@ def _obstacle(trace: Trace) -> str:
 
 
 def _recording(trace: Trace) -> Recording:
-    """Return a trace without the code of law, surface and estimator. A law of the same kind, at rest, stands for it."""
+    """Return a trace without the code of law, surface and estimator. A law of the same kind returns 0 instead."""
     s = trace.scenario
     placeholder = Component(
         kind="law",
@@ -155,7 +155,7 @@ def _in_fresh_process(task: str, arguments: object) -> Any:
 def serve() -> None:
     """Call the function that the parent process names, and write its result to standard output."""
     answer = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # so that nothing else is written there, by the user's code
+    os.dup2(2, 1)  # so that the user's code cannot write there
     function = {"verify": verify, "commands_of": commands_of}[sys.argv[1]]
     pickle.dump(function(pickle.load(sys.stdin.buffer)), answer)
     answer.flush()
@@ -174,7 +174,7 @@ def verify(tasks: Sequence[tuple[bytes, bytes]]) -> list[tuple[bool | None, str]
 
 
 def _computed(laws: list[tuple[bytes, list[Readings]]]) -> list[np.ndarray | str | None]:
-    """Return what `commands_of` returns for all laws, None for a law that ends its process or stays in it."""
+    """Return what `commands_of` returns for all laws, None for a law that ends its process or never returns."""
     try:
         return _in_fresh_process("commands_of", laws)
     except ScenarioError:
@@ -222,7 +222,7 @@ class Playback(reference.Loop):
         return self.recorded.u[k], self.recorded.s[k]
 
     def verdict(self, computed: np.ndarray | str | None) -> tuple[bool | None, str]:
-        """Return whether u and s, (calls, 2, n), are the recorded ones, and what differs; None: the law ended."""
+        """Return whether computed u and s, (calls, 2, n), are the recorded ones, and what differs; None: no answer."""
         if self.mismatch_time is not None:
             return False, f"the plant does not move as recorded under these commands, at t = {self.mismatch_time:g} s"
         if computed is None:
@@ -246,8 +246,8 @@ class Playback(reference.Loop):
 def commands_of(tasks: Sequence[tuple[bytes, list[Readings]]]) -> list[np.ndarray | str]:
     """Return u and s of each packed law for its readings, (calls, 2, n); a text for one that cannot be loaded.
 
-    All laws are called twice, first in the reverse order of the tasks. So a law that keeps a state outside its memory
-    returns other commands.
+    Each law gets all its readings twice, the first time with the tasks in reverse order. A law that keeps a state
+    outside its memory then returns other commands.
     """
     known = [(_loaded(law), readings) for law, readings in tasks]
     for law, readings in reversed(known):
@@ -264,7 +264,7 @@ def _loaded(law: bytes) -> Scenario | str:
 
 
 def _commands(scenario: Scenario | str, readings: Sequence[Readings]) -> np.ndarray | str:
-    """Return what the law of a scenario computes, NaN where it raises. The plant stays where it is."""
+    """Return what the law of a scenario computes, NaN where it raises. The plant does not move."""
     if isinstance(scenario, str):
         return scenario
     with installed():

@@ -18,7 +18,7 @@ from smc_mujoco.simulation.scenario import U_MAX, Scenario
 PACKAGE = "smc_mujoco."
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
 NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
-# Plant -> hashes of its code and files, for a call with many runs. A new dict for each study: a file may change.
+# Plant -> hashes of its code and files, shared by the runs of a study. Each study has a new dict: files may change.
 Hashes = dict[Plant, list[str]]
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
     "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
@@ -34,7 +34,7 @@ def description(scenario: Scenario) -> dict[str, Any]:
 
 
 def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes | None = None) -> str:
-    """Return a hash, 32 hex digits, of all that determines a run: scenario, code of its parts and package, versions."""
+    """Return a hash, 32 hex digits, of all that determines a run: scenario, code, versions. `plants` is a cache."""
     data = data or description(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
@@ -50,7 +50,7 @@ def portable_key(scenario: Scenario) -> str:
 
 
 def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
-    """Return the columns of a table that describe a run. `plants` is that of `key`."""
+    """Return the columns of a table that describe a run. `plants` is as in `key`."""
     data = description(scenario)
     return {
         "hash": key(scenario, data, plants),
@@ -99,7 +99,7 @@ def _codes(s: Scenario, plants: Hashes) -> list[str]:
 
 
 def _plant_codes(plant: Plant) -> list[str]:
-    """Return hashes of what is a user's in a plant: functions, and the model, which its build may read from a file."""
+    """Return hashes of a user's parts of a plant: functions, and the model, which `build` may read from a file."""
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):
         return [fingerprint.of(thing) for thing in (plant.fields, plant.nominal, *builds) if _of_a_user(thing)]
@@ -123,7 +123,7 @@ def _condition_text(data: dict[str, Any]) -> str:
 def _nominal(plant: Plant, duration: float) -> str:
     """Return the `_condition_text` of the nominal condition on a plant, "{}" where it does not fit the plant."""
     common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration, "control_period": CONTROL_PERIOD}
-    if not plant.limits:  # else its motors bound u
+    if not plant.limits:  # with limits, its motors bound u
         common["u_max"] = U_MAX
     with contextlib.suppress(ScenarioError):  # `recorded`: x0 may be outside a joint's range, as this is not run
         return _condition_text(description(Scenario.recorded(**common | find_condition("nominal").on(plant, duration))))

@@ -80,8 +80,8 @@ class Store:
     def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
         """Write the table of these finished runs, in this order.
 
-        `changes` are columns that replace those of the part, by hash: the source of the gains, because an earlier study
-        with other sources may have written the part, and the results of replays.
+        `changes` is hash -> columns that replace those of the part: results of replays, and the source of the gains,
+        because the part may be from an earlier study whose gains had another source.
         """
         import pyarrow as pa
 

@@ -36,7 +36,7 @@ from smc_mujoco.studies.replay import replays
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
 
-# One condition of each kind: of the paper's, and one each for friction, drive, gear, sensor and obstacles.
+# One condition of each kind. IDEAL: the paper's. REAL: friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 TRACES = ("none", "worst", "all")  # choices of traces to save
@@ -76,7 +76,7 @@ def study(
     noise_key: int | str = 0,
     replay: bool = False,
 ) -> Table:
-    """Run scenarios, score them, and write the table out/results.parquet with a row for each.
+    """Run and score scenarios; write a table with a row for each to out/results.parquet, and return it.
 
     Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored in out/parts, some
     seconds of work in each file. If a study was killed, or filled the disk, start it again with the same arguments: it
@@ -87,13 +87,13 @@ def study(
       out: folder of the study; it may contain the parts of other studies.
       resume: whether to keep the finished runs in the folder; False removes them first.
       executor: "local", "dask://HOST:PORT" (or "tcp://HOST:PORT") for the workers of that scheduler, a dask Client, or
-        any concurrent.futures.Executor, whose workers run one simulation each. It stays open.
+        any concurrent.futures.Executor, whose workers run one simulation each. The study does not close it.
       threads: number of simulations at a time, if local; None for one per available core.
       progress: whether to show a progress bar.
-      traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: a failed run,
-        else one that never settles, else the one with the largest ultimate bound.
-      noise_key: of all runs, see `Scenario`. "drawn": that of the folder if the study goes on, else a new one, which
-        is drawn now. So no law can know its noise.
+      traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: of a failed
+        run, else of one that never settles, else of the one with the largest ultimate bound.
+      noise_key: key of all runs, see `Scenario`. "drawn": a new random key, or the folder's if the study goes on, so
+        that no law can know its noise.
       replay: whether to replay one run of each of your laws on each plant in each condition, see `smc.replay`. A run
         whose commands do not follow from its measurements counts as failed.
 
@@ -136,7 +136,7 @@ def _compute(
     traces: Path | None,
 ) -> None:
     """Compute runs, given by key, store their rows as they finish, and save the traces of local ones in a folder."""
-    keys = {id(scenario): key for key, scenario in missing.items()}  # from before a run: a law may change its globals
+    keys = {id(scenario): key for key, scenario in missing.items()}  # made before any run: a law may change its globals
 
     def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
         scenarios = [prepared.scenario for prepared in batch]
@@ -158,7 +158,7 @@ def _compute(
 
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:
-    """Yield the scenarios of a study, one by one, because a generator with a wrong item may be endless."""
+    """Check and yield scenarios one by one: a generator with a wrong item may be endless."""
     empty, several = True, isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
     for scenario in scenarios if several else ():
         if not isinstance(scenario, Scenario):
@@ -176,8 +176,8 @@ def _checked(scenarios: Any) -> Iterator[Scenario]:
 def _replayed(
     runs: Mapping[str, Scenario], store: Store, folder: Path, threads: int | None, progress: bool
 ) -> dict[str, dict[str, Any]]:
-    """Replay chosen runs, those with no result in the folder. Return hash -> the columns that their replays change."""
-    chosen, known = _to_replay(runs), _known(folder / REPLAYS)
+    """Replay chosen runs whose result is not in the folder. Return hash -> the columns that their replays change."""
+    chosen, known = _to_replay(runs), _stored_results(folder / REPLAYS)
     if missing := [name for name in chosen if name not in known]:
         if progress:
             print(f"replaying {counted(len(missing), 'run')} of your laws", file=sys.stderr)
@@ -197,7 +197,7 @@ def _replayed(
 def _to_replay(runs: Mapping[str, Scenario]) -> list[str]:
     """Return the hash of one run for each of the user's laws, on each plant in each condition.
 
-    The choice is by a hash of these hashes. They depend on the noise key, so it cannot be foreseen.
+    The choice is the hash whose own hash is smallest. It depends on the noise key, so no law can foresee it.
     """
     groups: dict[tuple, list[str]] = {}
     for name, scenario in runs.items():
@@ -207,8 +207,8 @@ def _to_replay(runs: Mapping[str, Scenario]) -> list[str]:
     return [min(names, key=lambda name: hashlib.sha256(name.encode()).digest()) for names in groups.values()]
 
 
-def _known(file: Path) -> dict[str, str | None]:
-    """Return the results in a file: hash -> what differs, "" for nothing, None for a run that cannot be replayed."""
+def _stored_results(file: Path) -> dict[str, str | None]:
+    """Return results of replays from a file: hash -> what differs, "" for nothing, None if it cannot be replayed."""
     try:
         known = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -217,7 +217,7 @@ def _known(file: Path) -> dict[str, str | None]:
 
 
 def _replay_results(runs: Mapping[str, Scenario], store: Store, threads: int | None) -> dict[str, str | None]:
-    """Run and replay runs. Return hash -> what differs, as in `_known`."""
+    """Run and replay runs. Return hash -> what differs, as `_stored_results` does."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlainLoopWarning)  # the study itself has warned
         traces = run(list(runs.values()), threads=threads)
@@ -243,7 +243,7 @@ def trace_file(folder: Path, row: Mapping[str, Any]) -> Path:
 
 
 def worst_rows(table: Table) -> list[int]:
-    """Return the row of the worst run of every plant and condition: failed, unsettled, then by bound or overshoot."""
+    """Return row indices of the worst runs by plant and condition: failed, unsettled, then by bound or overshoot."""
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
     unsettled = table.column("settling_time") == np.inf

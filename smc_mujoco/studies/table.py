@@ -6,8 +6,8 @@
 
 Columns:
 
-- the run: `hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `noise_key`, 0 for the noise of the seed alone,
-  and `duration` in s;
+- the run: `hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `noise_key` (0: noise by the seed alone), and
+  `duration` in s;
 - where its gains come from: `source`, a kind of `control.source`, and `search` as JSON, null if there was no search;
 - every metric of `smc.score`: null if the run failed or the metric does not apply, inf for "never";
 - how the run failed: `diverged_at` in s, and `failure`;
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     import pyarrow as pa
 
-# Column -> its type: before the metrics, and after them.
+# Column -> its type. RUN_COLUMNS stand before the metrics, RESULT_COLUMNS after them.
 RUN_COLUMNS = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
 RUN_COLUMNS |= {"seed": "int64", "noise_key": "int64", "duration": "float64"}
 RESULT_COLUMNS = {"diverged_at": "float64", "failure": "string", "replayed": "bool"}
@@ -48,7 +48,7 @@ RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
 PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")
 MAX_ROWS = 8  # of the preview in a notebook
-DIGEST = b"digest"  # in a file's metadata
+DIGEST = b"digest"  # key in a file's metadata
 
 
 def schema(metadata: Mapping[str, str]) -> "pa.Schema":
@@ -212,5 +212,5 @@ class Table:
         return serialise.restore(about)
 
     def trace(self, i: int) -> Trace:
-        """Run row i again and return its trace; with the same versions it is the same to the last bit."""
+        """Run row i again and return its trace. With the same versions it is equal to the last bit."""
         return run(self.scenario(i))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 METRIC = "rms_error"
-DURATION = 8.0  # s, of attacked runs where none is given: the error counts from a quarter on, when laws have settled
+DURATION = 8.0  # s, default of attacked runs: the error counts from a quarter of it on, when laws have settled
 DEFAULT_STEPS = 1_250_000  # physics steps of a search by default, for a plant of one channel: 4 s of a core
 MIN_RUNS, MAX_RUNS = 24, 1024  # of the default budget
 MAX_BUDGET = 1_000_000
@@ -50,7 +50,7 @@ class WorstCase(Tables):
     median: float  # the metric's median over as many random members as the search had runs
     unit: str  # of both
     scenario: Scenario  # the worst run, an ordinary scenario that gives this value to the last bit
-    found_by: str  # the strategy that made the member, or the one from which it was changed
+    found_by: str  # the strategy that made the member, or the one of which it is a variation
     tried: int  # number of runs, half of them of random members
     nominal: Scenario  # the scenario that was given
     within: Uncertainty  # the class
@@ -153,7 +153,7 @@ class WorstCases(Tables, list[WorstCase]):
         return [*key, *tau, *beyond, *untuned_laws({law: case.nominal.law.source.kind for law, case in laws.items()})]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
-        """Draw the worst runs of all laws, that of one beside its scenario; arguments as in `smc.figure`."""
+        """Draw the worst runs of all laws, or of one law beside the given run; arguments as in `smc.figure`."""
         from smc_mujoco.draw.figure import figure
 
         first = self[0]
@@ -174,11 +174,11 @@ def worst_case(
     threads: int | None = None,
     progress: bool = False,
 ) -> WorstCase:
-    """Search for the worst that may happen to a scenario within a class of uncertainty.
+    """Search for the worst run of a scenario within a class of uncertainty, and return it.
 
     Args:
-      scenario: plant, law and conditions, to whose disturbances, noise, delay and parameters the class adds. Of several
-        scenarios, such as those of a rig's parameter sets, the first is the nominal one, and the adversary chooses.
+      scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and parameters. Or several,
+        such as a rig's parameter sets: the first is the nominal one, and the adversary chooses.
       metric: name of any metric; more is worse. Default: the rms error from a quarter of the run on.
       within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what the
         plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a sixth of the force of the
@@ -269,7 +269,7 @@ def _listed(given: object) -> list[Scenario]:
 def default_budget(scenario: Scenario, within: Uncertainty) -> int:
     """Return the number of runs of a search without a given budget.
 
-    Each channel adds half to the time of a physics step, and dry friction, which MuJoCo solves, doubles it.
+    With n channels a physics step takes (1 + n) / 2 times as long as with one; MuJoCo's dry friction doubles that.
     """
     plant = scenario.plant
     dry = bool(scenario.friction or within.friction[1]) or any(plant.parameters[name] for name in plant.dry)
