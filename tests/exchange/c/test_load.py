@@ -354,6 +354,7 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
         ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
         ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
         ("static double z; out[0] = z += y->e;", "smc_law gave two answers to one measurement, as from state which"),
+        ("static double top; if (y->e > top) top = y->e; out[0] = -top;", "smc_law gave two answers to one measurem"),
         ("memory[y->t > 36e3 ? 8 : 0] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
         ("out[0] = y->e; fesetround(FE_UPWARD);", "smc_law changes the arithmetic of its thread (rounding, flush-"),
         ("out[0] = *hidden += y->e;", "smc_law gave two answers to one measurement"),
