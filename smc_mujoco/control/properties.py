@@ -8,6 +8,7 @@ decorator states them. Tests compare both kinds with what the law does.
 """
 
 import ast
+import functools
 import inspect
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
@@ -31,7 +32,13 @@ class Property(NamedTuple):
 
 def reads(law: Template) -> frozenset[str]:
     """Return the fields of the measurement that a law's code reads; all of them if its code cannot be read."""
-    return frozenset(_reads(law.function, 0, set()))
+    return read_by(law.function)
+
+
+@functools.cache
+def read_by(function: Callable) -> frozenset[str]:
+    """Return the fields of the measurement that a law's function reads; see `reads`."""
+    return frozenset(_reads(function, 0, set()))
 
 
 def searched(law: Template) -> list[str]:

@@ -17,6 +17,7 @@ from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.jit import Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
+from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import Native, Plant
@@ -253,7 +254,8 @@ def _native_nominal(s: Resolved) -> Native | None:
         return s.plant.nominal.native(s.plant.parameters)
     if s.model == "none":
         return None
-    return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip)
+    at_rest = "g" in read_by(s.law.function)
+    return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest)
 
 
 def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:
