@@ -111,8 +111,8 @@ SAID = {
     ],
     smc.Scenario: [
         f"Default: {scenario.U_MAX:g}, or the limit",
-        f"such step up to {1e3 * scenario.MAX_STEP:g} ms",
-        f"up to a {PARTS[scenario.DRIVE_STEPS]} of it or half of their time constant",
+        f"else up to {1e3 * scenario.MAX_STEP:g} ms",
+        f"to a {PARTS[scenario.DRIVE_STEPS]} of that period or half of the drive's time constant",
         f"up to {1e3 * scenario.REALISTIC_STEP:g} ms with friction",
         f"up to a {PARTS[scenario.MIN_JITTER_STEPS]} of the clock's jitter",
         f"0 .. 2^{math.log2(scenario.MAX_SEED + 1):g} - 1",
@@ -127,7 +127,7 @@ SAID = {
     smc.TimeSeries.from_csv: [f"longer than {time_series.MAX_GAP_STEPS:g} median steps"],
     smc.BandLimited: [f"N = {signals.SINUSOIDS}, phi_i uniform"],
     smc.OrnsteinUhlenbeck: [f"`dt` defaults to {1e3 * smc.OrnsteinUhlenbeck(1.0, 1.0).dt:g} ms"],
-    smc.Impulse: [f"The default of {1e3 * smc.Impulse(1.0, 0.0).width:g} ms"],
+    smc.Impulse: [f"as {1e3 * smc.Impulse(1.0, 0.0).width:g} ms is for default steps"],
     conventions: [
         f"settling band: |e| <= {percent(conventions.SETTLING_BAND)} of the scale",
         f"the last {percent(conventions.LAST_PART)} of the run",
@@ -137,7 +137,7 @@ SAID = {
     ],
     catalogue.rise_time: [
         f"from {percent(catalogue.RISE_LEVELS[0])} to {percent(catalogue.RISE_LEVELS[1])} of the way",
-        f">= {catalogue.RISE_LEVELS[1]:g} minus first with >= {catalogue.RISE_LEVELS[0]:g}",
+        f">= {catalogue.RISE_LEVELS[0]:g} to the first with >= {catalogue.RISE_LEVELS[1]:g}",
     ],
     catalogue.hf_share: [f"above {catalogue.HIGH_FREQUENCY:g} Hz, 0 to 1"],
     limit_cycle: [

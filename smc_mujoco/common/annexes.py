@@ -8,7 +8,7 @@ ANNEXES = ("exchange", "evidence")
 
 
 def module(name: str, what: str) -> ModuleType:
-    """Return a module of the package."""
+    """Return a module of the package; `what` needs it, as the error says if its annex is missing."""
     annex = name.split(".")[1]
     if annex in ANNEXES and not installed(annex):
         from smc_mujoco.common.extras import MissingPackageError

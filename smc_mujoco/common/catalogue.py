@@ -150,7 +150,7 @@ class Catalogue(Mapping[str, T_co]):
             return default
 
     def __or__(self, other: Mapping[str, U]) -> "Catalogue[T_co | U]":
-        """Return the entries of both. The library's own of `other` replace those of the same name."""
+        """Return the entries of both. Of two entries of the library with one name, that of `other` is taken."""
         other = other if isinstance(other, Catalogue) else Catalogue(other)
         names = {*self.added, *other.added}
         both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}

@@ -133,7 +133,7 @@ def whole(what: str, value: object, low: int, high: int) -> int:
 
 
 def _real(value: Any) -> Any:
-    """Return a real number, also from an array without axes; None for all else, also for flags and durations."""
+    """Return a real number, also from an array without axes; None for anything else, such as flags and durations."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
     is_real = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
@@ -153,7 +153,7 @@ def items_of(what: str, values: Iterable[T]) -> list[T]:
 
 
 def words(error: BaseException) -> str:
-    """Return type and message of an exception, of which another package may be the author, on one line."""
+    """Return type and message of an exception, which another package may have raised, on one line."""
     try:
         return one_line(f"{type(error).__name__}: {error}")
     except Exception:

@@ -85,7 +85,7 @@ def without_room(why: object) -> ScenarioError:
 
 @contextlib.contextmanager
 def no_room(*numbers: int) -> Iterator[None]:
-    """Turn an OSError in the block, which writes temporary files, into a ScenarioError."""
+    """Turn an OSError in the block, which writes temporary files, into a ScenarioError; `numbers`: only these errno."""
     try:
         yield
     except OSError as error:
@@ -156,7 +156,7 @@ def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
 
 
 def plain(data: Any) -> Any:
-    """Return the data with words for NaN and infinities. A text that is such a word gets a ', until `from_json`."""
+    """Return the data with words for NaN and infinities. A text that is such a word gets a leading '."""
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):

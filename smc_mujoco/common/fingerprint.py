@@ -32,13 +32,13 @@ from smc_mujoco.common.numba_internals import builtin_registry
 from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]
-BESIDE_PACKAGE = ("models", "scenes")  # folders that lie in the package in a wheel, beside it in a checkout
+BESIDE_PACKAGE = ("models", "scenes")  # folders that are in the package in a wheel, and beside it in a checkout
 PRESENTATION = (
     "evidence/report",
     "evidence/commands",
     "exchange/commands.py",
     "cli",
-)  # that show results and do not change them
+)  # files that show results and do not change them
 VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "llvmlite", "scipy", "mujoco"}  # identified by their version
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
@@ -74,7 +74,7 @@ def package(*without: str) -> str:
 def of(thing: Any) -> str:
     """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
 
-    That of this package's functions and classes is computed once, that of others at every call until `keep` keeps it.
+    For functions and classes of this package it is computed once; for others at each call, until `keep` keeps it.
     """
     try:
         return _compiled_hashes[thing] if thing in _compiled_hashes else _cached(thing) if ours(thing) else now(thing)
@@ -124,7 +124,7 @@ class _CodePickler(pickle._Pickler):
     """Pickler that writes the contents of functions and classes, not their names. The result is never loaded."""
 
     def memoize(self, obj: Any) -> None:
-        """Note an object as written, but no constant: whether equal ones are one object depends on the compiler."""
+        """Note an object as written, except constants: whether equal ones are one object depends on the compiler."""
         if not isinstance(obj, tuple | str | bytes | CodeType):
             super().memoize(obj)
 

@@ -40,9 +40,9 @@ class Failed(Exception):
 
 
 def tried(module: str, order: Mapping[str, Any], timeout: float) -> Any:
-    """Call `attempt(order, say)` of a module in another process, and return its result. Both are plain data.
+    """Call `attempt(order, say)` of a module in another process. Return its result: plain data, as the order is.
 
-    `attempt` says the stage that it begins, and raises Fault with what is wrong. The timeout is in s.
+    `attempt` calls `say` with each stage that it begins, and raises Fault with what is wrong. The timeout is in s.
     """
     from smc_mujoco.common import files, process
 

@@ -47,7 +47,7 @@ free_after_fork(internals.global_compiler_lock)
 
 
 class Numbers:
-    """Numbers of the functions that this package compiles, from a random one on: no other process gives the same.
+    """Numbers for the functions that this package compiles. They count from a random one, so no process repeats them.
 
     The number is part of a function's symbol, also in code on disk. Numba counts from 1 in every process, so a process
     that loads code of two others would run one function in place of another with the same name, types and number
@@ -145,7 +145,7 @@ call_int = _calling(32)  # the same for a C function that returns an int: the re
 
 @functools.cache
 def attempting(count: int, estimates: bool = False) -> Callable:
-    """Return a compiled function that stores `count` numbers, body(*arguments), at an address: 1 if it raised, else 0.
+    """Return a compiled function: it stores the `count` numbers of body(*arguments). It returns 1 if body raised, or 0.
 
     No exception reaches Python. An estimator may return one number, its velocity: its acceleration is then NaN.
     """
@@ -274,8 +274,8 @@ def _complete(library: internals.CPUCodeLibrary) -> bool:
     """Return whether code is complete before it is linked, so that another process can load it, beside any other.
 
     Numba fills in some addresses while it links, such as that of a function that calls itself, and only in the process
-    that compiles. A process that loads such code from the disk would abort. A function that was compiled before has
-    one of numba's own numbers.
+    that compiles. A process that loads such code from the disk would abort. A function that numba compiled
+    outside of this package has one of numba's own numbers.
     """
     module = library._final_module
     linked = any(variable.name.startswith(internals.RuntimeLinker.PREFIX) for variable in module.global_variables)

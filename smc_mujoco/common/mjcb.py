@@ -84,7 +84,7 @@ def _callbacks() -> dict[str, Any]:
 
 
 def _install(callbacks: dict[str, Any]) -> None:
-    """Install callbacks, as `_callbacks` returns them, that are not installed yet."""
+    """Install those of the callbacks, given as `_callbacks` returns them, that are not installed yet."""
     with _python_lock if any(map(_python, callbacks.values())) else contextlib.nullcontext():
         for name, callback in callbacks.items():
             if getattr(mujoco, f"get_mjcb_{name}")() is not callback:

@@ -9,7 +9,7 @@ from typing import Any
 
 
 def free_after_fork(lock: Any) -> None:
-    """Let forks wait until no other thread holds a lock, which no thread of the child would ever release."""
+    """Let a fork wait until no other thread holds a lock, because nobody would release it in the child process."""
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
 

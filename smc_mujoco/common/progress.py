@@ -116,7 +116,7 @@ def _on_terminal(what: str, whole: float | None, counted: bool, console: "Consol
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
-    """Return a function that reports the work done so far, increased by a piece of work in each call."""
+    """Return a function that adds a piece of work to the work done, and reports the sum."""
 
     def add(work: float) -> None:
         nonlocal done
@@ -128,7 +128,7 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 
 @contextlib.contextmanager
 def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None]]:
-    """Yield a function that adds simulated steps; a bar has the runs done and the runs a second, if there are any."""
+    """Yield a function that adds simulated steps. A bar shows how many runs are done and how many a second."""
     start, done = time.monotonic(), 0
 
     def stepped(count: int) -> None:

@@ -1,4 +1,4 @@
-"""Inverse kinematics: positions of joints at which a tip, a site or body, is where it should be.
+"""Inverse kinematics: positions of joints at which a tip (a site or a body) is where it should be.
 
 Levenberg's method with MuJoCo's Jacobians: dx = J' (J J' + mu)^-1 e, mu = |e|^2 / 100, at most 0.3 rad or m a step.
 It converges quadratically where J has full rank, and stays bounded where the arm is stretched. MuJoCo's Jacobians are
@@ -16,8 +16,8 @@ from smc_mujoco.mechanisms.hardware.part import initial_pose, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 TOLERANCE = 1e-9  # m, of the tip
-MAX_STEPS = 200  # to a point
-MAX_MOVE = 0.3  # rad or m, of a step
+MAX_STEPS = 200  # of the iteration, for each point
+MAX_MOVE = 0.3  # rad or m, of any joint in a step
 
 
 def solve(plant: Plant, kind: str, name: str, points: np.ndarray, start: Sequence[float]) -> np.ndarray:

@@ -101,12 +101,12 @@ class Plant:
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
     direct: bool = False  # whether disturbances act on its joints, not on the bodies that they carry
     smooth: bool = True  # whether its model has no limits, contacts, dry friction and equality constraints
-    # Parameter -> lowest and highest value that a user may have, as factors or, of those in `added`, numbers that are
-    # added: the parameters that `smc.worst_case` varies where no class is given
+    # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user may meet.
+    # `smc.worst_case` varies these parameters if it is given no class
     uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
     dry: tuple[str, ...] = ()  # parameters that are dry friction. A plant with one that is not 0 is not smooth
     unmodelled: str = ""  # why there is no nominal model
-    friction: Any = None  # hardware.part.Friction of its joints by its source, to give to a scenario, or None
+    friction: Any = None  # hardware.part.Friction of its joints according to its source, for a scenario; or None
     limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
     ranges: tuple[tuple[str, float, float], ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
@@ -115,7 +115,7 @@ class Plant:
     # "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size
     jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     tip: str = ""  # site that the mechanism moves: where an arm's tool is
-    # "law", "u_max" or "reference" -> what each driven channel suggests to scenarios that are given none
+    # "law", "u_max" or "reference" -> what each driven channel suggests to a scenario that leaves it out
     suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self):

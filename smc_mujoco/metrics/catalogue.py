@@ -71,7 +71,7 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
-    Last exit of max_i |e_i| from 2 % of the scale, in s since t[0], also if r steps later.
+    Last exit of max_i |e_i| from 2 % of the scale. The time counts from t[0], even if r steps later.
     """
     return last_exit(trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace))
 
@@ -80,9 +80,9 @@ def settling_time(trace: Trace) -> float:
 def rise_time(trace: Trace) -> float:
     """Time from 10 % to 90 % of the way to the reference, slowest channel.
 
-    On a channel's first approach that starts with e_b != 0: first sample with 1 - e/e_b >= 0.9 minus first
-    with >= 0.1 (Ogata, Modern Control Engineering, transient response); inf if it does not get there. A
-    channel without such an approach is left out; 0 if all are.
+    It is taken on a channel's first approach whose e at the start, e_b, is not 0: the time from the first sample with
+    1 - e/e_b >= 0.1 to the first with >= 0.9 (Ogata, Modern Control Engineering, transient response), inf if there is
+    none. A channel without such an approach is left out; 0 if all are.
     """
     e, t = error(trace), trace.t
     times = [0.0]
@@ -99,8 +99,8 @@ def rise_time(trace: Trace) -> float:
 def overshoot(trace: Trace) -> float:
     """How far a channel goes beyond its reference, in percent of the scale.
 
-    100 max(0, -sign(e_b) e) / scale over all channels and approaches, e_b the e at an approach's start: only the
-    opposite side counts. For an approach that starts with e_b = 0 both sides count, |e|.
+    Maximum of 100 max(0, -sign(e_b) e) / scale over all channels and approaches, with e_b the e at the approach's
+    start: only the far side of the reference counts. If e_b = 0, both sides count: 100 |e| / scale.
     """
     e, worst = error(trace), 0.0
     for i, parts in enumerate(approaches(trace)):
@@ -221,9 +221,9 @@ def energy(trace: Trace) -> float:
 def hf_share(trace: Trace) -> float:
     """Share of the variance of u above 50 Hz, 0 to 1.
 
-    From the discrete Fourier transform U of u[0..K-1], no window: sum of |U(f)|^2 at |f| > 50 Hz over the sum
-    at all f but zero (by Parseval, K^2 times the variance). Powers are pooled over the channels, so that a
-    channel at rest does not count. 0 if u is constant, and if half the sampling rate is 50 Hz or less.
+    U is the discrete Fourier transform of u[0..K-1], without a window. The share is the sum of |U(f)|^2 at |f| > 50 Hz
+    divided by the sum at all f except 0 (by Parseval, K^2 times the variance). Powers are pooled over the channels,
+    so that a channel at rest does not count. 0 if u is constant, and if half the sampling rate is 50 Hz or less.
     """
     u, t = trace.u[:-1], trace.t
     if u.size == 0 or np.ptp(u, axis=0).max() <= ROUNDING_SHARE * np.abs(u).max():

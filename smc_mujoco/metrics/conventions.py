@@ -103,7 +103,7 @@ class Metric:
     summary: str  # first line of the docstring
     formula: Callable[[Trace], float]  # Trace of one group's channels -> float, without the checks
     label: str  # its name in tables and figures
-    need: str = ""  # the word of somebody who wants this number small, such as "fast"; "" if there is none
+    need: str = ""  # what somebody asks for who wants this number small, such as "fast"; "" if there is none
     network: bool = False  # whether it compares channels, and so needs several of a kind
     realistic: bool = False  # whether it is meaningful only for mechanisms with friction, contacts or other parts
     command: bool = False  # whether it is computed from u or s, which free joints do not have
@@ -139,11 +139,11 @@ class Metric:
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 
     def text(self, value: float) -> str:
-        """Return a value as text; inf is "never" of a time, else "fails"."""
+        """Return a value as text; inf is "never" for a time and "fails" for anything else."""
         return "fails" if value == math.inf and self.unit != "s" else number(value)
 
     def unit_for(self, x: str, u: str = "") -> str:
-        """Return the unit where positions are in x, "rad" or "m", and commands in u; "" for those of a force."""
+        """Return the unit where positions are in x, "rad" or "m", and commands in u; u="" for forces."""
         u = u or EFFORT[x]
         text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
         return text.format(x=x, u=u, force=EFFORT[x])
@@ -207,7 +207,7 @@ def error(trace: Trace) -> np.ndarray:
 
 
 def by_group(trace: Trace) -> dict[Group, Trace]:
-    """Return the trace of each group's channels, the argument of the functions below."""
+    """Return group -> the trace of its channels, which is the argument of the functions below."""
     return {group: group_trace(trace, group) for group in groups(trace.scenario)}
 
 

@@ -129,7 +129,7 @@ def _window(count: int) -> np.ndarray:
 
 
 def _refined(rates: np.ndarray, peak: int) -> float:
-    """Return the number of periods of a peak with its fraction, by which the phase turns between the halves."""
+    """Return the number of periods of a peak, to a fraction that follows from its phase in the two halves."""
     half = len(rates) // 2
     turns = np.exp(-2j * math.pi * peak / len(rates) * np.arange(2 * half))
     window = _window(half)

@@ -14,7 +14,7 @@ V = TypeVar("V")
 
 
 class once_per_trace(Generic[V]):
-    """Decorator of a function of a trace, which then computes its result once as long as the trace exists."""
+    """Decorator for a function of a trace: a result is computed once, and kept as long as its trace exists."""
 
     def __init__(self, function: Callable[[Trace], V]):
         functools.update_wrapper(self, function)  # hashes of code follow __wrapped__ and do not see the results

@@ -1,7 +1,7 @@
 """Scores of arms: where the tip is and how hard it presses, and every metric of each joint by itself.
 
 The tip is the site that `plant.tip` names. Its path follows from the joints' positions. A joint without a channel is
-taken to stay where it starts.
+assumed to stay where it starts.
 
 MuJoCo computes the forces of contact at the logged state, command and disturbances of each sample. So they are not
 means over a control period. They are unknown if an actuator has a state that a trace lacks, such as a motor's current,
@@ -159,9 +159,9 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
 
     Returns:
       max_error, rms_error, last_error, m: the distance of the tip from where the references want it. With a contact
-      whose forces `contacts` knows, over the last 80 % of the run: mean_force, N; force_error, of this mean, % of the
-      wanted one; force_ripple, the standard deviation, N; touching, the share of the time in contact, %; and over the
-      whole run depth, m.
+      whose forces `contacts` knows, over the last 80 % of the run: mean_force, N; force_error, by which it exceeds the
+      wanted force, % of that; force_ripple, the force's standard deviation, N; touching, the share of the time in
+      contact, %; and depth, the deepest penetration in the whole run, m.
 
     Raises:
       ScenarioError: the plant has no tip, or the run failed.

@@ -7,7 +7,7 @@ Laws, estimators, signals and nominal models all become functions of one C type:
 It returns 0, or 1 if the function raised an exception. Array accesses are bounds-checked, also in compiled functions
 that a law calls, so a law that writes beyond its memory fails instead of overwriting other data. Functions of the
 math module do not raise in compiled code: they return NaN outside their domain, and inf beyond the largest float. If
-that reaches u or s, the run ends.
+such a number reaches u or s, the run ends.
 """
 
 # pyright: reportCallIssue=false
@@ -46,7 +46,7 @@ from smc_mujoco.simulation.callback import magic
 from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.state import FRICTION_INPUT, INSTANT
 
-SERIES = floats(("address", "count"))  # of a series' data; behind its parameters
+SERIES = floats(("address", "count"))  # of a series' points; they follow its parameters
 instant_at, friction_input_at, seen_at, series_at = map(record_at, (INSTANT, FRICTION_INPUT, SEEN, SERIES))
 
 
@@ -102,7 +102,7 @@ def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
 def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
     """Compile a record INSTANT -> value, first and second derivative.
 
-    The parameters of a series are followed by the address and the number of its data.
+    The parameters of a series are followed by the address and the number of its points.
     """
     body, values, attempt = jit(kind.value), loader(named(names)), attempting(3)
     random, series, memory, parameter_bytes = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)

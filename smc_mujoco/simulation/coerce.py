@@ -47,7 +47,7 @@ def law(value: Law | Template | str) -> Law:
 
 
 def laws(name: str, value: Laws | None, s: Any) -> Law:
-    """Return the law of a plant's driven channels, from one for all, one for each, or None for the plant's."""
+    """Return the law of a plant's driven channels, from one law, one for each channel, or None for the suggested."""
     value = s.plant.suggested.get("law") if value is None else value
     if not isinstance(value, Mapping | list | tuple):
         return law(value)  # pyright: ignore[reportArgumentType]
@@ -78,7 +78,7 @@ def _component(kind: str, value: object) -> Component:
 
 
 def real(**limits: Any) -> Callable[[str, float, Any], float]:
-    """Return the converter of a field with a number within some limits, those of `errors.number`."""
+    """Return the converter for a field that is a number, within limits as of `errors.number`."""
     return lambda name, value, s: number(name, value, **limits)
 
 
@@ -145,7 +145,7 @@ def physics_step(name: str, value: float | None, s: Any) -> float | None:
 
 
 def one_of(names: Sequence[str]) -> Callable[[str, str | None, Any], str | None]:
-    """Return the converter of a field with one of some names, or None."""
+    """Return the converter for a field that is one of `names` or None."""
 
     def convert(name: str, value: str | None, s: Any) -> str | None:
         if value is None or (isinstance(value, str) and value in names):
@@ -164,7 +164,7 @@ def mechanism(name: str, value: str, s: Any) -> str:
 
 
 def instance(kind: type[T], example: str, default: Any = None) -> Callable[[str, T | None, Any], T]:
-    """Return the converter of a field with a value of a class, and a default for None."""
+    """Return the converter for a field that is an instance of `kind`; None becomes the default."""
 
     def convert(name: str, value: T | None, s: Any) -> T:
         if not isinstance(value, kind | None):
@@ -175,7 +175,7 @@ def instance(kind: type[T], example: str, default: Any = None) -> Callable[[str,
 
 
 def several(kind: type[T], example: str) -> Callable[[str, object, Any], tuple[T, ...]]:
-    """Return the converter of a field with values of a class, from one, several or None."""
+    """Return the converter for a field that is a tuple of `kind`, from one, several or None."""
 
     def convert(name: str, value: object, s: Any) -> tuple[T, ...]:
         for item in (items := as_tuple(value)):
@@ -192,7 +192,7 @@ def mismatch(name: str, value: Mapping[str, float] | None, s: Any) -> Mapping[st
 
 
 def suggested_reference(plant: Plant) -> Signal:
-    """Return the reference that the plant's channels suggest, and the plant's rest for those that suggest none."""
+    """Return the reference that the plant's channels suggest; a channel that suggests none gets the plant's rest."""
     at_rest = [Constant(x) for x in plant.rest] or [REST]
     suggested = plant.suggested.get("reference", (None,) * len(at_rest))
     signals = [signal or rest for rest, signal in zip(itertools.cycle(at_rest), suggested, strict=False)]
@@ -229,7 +229,7 @@ def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
 
 
 def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> tuple[Friction, ...]:
-    """Return frictions sorted by kind, from one, several or None. No two are of a kind, at most one has bristles."""
+    """Return frictions sorted by kind, from one, several or None. Kinds must differ, and one at most has bristles."""
     items = several(Friction, "smc.Coulomb(0.05)")(name, value, s)
     _check_kinds_differ(name, items)
     if len(bristles := [part for part in items if part.bristles]) > 1:
@@ -239,7 +239,7 @@ def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> 
 
 
 def actuator(name: str, value: Actuator | Sequence[Actuator] | None, s: Any) -> tuple[Actuator, ...]:
-    """Return at most two drives in the given order and after them a Backlash, from one, several or None."""
+    """Return the actuators, from one, several or None: at most two drives in the given order, then a Backlash."""
     items = several(Actuator, "smc.Lag(0.01)")(name, value, s)
     drives = [part for part in items if part.drives]
     _check_kinds_differ(name, [part for part in items if not part.drives])

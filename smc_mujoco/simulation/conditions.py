@@ -78,7 +78,7 @@ class Condition:
             object.__setattr__(self, "fields", frozen({name: _frozen(value) for name, value in self.fields.items()}))
 
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
-        """Return the Scenario fields on a plant, in runs of this duration, s. Single events happen at half time."""
+        """Return the Scenario fields for a plant and a duration, s. Single events happen at half of the duration."""
         length = number("duration", duration, above=0.0)
         return dict(self.fields(plant, length) if callable(self.fields) else self.fields)
 
@@ -93,7 +93,7 @@ class Condition:
             return self.name
         try:
             texts = [f"{name}={_as_text(value)}" for name, value in self.fields.items()]
-        except Exception:  # from the repr of a value that no scenario takes; the text is for its error
+        except Exception:  # the repr of a value that no scenario takes may fail; this text is for the error about it
             texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
         return f"{self.name}: {', '.join(texts)}"
 
@@ -144,7 +144,7 @@ def find_condition(value: Condition | str) -> Condition:
 
 
 def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -> list[str]:
-    """Return the names of conditions of the suite that have numbers for every plant."""
+    """Return those of the names, of conditions of the suite, that apply to every plant."""
     fitting = []
     for name in names:
         with contextlib.suppress(ScenarioError):
@@ -155,7 +155,7 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 
 
 def parse(text: str) -> Condition:
-    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)". It is not run."""
+    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)". No text is run."""
     name, _, fields = text.partition(":")
     try:
         values = read_fields(fields)
@@ -234,7 +234,7 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
 
 
 def _kinds() -> dict[str, Any]:
-    """Return name -> class of all parts and signals, also users'. Of equal names the suite's class is returned."""
+    """Return name -> class of all parts and signals, also users'. If two have one name, the suite's is returned."""
     kinds: list[type] = [Noise, Jump, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))

@@ -6,12 +6,12 @@ At the first stage of a control sample, for each channel:
 
 A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of the sample before.
 At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
-every stage, disturbance(t) goes to xfrc_applied. A friction by a formula follows, at the first stage.
+every stage, disturbance(t) goes to xfrc_applied. Then a friction by a formula goes to ctrl; its steps have one stage.
 Each sample is logged with the mean forces since the last one.
 
-The controller counts calls, because mjData.time does not tell a sample from a last stage: RK4 calls four times a step,
-at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again. A run that diverges, or whose law raises an
-exception, is marked in its record and gets no more control. The other simulations of the batch continue.
+The controller counts its calls, because mjData.time does not tell the last stage of a step from the start of the next:
+RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again. A run that diverges, or whose law
+raises an exception, is marked in its record and gets no more control. The other simulations of the batch continue.
 
 Private functions take the address of the record, the record `sim`, and `data`, the Arrays of its mjData. Those that
 can fail return a failure code of state.py, unless they say otherwise.
@@ -159,7 +159,7 @@ def _read_sensor(sim, state, i, x, v, j, hinge):
 
 @njit(error_model="numpy", inline="always")
 def _measurement_error(address, sim, function, t):
-    """Return an error of measurement at time t, s; NaN if it raised. Without one return -0, which changes no bit."""
+    """Return a measurement error at time t, s: NaN if its signal raised, -0 (which changes no bit) without a signal."""
     if function.address == 0:
         return -0.0
     sim.instant.t = t
@@ -315,7 +315,7 @@ def _measure_dynamics(address, sim):
 
 @njit(error_model="numpy")
 def _separate_equations(address, sim, M, h, g):
-    """Write M, h and g of channels with an equation x'' = f + g u each: M is diagonal."""
+    """Write M, h and g of channels that each have their own equation x'' = f + g u: M is diagonal."""
     n, v, measured = sim.n, pointer(sim.seen.v), pointer(sim.joint.v)
     for i in range(n * n):
         M[i] = 0.0
@@ -337,7 +337,7 @@ def _separate_equations(address, sim, M, h, g):
 
 @njit(error_model="numpy", inline="always")
 def _actuate(sim, data, step):
-    """Give the command whose delay has passed at a physics step, if there is one, to the actuators."""
+    """Give the actuators the command whose delay has passed at this physics step, if there is one."""
     past = step - sim.delay
     if past >= 0 and past % sim.steps == _late(sim, past // sim.steps):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
@@ -433,7 +433,7 @@ def _add_force(data, channel, force, cartesian):
 
 @njit(error_model="numpy")
 def _evaluate_feedback(address, sim, data, signal, i, k):
-    """Write the force of a disturbance that sees the loop, the last one if k < 0. Return 1 if it raised, or 0."""
+    """Write the force of a disturbance that sees the loop: the last one again if k < 0. Return 1 if it raised, or 0."""
     if i > 0 or k < 0:
         sim.motion.value = pointer(signal.function.memory)[0]
         return 0

@@ -92,7 +92,7 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's x0.
       spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more.
-      by: how much farther they lie, rad or m, 0 or more; for a plant that rests at 0.
+      by: a distance that is added to it, rad or m, 0 or more; for a plant that rests at 0.
 
     Raises:
       ScenarioError: a number out of its range.
@@ -152,7 +152,7 @@ def all_combinations(
     duration: float,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Return scenarios as `grid`; `laws` returns, for a plant, a function of the seed for each law."""
+    """Return scenarios as `grid` does. `laws` returns, for a plant, functions seed -> law, one for each law."""
     scenarios = []
     for plant in plants:
         for condition in conditions:

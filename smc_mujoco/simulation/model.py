@@ -193,7 +193,7 @@ def with_values(base: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujo
 
 
 def put_values(model: mujoco.MjModel, base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Write a scenario's field values into a copy of the base model, for which the caller calls mj_setConst."""
+    """Write a scenario's field values into a copy of the base model, and return them. The caller calls mj_setConst."""
     values = field_values(base, scenario, step)
     for name, value in values.items():
         field_array(model, name)[:] = value
@@ -237,7 +237,7 @@ def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scen
 
 
 def check_start(shared: Mechanism, scenario: Scenario) -> None:
-    """Raise ScenarioError if a scenario starts inside an obstacle, or beyond a stop, where no path leads.
+    """Raise ScenarioError if a scenario starts inside an obstacle, or beyond a stop that it could not pass.
 
     A check of many pendulums takes 40 ms, and most runs of a grid share their starts, so free ones are remembered.
     """

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
-MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise, and of the first process noise, which those of others follow
+MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise and of the first process noise; the second has 2, and so on
 DROPOUT = 1 << 32  # stream that decides which readings are lost
 JITTER, MISSED = 1 << 33, 1 << 34  # streams that decide which samples are late, and which are missed
 

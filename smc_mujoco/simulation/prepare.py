@@ -106,7 +106,7 @@ class Packed:
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
-    nominal: Any  # the data of a nominal model that MuJoCo computes, or None
+    nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
 
 
 def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
@@ -164,7 +164,7 @@ def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str
 
 
 def _shared_functions(s: Resolved, nominal: Native | None, buffer: state.Buffer) -> dict[str, Any]:
-    """Return the functions of a record that all channels share, but law and reference."""
+    """Return the functions of a record that all channels share, except law and reference."""
     fields = {}
     for c in filter(None, (s.velocity, s.surface)):
         compiled = cfunctions.compile_component(c)

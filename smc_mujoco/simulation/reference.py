@@ -84,7 +84,7 @@ class Loop:
         self.streams = [scenario.noise_stream(j) for j in range(len(scenario.disturbance))]
         self.commands: list[np.ndarray] = []
         self.last_u = np.zeros(n)  # commands of the last sample
-        self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)  # a: estimated accelerations, or NaN
         self.last_reading = np.zeros((n, 2))  # positions and velocities, of the last readings that were not lost
         self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.scale = math.prod(part.scale for part in scenario.actuator)
@@ -374,7 +374,7 @@ class PythonComponent:
         return as_floats(self.name, out, self.returns, 2)
 
     def call_joint(self, y: JointMeasurement) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s of a law of many joints, (n,) each; raises as a call."""
+        """Return u and s of a law of many joints, (n,) each; raise Failure if it fails."""
         try:
             out = self.functions[0](y, self.gains[0], self.memory)
         except USER_EXCEPTIONS as error:

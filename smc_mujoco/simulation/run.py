@@ -1,7 +1,7 @@
 """From scenarios to traces, in batches of bounded memory.
 
-A group shares the plant, its size and the kinds of its parts (but not their numbers), the integrator, the physics step
-and the number of steps. Its scenarios may differ in parameters, friction levels, laws, gains, signals, delays and
+The scenarios of a group have the same plant, size, kinds of parts (not the same numbers), integrator, physics step and
+number of steps. They may differ in parameters, friction levels, laws, gains, signals, delays and
 seeds. Functions that do not compile run in the reference loop. The results do not depend on the number of threads, the
 grouping or the other runs.
 """
@@ -34,7 +34,7 @@ from smc_mujoco.simulation.trace import Trace, from_log
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
-MIN_TRIM_RUNS = 64  # runs of a batch; its memory is returned to the system only if it had as many; chosen
+MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system; chosen
 SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
 USER_MODEL_STEPS = 200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
 FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
@@ -124,7 +124,7 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
 
 
 def return_freed_memory() -> None:
-    """Return freed memory to the system, if the C library is glibc; 45 to 100 kB a run stay allocated without it."""
+    """Return freed memory to the system, if the C library is glibc. Without it, a run leaves 45 to 100 kB allocated."""
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None:
         trim(0)
 
@@ -182,7 +182,7 @@ class ScenarioBatch:
         self.set_parameters(0, range(count))
 
     def run(self, report: Report) -> list[Trace]:
-        """Simulate all of them to the end."""
+        """Simulate all scenarios to the end, and return their traces."""
         total = self.scenarios[0].samples * self.scenarios[0].steps
         jumps = sorted({s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
         for step, next_step in itertools.pairwise([0, *jumps, total]):
@@ -193,7 +193,7 @@ class ScenarioBatch:
         return [self.trace(i) for i in range(len(self.scenarios))]
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
-        """Set the true parameters that hold from a step on."""
+        """Set the true parameters that hold from a physics step on, in the simulations of these indices."""
         changed = []
         for i in indices:
             values = self.base_values | models.field_values(self.base, self.scenarios[i], step)
@@ -277,9 +277,9 @@ class ScenarioBatch:
 
 
 def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
-    """Call the law that failed again, in Python, and return its exception, or its u and s in the record, in words.
+    """Return in words why a law failed: its exception, or the u and s in the record.
 
-    Compiled functions have no text of an exception. Return None for a law that had already changed its memory.
+    Compiled code keeps no text of an exception, so the law is called again in Python. Return None if that raises none.
     """
     n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
     function = reference.PythonComponent(s.law, n)
@@ -295,7 +295,7 @@ def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
             function(i, Measurement(*record["y"].tolist()))
     except reference.Failure as failure:
         return str(failure)
-    if record["failure"] == state.LAW_RAISED:
+    if record["failure"] == state.LAW_RAISED:  # the law had changed its memory before it raised
         return None
     u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[:, i % width].tolist()
     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"

@@ -1,7 +1,7 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
-A field is None if it was left out and its default depends on other fields. `scenario.resolved` has these defaults. The
-true mechanism is set by `plant`, `mismatch`, `jump`, friction, contact, actuator and sensor. The law knows at most the
+A field that was left out is None if its default depends on other fields; `scenario.resolved` has the default. The
+fields plant, mismatch, jump, friction, contact, actuator and sensor set the true mechanism. The law knows at most the
 plant's nominal parameters.
 """
 
@@ -55,7 +55,7 @@ Out = TypeVar("Out")
 
 
 def field(convert: Callable[..., Out], default: Any = dataclasses.MISSING) -> Out:
-    """Return a dataclass field whose value a function of `coerce` makes from what the user gives."""
+    """Return a dataclass field; `convert`, a function of `coerce`, makes its value from what the user gives."""
     return dataclasses.field(default=default, metadata={"convert": convert})
 
 
@@ -65,48 +65,48 @@ class Scenario:
 
     Attributes:
       plant: a Plant or the name of one.
-      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. Or one for each driven channel: a list in
-        their order, or a mapping from the joints' names, as also for u_max and reference. Left out, all three are what
-        the plant's channels suggest, see `smc.Channel`.
+      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. To give each driven channel its own, give a
+        list in the channels' order, or a mapping from the joints' names; u_max and reference take these forms, too.
+        Default of all three: what the plant's channels suggest, see `smc.Channel`.
       model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "nominal"
         for a law that requires it, else "none".
       surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
       duration: s. The run lasts as many whole control periods as fit into it.
-      control_period: s; the law runs this often and its command is held in between.
-      physics_step: s; must divide the control period. Default: the largest such step up to 1 ms for the plant's plain
-        equation; behind drives whose force changes within a control period, up to a quarter of it or half of their
-        time constant, whichever is longer; up to 0.25 ms with friction, contact, a mechanism or a Backlash; up to a
-        quarter of the clock's jitter.
+      control_period: s between two runs of the law. The command is held in between.
+      physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms with friction,
+        contact, a mechanism, a Backlash or a plant that is not `smooth`, else up to 1 ms; in both cases up to a quarter
+        of the clock's jitter. Where 1 ms holds, a drive whose force changes within a control period may lower it, to a
+        quarter of that period or half of the drive's time constant, whichever is longer.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
-        A motor's own limit holds too: see `limits`. In V, with the motor's voltage as default, if u is a voltage.
-      x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0, and 0.
-      reference: r(t), the same for every channel, or one for each driven channel. Default: 0, or the plant's own rest.
+        A motor's own limit holds too: see `limits`. If u is a voltage, the bound is in V; its default is the motor's.
+      x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0; v0 = 0.
+      reference: r(t), the same for every channel, or one for each driven channel. Default: the plant's `rest`, or 0.
       feedforward: a known signal that is added to the law's u before its bound, the same for every driven channel: an
         excitation, or the command of a recorded experiment (with the law "none"). None: nothing is added.
       disturbance: d(t), one signal or several to be added, or None.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
-      clock: the controller's Clock, of which samples may come late or be missed; None: all are on time.
+      clock: the controller's Clock: its samples may come late or be missed. None: all are on time.
       velocity: an Estimator of the velocity that the law sees, or the name of one. Default: "measured", or
         "filtered_difference" with an encoder, which measures no velocity.
-      mismatch: parameter name -> factor on the true plant's parameter, or what is added to one of `plant.added`, such
-        as kg of payload. `mass` is the plant's mass.
+      mismatch: parameter name -> factor on the true plant's parameter. For a parameter in `plant.added`, such as a
+        payload in kg, the value is added instead. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
-      noise_key: a number with which the random numbers of all seeds are keyed. Comparisons draw one after the laws are
-        fixed, so that no law can know its noise. 0: the seed alone.
+      noise_key: a number that changes the random numbers of every seed. Comparisons draw it after the laws are fixed,
+        so that no law can know its noise. 0: the random numbers depend on the seed alone.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
         a Lag, a RateLimit or a DCMotor, else implicitfast.
-      friction: of every joint, beside the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
-      contact: what the mechanism touches: a Contact or its kind, one of those the plant offers, or "none".
+      friction: on every joint, in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
+      contact: what the mechanism touches: a Contact that the plant offers, the kind of one, or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
-      actuator: between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag followed by another drive, and
-        then a Backlash. None: the command is the force. u is limited to u_max before the drives.
+      actuator: what is between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag and another drive; a
+        Backlash may follow. None: the command is the force. u is limited to u_max before the drives.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
       condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
 
-    Fields that are left out stay None, also under dataclasses.replace, so that a default follows the fields on which it
-    depends. `resolved` is the same scenario with its defaults. Scenarios whose resolved fields are equal are equal, and
+    A field that is left out stays None, also under dataclasses.replace, so that its default follows the other fields.
+    `resolved` is the same scenario with its defaults. Scenarios whose resolved fields are equal are equal, and
     give the same trace to the last bit.
 
     Raises:
@@ -194,7 +194,7 @@ class Scenario:
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
-        """Make the scenario of a recorded run, without warnings and without rules that may have come since."""
+        """Make the scenario of a recorded run, without warnings and without checks that are newer than the run."""
         scenario = object.__new__(cls)
         vars(scenario).update({f.name: fields.get(f.name, f.default) for f in dataclasses.fields(cls)})
         scenario._convert()
@@ -263,7 +263,7 @@ class Scenario:
 
     @property
     def plain_equation(self) -> bool:
-        """Whether MuJoCo integrates only the plant's equation, also behind drives."""
+        """Whether MuJoCo integrates only the plant's equation, with or without drives."""
         without_parts = not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
         return without_parts and self.plant.smooth and all(part.drives for part in self.actuator)
 
@@ -279,7 +279,7 @@ class Scenario:
 
     @functools.cached_property
     def limits(self) -> tuple[float, ...]:
-        """The bound on |u| of each driven channel, in its unit: the lesser of u_max and its motor's limit."""
+        """The bound on |u| of each driven channel, in the unit of u: the lesser of u_max and the motor's limit."""
         u_max = self.resolved.u_max
         bounds = u_max if isinstance(u_max, tuple) else (u_max,) * self.plant.driven
         if self.voltage_motor is not None:
@@ -305,7 +305,7 @@ class Scenario:
 
     @functools.cached_property
     def stages(self) -> int:
-        """Callbacks per physics step: one a stage of the integrator."""
+        """Callbacks per physics step: one for each stage of the integrator."""
         return 4 if self.resolved.integrator == "RK4" else 1
 
     @property
@@ -320,7 +320,7 @@ class Scenario:
 
     @property
     def jump_step(self) -> int:
-        """The physics step from which the jump holds; -1 without one."""
+        """The first physics step with the parameters of the jump; -1 without a jump."""
         return -1 if self.jump is None else math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
@@ -349,7 +349,7 @@ class Scenario:
         return NominalDrive() if self.voltage_motor is None else self.voltage_motor.nominal
 
     def factors(self, step: int) -> dict[str, float]:
-        """Return the plant's parameter factors, or terms for those of `plant.added`, at a physics step."""
+        """Return parameter -> its factor at a physics step; for parameters in `plant.added`, the number added."""
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
             for name, factor in self.jump.factors.items():
@@ -399,10 +399,10 @@ def _defaults(s: Scenario) -> dict[str, Any]:
 def longest_step(s: Scenario) -> float:
     """Return the largest default physics step, s.
 
-    A drive moves its force within a step, of which RK4 gets the mean. So velocities at the ends of steps are exact, and
-    positions are late by a twelfth of the square of the step times the acceleration's change: in a cycle of omega, by
-    (omega step)^2/12 of it. With four steps that is 5 % for the fastest cycle of a sampled law, of two samples. Half of
-    a long lag, behind which cycles are slower, does as well. A force that follows at once stays where it is in a step.
+    A drive's force changes within a step, and RK4 gets its mean. So velocities at the ends of steps are exact, and
+    positions err by step^2/12 times the change of the acceleration: in a cycle of frequency omega, by (omega step)^2/12
+    of its amplitude. With four steps this is 5 % in the fastest cycle of a sampled law, which lasts two samples. Cycles
+    behind a long lag are slower: a step of half the lag is enough. A force that follows u at once sets no limit.
     """
     jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
     if not s.plain_equation:
@@ -414,9 +414,9 @@ def longest_step(s: Scenario) -> float:
 def _default_steps(s: Scenario) -> int:
     """Return the default number of physics steps per control period.
 
-    Behind a drive the input delay should be a whole number of steps: up to four times as many steps are tried for that.
+    Behind a drive, up to four times as many steps are tried, until the input delay is a whole number of steps.
     """
-    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # scenarios that need less are refused later
+    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # a scenario that needs less is refused later
     minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
     fitting = (n for n in range(minimum, 4 * minimum + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
@@ -424,7 +424,7 @@ def _default_steps(s: Scenario) -> int:
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
-    """Return the bounds that the plant's channels suggest, and the default bound for those that suggest none."""
+    """Return what the plant's channels suggest, or the default bound; one number if all channels have the same."""
     default = default_u_max(plant)
     bounds = tuple(default if bound is None else bound for bound in plant.suggested.get("u_max", (None,)))
     return bounds if len(set(bounds)) > 1 else bounds[0]

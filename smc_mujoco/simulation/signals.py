@@ -8,8 +8,7 @@ The float fields of a signal are its parameters p. Its function `value` is compi
     value(t, p, memory, e, de, s)                     a disturbance that sees the loop
 
 The memory of process noise is its state in one channel. The stream number separates it from the other noises of a run.
-Times are in seconds. Values have the unit of what the signal is added to: m or rad for a reference, N or N m for a
-disturbance.
+Times are in seconds. A reference is in m or rad, a disturbance in N or N m.
 """
 
 import dataclasses
@@ -33,8 +32,8 @@ SINUSOIDS = 32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 %
 class Signal:
     """Base of all signals, which checks that every parameter is a finite number.
 
-    The class attribute `cartesian` says that it is a force on a body, N, instead of a force on the joint: a horizontal
-    one on the body of each channel, or that of a `Push`.
+    If the class attribute `cartesian` is true, the signal is a force on bodies, N, not on joints: a `Push` on one body,
+    or else a horizontal force on the body of each channel.
     """
 
     memory: ClassVar[int] = 0  # floats of state in each channel
@@ -42,8 +41,8 @@ class Signal:
     natural: ClassVar[tuple[str, ...]] = ()  # names of parameters that must be >= 0
     random: ClassVar[bool] = False  # whether `value` takes memory, seed, channel and stream
     series: ClassVar[bool] = False  # whether `value` takes data
-    sees: ClassVar[bool] = False  # whether `value` takes e, de and s, once a control sample; the force then stays
-    rows: ClassVar[int] = 2  # of the data
+    sees: ClassVar[bool] = False  # whether `value` takes e, de and s; then it is called once per control sample
+    rows: ClassVar[int] = 2  # of `data`
     cartesian: ClassVar[bool] = False
     data: ClassVar[np.ndarray]  # of a series, (rows, N) float64, C-contiguous
     value: ClassVar[Callable[..., tuple[float, float, float]]]  # static: value, first and second derivative
@@ -62,7 +61,7 @@ class Signal:
 
 @dataclasses.dataclass(frozen=True)
 class PerChannel(Signal):
-    """A separate reference for each driven channel. A scenario makes it of several references."""
+    """A separate reference for each driven channel. A scenario makes it when it is given several references."""
 
     signals: tuple[Signal, ...]
 
@@ -165,7 +164,7 @@ class Pulse(Signal):
 class Impulse(Signal):
     """impulse / width for time <= t < time + width, else 0: a blow with the time integral `impulse`, N s or N m s.
 
-    The integral is exact if width is a whole number of physics steps. The default of 5 ms is, for the default steps.
+    The integral is exact if width is a whole number of physics steps, as 5 ms is for default steps.
     """
 
     impulse: float
@@ -189,8 +188,8 @@ class Gust(Signal):
     """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a horizontal force, N.
 
     The discrete gust of 14 CFR 25.341(a)(2) and EASA CS-25.341(a)(2), U = U_ds/2 (1 - cos(pi s/H)) for 0 <= s <= 2H,
-    in time and as a force: 2H passes in width. (The gust of MIL-F-8785C rises in the same way and then stays.)
-    It acts on the centre of mass of every channel's body: its generalised force is F on a slide, F l cos x on a bob.
+    here as a force over time, where `width` stands for 2H. (The gust of MIL-F-8785C rises in the same way and stays.)
+    It acts on the centre of mass of every channel's body: the force on a slide is F, the torque on a bob F l cos x.
     """
 
     amplitude: float
@@ -212,7 +211,7 @@ class Gust(Signal):
 class Push(Signal):
     """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on the arm.
 
-    (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0: of impulse 2 width / pi times the peak.
+    (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0. The impulse is 2 width / pi (x, y, z).
     On plants whose disturbances act on joints, as on the panda and on users' models, a trace's d does not contain the
     push. On others, d has its effect on the body's joint: the force along a slide, or the torque of its horizontal part
     about a hinge.
@@ -246,16 +245,16 @@ class Push(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class Relay(Signal):
-    """A disturbance that sees the loop: it tends to `amplitude` where s + rate e' + error e > 0, else to -amplitude.
+    """A disturbance that sees the loop: it goes to `amplitude` if s sigma + rate e' + error e > 0, else to -amplitude.
 
-    It sees the true error e, its rate and the law's s at a control sample, and is constant until the next one. With a
-    positive `rate` alone it pushes along the motion: no other |d| <= amplitude gives the loop more energy. With a
-    `slope` above 0 it changes by at most this from sample to sample. Before `start` it is 0. All channels get the force
-    of channel 0.
+    It sees the true error e, its rate e' and the law's sliding variable sigma at a control sample. It is constant until
+    the next. With a positive `rate` alone it pushes along the motion: no other |d| <= amplitude gives the loop more
+    energy. With a `slope` above 0 it changes by at most `slope` from sample to sample. Before `start` it is 0. All
+    channels get the force of channel 0.
 
     Attributes:
       amplitude: N or N m.
-      s, rate, error: weights of the law's s, of e' and of e.
+      s, rate, error: weights of sigma, of e' and of e.
       slope: largest change between two control samples, N or N m; 0: no limit.
       start: s.
     """
@@ -285,8 +284,8 @@ class OrnsteinUhlenbeck(Signal):
     """Process noise with standard deviation sigma and correlation time tau, independent in every channel.
 
     d_(k+1) = a d_k + sigma sqrt(1 - a^2) n_k, a = exp(-dt/tau), on knots dt apart and linear between them: the exact
-    discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from the start. The knots do not depend on the
-    physics step and the control period, nor does the path. `dt` defaults to 1 ms.
+    discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from the start. Neither knots nor path
+    depend on the physics step and the control period. `dt` defaults to 1 ms.
     """
 
     sigma: float
@@ -358,7 +357,7 @@ def _band_limited(t, sigma, low, high, memory, seed, channel, stream):
 
 
 def bounds_of(signal: Signal) -> tuple[float, float] | None:
-    """Return bounds of |d| and |d'|, inf where d jumps, or None if none are known."""
+    """Return bounds of |d| and |d'|, the second inf if d jumps; None if they are not known."""
     match signal:
         case Constant(amplitude=a):
             return abs(a), 0.0
@@ -373,7 +372,7 @@ def bounds_of(signal: Signal) -> tuple[float, float] | None:
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Measurement noise: zero-mean and Gaussian, and errors that are known signals of time, the same in every channel.
+    """Measurement noise: Gaussian with mean 0, plus errors that are known functions of time, equal in all channels.
 
     Attributes:
       position, velocity: standard deviations, in SI units.
@@ -427,7 +426,7 @@ def parameter_factors(name: str, value: object) -> Frozen[float]:
 class Clock:
     """The timer of the controller. A sensor with a clock of its own is an `Encoder` with a `period`.
 
-    A real-time task is woken every control period T, some time after it should be. Sample k runs at
+    A real-time task is woken once in every control period T, a little late. Sample k runs at
 
         t_k = k T + late_k,    late_k uniform among the physics steps from 0 to `jitter`,
 

@@ -84,11 +84,11 @@ SIMULATION = np.dtype(
         ("calls", "i8"), ("failure", "i8"), ("failed_step", "i8"),
         # sizes: channels, those of them that have an actuator, qpos, qvel, samples in the log, disturbances
         ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("samples", "i8"), ("disturbance_count", "i8"),
-        # the clock: physics steps a control period, callbacks a physics step, s of each
+        # the clock: physics steps per control period, callbacks per physics step, lengths of step and period in s
         ("steps", "i8"), ("stages", "i8"), ("step", "f8"), ("period", "f8"),
         # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), DISTURBANCE (disturbance_count,)
         ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("disturbances", "i8"),
-        # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (n,), unit of the drive
+        # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (driven,), ctrl per u
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
         # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
         ("jitter", "i8"), ("missed", "f8"),
@@ -100,7 +100,7 @@ SIMULATION = np.dtype(
         # functions, and whether the law may use the nominal model
         ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
         ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
-        # addresses of the FUNCTIONs of the driven channels, where they differ; 0: `law` and `reference` are of all
+        # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`, or `reference`
         ("laws", "i8"), ("references", "i8"),
         # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and damping; 0: none
         ("frictions", "i8"),

@@ -43,7 +43,7 @@ class TimeSeries(Signal):
     Attributes:
       times: (N,), s, increasing, N >= 2.
       values: (N,), in the unit of what the signal is added to.
-      data: both, (2, N) float64, read-only.
+      data: times and values, (2, N) float64, read-only.
 
     Raises:
       ScenarioError: a number is not finite, or times do not increase.
@@ -88,7 +88,7 @@ class TimeSeries(Signal):
     def from_csv(cls, path: str | os.PathLike[str], column: str | None = None) -> "TimeSeries":
         """Return the series in a CSV file: a row per time, at a nearly constant rate.
 
-        Commas separate the cells, or semicolons, beside which a comma is a decimal point.
+        Commas separate the cells. If semicolons do, a comma is a decimal point.
 
         Args:
           path: the file. Its first row may name the columns, perhaps with a unit: "d [N m]", as Trace.export writes it.
@@ -141,7 +141,7 @@ class Held(TimeSeries):
     """Steps: 0 before the first point, then the value of the last point whose time has come.
 
     Attributes:
-      times: (N,), s, increasing, N >= 2. Runs are exact if they are whole numbers of control periods.
+      times: (N,), s, increasing, N >= 2. Runs are exact if all times are whole numbers of control periods.
       values: (N,), in the unit of what the signal is added to.
     """
 
@@ -249,17 +249,17 @@ def cartesian_path(
     body: str | None = None,
     x0: Sequence[float] | None = None,
 ) -> list[Waypoints]:
-    """Return a reference for each channel's joint, on which a tip moves through points in space with minimum jerk.
+    """Return a reference for each channel, under which a tip moves through points in space with minimum jerk.
 
     Inverse kinematics computes the joints' positions every 10 ms: least squares with MuJoCo's Jacobians, damped near
     singular poses. If an arm has more joints than the task needs, each solution is the one nearest to the one before.
-    Then a closed path of the tip may not close in the joints.
+    After a closed path of the tip, the joints may then be elsewhere than before.
 
     Args:
       plant: a plant or its name; its nominal model is used.
       times: (N,), s, increasing.
       points: (N, 3), m, in the world.
-      site, body: name of the site or body whose origin is the tip; one of them.
+      site, body: name of the site or body whose origin is the tip; give one of the two.
       x0: positions at which the search begins, one for each channel; None: the plant's.
 
     Raises:

@@ -44,11 +44,10 @@ class Trace:
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
       d: disturbances on the joint's body, as a generalised force on the joint, (K + 1, n), N or N m.
-      r: reference, (K + 1, n); of free joints, which have none, the plant's goal.
-      force: what the actuator delivers at the joint, and with a Backlash at its rotor, (K + 1, n), N or N m.
-      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. Both are means
-        over the control period that ends at t_k, of the values at its physics steps, so that no blow is missed; at
-        t = 0 they are 0.
+      r: reference, (K + 1, n); free joints have none, and get the plant's goal.
+      force: of the actuator on the joint, or on the rotor of a Backlash, (K + 1, n), N or N m.
+      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. So that no blow is missed,
+        force and reaction are means over the physics steps of the control period that ends at t_k; at t = 0 they are 0.
       scenario: the Scenario of the run.
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.

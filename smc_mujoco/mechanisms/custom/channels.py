@@ -32,14 +32,14 @@ class Channel:
 
     Attributes:
       motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps their forcerange, and
-        the joint's actuatorfrcrange. Without it, the joint needs one actuator, and that a motor.
+        the joint's actuatorfrcrange. Without it, the joint needs exactly one actuator: a motor.
       partner: a joint without an actuator that moves with this one, such as a pole on its cart. It is measured and
         scored as a separate channel, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
         y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.
       x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of the keyframe, or of
         the model.
-      law, u_max, reference: what scenarios that are given none take for this channel, as in a Scenario. Give each
-        channel a law, or none. None: the default bound, and rest at 0.
+      law, u_max, reference: defaults for this channel, of scenarios that leave them out; values as in a Scenario. Give
+        every channel a law, or no channel. None: the default bound, and rest at 0.
     """
 
     motor: bool = False
@@ -121,7 +121,7 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
 def starts(
     model: mujoco.MjModel, joints: list[str], channels: Pairs, keyframe: str | None
 ) -> tuple[dict[str, float], list[Range]]:
-    """Return joint -> x0, rad or m, and the ranges in which positions that the user chose must be.
+    """Return joint -> x0, rad or m, and the ranges of those joints whose x0 the user chose.
 
     x0 is that of the channel, else of the keyframe, else of the model. The model's own x0 may be outside its range.
     """
@@ -219,7 +219,7 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
 def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
     """Return the least and the largest force that the forceranges of a joint's actuators allow together, N m or N.
 
-    There is no bound if one has no forcerange, and if they push only one way: the ideal motor pushes both ways.
+    They give no bound if one has no forcerange, or if they push only one way: the ideal motor pushes both ways.
     """
     if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
         return -math.inf, math.inf

@@ -31,7 +31,7 @@ DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
 RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
-RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that these parts add
+RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that this package's parts add
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 

@@ -19,8 +19,8 @@ Laws of many joints see the mechanism as a whole instead,
 
 and C(x, v) w = (qfrc_bias(x, v + w) - qfrc_bias(x, v - w)) / 4: gravity cancels, and the rest is quadratic in v.
 
-Constraints are left out: contacts, limits, dry friction. A state that is not measured,
-in another kinematic tree, is taken to be the model's initial one.
+Constraints are left out: contacts, limits, dry friction. Joints that are not measured, all in other kinematic
+trees, are assumed to be in the model's initial state.
 """
 
 import contextlib
@@ -166,7 +166,7 @@ class NominalModel:
 
 @dataclasses.dataclass(eq=False)
 class BorrowedData:
-    """An MjData borrowed from a pool. A new one costs a run 0.7 ms."""
+    """An MjData borrowed from a pool, to which it returns when this is deleted. A new one costs a run 0.7 ms."""
 
     data: mujoco.MjData
     spare: list[mujoco.MjData]
@@ -201,7 +201,7 @@ def driven(places: np.ndarray) -> np.ndarray:
 
 
 def _mujoco(name: str, more: int = 0) -> Callable:
-    """Return a function of MuJoCo's library of model, data and more addresses, for numba.
+    """Return a function of MuJoCo's library for compiled code. It takes the addresses of model, data and `more`.
 
     Compiled code has its name, not its address, so that another process can load the code from the disk.
     """

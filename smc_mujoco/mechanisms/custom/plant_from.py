@@ -39,7 +39,7 @@ MAX_TIMEOUT = 86_400.0  # s, of a timeout
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"
-DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes although ctrl is 0
+DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes even at ctrl = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,8 +131,8 @@ def plant_from(
         x0 outside its joint's range.
 
     A scenario may have model="nominal" if every joint that moves with the channels is a channel or a partner, and no
-    equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours, mixed with the
-    laws' if there are several.
+    equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours; those of
+    several laws are mixed with the laws' colours.
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, errors.number("timeout", timeout, above=0.0, high=MAX_TIMEOUT))

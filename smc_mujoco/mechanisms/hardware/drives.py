@@ -5,8 +5,8 @@ A scenario takes one drive, or a Lag and another drive in series, and a Backlash
 The callback simulates Lag, RateLimit and the winding of a DCMotor (`DriveStep`) and gives MuJoCo the mean of their
 force over each physics step. So the velocities at the ends of the steps are those of the equations, whatever the step
 is, and any integrator may be used; only a RateLimit behind a Lag is not exact, see there. A state that MuJoCo
-integrates would give each step the force of its end. Such a lead of half a step takes away a part of the delay that a
-limit cycle depends on: behind one lag, most of it.
+integrates would give each step the force of its end. This lead of half a step would take away a part
+of the delay that a limit cycle depends on: behind one lag, most of it.
 
 A winding also feels the joint's speed, which only MuJoCo knows within a step. `winding_step` is exact for a speed that
 changes linearly there.
@@ -98,8 +98,8 @@ class DCMotor(Actuator):
     to u as gear k goes to 0. The current's limit cuts the torque, not i, which is back within a few L/R.
 
     With command="voltage" u is the voltage itself, in V, as on a rig whose amplifier takes volts. |u| is then bounded
-    by `voltage`, too, and a law that has the nominal model has it per volt: gear k/R is part of its g, and the back-EMF
-    of its f. The law's model never has the inductance, the cogging, the ripple, and the limit of the current.
+    by `voltage`, too, and the nominal model of a law is per volt: gear k/R is part of its g, and the back-EMF of its
+    f. The law's model never has the inductance, the cogging, the ripple, and the limit of the current.
 
     Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
     49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
@@ -124,7 +124,7 @@ class DCMotor(Actuator):
       ripple: share of the torque that a brush adds, 0 or more; 0 for an even torque. It needs inductance 0.
       bars: of the commutator, greater than 0; the default is chosen.
       bridge, bridge_2: rad at the motor, over which each brush bridges two bars, greater than 0; chosen.
-      brush, brush_2: rad at the motor, an angle at which each does; chosen.
+      brush, brush_2: rad at the motor, an angle at which each brush bridges two bars; chosen.
       command: what u is: "torque", N m (N) at the joint, or "voltage", V.
     """
 

@@ -44,10 +44,10 @@ class ServoFriction(Sliding):
 
     Attributes:
       kv: viscous friction, N m s/rad, 0 or more.
-      kc, kcs: dry friction at every speed, and its addition near rest, N m, 0 or more.
+      kc, kcs: dry friction at every speed, and what is added to it near rest, N m, 0 or more.
       km, ke: dry friction for each N m of the motor's torque and of the torque from outside, at every speed, 0 or more.
-      kms, kes: the same, its addition near rest, 0 or more.
-      kmq, keq: additions near rest for the squares of these torques, 1/(N m), 0 or more.
+      kms, kes: the same for what is added near rest, 0 or more.
+      kmq, keq: friction added near rest for the squares of these torques, 1/(N m), 0 or more.
       vs: speed at which the additions have fallen to 1/e, rad/s, greater than 0.
       alpha: how steeply they fall, greater than 0.
     """
