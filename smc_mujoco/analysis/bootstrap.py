@@ -27,7 +27,7 @@ import numpy as np
 
 LEVEL = 0.95  # of confidence, of every interval and verdict; chosen
 RESAMPLES = 1999  # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
-MIN_INTERVAL_SAMPLES = 6  # with fewer no interval of a median covers 95 %: it is their range
+MIN_INTERVAL_SAMPLES = 6  # with fewer, no interval of a median covers 95 %; their range is given instead
 
 
 class Interval(NamedTuple):
@@ -42,8 +42,8 @@ class Interval(NamedTuple):
 def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Interval:
     """Return the median of the blocks' medians, of values (blocks, n) that are NaN where there is no run.
 
-    The interval reaches from the resampled lower of the two middle values of an even number to the resampled higher.
-    Every column has a run. `samples` has the sample of each column, see `ranking.linked`; None if each is one.
+    An even number of values has two middle ones: the lower end resamples the lower, and the upper end the higher.
+    Every column has a run. `samples` has the sample of each column, see `ranking.linked`; None: each is its own.
     """
     from scipy.special import ndtr, stdtrit
 

@@ -36,9 +36,9 @@ MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
 GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35  # cells of the coarse grid on which cycles are sought: chosen
 CUTS = 8  # of a cell's sides, at most: a cell of the finest grid is 11 % in amplitude and 1.5 % in frequency; chosen
 CELL_MARGIN = 0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
-COARSE_SAMPLES = 60.618  # samples of a period on the grid, not whole, so that periods differ in their places; chosen
-MAX_OTHER_CYCLES = 3  # stable ones beside the predicted; more are made by the places of the samples: chosen
-COARSE_NOISE = 0.1  # of the log of N L, by the places of few samples: chosen
+COARSE_SAMPLES = 60.618  # samples of a period on the grid; not whole, so that they move from period to period; chosen
+MAX_OTHER_CYCLES = 3  # stable ones beside the predicted; more are artefacts of the sampling: chosen
+COARSE_NOISE = 0.1  # error of the log of N L with few samples a period: chosen
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # of a cell, in order
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
 SAME_CYCLE_TOLERANCE = 0.02  # of the logs of amplitude and omega, below which two cycles are one: chosen
@@ -79,7 +79,7 @@ class Chattering:
     third_harmonic: float = math.nan  # of s over its first; if large, the prediction is rough; NaN for two samples
     amplitude_range: tuple[float, float] = (math.nan, math.nan)
     frequency_range: tuple[float, float] = (math.nan, math.nan)  # Hz
-    coupling: float = math.nan  # of another driven channel's x, over amplitude_x; if large, the prediction fails
+    coupling: float = math.nan  # amplitude of another driven channel's x over amplitude_x; if large, prediction fails
     gain: complex = complex(math.nan)  # N at the cycle
     response: complex = complex(math.nan)  # L at the cycle
     assumptions: tuple[str, ...] = ()  # what was left out or is doubtful, in sentences
@@ -132,7 +132,7 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
 
 
 def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
-    """Yield what a run from elsewhere may end in, or that too many balances lie beside each other to mean cycles."""
+    """Yield a remark on each other stable cycle, or one remark if there are too many to be cycles."""
     if len(others) > MAX_OTHER_CYCLES:
         slow, *_, fast = sorted(omega / math.tau for _, omega in others)
         yield f"N L is about 1 everywhere from {slow:.3g} to {fast:.3g} Hz: the prediction is not to be trusted"
@@ -159,7 +159,7 @@ def switches(loop: Loop) -> bool:
 def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
     """Return the ranges of a cycle that is locked to the samples, of a law that switches.
 
-    It switches at most half a control period later than on average: the cycle is that of as much more delay, or less.
+    It switches at most half a control period later than on average, so the cycle with so much more delay is a bound.
     """
     control_period = loop.scenario.control_period
     later = loop.later(0.5 * control_period)
@@ -176,7 +176,7 @@ def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
 
 
 def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
-    """Return the stable and the other solutions of N L = 1; of two in one finest cell both may be missed."""
+    """Return the stable and the other solutions of N L = 1; two in one finest cell may both be missed."""
     balances: list[Balance] = []
     for cells in _starts(loop):
         one = next((balance for cell in cells if (balance := _balanced(loop, *cell))), None)
@@ -189,8 +189,8 @@ def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
     """Yield groups of neighbouring cells of a fine grid whose images under N L wind around 1: one has a solution.
 
-    A coarse cell is cut into four, again and again, where N L may be 1 in it. N is that of few samples, whose places
-    make the image of some neighbours wind, too, in turns to the left and to the right.
+    A coarse cell is cut into four, again and again, where N L may be 1 in it. N is that of few samples, so the images
+    of some neighbours wind without a solution, one to the left and the next to the right.
     """
     from scipy.ndimage import label
 
@@ -209,7 +209,7 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
         return np.array([product(i, k) for i, k in places]).reshape(-1, len(CORNERS))
 
-    cells, side = CUTS * np.argwhere(np.ones(count)), CUTS  # by the numbers of their lowest omega and amplitude
+    cells, side = CUTS * np.argwhere(np.ones(count)), CUTS  # each by the indices of its lowest omega and amplitude
     while side > 1:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2
@@ -227,7 +227,7 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
 
 
 def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """Return whether N L may be 1 in cells (K,), given at their corners (K, 4), within its range and a share more."""
+    """Return whether N L may be 1 in cells, (K,), from its values at their corners, (K, 4), with a margin."""
     sizes = np.log(np.maximum(np.abs(products), SMALLEST))
     margins = CELL_MARGIN * np.maximum(np.ptp(sizes, axis=1), max(sides[1], COARSE_NOISE))
     near = (sizes.min(axis=1) <= margins) & (sizes.max(axis=1) >= -margins)
@@ -263,7 +263,7 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
 
 
 def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return where size and phase change their signs, in a cell or beside it: by turns along amplitude and omega."""
+    """Return where log |N L| and arg N L are 0, in a cell or beside it: solved for amplitude and omega in turn."""
     from scipy.optimize import brentq
 
     z = 0.5 * (low + high)
@@ -314,7 +314,7 @@ def _of_two_samples(loop: Loop) -> list[Balance]:
 
 
 def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
-    """Return the cycles at which a larger oscillation decays (Loeb's criterion), in a slower one's turn of L.
+    """Return the cycles at which a larger oscillation decays (Loeb's criterion), none a turn of L beyond a slower one.
 
     A delay gives a row of such cycles, with a turn of phase between them, of which only the slowest is stable.
     """

@@ -30,7 +30,7 @@ from smc_mujoco.simulation.conditions import DURATION
 from smc_mujoco.simulation.scenario import Scenario
 
 MAX_SIZE_RATIO = 1e3  # of a size to that of the original gains, and its inverse
-SIZE_STEP = 2.0  # factor from one size to the next until the wanted one lies between
+SIZE_STEP = 2.0  # factor from one size to the next until the wanted one lies between two
 RULE = "largest gains of a predicted amplitude or frequency"
 SIZE_TOLERANCE = 1e-3  # relative: the search ends when the size is known so well
 SPEEDS = tuple(10.0 ** (0.1 * k) for k in range(-10, 11))
@@ -43,8 +43,8 @@ class Design:
     law: Component
     chattering: Chattering
     disturbance: float  # largest constant one in runs of 10 s, see `smc.margins`; NaN if not even 0 is tolerated
-    size: float  # q, over the gains that were given
-    speed: float  # w, over the gains that were given
+    size: float  # q, relative to the given gains
+    speed: float  # w, relative to the given gains
 
 
 def gains_for(
@@ -58,8 +58,8 @@ def gains_for(
     """Return the largest gains whose chattering stays below an amplitude, a frequency or both.
 
     The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one. A frequency also
-    decides its speed. Of 21 speeds, from a tenth to ten times that of the given gains, the one is taken that allows the
-    largest forces. No force among the gains exceeds u_max.
+    decides its speed: the one that allows the largest forces, of 21 from a tenth to ten times that of the given
+    gains. No force among the gains exceeds u_max.
 
     Args:
       law: a law or its name. Its gains give the proportions.
@@ -124,7 +124,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
 def _best_speed(
     cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, headroom: float
 ) -> float:
-    """Return, of the SPEEDS whose predicted frequency is at most the wanted one, that which allows the largest forces.
+    """Return the speed that allows the largest forces, of SPEEDS whose predicted frequency is at most the wanted one.
 
     The frequency is that of size 1, and is not monotone in the speed. A speed without a limit cycle counts only below
     the first speed with one: above it, the law has become too fast for the actuator.

@@ -31,17 +31,17 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 
 DIFFERENCE_STEP = 1e-6  # SI units, of finite differences
-CHUNK_SAMPLES = 50_000  # for which a law is called at once
-MAX_SAMPLES = 10**9  # of a period, for a describing function
+CHUNK_SAMPLES = 50_000  # samples for which a law is called at once
+MAX_SAMPLES = 10**9  # in a period, for a describing function
 MAX_SAMPLES_PER_PERIOD = 1000  # a law with a shorter control period is called that often
-EXCITATION_SAMPLES = 3  # of an excitation, about, over the largest number in a period
+EXCITATION_SAMPLES = 3  # samples of an excitation, about, as a multiple of the largest number in a period
 MIN_PERIODS, MAX_PERIODS = 12, 600  # of an excitation
 SETTLING_SHARE = 0.4  # of an excitation, while memories settle: left out
-REST_SAMPLES = 1000  # before, and after, the reading of an encoder moves by one count
+REST_SAMPLES = 1000  # samples before an encoder's reading moves by one count, and as many after it
 MAX_HARMONICS = 31  # of u that pass through the mechanism: the peak of a triangle is right to 1.3 %
 NEGLIGIBLE_SHARE = 1e-9  # of the first harmonic, below which another one is left out
 HARMONIC_PASSES = 2  # passes of the harmonics through mechanism and law: a third changes amplitudes by less than 0.2 %
-SAMPLE_POSITIONS = 16  # of the first sample in its control period that are tried
+SAMPLE_POSITIONS = 16  # tried places of the first sample in its control period
 FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
 T, DT, X, V, E, DE, F, G, A = (FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a"))
 LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq"))
@@ -142,7 +142,7 @@ class Loop:
         return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
 
     def _solve(self, omega: complex) -> np.ndarray:
-        """Return MuJoCo's state at samples per unit of held u; its images at omega + 2 pi m / control_period count."""
+        """Return MuJoCo's state at samples per unit of held u, with u's images at omega + 2 pi m / control_period."""
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
@@ -176,7 +176,7 @@ class Loop:
         return self._gain_of(_first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega)
 
     def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
-        """Return the range, from <= 0 to >= 0, of the phase of a locked cycle's gain beyond that of `gain`, rad.
+        """Return the lowest and highest phase of a locked cycle's gain relative to `gain`, rad: one <= 0, one >= 0.
 
         `gain` is a mean over all positions of the samples in the period, but a cycle of a whole number of samples is
         locked to one. A relay then switches up to half a control period earlier or later than in the mean.
@@ -207,7 +207,7 @@ class Loop:
         return gear.gap * rotor * float(mobility[dof])
 
     def wave(self, amplitude: float, omega: float) -> Wave:
-        """Return what the law returns for e with a first harmonic of this amplitude, and those that follow from u."""
+        """Return what the law returns for e with this first harmonic, and the others that follow from u."""
         angles, u, s = self._excited([amplitude], omega, MAX_SAMPLES_PER_PERIOD)
         harmonics: list[complex] = [amplitude]
         for _ in range(HARMONIC_PASSES):
@@ -307,7 +307,7 @@ class Controller:
         models: Sequence[tuple[float, ...]],
         memories: list[np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s, each (K,), for samples of a motion, of which `first` is the first; the memories change.
+        """Return u and s, each (K,), for samples of a motion that begins at sample `first`; the memories change.
 
         `fixed` has fields of a measurement with their values in all samples; `motion` has x and v of the channel, then
         those of the joint that it moves, if any; `models` is as `Loop._nominal_model` returns it for these.
@@ -342,7 +342,7 @@ def transition(
 
 
 def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.ndarray:
-    """Return the `rates` of a model behind a drive, whose outputs are then states and its inputs the commands.
+    """Return the `rates` of a model behind a drive: the drive's outputs become states, and its inputs the commands.
 
     A motor's model has no inductance: the voltage V - gear k v becomes the state R i.
     """
@@ -395,7 +395,7 @@ def play(amplitude: float, gap: float) -> complex:
 
     Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor leaves its flank when
     u changes its sign. It moves alone until the angle c with c - sin c = play m1 omega^2 / |u|. There it hits the other
-    flank and gives the joint the impulse 1 - cos c, which u has given it since. As x has the amplitude
+    flank and passes on to the joint the impulse 1 - cos c that it has from u. As x has the amplitude
     |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone. `gap` is that of the play, times
     m1 / (m1 + m2): how far the joint moves while the rotor crosses, rad or m.
     """

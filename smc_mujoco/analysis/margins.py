@@ -3,7 +3,7 @@
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
 (`conventions`). Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
-tolerated, until it is known to one control period of delay, an eighth of one of jitter, or 2 % of other levels. There
+tolerated, until the margin is known to one control period (delay), an eighth of one (jitter) or 2 % (others). There
 may be tolerated levels above one that is not, and levels that are not between two that were tried. Noise is one
 realisation, seed 0, the same for every law. A disturbance acts on every channel, and both of its signs are tolerated.
 
@@ -217,7 +217,7 @@ class Margin:
     plant: str  # its name
     law: str  # its name
     kind: str  # one of MARGIN_KINDS
-    value: float  # largest tolerated level below the first one tried that is not; NaN if the run without it fails
+    value: float  # largest tolerated level below the first one tried that is not; NaN if even the run without it is not
     unit: str  # of value, resolution, searched and theory
     resolution: float  # a level that is not tolerated is at most this much larger
     searched: float  # largest level of the search; if it is the value, all that were tried are tolerated

@@ -87,7 +87,7 @@ class Group:
         index = {key: i for i, key in enumerate(self.blocks)}
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
         cells = law, np.array([index[key] for key in keys]), seed
-        # the row of each run in the table; equal for runs of a law that differ only by rounding; equal for equal gains
+        # the run's row in the table; a number equal for runs that differ by rounding alone; one equal for equal gains
         self.rows, self.outcome, self.sets = np.full((3, len(laws), len(self.blocks), len(numbers)), -1)
         if (twice := np.bincount(np.ravel_multi_index(cells, self.rows.shape)) > 1).any():
             a, b, c = np.unravel_index(int(np.argmax(twice)), self.rows.shape)
@@ -144,7 +144,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a number for each row, the same for the same gains; refuse runs of a cell that differ in more."""
+    """Return a number for each row, the same for the same gains; refuse a cell's runs that differ beyond the law."""
     try:
         texts = table.column("scenario")
     except ScenarioError:
@@ -187,7 +187,7 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
 
 
 def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
-    """Return law -> where the gains of its runs come from, of some rows or all; {} for a table without the columns."""
+    """Return law -> sources of its gains in some rows, by default in all; {} for a table without these columns."""
     try:
         columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
     except ScenarioError:
@@ -200,7 +200,7 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
 
 
 def floor(scenario: Scenario | None, unit: str) -> float:
-    """Return the difference of two values of a metric in this unit that matters on no machine, however small they are.
+    """Return the largest difference of a metric in this unit that matters on no machine, however small its values.
 
     For a position it is what the sensor does not resolve: the larger of half a count of the encoder and the standard
     deviation of the noise; for a share of the initial error, that over the largest |x0| of a driven channel. For u and

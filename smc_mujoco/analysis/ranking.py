@@ -12,7 +12,7 @@ fail more often.
 The test (F. Wilcoxon, Biometrics Bulletin 1(6), 1945) is exact if differences are symmetric about their centre, as
 those of two equal laws are, whatever the distribution. The estimate is the median of the means of all pairs of
 differences (J. L. Hodges, E. L. Lehmann, Annals of Mathematical Statistics 34(2), 1963). The interval has the centres
-that the test does not reject. It was chosen by simulation among three tests of 24 pairs: the sign test has too little
+that the test does not reject. Simulation of 24 pairs chose this test among three: the sign test has too little
 power, and Student's t is wrong in 16 % of samples in place of 2.5 % where the differences have a long tail to the left
 (the signed ranks in 4 %), and cannot take an infinite value.
 
@@ -187,13 +187,13 @@ class Comparison:
 
     @functools.cached_property
     def beaten(self) -> np.ndarray:
-        """Whether another law is better, or fails less often, (laws, blocks). A law that fails is beaten everywhere."""
+        """Whether another law is better, or a run of the law failed or has no value, (laws, blocks)."""
         lacking = self.without_value > 0
         return np.any(self.better, axis=1).T | lacking
 
     @functools.cached_property
     def tied(self) -> np.ndarray:
-        """Whether of two laws none is better, fails less often or has a relevantly lower median, (laws, laws)."""
+        """Whether neither law is better, fails less often or has a relevantly lower median in a block, (laws, laws)."""
         lacking = self.without_value.T
         fails_less = lacking[:, :, None] < lacking[:, None, :]
         differs = np.any(self._relevantly_lower | self.better | fails_less, axis=0)
@@ -201,7 +201,7 @@ class Comparison:
 
     @functools.cached_property
     def undecided(self) -> np.ndarray:
-        """Whether a law is not beaten for want of samples alone, (laws, blocks); False in `untested` blocks."""
+        """Whether only a lack of samples keeps a law from being beaten, (laws, blocks); False in `untested` blocks."""
         few = np.vectorize(min_p)(self.samples) > self.limits.pair
         few[self.untested] = False
         return np.any(self._relevantly_lower & self._eligible & few, axis=1).T & ~self.beaten
@@ -267,7 +267,7 @@ def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray
 def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
     """Return a number for each run, the same for runs that share a set of gains, directly or through others.
 
-    Each of `sets` has the number of the set of each run, -1 where there is no run. One that has a single set links
+    Each of `sets` has the number of the set of each run, -1 where there is no run. A law with one set links
     nothing. None if no two runs are linked.
     """
     return _linked(*(numbers.astype(np.int64).tobytes() for numbers in sets))
@@ -401,7 +401,7 @@ def p_values(differences: ArrayLike) -> np.ndarray:
 def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]:
     """Return the centre of differences (n,), NaN for none, and the ends of its interval.
 
-    The interval misses the centre on a side by chance `error`. An end is infinite where the sample is too small.
+    The true centre lies beyond each end with probability `error`. Ends are infinite if the sample is too small.
     """
     known = np.asarray(differences, float)
     known = known[~np.isnan(known)]
@@ -426,7 +426,7 @@ def min_p(n: int) -> float:
 
 
 def _tail(twice: tuple[int, ...], sums: np.ndarray) -> np.ndarray:
-    """Return the probability that signs by chance give a rank sum as large as these, of doubled ranks."""
+    """Return the probability that random signs give a sum of doubled ranks as large as these."""
     if len(twice) <= MAX_EXACT:
         return _distribution(twice)[sums]
     from scipy.special import ndtr
@@ -437,7 +437,7 @@ def _tail(twice: tuple[int, ...], sums: np.ndarray) -> np.ndarray:
 
 @functools.lru_cache(maxsize=1024)
 def _distribution(twice: tuple[int, ...]) -> np.ndarray:
-    """Return the probability of a sum of doubled ranks of at least 0, 1, ..., if each sign is drawn by chance."""
+    """Return the probability of a sum of doubled ranks of at least 0, 1, ..., if signs are random."""
     share = np.zeros(sum(twice) + 1)
     share[0] = 1.0
     for rank in twice:

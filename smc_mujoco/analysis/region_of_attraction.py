@@ -6,8 +6,8 @@ The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the 
 |e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2 + (v/V)^2 is below
 (0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
 beginning, for 40 %, and those still undecided for the whole duration.
-- Early, a run converges if it is in the band throughout the last third of the run, and its largest squared distance in
-  the second half of this third is smaller by a tenth than in the first, or near. Near the reference the distance need
+- Early, a run converges if it is in the band throughout the last third of the run, and in the second half of this third
+  it is near, or its largest squared distance is a tenth smaller than in the first. Near the reference the distance need
   not decrease, because a law that switches leaves a ripple. If a run starts near, the distance must decrease, because a
   run that leaves slowly is near for long.
 - Early, a run does not converge if it failed, or if it rests outside the band in that third: x, v and u change by less

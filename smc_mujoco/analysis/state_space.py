@@ -76,7 +76,7 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: 
 
 
 def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Return d(rates) / d(positions, velocities, activations, commands) at `data`; rows of the commands are 0."""
+    """Return d(rates) / d(positions, velocities, activations, commands) at `data`, square; rows of commands are 0."""
     nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
     point = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
     model.opt.timestep = INSTANT_STEP  # the force of a drive is that at the end of a step

@@ -1,6 +1,6 @@
 """Whether half the physics step changes the chattering of a run: the same runs with half the step.
 
-True in `smc.step_halving([trace])[0].marked` says that half the step changes amplitude or frequency by more than 10 %.
+`smc.step_halving([trace])[0].marked` is True if half the step changes amplitude or frequency by more than 10 %.
 It costs one more run of twice the steps for each trace. Nothing is run unless this is called. A number without the
 mark may still depend on the step: of 69 cycles (5 plants, 8 laws, 8 mechanisms, seed 3, 4 s) that half the step changed
 by at most 10 %, an eighth of the step changed 6 by more than 10 %, mostly with backlash.
@@ -26,7 +26,7 @@ UNTRIED = (
 
 @dataclasses.dataclass(frozen=True)
 class StepChange:
-    """What half the physics step changes in the limit cycle of s of a run, relative; inf if one step has no cycle."""
+    """Relative changes of a run's limit cycle of s with half the physics step; inf if only one run has a cycle."""
 
     amplitude: float
     frequency: float
@@ -43,11 +43,11 @@ def depends_on_step(scenario: Scenario) -> bool:
 
 
 def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: int | None = None) -> list[StepChange]:
-    """Return what half the physics step changes in the limit cycles of runs.
+    """Return how half the physics step changes the limit cycle of each run.
 
     Args:
       traces: the runs, which are repeated with half their steps.
-      channel: whose s is compared. Default: the one with the largest limit cycle.
+      channel: the one whose s is compared. Default: that with the largest limit cycle.
       threads: as in `run`.
     """
     scenarios = [trace.scenario for trace in traces]

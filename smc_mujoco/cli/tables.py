@@ -161,7 +161,7 @@ def _by_label(
     rows: Mapping[str, Iterable[Text | str]],
     width: int = 16,
 ) -> Table:
-    """Return a table with a row of cells for each labelled run, or "failed"; labels are up to `width` wide."""
+    """Return a table with a row of cells for each labelled run, or "failed"; labels have up to `width` letters."""
     laws = [trace.scenario.law.name for trace in traces.values()]
     head = "run" if len(set(laws)) == 1 < len(laws) else "law"  # labels of runs of one law say what differs
     label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")

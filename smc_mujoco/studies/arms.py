@@ -91,7 +91,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
 
 
 def hybrid(friction: bool = False) -> Law:
-    """Return the law that presses on the wall, with computed_torque_sliding's gains; `friction`: if known to it."""
+    """Return the law that presses on the wall, gained as computed_torque_sliding. If `friction`, it knows the arm's."""
     gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
     if friction:
         known = arm().friction

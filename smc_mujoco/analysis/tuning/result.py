@@ -31,8 +31,8 @@ SAVED_FIELDS = (
 AGREEING_STARTS, AGREEMENT_TOLERANCE = 3, 0.01  # a search has converged when so many starts end so close to the best J
 NEAR_OPTIMAL_TOLERANCE = 0.03  # of the best J; as much as a metric must differ to be relevant
 MAX_SETS = 24  # near-optimal sets of gains of a tuning: as many as runs of a law in a study
-# Numbers of sets that laws may have. Each divides those before it. Runs use their sets in turn, so that the runs of two
-# laws are as many independent samples as the law with fewer sets has.
+# Numbers of sets that laws may have. Each divides those before it. Runs use their sets in turn, so the runs of two laws
+# are as many independent samples as the law with fewer sets has sets.
 SET_COUNTS = (MAX_SETS, 12, 6, 3, 1)
 
 

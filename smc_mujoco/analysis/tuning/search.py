@@ -55,7 +55,7 @@ FIRST_RADII = (0.2, 0.1)  # decades: first radius of the trust region in each of
 LAST_RADIUS = 0.005  # decades
 SPARE_EVALUATIONS = 96  # starts after the first leave so many for further near-optimal sets; chosen
 BUDGET = 768 + SPARE_EVALUATIONS  # evaluations: three starts of a law of four gains, six of one of two
-# Factors on the random step after a near-optimal set and after another: they balance at a third of near-optimal ones.
+# Factors on the random step after a near-optimal set, and after another. They balance if a third is near-optimal.
 STEP_GROWTH, STEP_SHRINKAGE = 1.5, 1.5**-0.5
 GAIN_DIGITS = 4
 MAX_BUDGET = 1_000_000  # evaluations

@@ -1,6 +1,6 @@
 """The search for the worst member of a class around a scenario.
 
-A search tries the same in the same order, whatever its budget:
+A search tries the same members in the same order, whatever its budget:
 
 1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
 2. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
@@ -11,10 +11,10 @@ A search tries the same in the same order, whatever its budget:
    & N. Hansen, PPSN X, 2008; package cmaes), which adds straight lines between knots to its force and cuts the sum off
    at the bound.
 
-A larger budget only continues a search, so it is never less bad. A search also ends when a run fails, because nothing
-is worse. The force of a relay is recorded and replayed, so every member is an ordinary scenario. Forces are over their
-bound, one number for each control sample. The error of a linear loop is a convex function of the force, so the worst
-force jumps between its bounds, as most of these do.
+A larger budget only continues a search, so its worst is never milder. A search also ends when a run fails, because
+nothing is worse. The force of a relay is recorded and replayed, so every member is an ordinary scenario. A force is a
+number for each control sample, as a share of its bound. The error of a linear loop is a convex function of the force,
+so the worst force jumps between its bounds, as most of these do.
 """
 
 import dataclasses
@@ -73,7 +73,7 @@ class Search:
         self.members, self.metric, self.budget, self.threads, self.report = members, metric, budget, threads, report
         self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
-        self.swing: Trace | None = None  # the first run under a relay of e', or without a force: tells the frequency
+        self.swing: Trace | None = None  # the first run under a relay of e', or without a force, for its frequency
 
     @property
     def worst(self) -> Tried:
@@ -130,7 +130,7 @@ class Search:
             yield [*(self._forced("constant", force) for force in self._constants()), *relays]
 
     def _at_loop_frequency(self) -> Iterator[list[Case]]:
-        """Yield what suits the frequency at which the loop swings, with the constants in the middle as well."""
+        """Yield members for the frequency at which the loop swings, also with constants in the middle."""
         members = self.members
         if members.forced and self.swing:
             yield [*self._weighted_sums(self.swing), *self._single_switches(), *self._waves(self.swing)]
@@ -168,7 +168,7 @@ class Search:
             yield self._forced("one switch", np.where(np.arange(samples + 1) < share * samples, sign, -sign))
 
     def _weighted_sums(self, trace: Trace) -> Iterator[Case]:
-        """Yield relays of weighted sums of e' and e, or of e' and s: both are equally large in a run."""
+        """Yield relays of weighted sums of e' and e, or of e' and s, each divided by its size in a run."""
         sizes = {name: float(np.nan_to_num(part).std()) or 1.0 for name, part in relay_signals(trace).items()}
         for lead in PHASE_LEADS:
             weights = {"rate": math.cos(lead) / sizes["rate"], "error": math.sin(lead) / sizes["error"]}

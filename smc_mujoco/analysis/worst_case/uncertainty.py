@@ -29,7 +29,7 @@ from smc_mujoco.simulation.time_series import Held, TimeSeries
 KNOT_SPACING = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen
 MIN_KNOTS = 8  # of a random disturbance in a run; chosen
 MAX_PIECE_SHARE = 0.4  # of a run: the longest piece of a force that a change reverses; chosen
-SHIFT_PROBABILITY = 0.5  # that a change of a force shifts a switch, if there is one, and reverses no piece; chosen
+SHIFT_PROBABILITY = 0.5  # that a change of a force shifts a switch, if it has one, instead of reversing a piece; chosen
 MOVE_PROBABILITY = 0.5  # of each constant, in a change of constants; chosen
 CONSTANT_DEVIATION = 0.3  # standard deviation by which a constant moves, of its range; chosen
 JITTER_SHARES = 8  # jitter is a multiple of this part of the control period; chosen
@@ -50,15 +50,15 @@ class Uncertainty:
       slope: |d'| <= this, N/s or N m/s; None: d may jump.
       position_noise, velocity_noise: bounds on errors of measurement, rad or m, and per second, beside the scenario's
         own noise. The adversary chooses the errors, the same in every channel.
-      hold: s, for which each error of measurement lasts.
+      hold: time for which each error of measurement lasts, s.
       delay: lowest and highest input delay, s, beside the scenario's own; those tried are multiples of its physics
         step.
-      jitter: largest delay of a sample, s, see `smc.Clock`; those tried are eighths of the control period. Which
-        samples are late is as the scenario's seed says.
+      jitter: largest delay of a sample, s, see `smc.Clock`; those tried are eighths of the control period. The
+        scenario's seed decides which samples are late.
       mass: lowest and highest factor on the plant's mass.
       parameters: name -> lowest and highest factor on other parameters of the plant, or what is added to one of
         `plant.added`: {"payload": (0.0, 2.0)}.
-      friction: lowest and highest dry friction, N or N m, beside the scenario's own; it is not scaled.
+      friction: lowest and highest dry friction, N or N m, beside the scenario's own; `friction_scale` leaves it.
       friction_scale: lowest and highest factor on the friction of the scenario and on the dry friction of its plant.
       x0: how far each channel may start from the scenario's x0, as a share of it.
 
@@ -115,7 +115,7 @@ class Uncertainty:
 
 
 def default_class(scenario: Scenario) -> Uncertainty:
-    """Return the class of a scenario without a given one: what its plant declares, and friction varies by half of it.
+    """Return the default class of a scenario: what its plant declares as `uncertain`, and friction within 50 %.
 
     If the plant declares nothing: a disturbance up to a sixth of the force of the weakest drive.
     """
@@ -182,8 +182,8 @@ class Member:
 class Members:
     """The members of a class around one scenario, or around the same scenario on several parameter sets.
 
-    `constants` set a scenario's constants to a share in [0, 1] of their ranges, the first one the parameter set where
-    there are several; `ends` are those of corners. `bare` has no force and no noise, and constants in the middle.
+    `constants` are functions that set a constant to a share in [0, 1] of its range; if there are several parameter
+    sets, the first chooses one. `ends` are the shares at corners. `bare` has no force or noise, and shares of 0.5.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):

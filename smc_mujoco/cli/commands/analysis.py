@@ -146,8 +146,8 @@ def worst(
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    Only what you bound is uncertain; all else is as in the condition. Without bounds, the plant's own count, such as an
-    arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. Of a rig, such as qube_servo,
+    Only what you bound is uncertain; all else is as in the condition. Without bounds, the plant's count, such as an
+    arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. On a rig, such as qube_servo,
     the adversary also chooses a parameter set. The search is the same for all laws; there may be worse than it finds.
 
     The column "worst found" has the error of the worst run, the column "median" that of as many random runs within the
@@ -282,8 +282,8 @@ def chatter(
     If a law switches and the actuator lags, the loop oscillates without end, where the law's describing function N and
     the response L of the linearised mechanism have N L = 1. The column "±" is how far the prediction may be off. A star
     marks a run that changes by more than 10 % with half the physics step. The column "third" is the third harmonic over
-    the first. Of several driven channels, "coupling" is how far this channel's command moves another one, over how far
-    it moves this one: if that is not small, the prediction fails.
+    the first. With several driven channels, "coupling" is how far this channel's command moves another one, over how
+    far it moves this one: if that is not small, the prediction fails.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.grid import Starts
 
 COMMA = re.compile(r",(?![^(]*\))")  # a comma outside brackets
-GAINS_HELP = "With your own gains: pid(kp=50, ki=1). Of a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
+GAINS_HELP = "With your own gains: pid(kp=50, ki=1). From a file: my_law.py, or gains.json of `smc-mujoco tune --out`."
 
 
 def picture(contents: str) -> Any:
@@ -31,7 +31,7 @@ def picture(contents: str) -> Any:
 
 
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:
-    """Return a shell's function that completes a text such as "a,b" or "a+b" with a module's names, or a function's."""
+    """Return a function that completes a text such as "a,b" or "a+b" in a shell, with names from a module."""
 
     def complete(incomplete: str) -> list[str]:
         names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
@@ -212,7 +212,7 @@ def law_with(text: str, gains: str) -> "Law":
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
-    """Return where the laws' gains come from, in words: those of names from the set `gains`."""
+    """Return where the laws' gains come from, in words. Laws given by name have the set `gains`."""
     from smc_mujoco.control import source
 
     of_set = source.Source(kind={"default": source.DEFAULT, "study": source.STUDY}.get(gains, source.SHIPPED))
