@@ -31,7 +31,7 @@ def lag(scenario: Scenario) -> float:
 
 
 def crossover(lags: Sequence[float], one: Sequence[float], other: Sequence[float]) -> float:
-    """Return the lag, s, at which two amplitudes are equal, interpolated by powers; NaN where they do not cross."""
+    """Return the lag, s, at which two amplitudes are equal, interpolated in logarithms; NaN where they do not cross."""
     known = [i for i, pair in enumerate(zip(one, other, strict=True)) if all(value > 0.0 for value in pair)]
     ratios = [math.log(one[i] / other[i]) for i in known]
     for k, (low, high) in enumerate(itertools.pairwise(ratios)):

@@ -17,7 +17,7 @@ MEAN_WINDOW = 0.01, 40  # of a mean: share of the run, and smallest number of sa
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
 TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
-LINE_PARTS = 250  # of a line; the smallest and the largest value of each are kept
+LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest value
 
 
 class Envelope(NamedTuple):
@@ -87,7 +87,7 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     with opposite signs. Reversals are n-close if neither the time between a reversal's moves nor the time to the next
     reversal is longer than n samples. y chatters where MIN_REVERSALS or more in a row are (width / 4)-close.
 
-    A part goes from the first move to the last of the reversals around that are width-close. It extends to the end of y
+    A part goes from the first move to the last of the width-close reversals around these. It extends to the end of y
     if that is as close. It extends to the start only if that is within a quarter of `width`, because a y that rests
     there longer does not chatter yet.
     """

@@ -38,7 +38,7 @@ SIGNALS_HEIGHT = 5.6  # inches, of a page of `signals`
 
 
 class Runs(NamedTuple):
-    """Runs of a figure, and what is marked at which time, s, in panels that show the time `span`, of the whole, s."""
+    """Runs of a figure; `changes` are marks by time, s; `span` is the time that panels show, and the whole time, s."""
 
     traces: Sequence[Trace]
     names: Sequence[str]
@@ -202,7 +202,7 @@ def _default(traces: Sequence[Trace], width: float) -> list[str]:
 
 
 def _by_joint(panels: Sequence[Panel]) -> list[Panel]:
-    """Return the panels, divided into one for each joint of a robot: these have nothing in common."""
+    """Return the panels, with one for each joint of a robot, because joints have nothing in common."""
     direct = any(panel.traces[0].scenario.plant.direct for panel in panels)
     return [part for panel in panels for part in (drawing.by_channel(panel) if direct else [panel])]
 

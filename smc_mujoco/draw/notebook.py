@@ -29,7 +29,7 @@ class Frames:
     `clock` has the times of the run at each picture, s. Arguments: as `film`.
 
     Raises:
-      ScenarioError: as `film`; what concerns the size or OpenGL when the first picture is made.
+      ScenarioError: as `film`; those of size and OpenGL are raised at the first picture.
     """
 
     traces: Trace | Sequence[Trace]

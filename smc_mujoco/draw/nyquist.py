@@ -24,7 +24,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 ROW_HEIGHT = 3.4  # inches
-SPAN_FACTOR = 40.0  # of the frequencies of L about the crossing, and of the amplitudes of N: a factor
+SPAN_FACTOR = 40.0  # from the crossing to the ends of L's frequencies and of N's amplitudes
 PLANE_EDGE = 2.5  # of the complex plane
 SHOWN_PERIODS = 6  # of s
 
@@ -43,7 +43,7 @@ def nyquist(
       scenarios: of one plant and one set of conditions, with different laws.
       channel: index of a driven channel.
       cycles, traces: predicted for these scenarios, and run.
-      changes: of the traces, see `smc.step_halving`; the marked ones are told.
+      changes: of the traces, see `smc.step_halving`; marked ones get a note.
       path: as in `figure`.
     """
     with style.page():

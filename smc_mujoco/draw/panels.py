@@ -27,17 +27,17 @@ COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
 MAX_DRAWN_CHANNELS = 9  # channels of a network that are drawn one by one
-LASTING_QUANTILE = 0.98  # quantile of |reaction|, or of what an arrow shows: larger values are short peaks; chosen
+LASTING_QUANTILE = 0.98  # of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
 MAX_SMALL = 12  # channels that each have small panels
 CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 COINCIDENT_DISTANCE = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
-COINCIDENT_SHARE = 0.99  # of the samples of coinciding curves, so that controls that switch a sample apart do; chosen
+COINCIDENT_SHARE = 0.99  # of coinciding curves' samples, so that controls that switch a sample apart coincide; chosen
 DASH_LENGTH = 5.0  # widths of a line
-MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's; more of them need a row each; chosen
+MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's, and how many share a row; chosen
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
-ZOOM, MAX_ZOOMED = 1.3, 0.5  # of the time until all rest, which panels show if it is less than that part of the run
+ZOOM, MAX_ZOOMED = 1.3, 0.5  # panels show ZOOM times the time until all rest, if that is less than this part of a run
 MIN_ERROR, MIN_RATIO = 1e-9, 20.0  # smaller errors are drawn at it; least ratio of a logarithmic axis, chosen
 JUMP_RATIO = 2.0  # a reference jumps where its rate is more than this many times the 99 % quantile; chosen
 QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
@@ -45,7 +45,7 @@ QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
     **dict.fromkeys(("largest", "applied"), "u"),
     **dict.fromkeys(("reaction", "d"), "force"),
 }
-WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"}  # quantity -> its words, no letter
+WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"}  # quantity -> words instead of a letter
 KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"}
 KINDS["applied"] = "control"
 WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
@@ -91,7 +91,7 @@ class Panel(NamedTuple):
     def unit(self) -> str:
         """The unit of the vertical axis in brackets; "" where the words have it, or where it depends on the law.
 
-        That of s does: the s of twisting is e, and that of PID is a force.
+        The unit of s does: the s of twisting is e, and that of PID is a force.
         """
         plant, laws = self.traces[0].scenario.plant, [trace.scenario.law for trace in self.traces]
         rates = plant.free == 0 and all(law.relative_degree == 1 and not _is_baseline(law) for law in laws)
@@ -120,7 +120,7 @@ def _is_baseline(law: Law) -> bool:
 
 
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
-    """Return the panels of a quantity over time, one for each group of channels that has it; tips have one of arms."""
+    """Return the panels of a quantity over time, one for each group of channels that has it; a tip has one panel."""
     groups, scenarios = style.split(traces), [trace.scenario for trace in traces]
     if quantity in ("tip", "contact"):
         has = [tip.knows_contacts(one) if quantity == "contact" else bool(one.plant.tip) for one in scenarios]

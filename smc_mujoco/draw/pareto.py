@@ -2,7 +2,7 @@
 
     pareto([tune("duffing", law) for law in ("observer_free", "classical")], "fronts.svg")
 
-Down and to the left is better. A front consists of the gains that no others of the search beat in both. No tried gains
+Down and to the left is better. A front has the gains that no others of the search beat in both terms. No tried gains
 lie below the staircase. The chosen gains have the least objective, see `analysis.tuning.objective`.
 """
 

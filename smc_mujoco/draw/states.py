@@ -3,7 +3,7 @@
 No state is shown for less than MIN_STATE_TIME: a blow of 5 ms is shown for that time, and rest only if it lasts so
 long. `metrics.conventions.at_rest` defines rest. Contact is what MuJoCo's collision detection says of the scenario's
 model, posed at each sample. The flank of a backlash is the sign of the joint's reaction. Friction and contacts are in
-the reaction too: with them it is the sign of the actuator's force, which does not tell when the rotor is in play.
+the reaction too: with them the flank is the sign of the actuator's force, which does not tell when a rotor is in play.
 """
 
 import itertools

@@ -1,9 +1,9 @@
 """Style of figures and films: colours, labels, units and fonts.
 
 Laws and plants state their labels in their own files. A law has one colour in all pictures: the one that its file
-states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else its place in
-`_palette`. Matplotlib's petroff10 would be ten colours for fifty laws, of which two are the grey of failed runs and one
-the violet of friction.
+states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else one of
+`_palette`. Matplotlib's petroff10 has only ten colours for fifty laws. Two of them are the grey of failed runs, and one
+is the violet of friction.
 """
 
 import colorsys
@@ -107,7 +107,7 @@ def points(size: float) -> float:
 
 
 def law_colour(law: Component | str) -> str:
-    """Return the colour of a law, "#RRGGBB": its own, or its place in the palette."""
+    """Return the colour of a law, "#RRGGBB": its own, or that of its place in the palette."""
     template, name = _template(law)
     if template and template.colour:
         return template.colour
@@ -171,9 +171,9 @@ def _grid(count: int) -> tuple[str, ...]:
 
 @functools.cache
 def _place(colour: str) -> tuple[float, float, float]:
-    """Return where a colour is for `distance`: a third of its lightness, green-red and blue-yellow.
+    """Return a colour's coordinates for `distance`: a third of its lightness, green-red and blue-yellow.
 
-    They are those of OKLab (B. Ottosson, 2020), strong colours dampened.
+    They are those of OKLab (B. Ottosson, 2020), with strong colours dampened.
     """
     lightness, a, b = (OKLAB @ np.cbrt(OKLAB_CONES @ _linear(colour))).tolist()
     damp = min(1.0, MAX_CHROMA / math.hypot(a, b)) if a or b else 1.0
@@ -224,9 +224,7 @@ def in_words(name: str) -> str:
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
     """Return one label per trace: the given ones, else the laws' labels, with what differs between runs of one law.
 
-    Machines with other parameters have these in their labels, whatever their laws.
-
-    Runs of one law without differences are numbered.
+    Machines whose parameters differ have these in their labels, whatever their laws. Equal labels are numbered.
     """
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
@@ -244,7 +242,7 @@ def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
 def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
     """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no noise, m = 0.7".
 
-    The name of a run's condition, where it differs, stands for the fields in which all its runs agree.
+    Where the condition differs, its name replaces the fields that are equal in all its runs.
     """
     settings = _differing(_settings, trace, alike)
     condition = settings.pop("condition", None)

@@ -41,7 +41,7 @@ def watch(scenario: Scenario) -> None:
                 aim(live.model, live.data, window.cam)
             play(live, window)
     finally:
-        for thread in set(threading.enumerate()) - others:  # if the process ends while it draws, that crashes
+        for thread in set(threading.enumerate()) - others:  # a process that ends while they draw crashes
             thread.join(timeout=10.0)
         print(as_code(live.law))
 
@@ -76,7 +76,7 @@ class Live:
         self.data = mujoco.MjData(self.model)
         ids = [self.model.actuator(GAIN + name).id for name in slider_gains(scenario.law)]
         self.sliders = self.model.actuator_ctrladr[ids] if ids else np.zeros(0, int)
-        self.limits = self.model.actuator_ctrlrange[self.sliders].T  # one row a control: some actuators have none
+        self.limits = self.model.actuator_ctrlrange[self.sliders].T  # a row per control, as some actuators have none
         self.paused, self.say = False, say
         self.begin(scenario)
         self.show()
@@ -194,7 +194,7 @@ def slider_gains(law: Law) -> dict[str, float]:
 
 
 def slider_range(gain: float) -> list[float]:
-    """Return a slider's range: a tenth to ten times its gain; 0 to 1 for a gain of 0, which may not be negative."""
+    """Return a slider's range: a tenth to ten times its gain; 0 to 1 for 0, as negative ones may be invalid."""
     return sorted((gain / 10.0, gain * 10.0)) if gain else [0.0, 1.0]
 
 

@@ -17,13 +17,13 @@ from smc_mujoco.simulation.trace import Trace
 
 PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
 WANTED_OPACITY = 0.5  # of the wanted path
-OUTSIDE = 100  # px beyond the picture, farther than which no path is followed
+OUTSIDE = 100  # px beyond the picture up to which a path is followed
 BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 13, 5, 42  # px, of a bar, between bars, and from one limit to the other
 BAR_LETTERS, NUMBER_SIZE = 10, 13  # px
 LABEL_GAP = 5  # px, from a label to its bars
 BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.6 * BAR_LETTERS  # px, of bars with their numbers
-MAX_TIP_ERROR = 0.015  # m: a ghost shows the reference of a tip farther off its path; nearer ones hide it; chosen
-FORCE_ARROW = 0.6  # m, length of the arrow of the largest force
+MAX_TIP_ERROR = 0.015  # m: only a tip farther off its path has a ghost at its reference; a nearer one hides it; chosen
+FORCE_ARROW = 0.6  # m, length of the arrow for the largest force
 BLOW_ARROW = 0.4  # m, length of the arrow of a blow
 SHAFT_WIDTH = 4.0  # px
 BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
@@ -32,7 +32,7 @@ Project = Callable[[np.ndarray], np.ndarray]  # points (m, 3) -> (m, 2) px
 
 
 def is_arm(traces: Sequence[Trace]) -> bool:
-    """Return whether all machines have a tip, of which a film then tells."""
+    """Return whether all machines have a tip, which a film then shows."""
     return all(bool(trace.scenario.plant.tip) for trace in traces)
 
 

@@ -1,8 +1,8 @@
 """Arrows in the scene: control, disturbance, and friction with contact, at each driven joint.
 
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
-swings that switches faster than the film. Behind a drive they are those of its force, and a pale arrow is the command.
-Arrows lie along a pendulum's arc, beyond the bob; and along the rail, above the cart, or before it if it carries
+swings that switches faster than the film. With a drive, arrow and bar show its force, and a pale arrow the command.
+Arrows lie along a pendulum's arc, beyond the bob; or along the rail, above the cart, or before it if it carries
 something. At a hinge of a user's model, whose links may have any shape, they bend around its axis. They are drawn over
 the picture, so that no link hides them.
 """
@@ -23,7 +23,7 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 HINGE_LENGTH, SLIDE_LENGTH = 0.425, 0.08  # longest arrow, as a share of the pendulum's length, and of the rail's
-RADIUS_SHARE, LENGTH_SHARE = 0.16, 0.024  # of the bob's radius and of the pendulum's length: their sum is the thickness
+RADIUS_SHARE, LENGTH_SHARE = 0.16, 0.024  # of the bob's radius and the pendulum's length, which add up to the thickness
 LONG_PENDULUM = 0.5  # m: longer pendulums have arrows as thick as one of this length
 ARC_DISTANCE, RAIL_DISTANCE = 1.6, 2.2  # thicknesses between a body and its nearest arrow
 LAYER_DISTANCE = 2.6  # thicknesses between two arrows
@@ -58,7 +58,7 @@ class Mount(NamedTuple):
     """Place and size of the arrows at a joint of the film's scene."""
 
     joint: int
-    unit: float  # length of the longest arrow at a slide, m; its factor at a hinge, over HINGE_LENGTH of the pendulum's
+    unit: float  # at a slide, length of the longest arrow, m; at a hinge, a factor on HINGE_LENGTH of the pendulum's
     thick: float  # thickness at a slide, m
     front: np.ndarray | None  # direction to the camera, (3,), of arrows before a slide that carries something
     beyond: bool = False  # whether on the other side of a hinge than the body: a network's pendulums pass each other
@@ -101,7 +101,7 @@ class Scale(NamedTuple):
     control: float
     disturbance: float
     reaction: float = 0.0
-    exceeded: tuple[str, ...] = ()  # those of these whose values are larger than their longest arrow
+    exceeded: tuple[str, ...] = ()  # names of those above whose values exceed their longest arrow
     drive: bool = False  # whether the control passes a drive, such as a motor, whose force is then shown
 
 
@@ -124,7 +124,7 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
 
 
 def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the largest magnitude of a quantity in runs that last, and that without brief values of twice as much.
+    """Return the largest magnitude of a quantity in runs that last, and the one without brief values of over twice it.
 
     A brief value takes at most 1 - LASTING_QUANTILE of the time.
     """

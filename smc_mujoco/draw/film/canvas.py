@@ -31,7 +31,7 @@ Area = tuple[int, int, int, int]  # px from the top left: left, top, right, bott
 class Canvas:
     """A picture of `size` px of a model, from its camera `film`, which does not move.
 
-    Rings around the links of arms cast no shadows, and show all around.
+    With `arms`, rings around links cast no shadows, and show on all sides.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int], arms: bool = False):
@@ -43,7 +43,7 @@ class Canvas:
         self.casts = shadows.casting(model, middle * camera.pixel(size), shadows.MIN_ARM_SIZE if arms else 0.0)
         ball, widest = roundness(model) / (middle * camera.pixel(size))
         quality = model.vis.quality
-        # of cylinders, too
+        # also those of cylinders
         quality.numstacks = FEW_STACKS if ball < SMALL_RADIUS else facets(ball, np.pi, quality.numstacks)
         if arms:  # joints hide the round ends of links
             ball = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_SPHERE, 0].max(initial=0.0)

@@ -54,7 +54,7 @@ def mediapy() -> ModuleType:
 
 @contextlib.contextmanager
 def in_thread(write: Write) -> Iterator[Write]:
-    """Yield a function that has `write` called with the same pictures, in order, in another thread.
+    """Yield a function that passes its pictures, in order, to `write` in another thread.
 
     It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by a later call, or at the
     end. After an error, here or there, pictures that still wait are dropped.
@@ -76,7 +76,7 @@ def in_thread(write: Write) -> Iterator[Write]:
 
 @contextlib.contextmanager
 def sigint_blocked() -> Iterator[None]:
-    """Block SIGINT: a process that is started meanwhile never receives it, this one does afterwards."""
+    """Block SIGINT: a process started meanwhile never receives it, and this one receives it afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return

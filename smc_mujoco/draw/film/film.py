@@ -36,7 +36,7 @@ MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
 CHARTS_SHARE = 0.36  # of the film's height
-LAST_FRAME_TIME = 1200  # ms, for which a clip's last picture stays before it repeats
+LAST_FRAME_TIME = 1200  # ms for which a clip's last picture stays before the clip repeats
 
 
 def film(
@@ -51,7 +51,7 @@ def film(
 ) -> Path:
     """Write an .mp4 of traces of one plant, from t = 0 to the end of the longest.
 
-    Fast motion and blows are shown in slow motion, and rest is shown faster than it was: the clock says so.
+    Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the speed.
 
     Args:
       traces: several, or a single one.
@@ -60,7 +60,7 @@ def film(
       size: width and height in px, even.
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera. It gives
-        the direction of the view, and the camera stands as near as all machines can be seen. Default: the plant's own
+        the direction of the view, and the camera is as near as it can see all machines. Default: the plant's own
         `look`; for your own model the first camera that does not move.
 
     Raises:
@@ -212,8 +212,8 @@ def framed(
 ) -> Stage:
     """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
 
-    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`. It warns of a
-    chosen view that shows nothing, and if no view shows anything.
+    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`. A warning tells if
+    the chosen view, or every view, shows nothing.
     """
     name = traces[0].scenario.plant.name
     for view in (chosen, *scene.OTHER_VIEWS):
@@ -240,5 +240,5 @@ def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:
-    """Return the lead of the rotors over their joints, (edges - 1, n): on the flank that pushes, in the mean."""
+    """Return the mean lead of the rotors over their joints, (edges - 1, n), rad or m, from the flank that pushes."""
     return 0.5 * states.backlash_gap(trace.scenario) * windows(trace.t, states.flanks(trace), edges).mean

@@ -16,11 +16,11 @@ from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.simulation.trace import Trace
 
-MAX_TRAVEL = 0.02  # of its range, that a thing moves in a frame if the speeds suffice; chosen
+MAX_TRAVEL = 0.02  # of its range: how far a thing moves in a frame, if the speeds suffice; chosen
 MAX_HALVINGS = 3  # of the speed
 REST_TRAVEL = 5e-4  # of its range: a thing that moves less in a frame is at rest; chosen: a pixel in 3 frames
 REST_SPEED = 4.0  # times real time
-MOTION_MARGIN = 0.1  # s before and after fast motion that are shown as slowly
+MOTION_MARGIN = 0.1  # s before and after fast motion that are shown as slowly as it
 IMPACT_TIME = 0.04  # s around the start of a contact, and around the middle of a push
 REST_MARGIN = 0.3  # s after motion, and before it, that are not shown faster
 MAX_LENGTH = 1.85, 8.0  # duration of a film: in durations of the run, or in s if that is more; chosen

@@ -77,7 +77,7 @@ class Puppet:
         """Return what must be in the picture, (points, 3) m from the machine's place.
 
         These are the corners of the boxes of all that the channels move, over the poses of its trace. Of other things
-        they are those of the part that is close to them, such as the upper half of a stand. Joints without a channel
+        only the part close to these counts, such as the upper half of a stand. Joints without a channel
         move as in `motion`, or stay where they start.
         """
         data = [mujoco.MjData(shape.model) for shape in self.shapes]

@@ -32,7 +32,7 @@ SUN = "sun"  # the light whose shadows lie on the floor, see shadows.py
 FLOOR_CELLS = 7  # of the floor's grid, in the width of what is seen; chosen
 HAZE = (0.66, 0.725, 0.80)  # red, green, blue, chosen
 HAZE_AT_TOP = 0.9  # share of the full haze at the top of the picture, chosen
-HAZE_HORIZON = 3.0  # times the distance of the farthest machine: largest distance at which the haze is so thick
+HAZE_HORIZON = 3.0  # largest distance at which the haze is that thick, in distances of the farthest machine
 MIN_HAZE_DISTANCE = 1.05  # times the distance of the farthest point: a nearer floor gets no haze; chosen
 LOW_ELEVATION = -12.0  # degrees: a view from a little above a user's model, so that the floor is seen; chosen
 FRONT, ABOVE = (90.0, LOW_ELEVATION), (90.0, -70.0)  # azimuth, elevation: for slides, for vertical hinges; degrees
@@ -141,7 +141,7 @@ def camera_of(scenario: Scenario, name: str) -> np.ndarray:
 def view(model: mujoco.MjModel) -> tuple[float, float]:
     """Return azimuth and elevation, degrees, of a user's first fixed camera, or of one that sees its joints turn.
 
-    The view looks down a little at least: along the floor or from below it there is nothing to see.
+    The view looks down at least a little: along the floor, or from below, there is nothing to see.
     """
     for i in range(model.ncam):
         if model.cam_bodyid[i] == 0 and model.cam_mode[i] == FIXED:
@@ -163,7 +163,7 @@ def view(model: mujoco.MjModel) -> tuple[float, float]:
 def in_a_row(scenario: Scenario, turn: np.ndarray) -> bool:
     """Return whether machines stand in a row across the picture, and not behind each other.
 
-    They do if the plant's lane lies across it, if they carry something that would hide the machine behind, and if the
+    They do if the plant's lane lies across it, if they carry something that would hide the machine behind, or if the
     model is the user's.
     """
     if not scenario.plant.on_stage or scenario.plant.free:
@@ -233,7 +233,7 @@ def first_channels(scenario: Scenario) -> Scenario:
 
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
-    """Return the length of the rail, m: of what does not move, along x; inf for pendulums and users' models."""
+    """Return the length of the rail along x, m, from what does not move; inf for pendulums and users' models."""
     if scenario.plant.unit == "rad" or not scenario.plant.on_stage:
         return np.inf
     return float(2 * np.abs(fixed_boxes(model)[..., 0]).max())

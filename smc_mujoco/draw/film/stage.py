@@ -27,7 +27,7 @@ COLOUR_TOLERANCE = 8  # of 255: colours that differ by less are one; chosen
 MIN_PICTURE_SHARE = 2e-4  # of a picture that shows something, such as 120 px of 1280 x 460; chosen
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
 GHOST_RGBA = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
-GHOST_SIZE = 0.97  # of its machine's: a machine that has reached its reference hides it
+GHOST_SIZE = 0.97  # of its machine's, so that a machine at its reference hides it
 OTHER = mujoco.mjtObj.mjOBJ_UNKNOWN
 
 
@@ -105,7 +105,7 @@ class Stage:
         return bool((np.abs(picture - bare).max(axis=2) > COLOUR_TOLERANCE).mean() > MIN_PICTURE_SHARE)
 
     def set_shape(self, k: int, time: float) -> None:
-        """Give machine k its shape at a time, s: a scenario's rod may be longer than the plant's, and may change."""
+        """Give machine k its shape at a time, s: its rod may be longer than the plant's, and may change in a jump."""
         now = self.puppets[k].shape(time)
         if now == self.shape[k]:
             return
@@ -118,7 +118,7 @@ class Stage:
         self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
-        """Colour the accent of machine k. A user's model has none: colour its links, of a single one the unpainted."""
+        """Colour the accent of machine k. A user's model has none: colour its links, those unpainted if it is alone."""
         if self.colours[k] == colour:
             return
         rgb, links = np.array(style.rgb(colour)) / 255, self.links[k]
