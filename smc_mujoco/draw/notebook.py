@@ -59,11 +59,6 @@ class Frames:
         width, height = self.size
         return encoder.mediapy().VideoMetadata(len(self), (height, width), self.fps, None)
 
-    @property
-    def looks(self) -> tuple:
-        """The arguments of `film.film` after the path."""
-        return self.labels, self.title, self.size, self.fps, self.speed, self.camera
-
 
 frames = Frames
 """Pictures of a film for other packages, such as `mediapy.show_video(smc.frames(traces))`, see `Frames`."""
@@ -96,9 +91,10 @@ def show(
     if isinstance(what, Figure | SubFigure):
         display(HTML(html.embedded(page.png(what), "image/png", page.css_width(what))))
         return
-    shown = what if isinstance(what, Frames) else frames(what, labels, title, size, fps, speed, camera)
+    its = what if isinstance(what, Frames) else frames(what, labels, title, size, fps, speed, camera)
     if why := film.missing():
         raise ScenarioError(why)
     with scratch() as folder:
-        path = film.film(shown.traces, folder / "film.mp4", *shown.looks)
-        display(HTML(html.embedded(path.read_bytes(), "video/mp4", shown.size[0])))
+        path = folder / "film.mp4"
+        film.film(its.traces, path, its.labels, its.title, its.size, its.fps, its.speed, its.camera)
+        display(HTML(html.embedded(path.read_bytes(), "video/mp4", its.size[0])))

@@ -17,7 +17,7 @@ of `ties`, less first. The first law is advised, unless all are level.
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -48,8 +48,15 @@ MIN_BUDGET = 16  # runs of an adversary in a condition, and as many random ones;
 MIN_SETTLED = 0.5  # of the share of runs that settle under the best law; chosen
 
 
-# Duration of a run, s; sets of gains that a tuning tries; divisor of an adversary's budget
-FULL, QUICK = (5.0, 96, 1), (3.0, 32, 3)
+class Extent(NamedTuple):
+    """How much is run."""
+
+    duration: float  # s, of a run
+    budget: int  # sets of gains that a tuning tries
+    parts: int  # divisor of an adversary's budget
+
+
+FULL, QUICK = Extent(5.0, 96, 1), Extent(3.0, 32, 3)
 
 
 def which(
@@ -89,16 +96,16 @@ def which(
     Raises:
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
-    (length, tries, parts), machine = QUICK if quick else FULL, as_plant(plant)
+    extent, machine = QUICK if quick else FULL, as_plant(plant)
     count, relevant = whole("seeds", seeds, 1, 10_000), checked_share(relevant)
     compared, properties = _needs(needs, machine)
-    length = length if duration is None else number("duration", duration, above=0.0)
+    length = extent.duration if duration is None else number("duration", duration, above=0.0)
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
-    candidates = _candidates(trial, _suited(machine, wanted, laws), tries)
+    candidates = _candidates(trial, _suited(machine, wanted, laws), extent.budget)
     table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
-    worst = _worst(trial, candidates, duration, within, parts) if ROBUST in compared else {}
+    worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
     return Advice(
         plant=machine,

@@ -374,7 +374,7 @@ def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(
     monkeypatch.setattr(
         fair_gains.Trial, "tuned", lambda self, plant, law, budget, starts: asked.append((budget, starts))
     )
-    known, other = adviser.QUICK[1], smc.starts(x0=0.5)
+    known, other = adviser.QUICK.budget, smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (smc.plant("duffing"), smc.plant("duffing", M=2.0)):
@@ -398,7 +398,7 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
 
     heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
     monkeypatch.setattr(search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1])
-    monkeypatch.setattr(adviser, "FULL", (5.0, 16, 1))
+    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=16))
     monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
     options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
