@@ -278,6 +278,7 @@ def test_the_study_has_gains_for_six_laws_and_the_baseline(plant):
     for law, gains in GAINS[plant].items():
         assert smc.paper.scenario(plant, law).law == smc.law(law, **gains)
     assert smc.paper.scenario(plant, "none").law == smc.law("none")
+    assert smc.paper.comparison(plant, changes={"seed": 3})["classical"].seed == 3
     assert set(smc.paper.GAINS[plant]) == set(GAINS[plant])
     assert set(smc.paper.GAINS) == set(PLANTS)
 

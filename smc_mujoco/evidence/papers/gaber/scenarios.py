@@ -48,7 +48,7 @@ def scenario(
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())
     made = case(sets.paper_plant(plant), law_name, condition, duration, gains, changes=changes)
-    return dataclasses.replace(made, seed=seed).named(None if changes else made.condition)
+    return dataclasses.replace(made, seed=changes.get("seed", seed)).named(None if changes else made.condition)
 
 
 def comparison(
