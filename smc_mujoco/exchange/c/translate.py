@@ -251,8 +251,7 @@ class Function:
         self.frames = list[tuple[list[str], list[Value]]]()  # shapes and calls of operands of nested expressions
         self.fixed = False  # whether nothing may move before the present line
         written, self.tree = parsed(function)
-        cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
-        self.globals = written.__globals__ | {name: cell.cell_contents for name, cell in cells} | dict(constants)
+        self.globals = around(written) | dict(constants)
         arguments = [a.arg for a in self.tree.args.args]
         if len(arguments) != len(kinds) or self.tree.args.vararg or self.tree.args.kwonlyargs or self.tree.args.kwarg:
             raise refuse(None, f"{self.tree.name} with its arguments")
@@ -1093,6 +1092,12 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     return written, tree
 
 
+def around(written: FunctionType) -> dict[str, Any]:
+    """Return the names outside of a function that it can read, with their values."""
+    cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
+    return written.__globals__ | {name: cell.cell_contents for name, cell in cells}
+
+
 def of_numpy(function: Any) -> bool:
     """Return whether a function is one of numpy's own."""
     return str(getattr(function, "__module__", "")).partition(".")[0] == "numpy"
@@ -1154,7 +1159,7 @@ def may_return_argument(function: Any) -> bool:
             case ast.Tuple():
                 return any(map(may_share, value.elts))
             case ast.Call():
-                return may_return_argument(resolved(value.func, written.__globals__))
+                return may_return_argument(resolved(value.func, around(written)))
         return not isinstance(value, ast.BinOp | ast.UnaryOp | ast.Compare | ast.Constant)
 
     return any(may_share(node.value) for node in ast.walk(parsed(function)[1]) if isinstance(node, ast.Return))

@@ -332,6 +332,7 @@ REFUSED = {
     "s, u = y.x, s": "arrays that change places at once",
     "u = math.tanh(s)": "tanh of an array",
     "u = part(s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
+    "u = outer(s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
     "u = part(y.x)\n    u[0] = 0.0": "an array, which shares its numbers with another name",
     "u = joint_law.torque(y, s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
     "u = position(y)\n    u[0] = 0.0": "an array, which shares its numbers with another name",
@@ -350,6 +351,9 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
         "def part(a):\n    b = a if a[0] > 0.0 else -a\n    return b\n"
         "def position(y):\n    return y.x\n"
         "def moved(a):\n    a = a + 1.0\n    return a\n"
+        "def around():\n    def inner(a):\n        return a\n"
+        "    def outer(a):\n        return inner(a)\n    return outer\n"
+        "outer = around()\n"
         "@smc.law_function(joint=True)\n"
         f"def strange(y, gains, memory):\n    s = y.de + y.e\n    {line}\n    return u, s\n"
     )
