@@ -94,6 +94,7 @@ class Loop:
         self.limits = np.array(scenario.limits)
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
         self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
+        self.numbers = [] if formula is None else [friction_numbers(formula, i) for i in range(n)]
         self.stuck_at, self.speed = [math.nan] * n, [0.0] * n  # positions of joints that stick, or NaN; last speeds
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
@@ -318,7 +319,7 @@ class Loop:
             motor = float(data.actuator_force[at["force"][i]]) if self.has_drive[i] else 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             load += float(data.qfrc_constraint[dof] + d[i])
-            friction, low, high = sliding_friction(formula, i, v, motor, load)
+            friction, low, high = sliding_friction(formula, self.numbers[i], v, motor, load)
             stuck, before = not math.isnan(self.stuck_at[i]), self.speed[i]
             slows = abs(v) < STICKING_SPEED and abs(v) <= abs(before)
             if not stuck and (slows or v * before < 0.0):
@@ -389,11 +390,16 @@ class PythonComponent:
         return u, s
 
 
-def sliding_friction(formula: Sliding, i: int, v: float, motor: float, load: float) -> list[float]:
-    """Return the sliding friction of channel i by a formula, and both bounds of its static friction."""
-    name, parameters = f"friction {type(formula).__name__}", jit.named(formula.names)(*(formula.parameters(i) or [0.0]))
+def friction_numbers(formula: Sliding, i: int) -> tuple:
+    """Return the numbers of channel i as the record that the formula of a friction reads."""
+    return jit.named(formula.names)(*(formula.parameters(i) or [0.0]))
+
+
+def sliding_friction(formula: Sliding, numbers: tuple, v: float, motor: float, load: float) -> list[float]:
+    """Return the sliding friction by a formula with the `friction_numbers` of a channel, and its bounds at rest."""
+    name = f"friction {type(formula).__name__}"
     try:
-        out = type(formula).value(v, motor, load, parameters)
+        out = type(formula).value(v, motor, load, numbers)
     except USER_EXCEPTIONS as error:
         raise failure_of(name, error) from error
     return as_floats(name, out, "a force and two bounds", 3)

@@ -271,7 +271,7 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
             fitted = SERVOS[name][model]
             assert (len(fitted) - 3) == {"m1": 2, "m2": 5, "m3": 3, "m4": 7, "m5": 9, "m6": 11}[model]
             friction = smc.servo(name, model).friction
-            numbers = functools.partial(reference.sliding_friction, friction, 0)
+            numbers = functools.partial(reference.sliding_friction, friction, reference.friction_numbers(friction, 0))
             speeds, torques = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0], np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]
             for v in speeds:
                 for motor in torques:
