@@ -58,7 +58,7 @@ def _brief(value: object) -> str:
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
-    """Return the error for a name that is not in `known`. It suggests the nearest name, or lists all."""
+    """Return the error for a name that is not in `known`. It suggests the nearest name, or lists all names."""
     names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))  # claims have numbers
     hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}" if names else "there are none"
     if near := _nearest(name, names) if isinstance(name, str) else []:

@@ -91,7 +91,7 @@ def note() -> str | None:
 
 @functools.cache
 def missing() -> str | None:
-    """Return None if pictures can be rendered, as a child process tries, else a sentence with the cure."""
+    """Return None if a child process can render pictures, else a sentence with the cure."""
     wish, backend = choice()
     if wish in OFF_VALUES:
         return f"no film: MUJOCO_GL={wish} turns rendering off: unset it"

@@ -105,7 +105,7 @@ class Plant:
     # `smc.worst_case` varies these parameters if it is given no class
     uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
     dry: tuple[str, ...] = ()  # parameters that are dry friction. A plant with one that is not 0 is not smooth
-    unmodelled: str = ""  # why there is no nominal model
+    unmodelled: str = ""  # why there is no nominal model; "" if there is one
     friction: Any = None  # hardware.part.Friction of its joints according to its source, for a scenario; or None
     limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
     ranges: tuple[tuple[str, float, float], ...] = ()  # joint, lowest and highest x of each channel; empty: no limits

@@ -4,7 +4,7 @@ Groups: a metric compares channels of one kind and one unit, a group of the plan
 have no common maximum or sum. Driven channels and free joints, which have no actuator, are different groups, even if
 their units agree. If a plant has several groups, `score` and each metric return the worst group for a time, a
 percentage or a share of the motion: a law that drops the pole has settled nothing. A metric with x's unit, or of the
-command, is that of the driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
+command, counts only driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
 returns every group by itself.
 
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's

@@ -34,7 +34,7 @@ from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.model import USERDATA
 from smc_mujoco.simulation.state import simulation_at
 
-with mjcb.installed(None):  # this import compiles a model; imported later, it would wait for a run to end
+with mjcb.installed(None):  # this import compiles a model; during a run it would wait for the run's end
     import mujoco.batch
 
 C_TYPES = {

@@ -160,7 +160,7 @@ def _stored(native: Callable, function: Callable, *arguments: object) -> Functio
 
 
 def cached(function: Callable) -> Callable:
-    """Compile a function of numbers and arrays at its first call. It is kept on disk, as C functions are."""
+    """Compile a function of numbers and arrays at its first call. The code is kept on disk, as for C functions."""
     made = njit(error_model="numpy")(function)
 
     @functools.wraps(function)

@@ -49,7 +49,7 @@ class Failure(Exception):
 
 
 def run(scenario: Scenario, mechanism: models.Mechanism | None = None) -> Trace:
-    """Return the trace of a scenario, simulated in the reference loop, with its mechanism if that is made already."""
+    """Return the trace of a scenario, run in the reference loop. `mechanism`: the scenario's, if it is made already."""
     mechanism = mechanism or models.mechanism(scenario)
     with installed():
         loop = Loop(scenario, mechanism)
@@ -115,7 +115,7 @@ class Loop:
             self.failure, self.failed_step = INTERRUPTED, step
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Control callback: run the law at the first stage of a sample, and the disturbance at every stage."""
+        """Control callback: run the law at the first stage of a sample, and apply the disturbances at every stage."""
         if self.failure or data._address != self.data._address:
             return  # a law or another thread may step another model
         step, stage = divmod(self.calls, self.scenario.stages)

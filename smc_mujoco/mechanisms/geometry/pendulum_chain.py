@@ -33,7 +33,7 @@ BEAM_Y = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the piv
 
 
 def compose(single, n, x0):
-    """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (recycled) in keyframe `home`."""
+    """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (repeated) in keyframe `home`."""
     source = mujoco.MjSpec.from_file(str(model_path(single)))
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     spec.modelname = f"{n}_{source.modelname}s"
@@ -74,7 +74,7 @@ def strip(source, pendulum):
 
 
 def stand(spec, n):
-    """Add the body `machine`: two end posts and the shaft between them."""
+    """Add the body `machine`, two end posts and the shaft between them, and return it."""
     length = (n - 1) * PITCH
     shown = min(length, 8 * PITCH)  # the camera frames nine pendulums at most
     spec.stat.center = (0.0, shown / 2, HEIGHT)

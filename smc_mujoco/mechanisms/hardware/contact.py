@@ -185,7 +185,7 @@ def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[
 
 
 def box(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str) -> mujoco.MjsGeom:
-    """Add a box between two corners, m in the body's frame."""
+    """Add a box between two corners, m in the body's frame, and return its geom."""
     a, b, kind = np.array(low, float), np.array(high, float), mujoco.mjtGeom.mjGEOM_BOX
     return body.add_geom(name=name, type=kind, pos=(a + b) / 2, size=(b - a) / 2, material=material)
 

@@ -303,7 +303,7 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
 
 
 def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) -> DriveStep:
-    """Return the effect of a step on a motor's winding, behind a lag of which the step is `a` time constants.
+    """Return the effect of a step on a motor's winding behind a lag; the step is `a` of the lag's time constants long.
 
     Behind a lag, the winding gets two voltages that are held over the step: one that gives the mean of its torque, and
     one that gives its end. So both are exact, unless the supply's bound cuts the lag's output within the step.
@@ -329,8 +329,8 @@ def winding_step(b: float, rk4: bool) -> tuple[float, float]:
 
     The first number is the weight of a constant speed in the mean torque, and of the speed's change in the torque at
     the end. The second is the share of the drag of a motor without inductance that MuJoCo gets, so that the speed's
-    change in the step has its effect on the mean torque. A change by 1 has the effect `late` there. RK4 gives a drag
-    the mean speed, so half of the change, and implicit integrators give it the speed at the end.
+    change in the step has its effect on the mean torque. A change by 1 has the effect `late` there. RK4 applies a
+    drag at the mean speed, so at half of the change, and implicit integrators at the speed at the end.
     """
     drag = 1.0 - _mean(b)
     late = b / 6.0 - b**2 / 24.0 if b < SHORT_STEP else 0.5 - drag / b
