@@ -229,7 +229,7 @@ def _setup(
     duration: float,
     starts: Starts | None,
 ) -> Setup:
-    """Return the runs of a law on a plant in a condition; of a law of no gains in the set with its defaults."""
+    """Return the runs of a law on a plant in a condition. A law without gains in the set has its defaults."""
     fields = condition.on(plant, duration)
     if "control_period" in fields:
         raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")

@@ -4,7 +4,7 @@
     result.claims[0].verdict
     result.save("evidence.json")                   # claim -> runs -> numbers -> threshold -> verdict
 
-Thresholds are fixed in the paper's file before any run, and are not moved. How verdicts follow from checks: `verdict`.
+Thresholds are fixed in the paper's file before any run, and are not moved. `verdict` says how checks become verdicts.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ class Audit:
 
     paper: Paper
     claims: Claims  # with their verdicts, in the order of the paper's file
-    quick: bool  # whether less was looked at, as each claim says
-    used: Mapping[str, Mapping[str, Mapping[str, Used]]]  # claim -> set of gains -> key -> run that it rests on
-    sealable: bool  # whether all of it was run here
+    quick: bool  # whether less was measured, as each claim says
+    used: Mapping[str, Mapping[str, Mapping[str, Used]]]  # claim -> set of gains -> run's key -> run that it used
+    sealable: bool  # whether all runs were made here, none taken from a table
 
     def save(self, path: str | Path) -> Path:
         """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict, sealed by a hash.
 
-        A second audit in a clean process writes the same file, to the last bit, with the same versions of the packages
-        and on a machine whose arithmetic is the same. The file holds no times, no paths and nothing of the machine.
-        Numbers that differ from audit to audit, such as timings, are left out, and the file says so.
+        With the same package versions and the same arithmetic of the machine, a second audit in a clean process writes
+        the same file, to the last bit. The file holds no times, no paths and nothing about the machine. It leaves out
+        numbers that differ from audit to audit, such as timings, and says so.
 
         Raises:
           ScenarioError: the name does not end in .json, or runs were taken from a table.
@@ -86,13 +86,13 @@ def audit(
         smc.audit("./my_paper").save("evidence.json")
 
     Args:
-      paper: the name of one that ships, see `smc-mujoco papers`, or a folder.
+      paper: a name of `smc-mujoco papers`, or a folder.
       only: ids of the claims wanted; None for all.
-      gains: sets of gains, of the paper's; None for all of them, or its quick sets if it is to be quick.
-      quick: less, as each claim says: coarser grids, shorter runs.
+      gains: names of the paper's sets of gains; None for all of them, or for its quick sets if `quick`.
+      quick: whether to measure less, as each claim says: coarser grids, shorter runs.
       threads: simulations at once; None for one per available core.
-      table: of a study, whose runs are then not made again.
-      report: called with how many claims are done, each under each set of gains, and how many there are.
+      table: a study's table, whose runs are not made again.
+      report: called with how many claims are done and how many there are; each counts once per set of gains.
 
     Raises:
       ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the paper.
@@ -163,7 +163,7 @@ def document(claims: Sequence[Claim]) -> str:
 def measure(entry: Entry, runs: Runs) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
-    For a claim about all or some of the allowed gains they are those at the gains that decide.
+    A claim about all or some of the allowed gains is measured at the gains that decide it.
     """
     if entry.over:
         from smc_mujoco.evidence.audit import search
@@ -185,7 +185,7 @@ def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
 
 
 def _evidence(entry: Entry, returned: Any, checked: Collection[str]) -> Iterator[Check | Beside]:
-    """Yield the checks of what a claim's function returned; `checked`: measures whose thresholds it used."""
+    """Yield checks and numbers from what a claim's function returned; `checked`: measures whose thresholds it used."""
     if not isinstance(returned, Mapping):
         checks = isinstance(returned, Sequence) and all(isinstance(one, Check | Beside) for one in returned)
         if not checks:

@@ -1,11 +1,11 @@
 """The evidence of an audit as a JSON file that anybody can make again, to the last bit.
 
     audit("gaber").save("evidence.json")
-    check("evidence.json")                    # its seal: the file is as it was written
+    check("evidence.json")                    # raises if the file was changed after it was written
 
 It leads from each claim to its runs, their numbers, the threshold and the verdict. A run is named by a hash of its
-scenario, and has a hash of what the claim took from it, its scores or its trace. The paper's own files count by their
-hashes. The seal is a hash of all the rest. There are no times, no paths and nothing of the machine in it.
+scenario, and has a hash of what the claim took from it: its scores or its trace. There are hashes of the paper's own
+files. The seal is a hash of all the rest. There are no times, no paths and nothing about the machine.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from smc_mujoco.studies.run_key import condition, portable_key
 
 FORMAT = "smc-mujoco evidence 1"
 CLAIM_FIELDS = ("id", "text", "where", "whose", "how", "read", "measured", "holds_if", "quantifier", "over")
-HASHED_SUFFIXES = (".py", ".toml", ".xml")  # of a paper's files that count
+HASHED_SUFFIXES = (".py", ".toml", ".xml")  # of a paper's files that are hashed
 
 
 def document(audit: Any) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def seal(data: Mapping[str, Any]) -> str:
 
 
 def check(path: str | Path) -> dict[str, Any]:
-    """Return the evidence in a file whose seal is whole."""
+    """Return the evidence in a file, or raise ScenarioError if its seal is broken."""
     with reading(path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote") as file:
         data = read_json(file)
         if data["format"] != FORMAT:
@@ -82,14 +82,14 @@ def check(path: str | Path) -> dict[str, Any]:
 
 
 def files(paper: Paper) -> dict[str, str]:
-    """Return file -> hash, of the files of a paper that count; the ends of lines do not."""
+    """Return file -> hash of a paper's files, the same for every kind of line ending."""
     paths = sorted(path for path in paper.folder.rglob("*") if path.suffix in HASHED_SUFFIXES and path.is_file())
     texts = {path.relative_to(paper.folder).as_posix(): path.read_bytes().replace(b"\r\n", b"\n") for path in paths}
     return {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
 
 
 def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return what is sealed of a claim."""
+    """Return the part of a claim that is sealed."""
     entry = audit.paper.claims[claim.id]
     sealed = {name: getattr(claim, name) for name in CLAIM_FIELDS}
     if entry.immune:

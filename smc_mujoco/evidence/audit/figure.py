@@ -4,8 +4,8 @@ The figure shows how far every check is from its threshold, a row for each claim
 
     audit("levant_1993").figure("checks.pdf")
 
-A check is a dot at its value over its limit, or at its limit over its value if more is asked for: left of 1 it holds,
-and its dot is filled. Where the ratio tells nothing, as with a limit of 0, the dot is at the edge.
+A check is a dot at value / limit, or at limit / value if the value must be larger. Left of 1 the check holds, and its
+dot is filled. Where the ratio tells nothing, as with a limit of 0, the dot is at the edge.
 """
 
 import math
@@ -28,14 +28,14 @@ from smc_mujoco.evidence.audit.verdict import ANSWERS, MARKS, VERDICTS, Check, C
 COLOURS = dict(
     zip(VERDICTS, ("#2b7a3d", "#8a6100", "#b3322b", "#6a6a6a", "#6a6a6a"), strict=True)
 )  # white on each: 5:1
-COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # of a question
+COLOURS |= dict.fromkeys(ANSWERS.values(), "#3d5a80")  # answers to questions
 LABEL_COLOUR = "#444"
 HEIGHT, FONT_SIZE, MARGIN = 20, 11, 6  # px
 FONT = "Verdana,Geneva,DejaVu Sans,sans-serif"
 ROW_HEIGHT = 26.0  # points on a full page, height of a claim's row
 MAX_DECADES = 3.0  # on each side of 1
-SETS_SHARE = 0.5  # of a row, over which the sets of gains are spread
-TEXT_SHARE = 0.36  # of the page's width, for the claims
+SETS_SHARE = 0.5  # share of a row's height over which its sets of gains are spread
+TEXT_SHARE = 0.36  # share of the page's width for the claims' texts
 
 
 def figure(
@@ -95,7 +95,7 @@ def draw(ax: Axes, row: int, claim: Claim) -> None:
 
 
 def place(check: Check) -> float:
-    """Return the place of a check: log10 of the multiple of what is asked, at most MAX_DECADES from 0."""
+    """Return where a check's dot is: log10 of value / limit or limit / value, at most MAX_DECADES from 0."""
     over, under = (check.value, check.limit) if check.relation in ("<", "<=") else (check.limit, check.value)
     edge = -MAX_DECADES if check.holds else MAX_DECADES
     if not (0.0 < over < math.inf and 0.0 < under < math.inf):

@@ -39,7 +39,7 @@ def survivors(
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.
-      report: called with how many of the laws are done, the law itself and each of its mutants, and how many there are.
+      report: called with how many rounds are done and how many there are: the law itself is one, each mutant another.
     """
     audited = paper if isinstance(paper, Paper) else find_paper(paper)
     kept = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
@@ -82,7 +82,7 @@ def first_law(entry: Entry) -> str:
 
 
 def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
-    """Return whether a mutant loses a claim: `mutant` is None if it cannot be measured."""
+    """Return whether a mutant loses a claim. `mutant`: its evidence; None if it cannot be measured."""
     if mutant is None:
         return True
     if holding:

@@ -44,7 +44,7 @@ PAPER_FILE, CODE_FILE = "paper.toml", "claims.py"
 SHIPPED_PACKAGE = "smc_mujoco.evidence.papers"
 KINDS_OF_CLAIM = {"paper": "of its sentences", "derived": "derived", "ours": "beside it"}
 NO_FIELDS: Mapping[str, Any] = frozen({})
-# What of a paper was read.
+# How much of a paper was read.
 READ_PARTS: dict[str, None] = dict.fromkeys(("full text", "abstract", "textbook", "second hand", "nothing"))
 TEXT_FIELDS = ("title", "authors", "source", "read", "access", "note")  # of a paper
 A_TEXT, A_LIST, FIELDS_CURE = (str, "a text"), (list, "a list of names"), 'fields of a scenario, as "duration=5.0"'
@@ -78,7 +78,7 @@ class Allowed(NamedTuple):
     """The gains of a law that a paper allows, within the bounds of the search."""
 
     bounds: Mapping[str, tuple[float, float]]  # gain -> lowest and highest value, both positive
-    margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None  # gains -> condition -> its margin
+    margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None  # gains -> {condition: margin}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -89,7 +89,7 @@ class Entry(Statement):
     thresholds: tuple[Threshold, ...] = ()  # empty if the function returns checks with limits
     quick: str = ""  # what a quick audit measures instead, if that is less
     late: bool = False  # whether it looks at the runs of all other claims, and so comes after them
-    varies: str = ""  # why its numbers differ from audit to audit, as a timing; they are not sealed
+    varies: str = ""  # why its numbers, such as timings, differ from audit to audit; they are not sealed
     immune: str = ""  # why no mutant of the law loses the claim, if none can
     plants: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()  # the first is the one that mutants replace
@@ -107,12 +107,12 @@ class Paper:
     title: str
     authors: str
     source: str
-    read: str  # what was read of it, one of READ_PARTS
-    access: str = ""  # where, and what could not be read
+    read: str  # how much of it was read, one of READ_PARTS
+    access: str = ""  # where it was read, and what could not be read
     note: str = ""  # what a reader of the audit should know
     sets: Mapping[str, Mapping[str, Mapping[str, Mapping[str, float]]] | None]  # plant ("" for all) -> law -> gains
     quick_sets: tuple[str, ...]
-    plants: Mapping[str, Plant]  # its own, as conditions and laws
+    plants: Mapping[str, Plant]  # its own, like the conditions and laws below
     conditions: Mapping[str, Condition]
     laws: Mapping[str, Template | Component]
     fields: Mapping[str, Any]  # of the scenarios of all its runs
@@ -177,13 +177,13 @@ Home = tuple[Path, str]  # a paper's folder, and the name under which it is impo
 
 @functools.cache
 def catalogue() -> Catalogue[Home]:
-    """Return where every paper is that ships, or comes with another package, by name."""
+    """Return name -> home of every paper that ships or comes with another package."""
     of_suite = {name: (folder, f"{SHIPPED_PACKAGE}.{name}") for name, folder in shipped().items()}
     return Catalogue(of_suite, added("smc_mujoco.papers", _of_package))
 
 
 def _of_package(point: EntryPoint) -> Home:
-    """Return where the paper is that an entry point of another package names."""
+    """Return the home of the paper that an entry point of another package names."""
     spec = source(point)
     if not spec.submodule_search_locations:
         raise ScenarioError(f"{spec.origin} is no folder: give {KINDS[point.group][1]}")
@@ -240,7 +240,7 @@ def _package(folder: Path) -> str:
 
 @contextlib.contextmanager
 def _about(what: object) -> Iterator[None]:
-    """Say in errors what they are about."""
+    """Put what an error is about before its message."""
     try:
         yield
     except ScenarioError as error:
@@ -260,7 +260,7 @@ def _read(folder: Path, package: str) -> Paper:
         return _checked(folder, data, code)
 
 
-_read_once = functools.cache(_read)  # of what is installed: a user's folder may change
+_read_once = functools.cache(_read)  # for installed papers only: a user's folder may change
 
 
 def _module(folder: Path, package: str) -> ModuleType:
@@ -296,7 +296,7 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
 
 
 def _values(data: Mapping[str, Any], fields: Mapping[str, tuple[Any, str]], required: tuple[str, ...]) -> dict:
-    """Return the values of a table, texts with single spaces; refuse other fields and other types, and what lacks."""
+    """Return the values of a table, texts with single spaces; refuse unknown fields, wrong types and missing fields."""
     for field in data:
         find("field", field, fields)
     values = {field: _typed(field, value, *fields[field]) for field, value in data.items()}
@@ -366,7 +366,7 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
 
 
 def _check(entry: Entry, paper: Paper) -> None:
-    """Raise ScenarioError unless a claim says whose it is, from what and over which gains, and its names are known."""
+    """Raise ScenarioError if a claim has an unknown name, or does not say whose it is, how derived or over what."""
     find("origin in whose", entry.whose, WHOSE_WORDS)
     find("part in read", entry.read, READ_PARTS)
     if entry.whose == DERIVED and not entry.how:

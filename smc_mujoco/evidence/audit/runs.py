@@ -1,11 +1,11 @@
-"""The runs that claims rest on: what a claim's function is called with.
+"""The runs that claims rest on. A claim's function is called with a `Runs`.
 
     def settles(runs):
         scenarios = runs.grid()                        # (plant, law, condition) -> Scenario, of the claim's names
         scores = runs.scores(scenarios.values())       # every metric of each, in order
         return {"settling time, s": {plant: one["settling_time"] for (plant, *_), one in zip(scenarios, scores)}}
 
-A run is made once: scores are kept by the scenario's key. Those in a study's table are taken from it.
+A run is made once: scores are kept by the scenario's key. Runs in a study's table are taken from it.
 """
 
 import copy
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 Scores = dict[str, float]
 Name = TypeVar("Name")
 Value = TypeVar("Value")
-Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> what makes its mutant of it
+Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> function from the law to its mutant
 
 
 class Result(NamedTuple):
@@ -74,11 +74,11 @@ class Runs:
     substitute: Substitute = dataclasses.field(default_factory=dict)
     threads: int | None = None
     table: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run that is not made again
-    shared: dict[str, Result] = dataclasses.field(default_factory=dict)  # with the Runs of other sets
+    shared: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run, for the Runs of all sets
     used: dict[str, Used] = dataclasses.field(default_factory=dict)  # key -> run that the claim has used
     checked: set[str] = dataclasses.field(default_factory=set)  # measures whose thresholds the claim has asked for
     scored: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run whose scores any claim has used
-    plants: tuple[str, ...] = ()  # names of the claim's plants, as laws and conditions
+    plants: tuple[str, ...] = ()  # names of the claim's plants; below, of its laws and conditions
     laws: tuple[str, ...] = ()
     conditions: tuple[str, ...] = ("nominal",)
     values: Mapping[str, Any] = frozen({})  # the claim's numbers, such as the levels of a sweep
@@ -116,7 +116,7 @@ class Runs:
         """Return the check of what was measured against the threshold of a measure, `holds_if` in the paper's file.
 
         A function returns checks instead of numbers if a limit depends on runs, or if it has a name for each number.
-        The limit is a multiple of `times`: "<= 1.1" and a rival's time mean at most 1.1 times that time.
+        The limit is multiplied by `times`: with a rival's time, "<= 1.1" asks for at most 1.1 times that time.
         """
         threshold = find("threshold", measure, self.thresholds)
         self.checked.add(measure)
@@ -131,7 +131,7 @@ class Runs:
         return self.mutated(dataclasses.replace(law, gains={**law.gains, **gains}))
 
     def mutated(self, law: Component) -> Component:
-        """Return the law, or its mutant in this audit under the law's name, by which a claim may look for its run."""
+        """Return the law, or its mutant in this audit, which keeps the law's name so that claims find its runs."""
         mutant = self.substitute.get(law.name)
         return dataclasses.replace(mutant(law), name=law.name) if mutant else law
 
@@ -140,8 +140,8 @@ class Runs:
     ) -> Scenario:
         """Return the scenario of a plant under a law in a condition, with some of its fields changed.
 
-        The fields are the paper's, the condition's, the claim's and then the changes. A change of `plant` may have
-        other parameters or another size; the gains stay those of the named plant.
+        Fields come from the paper, the condition, the claim and the changes; the later replace the earlier. A changed
+        `plant` may have other parameters or another size. The gains stay those of the named plant.
         """
         paper, its = self.paper, self.fields
         machine = paper.plant(plant)

@@ -1,9 +1,9 @@
 """A search over the gains that a paper allows, for a claim about all of them or about some.
 
-What is said of all gains is refuted by one, and what is said of some is supported by one: the search stops there. It
-tries the gains of the set first, then points spread over the bounds, then points around the best of them. It measures
-these points as a quick audit does, and the one that decides in full. Nothing is random, so a second audit comes to the
-same gains.
+A claim about all gains is refuted by one counter-example, and a claim about some is supported by one example: the
+search stops there. It tries the gains of the set first, then points spread over the bounds, then points around the best
+of them. It measures these points as a quick audit does, and the one that decides in full. Nothing is random, so a
+second audit finds the same gains.
 """
 
 import dataclasses
@@ -22,7 +22,7 @@ from smc_mujoco.evidence.audit.verdict import Beside, Check, Evidence
 SPREAD_SETS, NEAR_SETS = 6, 3  # sets of gains tried over the whole bounds, and around the best of them
 QUICK_SPREAD_SETS, QUICK_NEAR_SETS = 2, 0  # in a quick audit
 NEAR_BOUNDS_SHARE = 0.25  # share of the bounds, on a logarithmic scale, around the best
-DRAWN_POINTS = 2000  # points drawn for gains that meet the conditions of the theorem
+DRAWN_POINTS = 2000  # points drawn to find gains that meet the theorem's conditions
 
 Gains = dict[str, float]
 Bounds = Mapping[str, tuple[float, float]]
@@ -36,7 +36,7 @@ class Tried(NamedTuple):
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """How far they are from deciding: whether all checks hold, and the least slack."""
+        """Key that orders gains: whether all checks hold, then the least slack."""
         checks = [check for check in self.evidence if isinstance(check, Check)]
         return all(check.holds for check in checks), min((check.slack for check in checks), default=math.inf)
 
@@ -44,7 +44,7 @@ class Tried(NamedTuple):
 def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> Evidence:
     """Return the evidence at the gains that decide, with these gains and their margins beside.
 
-    What is said of some gains is said of each plant by itself: other plants have other gains.
+    A claim about some gains is decided for each plant by itself, because plants may need different gains.
     """
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")
@@ -87,7 +87,7 @@ class Theorem:
 
     def __init__(self, entry: Entry, runs: Runs):
         self.allowed: Allowed = runs.paper.allowed[entry.laws[0]]
-        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], entry.laws[0], runs.gains).gains  # all of it
+        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], entry.laws[0], runs.gains).gains  # of the set
         self._failed = lambda error: failed(runs.paper, entry, error)
 
     def points(self, bounds: Bounds, count: int) -> Iterator[Gains]:

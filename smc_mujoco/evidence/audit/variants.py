@@ -1,10 +1,10 @@
-"""Variants of laws: a reversed command, none, a relay, no memory, or an input gain that varies with x.
+"""Variants of laws: a reversed command, command 0, a relay, no memory, or an input gain that varies with x.
 
     variant(law, "squeezed")
 
-A channel's input gain g(x) multiplies what its actuator gives. A law whose command, within the actuator's bound, is
-multiplied by g at each sample is therefore the law on a plant with that gain. This is exact if |g| <= 1, except that g
-changes within a control period, during which the command is held. So runs are made on plants that the library lacks.
+A channel's input gain g(x) multiplies the actuator's output. To run a law on a plant with that gain, which the library
+lacks, clip its command to the actuator's bound and multiply it by g at each sample. This is exact if |g| <= 1, except
+that g changes within a control period, during which the command is held.
 """
 
 import dataclasses
@@ -17,7 +17,7 @@ from smc_mujoco.control.component import Component
 
 
 def _times(gain: Callable[[float], float]) -> Callable[[Callable], Callable]:
-    """Return what multiplies a law's command, within the actuator's bound, by a gain of x in rad or m."""
+    """Return a wrapper that clips a law's command to the actuator's bound and multiplies it by gain(x), x rad or m."""
     factor = njit(gain)
 
     def multiply(body):
@@ -50,13 +50,13 @@ VARIANTS: dict[str, Callable[[Callable], Callable]] = {
     "reversed": _times(lambda x: -1.0),
     "zero": _times(lambda x: 0.0),
     "squeezed": _times(lambda x: 1.0 / (1.0 + x * x)),
-    "forgetful": _without_memory,  # 0 at every sample; a law that uses no memory stays as it is
+    "forgetful": _without_memory,  # memory is 0 at every sample; a law that uses none stays as it is
     "relay": _relay,  # the actuator's bound with the sign of the command
 }
 
 
 def variant(law: Component, name: str) -> Component:
-    """Return a variant of VARIANTS of a law."""
+    """Return the variant of a law that VARIANTS has under a name."""
     return dataclasses.replace(law, name=f"{law.name}_{name}", function=_varied(law.function, name))
 
 

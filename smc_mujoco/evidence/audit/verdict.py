@@ -2,11 +2,11 @@
 
 A claim consists of one sentence or several. A sentence holds if all its checks hold; an existential one ("may",
 "there is") if one does. Under one set of gains a claim is supported if all its sentences hold, refuted if none does,
-partly supported between; without checks it is not testable. What is said of some gains or cases is supported by one
-example. Examples that fail refute no such claim: it is not shown.
+and else partly supported; without checks it is not testable. A claim about some gains or cases is supported by one
+example. Without an example it is not refuted but "not shown".
 
-A verdict is of what the paper says, or of what follows from it. A question beside the paper has an answer in its
-place, "yes" for "supported", and totals count the paper's sentences alone (`totals`).
+A verdict is about what the paper says, or what follows from it. A question beside the paper gets an answer instead,
+"yes" for "supported". `totals` counts the paper's own sentences alone.
 
 If all sets of gains give the same verdict, that is the verdict of the claim. If they differ, the claim is partly
 supported, and flips. A universal claim ("every", "any", "by construction") and one over all gains are refuted by a
@@ -52,7 +52,7 @@ class Check(NamedTuple):
     relation: str
     limit: float
     holds: bool
-    sentence: str = ""  # of the claim, that it is about
+    sentence: str = ""  # the sentence of the claim that it is about
 
     def __str__(self) -> str:
         limit = f"{self.relation} {measured(self.limit, self.what)}"
@@ -115,9 +115,9 @@ class Threshold(NamedTuple):
     text: str  # as it was written
     relation: str
     limit: float
-    low: float = math.nan  # with `high` the range, equal for "2 +- 0.1"; NaN for a limit
+    low: float = math.nan  # `low` .. `high` is the range: 2 .. 2 for "2 +- 0.1", NaN for a limit such as "< 1"
     high: float = math.nan
-    sentence: str = ""  # of the claim, that it is about
+    sentence: str = ""  # the sentence of the claim that it is about
 
     @classmethod
     def read(cls, measure: str, text: object, sentence: str = "") -> "Threshold":
@@ -165,10 +165,10 @@ class Statement:
     measured: str  # what is run, and what is measured on it
     holds_if: str  # the threshold, in words
     note: str = ""  # what a reader must know to judge the numbers
-    quantifier: str = NAMED  # UNIVERSAL, EXISTENTIAL, or about the plants and conditions that it names, and no others
+    quantifier: str = NAMED  # UNIVERSAL, EXISTENTIAL, or NAMED: about only the plants and conditions that it names
     whose: str = PAPER  # PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it
-    how: str = ""  # it was derived, or why it is asked
-    read: str = ""  # what was read of the place where it stands, one of `paper.READ_PARTS`
+    how: str = ""  # how it was derived, or why it is asked
+    read: str = ""  # how much was read of the place where it stands, one of `paper.READ_PARTS`
     over: str = ""  # "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter
     instead: str = ""  # what the author may claim instead, where it does not hold: a theorem or a measured bound
     shown_by: str = ""  # the command that shows that
@@ -198,7 +198,7 @@ class Claim(Statement):
         return min(self.checks(gains), key=lambda check: (check.holds, check.slack), default=None)
 
     def decided(self, gains: str) -> str:
-        """Return the decisive check in a line, that of a range by the number itself; the note without checks."""
+        """Return the decisive check in a line, with the number instead of its distance; the note without checks."""
         if not (check := self.decisive(gains)):
             return self.note
         what, apart, middle = check.what.partition(DISTANCE_WORDS)
@@ -232,13 +232,13 @@ class Claims(list[Claim]):
 
 
 def totals(claims: Sequence[Claim]) -> dict[str, int]:
-    """Return verdict -> how many of the paper's own sentences have it, where some do."""
+    """Return verdict -> how many of the paper's own sentences have it, without zeros."""
     of_paper = [claim.verdict for claim in claims if claim.whose == PAPER]
     return {kind: of_paper.count(kind) for kind in VERDICTS if kind in of_paper}
 
 
 def summary(claims: Sequence[Claim]) -> str:
-    """Return a line: the totals of the paper's own sentences and what was read, then what is not in them."""
+    """Return a line: the totals of the paper's own sentences and what was read, then the verdicts on the rest."""
     read = ", ".join(dict.fromkeys(claim.read for claim in claims if claim.whose == PAPER and claim.read))
     parts = [f"the paper's own sentences{f' ({read} read)' if read else ''}: {_marked(totals(claims))}"]
     for whose, words in ((DERIVED, "derived from it"), (OURS, "questions beside it")):
@@ -254,7 +254,7 @@ def _marked(counts: Mapping[str, int]) -> str:
 
 
 def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
-    """Return the verdict under one set of gains, of a claim over "all" or "some" gains or over none in particular."""
+    """Return the verdict under one set of gains. `over`: "all" or "some" if the claim is about allowed gains."""
     hold = sentences(evidence, quantifier).values()
     if not hold:
         return NOT_TESTABLE
@@ -264,7 +264,7 @@ def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
 
 
 def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
-    """Return sentence -> whether it holds: all its checks do, or one of an existential claim."""
+    """Return sentence -> whether it holds: all its checks do, or one if the claim is existential."""
     checks: dict[str, list[bool]] = {}
     for one in evidence:
         if isinstance(one, Check):
@@ -276,7 +276,7 @@ def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
 def combined(
     verdicts: Mapping[str, str], quantifier: str = NAMED, answers: Mapping[str, str] | None = None, over: str = ""
 ) -> tuple[str, bool, str]:
-    """Return the verdict over all sets of gains, whether it flips, and a sentence about that, in answers if given."""
+    """Return the verdict over all sets of gains, whether it flips, and a sentence on that, in `answers` if given."""
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""

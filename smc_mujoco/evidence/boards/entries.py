@@ -80,7 +80,7 @@ def on_board(robot: str, law: Law | Template | str, velocity: Estimator | str = 
 
 @njit
 def hermite(a, b, da, db, h, part):
-    """Return the cubic between a and b with slopes da and db, h apart, at a part of the way."""
+    """Return the cubic between a and b, h apart, with slopes da and db, at a fraction `part` of the way."""
     rest = 1.0 - part
     return rest * rest * (a * (1.0 + 2.0 * part) + h * part * da) + part * part * (
         b * (1.0 + 2.0 * rest) - h * rest * db

@@ -1,7 +1,7 @@
 """Criteria and scores of RealAIGym's simulation boards, of a run of pendubot or acrobot.
 
-A run lasts 10 s, with RK4 and a command every 2 ms, from rest hanging. With N samples, of which the last is only the
-end of the last step:
+A run starts at rest, hanging, and lasts 10 s, with RK4 and a command every 2 ms. Sums leave out the last sample, which
+is only the end of the last step:
 
     swing-up time       first t from which the tip stays above 0.9 (l1 + l2); a run that never does has failed
     energy              sum |dq tau|, with dq the step of the driven joint

@@ -41,10 +41,10 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.noise_key import draw_key, has_user_code
 
 SEED = 20240  # of all random numbers; chosen before any run
-STEP, STEPS = 2e-3, 5000  # s; number of
+STEP, STEPS = 2e-3, 5000  # s; number of steps
 UPRIGHT_TOLERANCES = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
 LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
-MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s between pulses, s, N m
+MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s; s; N m
 SCALED_PARAMETERS = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
 MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(SCALED_PARAMETERS, (0.75, 1.25))  # parameter -> ends of its values
 MODEL_LEVELS |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
@@ -77,7 +77,7 @@ class Robustness:
     """The result of the test: percent of survived levels of each test, and the score, their mean in 0 .. 1."""
 
     survived: Mapping[str, tuple[tuple[str, float, bool], ...]]  # test -> (name, level, whether the law survived it)
-    noise_key: int = 0  # of the random numbers, which a scenario with it repeats; 0: those of SEED alone
+    noise_key: int = 0  # key of the random numbers: a scenario with it repeats them; 0 if they depend on SEED alone
 
     def __repr__(self) -> str:
         tests = ", ".join(f"{test} {percent:.1f} %" for test, percent in self.percent.items())
@@ -136,7 +136,7 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
     Args:
       scenario: plant pendubot or acrobot; its law and velocity estimator are tested. The law may know the plant's
         nominal parameters if the scenario says so. If its noise_key is 0, and the law is your own, one is drawn.
-      report: called with the runs that are done and all runs.
+      report: called with the number of runs done and the number of all.
 
     Raises:
       ScenarioError: another plant, a surface, a reference that moves, or a law that does not compile.

@@ -75,7 +75,7 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
                 f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
                 "use smc.boards.on_board"
             )
-    # a compiled law sees no plant
+    # A compiled law cannot see the plant; only a law of the Python loop is replayed.
     if prepare(trace.scenario).why_not and not (result := replay(trace)).same:
         raise errors.ScenarioError(f"{trace.scenario.law.name} cannot enter the board, {result.why}: see smc.replay")
     return Row(name=name, score=score(values), **{field: getattr(values, field) for field in Row._fields[1:6]})

@@ -48,18 +48,18 @@ class Condition(NamedTuple):
     name: str  # as in the certificate's data
     margin: float  # by how much it holds, negative where it fails
     unit: str  # of the margin; "" for a share
-    words: str  # what it asks, or what it means that it fails
+    words: str  # what it asks, or what its failure means
     holds: bool
 
 
 def holds(name: str, margin: float) -> bool:
-    """Return whether a condition holds with a margin. At 0 all do but "reaching", which asks for more."""
+    """Return whether a condition holds with a margin. A margin of 0 is enough for all but "reaching"."""
     return margin > 0.0 or (margin == 0.0 and name != "reaching")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Certificate:
-    """What is proven of a law on a plant. `smc.certify` makes it, and a checker apart has accepted it.
+    """What is proven of a law on a plant. `smc.certify` makes it, and a separate checker has accepted it.
 
     Attributes:
       data: all of it, as in its file: plant, law, bounds of the disturbance, theorems with their conditions and what
@@ -100,17 +100,17 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether the scenario's own start surely comes to rest or into the bound, but for what `leaves_out` names."""
+        """Whether the scenario's start provably comes to rest or into the bound, apart from what `leaves_out` names."""
         return self.bound is not None
 
     @property
     def stable(self) -> bool:
-        """Whether every start surely comes to rest without a disturbance."""
+        """Whether every start provably comes to rest without a disturbance."""
         return self._part("saturated PD", holding=True) is not None
 
     @property
     def bound(self) -> float | None:
-        """The largest |x| in the end of runs from the scenario's start, m or rad, under every d within its bound."""
+        """The largest |x| in the end, m or rad, from the scenario's start under every d within its bound, or None."""
         if not self.data["disturbance"] and self.stable:
             return 0.0
         part = self._part("level sets", holding=True)
@@ -141,7 +141,7 @@ class Certificate:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What is proven and what is not: a sentence for each theorem, whether none speaks of d, what all leave out."""
+        """What is proven: a sentence for each theorem, one if none is about d, and one on what all leave out."""
         here = "; ".join(f"{name} ({what})" for name, what in self.leaves_out.items() if what)
         absent = ", ".join(name for name, what in self.leaves_out.items() if not what)
         left_out = f"no theorem here is about {here}" + f"; nor about what is not here: {absent}" * bool(absent)
@@ -151,7 +151,7 @@ class Certificate:
         return *(self._sentence(part) for part in self.data["parts"]), *nothing, left_out
 
     def _sentence(self, part: Mapping[str, Any]) -> str:
-        """Return what a theorem says of this plant, or which of its conditions fail, by how much."""
+        """Return what a theorem says of this plant, or which of its conditions fail and by how much."""
         theorem, x, d0 = part["theorem"], self.data["unit"], self.data["disturbance"]
         under = f"under every |d| <= {d0:g} {EFFORT[x]}" if d0 else "without d"
         failing = [row for row in self.conditions if row.theorem == theorem and not row.holds]
@@ -179,13 +179,13 @@ class Certificate:
         return f"proven by super-twisting: from a set in {where} s = 0 is reached, {under}{rate}"
 
     def _widest(self, part: Mapping[str, Any]) -> float:
-        """Return the largest x at rest up to which all lie in the level sets."""
+        """Return the largest x up to which all states at rest lie in the level sets."""
         x = np.linspace(0.0, part["x"][-1], 2001)
         outside = self.level(x, np.zeros_like(x)) > part["outer"]
         return float(x[max(int(np.argmax(outside)) - 1, 0)]) if outside.any() else float(x[-1])
 
     def contains(self, x: Any, v: Any) -> np.ndarray:
-        """Return which states lie in the region from which all come to rest or into the bound.
+        """Return whether each state lies in the region from which all come to rest or into the bound.
 
         Args:
           x, v: positions and velocities, arrays of one shape, rad or m and per second; w of super_twisting is 0.
@@ -251,7 +251,7 @@ class Certificate:
         """
         with reading(path, "certificate", "give a .json file that Certificate.save wrote") as file:
             made = cls(data=read_json(file))
-            made.sentences  # noqa: B018  # of what is no certificate it cannot be made
+            made.sentences  # noqa: B018  # raises if the file is no certificate
             return made
 
     def figure(self, path: str | os.PathLike[str] | None = None, traces: "Sequence[Trace]" = ()):

@@ -98,7 +98,7 @@ def phi(e, x):
 
 
 def sigma(f, s):
-    """Return sigma over a ball; of sgn where s has one sign, and its limit at an end that is 0."""
+    """Return sigma over a ball. For sgn, s has one sign; where it ends at 0, sigma is the limit there."""
     if f.kind == "tanh":
         return f.K * s.tanh()
     if f.kind == "sat":
@@ -187,7 +187,7 @@ def levels(doc, part, e, f):
 
 
 def falls(e, f, d0, box, corners, depth=MAX_HALVINGS):
-    """Return whether W' < 0 in a box for every |d| <= d0, in quarters of it where that is not certain."""
+    """Return whether W' < 0 in a box for every |d| <= d0. A box where that is not certain is cut into quarters."""
     (x0, x1, s0, s1), (w00, w10, w01, w11) = map(arb, box), map(arb, corners)
     x, s, edge = hull(x0, x1), hull(s0, s1), x1 - x0
     v, D = s - f.c * x, e.E + e.F * x * x
@@ -202,10 +202,10 @@ def falls(e, f, d0, box, corners, depth=MAX_HALVINGS):
 
 
 def quadratic(P, e, f, corners):
-    """Check that z' P z, P = [[p, q], [q, r]], falls where it is at most 1, and that these corners are there."""
+    """Check that z' P z, P = [[p, q], [q, r]], falls where it is at most 1, and that these corners lie in that set."""
     p, q, r = map(arb, P)
     det = p * r - q * q
-    x, s = (r / det).sqrt(), (p / det).sqrt()  # the largest where it is at most 1
+    x, s = (r / det).sqrt(), (p / det).sqrt()  # the largest |x| and |s| where the form is at most 1
     push = e.A * hull(x.sin() / x, 1) + e.B + e.C * hull(0, x * x)  # phi(x) / x for x < pi
     D, gain = hull(e.E, e.E + e.F * x * x), hull(sigma(f, s) / s, f.a)
     low, high = (push + D * f.c) / e.M - f.c * f.c, f.c - (D + gain) / e.M  # x' = s - c x, s' = low x + high s

@@ -16,8 +16,8 @@ from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation.trace import Trace
 
 FIGURE_SIZE = (11.0, 5.6)  # inches
-ZOOM_BOUNDS = 2.5  # the second panel shows so many bounds: chosen
-AXIS_POINTS = 801  # of the plane in each direction
+ZOOM_BOUNDS = 2.5  # half-width of the second panel as a multiple of the bound: chosen
+AXIS_POINTS = 801  # points of the plane in each direction
 LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
 
 

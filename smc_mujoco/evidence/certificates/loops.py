@@ -40,7 +40,7 @@ class Loop:
         return bool(np.isinf(self.steep))
 
     def fall(self, x, s, d):
-        """Return s' at states, with sigma at s = 0 what keeps s = 0 if the law can."""
+        """Return s' at states. At s = 0 a law that switches keeps s = 0 if it can."""
         v = s - self.c * x
         force = self.phi(x) - self.D(x) * v + self.M * self.c * v + d
         law = self.sigma(s)

@@ -28,12 +28,12 @@ from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, bounds_of
 
-GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # in x: chosen
+GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # largest x: chosen
 MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
 BOX_COUNTS = (64, 256, 1024, 4096)  # tried in turn
 SET_FACTOR = 0.98  # factor on the largest set that a condition allows: chosen
 SIZE_HALVINGS = 40  # of a set's size, in search of the largest
-POSITIVE_GAINS = "lam", "k", "k1", "c", "phi", "kp", "kd", "q1"  # of the laws that have them; the theorems need it
+POSITIVE_GAINS = "lam", "k", "k1", "c", "phi", "kp", "kd", "q1"  # where a law has them, its theorems need them > 0
 LAWS = ("observer_free", "boundary_layer", "lqr", "pid", "classical", "terminal", "super_twisting")
 Judge = Callable[[str, dict], dict[str, Any] | None]  # theorem, its data -> its margins, None where it is refused
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
@@ -43,11 +43,11 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     """Return what is proven of a scenario's law on its plant, checked in ball arithmetic.
 
     Laws: observer_free, boundary_layer, lqr and pid (without an integral), classical, terminal, super_twisting; all
-    without the nominal model and a surface of another file. Plants: the pendulums and their networks, duffing and
-    van_der_pol, with any parameters and mismatch, at rest at 0.
+    without the nominal model or a separate surface. Plants: the pendulums and their networks, duffing and
+    van_der_pol, with any parameters and mismatch, and with 0 as the goal.
 
     Args:
-      within: the class of disturbances, as of `worst_case`, beside those of the scenario: bounds of |d| and, for
+      within: disturbances in addition to the scenario's own, as of `worst_case`: bounds of |d| and, for
         super_twisting, of |d'|. None: the scenario's own disturbance and no other.
 
     Raises:
@@ -200,7 +200,7 @@ def _told(margins: dict[str, Any]) -> list[dict]:
 
 def _judged(theorem: str, data: dict, judge: Judge) -> dict:
     """Return a theorem with the margins that the checker derives from its data."""
-    return _part(theorem, _told(judge(theorem, data) or {}), **data)  # if it is refused, so is the whole in the end
+    return _part(theorem, _told(judge(theorem, data) or {}), **data)  # data refused here is refused again in the end
 
 
 def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:
@@ -271,7 +271,7 @@ def _levels(room: float, levels: search.Levels, scenario: Scenario, start: tuple
 
 
 def _cell(levels: search.Levels, x: float, s: float) -> float:
-    """Return the largest corner of the cell of a state, 1 outside of the grid."""
+    """Return the largest W at the corners of a state's cell, 1 outside of the grid."""
     x, s = (x, s) if x >= 0.0 else (-x, -s)
     if x >= levels.x[-1] or abs(s) >= levels.s[-1]:
         return 1.0

@@ -3,7 +3,7 @@
 The loop is M x'' = phi(x) - D(x) x' - sigma(s) + d with |d| <= d0 and s = x' + c x, in the coordinates x and s, which
 separate its fast from its slow motion. W = 1 - exp(-T), where T is the time until a target around rest is reached while
 d delays it as long as it can: the value of a game of pursuit and evasion. It is computed by a semi-Lagrangian scheme
-and swept in four orders until it stays. W is bilinear between the nodes. The search proves nothing: the checker does.
+and swept in four orders until it settles. W is bilinear between the nodes. The search proves nothing: the checker does.
 
 Source: M. Bardi and I. Capuzzo-Dolcetta, Optimal Control and Viscosity Solutions of Hamilton-Jacobi-Bellman Equations,
 Birkhauser 1997 (the game, and 1 - exp(-T)); P. Giesl and S. Hafstein, "Review on computational methods for Lyapunov
@@ -24,9 +24,9 @@ from smc_mujoco.simulation.cfunctions import cached
 # Says of a cell (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls there.
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
 Attracts = Callable[[np.ndarray], bool]  # says of P whether z' P z surely falls where it is at most 1
-CELLS, TARGET_CELLS = 110, 8.0  # on each side of 0, in x and in s, and in half a target: chosen
+CELLS, TARGET_CELLS = 110, 8.0  # cells on each side of 0, in x and in s; cells in half a target: chosen
 SWEEPS, SWEEP_TOLERANCE = 500, 1e-9  # of a solution
-SMOOTHING_COUNTS = (2, 8, 24)  # of W, which blunt its edges: chosen
+SMOOTHING_COUNTS = (2, 8, 24)  # how often W is smoothed, which blunts its edges: chosen
 SPEED_RATIO = 3.0  # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
 MIN_FALL_SHARE = 0.01  # least fall in a cell, as a share of the range of W' in it: chosen
 MIN_RANGE = 0.02  # range of levels that is worth a certificate: chosen
@@ -207,7 +207,7 @@ class _Grid:
 
 
 def axis(reach: float, step: float) -> np.ndarray:
-    """Return 2 CELLS + 1 nodes from -reach to reach, the closest `step` apart around 0, ever wider outwards."""
+    """Return 2 CELLS + 1 nodes from -reach to reach, `step` apart around 0 and ever wider outwards."""
     step = min(step, reach / CELLS * 0.999)
     wide: Any = brentq(lambda a: reach / np.sinh(a) * np.sinh(a / CELLS) - step, 1e-6, 60.0)
     half = reach / np.sinh(wide) * np.sinh(wide * np.arange(CELLS + 1) / CELLS)

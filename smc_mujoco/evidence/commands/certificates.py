@@ -40,8 +40,8 @@ def certify(
 
     The plant is its equation, integrated exactly, and the law acts at every instant. The command prints each theorem
     with its conditions and their margins, also where they fail, and what it leaves out of your machine: the sampling,
-    delay, noise, dry friction. A checker of its own has proven it in ball arithmetic before it is shown; --check runs
-    that checker again, with exit code 2 if a statement is not proven.
+    delay, noise, dry friction. A separate checker proves it in ball arithmetic before it is shown; --check runs that
+    checker again, with exit code 2 if a statement is not proven.
 
     Example: smc-mujoco certify duffing --law observer_free --disturbance 2 --out duffing.json --figure duffing.png
 

@@ -34,8 +34,8 @@ def claims(
     """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
-    otherwise. One counter-example refutes a universal claim. What is said of some gains is "not shown" where a search
-    finds no example. Claims that you name are shown in full. All of Gaber's, the default, take minutes.
+    otherwise. One counter-example refutes a universal claim. A claim about some gains is "not shown" if a search finds
+    no example. Claims that you name are shown in full. All of Gaber's, the default, take minutes.
 
     A second audit with the same versions writes the same file of --evidence, to the last bit. With --mutants the exit
     code is 1 if an audit of some claim cannot fail.
@@ -76,7 +76,7 @@ def claims(
 
 
 def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
-    """Print the claims that no mutant loses, and those that cannot be lost; return whether there are any of the first.
+    """Print the claims that no mutant loses, and those that cannot be lost; return whether any is in the first list.
 
     `asked`: the first arguments of `survivors`.
     """

@@ -7,7 +7,7 @@ import numpy as np
 from smc_mujoco.metrics.limit_cycle import limit_cycle
 from smc_mujoco.simulation.trace import Trace
 
-END_SAMPLES = 3000  # for every control period, as their maximum grows with their number
+END_SAMPLES = 3000  # the same at every control period, because a maximum grows with the number of samples
 
 
 def late(signal: np.ndarray) -> float:

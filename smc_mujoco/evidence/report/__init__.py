@@ -3,8 +3,8 @@
     from smc_mujoco.evidence.report import report
     report("report", quick=True)                   # report/report.html, which needs no other file and no network
 
-The folder also keeps the data: study/results.parquet, claims, margins and region maps as JSON, films as WebM. Started
-again it computes only what is missing.
+The folder also keeps the data: study/results.parquet, claims, margins and region maps as JSON, films as WebM. A second
+call computes only what is missing.
 """
 
 import dataclasses
@@ -33,17 +33,17 @@ def report(
     Args:
       out: the folder; what it holds already is not computed again.
       quick: a look in two minutes: less of everything, one set of gains for the claims.
-      seeds: of every cell of the grid; by default 24.
+      seeds: number of seeds of each cell of the grid; by default 24.
       threads: simulations at once; None for one per available core.
-      progress: whether to show a bar a stage.
+      progress: whether to show a bar for each stage.
       plan: how much of everything, instead of `quick`.
       records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
       laws: names of further laws, beside those of the plan; each needs tuned gains on every plant of the plan.
       relevant: the least relevant difference, as a share of the larger value, see `leaderboard`; by default 0.03.
 
     Raises:
-      ScenarioError: a number of seeds or threads that cannot be, a folder that cannot be written, records of no rig, or
-        a further law that is unknown or has no tuned gains.
+      ScenarioError: an impossible number of seeds or threads, a folder that cannot be written, records of no known
+        rig, or a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 or plotly is not installed.
     """
     from smc_mujoco.common import extras

@@ -57,7 +57,7 @@ class Loss(NamedTuple):
     law: str  # the best one
     # Ratio of the medians; where the rival's is below the least difference that counts, the ratio to that difference.
     times: float
-    rounded: bool  # whether it is, so that the ratio is a lower bound
+    rounded: bool  # whether the rival's is below it, so that `times` is a lower bound
     settles: bool  # whether the best law settles there: a law that hardly acts may be calm, and never arrive
 
 
@@ -136,7 +136,7 @@ def attacked(findings: "Findings") -> dict[str, WorstCases]:
 
 
 def robust(attacked: Mapping[str, WorstCases]) -> str:
-    """Return which law has the smallest error in the worst case on each plant, and where it is not first by median."""
+    """Return which law has the smallest worst-case error on each plant, and which has the smallest median if others."""
     first = [rows[0] for rows in attacked.values()]
     lowest = [min(rows, key=lambda case: case.median) for rows in attacked.values()]
     others = [case for case in lowest if case not in first]

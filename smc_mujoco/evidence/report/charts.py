@@ -29,7 +29,7 @@ FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, s
 KEYS_PER_LINE = 5  # laws in a line of a legend
 LINE_HEIGHT = 21  # px, of a line of a legend
 NAME_FONT = {"size": 11.5, "color": style.INK}  # of laws beside their lines
-FALLS, RISES = "#DCEAF4", "#C05A21"  # of V; light and dark apart from hue
+FALLS, RISES = "#DCEAF4", "#C05A21"  # where V falls, where it rises: different in lightness, not only in hue
 # Of logarithmic axes. Plotly writes powers a quarter larger than this size.
 LOG_AXIS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
 AXIS = {
@@ -133,7 +133,7 @@ def _span(values: Sequence[float], floor: float | None) -> list[float]:
 def margins(drawn: "Sequence[Margin]", kind: str) -> go.Figure:
     """Draw the largest level of one kind that each law tolerates: a panel per plant; a bar marks linear theory.
 
-    A triangle means that the search ended there without a failure, a cross that not even none is tolerated.
+    A triangle means that the search ended there without a failure, a cross that even the level 0 is not tolerated.
     """
     plants = list(dict.fromkeys(margin.plant for margin in drawn))
     laws = list(dict.fromkeys(margin.law for margin in drawn))

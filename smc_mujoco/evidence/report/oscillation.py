@@ -29,7 +29,7 @@ class Oscillation:
     frequency: float  # predicted, Hz
     measured_amplitude: float  # of a run
     measured_frequency: float
-    third_harmonic: float  # as the next how good the prediction is, see `Chattering`
+    third_harmonic: float  # like `uncertainty`, how good the prediction is; see `Chattering`
     uncertainty: float
     marked: bool  # whether half the physics step changes the run's numbers by more than 10 %
 

@@ -50,7 +50,7 @@ Cell = TypeVar("Cell")
 
 
 def environment() -> "Environment":
-    """Return what renders the templates, with their filters and the functions that they share."""
+    """Return the jinja2 environment of the templates, with their filters and shared functions."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 

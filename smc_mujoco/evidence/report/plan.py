@@ -31,8 +31,8 @@ class Plan(Extent):
     conditions: tuple[str, ...] = GRID.conditions
     seeds: int = GRID.seeds
     relevant: float = RELEVANT  # the least relevant difference, see `leaderboard`
-    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")  # of margins of all plants and laws
-    attacked: tuple[str, ...] = scenarios.PLANTS  # on which an adversary searches the worst case of each law
+    kinds: tuple[str, ...] = ("delay", "disturbance", "friction", "mass", "noise")  # of margins, for all plants, laws
+    attacked: tuple[str, ...] = scenarios.PLANTS  # plants on which the worst case of each law is searched
     attacks: int | None = None  # runs of its search; None for 10 s of processor time a law and plant
     compared: tuple[str, ...] = ("disturbance",)  # kinds of margins that are searched under every set of gains
     # With maps of their regions of attraction: on 2 cores a map of 1000 states takes 12 s.
@@ -40,15 +40,15 @@ class Plan(Extent):
     basin_laws: tuple[str, ...] = scenarios.LAWS
     points: tuple[int, int] = (32, 32)  # of a map, across and up
     region: float = scenarios.DURATION  # the longest run of a map, s
-    claims: tuple[str, ...] | None = None  # to judge; None for all
+    claims: tuple[str, ...] | None = None  # ids of the claims to judge; None for all
     scenes: tuple[tuple[str, str], ...] = tuple((plant, "nominal") for plant in scenarios.PLANTS)  # traces and films
     filmed: int = len(scenarios.PLANTS)  # how many of the scenes are filmed
     scene_laws: tuple[str, ...] = scenarios.LAWS  # side by side in a scene
     scene: float = 5.0  # duration of traces and films, s
     rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")  # whose laws are compared on all parameter sets
     accurate: tuple[str, ...] = ("duffing",)  # plants on which accuracy is measured without noise
-    periods: tuple[float, ...] = PERIODS  # control periods of that, s
-    accuracy_starts: int = DEFAULT_SEEDS  # initial states of that
+    periods: tuple[float, ...] = PERIODS  # control periods of these measurements, s
+    accuracy_starts: int = DEFAULT_SEEDS  # number of initial states of these measurements
 
 
 FULL = Plan(quick=False)

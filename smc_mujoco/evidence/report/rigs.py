@@ -67,8 +67,8 @@ class Repeated:
 
     rig: Rig
     name: str  # of the record's file
-    fits: Mapping[str, Mapping[str, float]] = frozen({})  # quantities, or "do nothing" -> column -> percent
-    t: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0))  # s, (K,), in few points
+    fits: Mapping[str, Mapping[str, float]] = frozen({})  # parameter set or "do nothing" -> column -> percent
+    t: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0))  # s, (K,), thinned to few points
     measured: records.Record = dataclasses.field(default_factory=dict)  # column -> values, (K,)
     twin: records.Record = dataclasses.field(default_factory=dict)
     why: str = ""  # why it could not be repeated

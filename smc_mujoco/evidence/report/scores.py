@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Score(NamedTuple):
-    """A law's median in a cell over the seeds, with its 95 % interval; inf is never."""
+    """A law's median in a cell over the seeds, with its 95 % interval; inf means never."""
 
     plant: str
     condition: str

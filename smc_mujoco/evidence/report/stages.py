@@ -2,8 +2,8 @@
 
     findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
 
-Killed and called again, the grid continues where it stopped. The other stages continue with the first plant, map, film
-or list of claims that is missing.
+If it is killed and called again, the grid continues where it stopped. The other stages continue with the first plant,
+map, film or list of claims that is missing.
 """
 
 import contextlib
@@ -123,7 +123,7 @@ class Findings:
 def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Path | None = None) -> Findings:
     """Return everything that a report shows, computed or read from the folder; `records`: folder of rigs' records."""
     work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
-    repeated = rigs.repeated(work, records)  # first, as bad files are refused
+    repeated = rigs.repeated(work, records)  # first, so that bad files are refused before anything is computed
     table = grid(work)
     claims = judged_claims(work, table)
     worst, margins = worst_cases(work), all_margins(work)
@@ -178,7 +178,7 @@ def judged_claims(work: Work, table: Table) -> Claims:
 
 
 def worst_cases(work: Work) -> tuple[WorstCase, ...]:
-    """Return the worst case that is found of each law, within the class that is usual on its plant."""
+    """Return the worst case found for each law, within the usual uncertainty of its plant."""
     plan = work.plan
 
     def compute(pair: tuple[str, str], report: Report) -> WorstCase:
@@ -248,7 +248,7 @@ def accuracies(work: Work) -> AccuracyTable:
 
 
 def all_scenes(work: Work) -> tuple[films.Scene, ...]:
-    """Return runs side by side: their curves, and films where something renders."""
+    """Return runs side by side: their curves, and films where they can be rendered."""
     plan = work.plan
 
     def compute(scene: tuple[str, str], report: Report) -> films.Scene:
@@ -283,7 +283,7 @@ def fields(plan: Plan) -> tuple[Field, ...]:
 
 
 def fronts(plan: Plan) -> tuple[Front, ...]:
-    """Return error against effort, of the tunings that come with the package."""
+    """Return the fronts of error against effort that the package's tunings found."""
     pairs = []
     for plant in plan.plants:
         for law in plan.laws:

@@ -43,7 +43,7 @@ def interval(median: float, low: float, high: float) -> str:
 
 
 def colour(name: str) -> str:
-    """Return the colour of a law; no law has that of one of the short list, or of an installed package."""
+    """Return the colour of a law, different from those of the short list and of other packages' laws."""
     shown = list(dict.fromkeys([*gain_sets.LAWS, *known_laws().added, name]))
     return style.law_colours(shown)[shown.index(name)]
 
@@ -69,12 +69,12 @@ def metric(name: str) -> str:
 
 
 def asks(metric: str) -> str:
-    """Return what a user asks for who wants a small value of a metric, such as "fast"."""
+    """Return the wish that a small value of a metric grants, such as "fast"."""
     return CATALOGUE[metric].need.replace("-", " ")
 
 
 def unit(metric: str, plant: str | None = None) -> str:
-    """Return a metric's unit on a plant, or on all of those that differ: "rad or m"."""
+    """Return a metric's unit on a plant; without a plant its different units, as "rad or m"."""
     if metric not in CATALOGUE:
         return ""
     xs = [plants()[plant].unit] if plant and plant in plants() else ["rad", "m"]

@@ -29,8 +29,8 @@ def runs(
 ) -> list[Scenario]:
     """Return scenarios of every law on every parameter set from every seed. The set is the condition.
 
-    A name of one of the rig's `laws`, the default, means that one. `seeds`, `gains`, `duration` and `starts` are as in
-    `smc.grid`, by default within 20 % of the rig's x0.
+    `laws`: by default the rig's own; the name of one of these means it, with its gains. `seeds`, `gains`, `duration`
+    and `starts` are as in `smc.grid`; starts are by default within 20 % of the rig's x0.
     """
     if not rig.ensemble:
         raise ScenarioError(

@@ -232,7 +232,7 @@ def _checked_names(twin: Rig, quantities: Sequence[str] | None) -> list[str]:
 def _solved(
     twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], starts: int, seed: int, most: int, report: Any
 ) -> tuple[Replays, Slopes, np.ndarray]:
-    """Return the replays that are compared in the end, their slopes at the solution, and its error by steps, (p,)."""
+    """Return the replays of the last search, their slopes at the solution, and its error due to steps, (p,)."""
     pieces = Replays(twin, names, data, False, report)
     reached = search.search(pieces, starts, seed, most)
     if twin.controller is None:

@@ -45,7 +45,7 @@ class Columns:
     torque: tuple[str, ...] = ()  # of each joint, for records whose torques are predicted from the motion
 
     def needed(self, closed: bool) -> tuple[str, ...]:
-        """Return the columns that a record must have, of a closed loop also the reference."""
+        """Return the columns that a record must have; for a closed loop also the reference."""
         command = self.torque or (self.u, self.reference)[: 1 + closed]
         return self.time, *self.x, *command
 
@@ -230,7 +230,7 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
 
 
 def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
-    """Return a derivative of columns, (..., K), from a cubic through the samples about each. Order 0 is the cubic."""
+    """Return a derivative of columns, (..., K), from a cubic about each sample. Order 0 is the cubic itself."""
     from scipy.signal import savgol_filter
 
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))

@@ -1,7 +1,7 @@
 """Residuals of records and their slopes: what a twin predicts at trial values, in pieces that have states of their own.
 
 A piece of a record is replayed from positions and velocities at its start. These are free numbers of the search, one
-set for each piece (multiple shooting), because no few samples give them well enough. They enter almost linearly, so
+set for each piece (multiple shooting), because a few samples give them too poorly. They enter almost linearly, so
 each step of the search moves them by linear least squares, and only the quantities remain.
 Source: H. G. Bock, "Recent advances in parameter identification techniques for ODE", 1983.
 
@@ -44,7 +44,7 @@ class Piece:
     part: Part | None  # what its replay takes from the record; None if torques are predicted
     skipped: int  # samples at its start that are not compared
     measured: Record  # the columns compared, (N,) each
-    spread: Mapping[str, float]  # norm of each whole column about its mean, of which residuals are parts
+    spread: Mapping[str, float]  # norm of each whole column about its mean, by which residuals are divided
     scales: np.ndarray  # units of the free states, (s,)
 
 
@@ -64,8 +64,8 @@ class Slopes:
     residuals: list[np.ndarray]  # (N,) of each piece
     by_values: list[np.ndarray]  # derivatives by the quantities, (N, p)
     by_states: list[np.ndarray]  # derivatives by the piece's states, (N, s)
-    columns: int  # that are compared
-    records: int  # of which these are pieces
+    columns: int  # number of columns that are compared
+    records: int  # number of records whose pieces these are
 
     def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
@@ -82,7 +82,7 @@ class Slopes:
     def stepped(self, step: np.ndarray) -> "Slopes":
         """Return the slopes after a small step of the quantities (p,), with residuals that follow from derivatives.
 
-        States that the noise hides, as a velocity at a start in dry friction, do not move.
+        States that the noise hides, such as a starting velocity in dry friction, do not move.
         """
         noise = math.sqrt(self.cost / sum(map(len, self.residuals)))
         rows, moves = [], []
@@ -196,9 +196,9 @@ class Replays:
         ]
 
     def correct(self, point: Point, halvings: int) -> bool:
-        """Correct all replays by what `halvings` of MAX_STEP change at a point. Return whether steps err at all."""
+        """Correct later replays by what `halvings` of MAX_STEP change at a point; return whether that is needed."""
         if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
-            return False  # simulated runs have the errors of the scenario's own steps, too
+            return False  # records of simulated runs have the same errors by steps
         rig = self.rig(point)
         if not (plain := rig.repeated(self._part(0))).realistic:
             return False
@@ -227,7 +227,7 @@ class Replays:
         return dataclasses.replace(sharp, residuals=slopes.residuals)
 
     def _replayed(self, rigs: Sequence[Rig], points: Sequence[Point], fields: dict[str, Any]) -> list[list[Record]]:
-        """Return `predicted` by replays without corrections, whose scenarios have other `fields`."""
+        """Return what `predicted` returns, without corrections; `fields` replace those of the replays' scenarios."""
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)
             scenarios = [
@@ -245,7 +245,7 @@ class Replays:
         ]
 
     def relative(self, piece: Piece, predicted: Record) -> np.ndarray:
-        """Return the residuals of a piece, sample by sample with all columns, (N,), as parts of the columns' spread."""
+        """Return the residuals of a piece, sample by sample with all columns, (N,), divided by the columns' spread."""
         rows = np.column_stack([(piece.measured[name] - predicted[name]) / piece.spread[name] for name in predicted])
         return np.clip(np.nan_to_num(rows, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST).ravel()
 

@@ -299,7 +299,7 @@ class Rig:
         return self.period or records.step_of(data[self.columns.time])
 
     def reading(self, many: Sequence[Source]) -> tuple["Rig", list[Mapping[str, Any]]]:
-        """Return the rig that repeats some records, of traces from their start under their law, and them as columns."""
+        """Return the rig that repeats records, and these as columns. It repeats a trace by its law, from its start."""
         traces = [record for record in many if isinstance(record, Trace)]
         if not traces:
             return self, [record for record in many if not isinstance(record, Trace)]
@@ -343,7 +343,7 @@ class Rig:
     def refuse_degrees(self, record: Mapping[str, Any], fit: Mapping[str, float]) -> None:
         """Raise ScenarioError if a record has degrees in place of radians.
 
-        It has if it fits far better after all its angles, those of a joint, or the references are converted to radians.
+        It has degrees if it fits far better with all its angles, those of a joint, or the references taken as degrees.
         A record that fits well as it is, by `fit`, is not simulated again.
         """
         if min(fit.values()) >= 100.0 - RADIANS_GAIN or "rad" not in self.scenario("none").plant.units:

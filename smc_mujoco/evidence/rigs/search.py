@@ -1,11 +1,11 @@
-"""The search of identification: starts by torques and over decades, and damped Gauss-Newton steps from the best.
+"""The search of identification: starts from torques and over decades, and damped Gauss-Newton steps from the best.
 
 Where the joints have the recorded command as their force, a first least squares compares that force with the inverse
 dynamics of the measured motion. It is nearly linear in masses and frictions, so any values may start it. The noise
 of accelerations biases it, so its result is only a start.
 
-Quantities that cannot be negative, as masses and frictions, differ between machines by powers of ten. So further starts
-are drawn evenly in their logarithms, and no step changes such a quantity by more than a factor of ten.
+Quantities that cannot be negative, such as masses and frictions, differ between machines by powers of ten. So further
+starts are drawn evenly in their logarithms, and no step changes such a quantity by more than a factor of ten.
 """
 
 import dataclasses
@@ -20,7 +20,7 @@ from smc_mujoco.evidence.rigs.uncertainty import jackknife
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
 DAMPINGS = (0.0, 1e-2, 1.0, 1e3)  # of the steps that are tried at once, relative to the curvature; chosen
-SHARES = (0.3, 1.0)  # of its linear move that a state at the start of a piece makes in trials; chosen
+SHARES = (0.3, 1.0)  # shares of its linear move by which a piece's starting state is moved in trials; chosen
 MAX_STATE = 100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
@@ -97,7 +97,7 @@ def better(replays: Replays, *points: Point) -> Point:
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
     """Return what a search reaches when its replays are corrected, and how far the last halving moved it, (p,).
 
-    The step is halved until that is a small part of the standard errors. Residuals are corrected at each point, because
+    The step is halved until that move is far below the standard errors. Residuals are corrected at each point, because
     the moments at which dry friction changes its direction move. The derivatives stay those of the first step.
     """
     moved = np.zeros(len(replays.names))
@@ -140,7 +140,7 @@ def refine(replays: Replays, point: Point, most: int) -> Slopes:
 
 
 def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
-    """Return the best of several damped steps, and its cost. Each piece moves its own states as far as it gains."""
+    """Return the best of several damped steps, and its cost. Each piece chooses the best move of its own states."""
     groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
     trials, size = [point for group in groups for point in group], len(groups[0])
     costs = np.array([[cost([rows]) for rows in pieces] for pieces in replays.residuals(trials)])

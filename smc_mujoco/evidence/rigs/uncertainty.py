@@ -27,14 +27,14 @@ REPEATS = 24  # simulated repetitions of the records of a closed loop, for stand
 # Of the jackknife, chosen: blocks of time in all pieces together, and the length of a block in correlation times of the
 # residuals.
 BLOCKS, CORRELATION_TIMES = (60, 400), 10.0
-MIN_POWER = 1e-300  # no residual at all
+MIN_POWER = 1e-300  # in place of the power 0 of residuals that are all 0
 SINGULAR_RATIO = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
 
 
 def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray, float]:
     """Return the standard error of each quantity, their correlations (p, p), and `independent`, at the solution.
 
-    `by_steps`: errors of the quantities by the steps of their simulation, in their scales, (p,).
+    `by_steps`: errors of the quantities that the simulation's steps cause, in their scales, (p,).
     """
     names = replays.names
     J = np.concatenate(slopes.freed(slopes.by_values))

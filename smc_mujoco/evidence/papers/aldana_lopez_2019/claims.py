@@ -5,11 +5,11 @@ import math
 from smc_mujoco.control.law import law_function
 from smc_mujoco.evidence.papers.measures import settled
 
-BAND = 1e-6  # m/s, of |s|: it counts as reached
-SWITCHING_BAND = 1e-3  # m/s, the band with a switching gain, which chatters in k dt
+BAND = 1e-6  # m/s: s = 0 counts as reached while |s| is within it
+SWITCHING_BAND = 1e-3  # m/s, the same with a switching gain k, which chatters by k dt
 FAR_START, MAX_SHARE_BEYOND = 5000.0, 0.02  # m/s, stands for infinity; share of the time beyond it
 MIN_KP = 0.3  # least k p: below it a sample of 10 us takes s across the band
-RUN_BOUNDS = 1.5  # least bounds that a run lasts
+RUN_BOUNDS = 1.5  # duration of a run over the least bound
 
 
 @law_function(

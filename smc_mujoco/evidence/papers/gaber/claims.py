@@ -1,7 +1,7 @@
 """How the claims of Gaber's paper are measured, in the order of the paper.
 
 Settling time, overshoot and ripple are those of `metrics`. Overshoot is what goes beyond the origin, in percent of
-|x0|, whether the paper calls it overshoot or undershoot; if less is better, it is inf of a run that does not settle.
+|x0|, whether the paper calls it overshoot or undershoot; where less is better, a run that does not settle has inf.
 "Larger" and "slower" mean by more than the least relevant difference. The paper says neither which way up the network's
 pendulums are nor how strongly they are coupled: a claim on it is supported if it holds on both networks of the study.
 """
@@ -32,8 +32,8 @@ from smc_mujoco.simulation.signals import Noise
 
 OURS, CLASSICAL, ADAPTIVE, HOSMC = LAWS  # the paper's law, and those that it compares
 RIVALS = LAWS[1:]
-UNCLAMPED = "super_twisting_unclamped"  # as published; in the first gains its integral is clamped
-CONDITIONED = "conditioned_super_twisting"  # not the paper's: without the wind-up of the plain one
+UNCLAMPED = "super_twisting_unclamped"  # as published; with the gains "study" HOSMC's integral is clamped
+CONDITIONED = "conditioned_super_twisting"  # not the paper's: it does not wind up as the plain one does
 RELEVANT_SCALE_SHARE = 0.005  # share of a scale; chosen
 LONG_RUN, LONG_PERIOD = 40.0, 5e-3  # s; s, of control and physics, enough for a smooth law near rest
 QUICK_RESOLUTION = 8  # control periods, of a quick search of delays, which tries none shorter; chosen
@@ -45,7 +45,7 @@ SMALL_START_SHARE = 1e-3  # of x0
 
 
 def scale(scenario):
-    """Return the largest |x0|, of which percentages are; the scale of a run that is to come to rest at 0."""
+    """Return the largest |x0|, the scale of a run that should come to rest at 0; 1 if it starts at 0."""
     return max(map(abs, scenario.resolved.x0)) or 1.0
 
 
@@ -57,7 +57,7 @@ def long_run(runs, plant, lam, position, rate=0.0):
 
 
 def command_bound(runs, plant):
-    """Return min(lambda, u_max), the bound on the u of the paper's law, N or N m; of a mutant with its |lambda|."""
+    """Return min(|lambda|, u_max), the bound on the u of the paper's law or its mutant, N or N m."""
     return min(abs(runs.law(plant, OURS).gains["lam"]), runs.scenario(plant, OURS).resolved.u_max)
 
 
@@ -137,7 +137,7 @@ def smallest_lam(runs, plant):
 
 
 def smallest_stable(runs):
-    """Return plant -> the smallest lambda found stable between MIN_LAMBDA and U_MAX; inf if U_MAX is not.
+    """Return plant -> the smallest lambda found stable between MIN_LAMBDA and U_MAX; inf if U_MAX is not stable.
 
     Stable means that a start near the origin dies out. Each round divides the range by eight values.
     """

@@ -35,7 +35,7 @@ def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -
 
 
 def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V' by (2) in the states (x, v), in the unit of s, squared, per s; gains lam, k1 are not saturated."""
+    """Return V' by (2) in the states (x, v), in the squared unit of s per second; u is not saturated."""
     x, v = np.asarray(x, float), np.asarray(v, float)
     f, g = _model(plant, x, v)
     alpha = v + k1 * x
@@ -45,7 +45,7 @@ def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> n
 
 
 def plane(plant: Plant, k1: float, points: int = GRID_POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Return a grid of states: x up to GRID_REACH |x0|, v up to k1 times that. A diagonal is alpha = 0."""
+    """Return a grid of states: x up to GRID_REACH |x0|, v up to k1 times that. On one diagonal alpha is 0."""
     reach = GRID_REACH * max(map(abs, plant.x0))
     x = np.linspace(-reach, reach, points)
     grid = np.meshgrid(x, k1 * x)

@@ -38,7 +38,7 @@ def scenario(
     """Return the scenario of one plant under one law in one condition.
 
     Args:
-      changes: Scenario field -> value, over what the study and the condition have, such as {"friction": Coulomb(0.1)}.
+      changes: Scenario field -> value, in place of the study's or the condition's: {"friction": Coulomb(0.1)}.
       gains: a set of `gains`: "study", "tuned", "tracking", or "default".
 
     Raises:

@@ -5,7 +5,7 @@ import numpy as np
 from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, late_step, settled
 
 FORCE = 2.0  # N: d, and what the plants add to it within 0.6 of the origin
-SLOPE = 6.0  # N/s, of that
+SLOPE = 6.0  # N/s, slope of that force
 
 
 def classical_margins(gains):

@@ -10,7 +10,7 @@ QUICK_PERIOD, FORCE = 5e-4, 13.0  # s, of a quick audit; N, the largest d with w
 
 
 def margins(gains):
-    """What the sampling leaves of the largest disturbance, N: 2 sqrt(eps/h) - 1 - D."""
+    """How far the largest disturbance D is below what the sampling allows, N: 2 sqrt(eps/h) - 1 - D."""
     return {"D < 2 sqrt(eps/h) - 1, N": 2.0 * (gains["eps"] / QUICK_PERIOD) ** 0.5 - 1.0 - FORCE}
 
 

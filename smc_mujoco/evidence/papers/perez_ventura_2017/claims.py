@@ -1,4 +1,4 @@
-"""How the claims of Perez-Ventura & Fridman 2017 are measured."""
+"""How the claims of Perez-Ventura & Fridman 2017 are measured. ATC is the actuator's time constant."""
 
 import math
 
@@ -9,7 +9,7 @@ from smc_mujoco.evidence.papers.measures import cycle, exponent
 
 FIRST_HARMONIC = 2.0 * math.gamma(1.25) / (math.sqrt(math.pi) * math.gamma(1.75))  # c, of [sin]^(1/2)
 RELAY_GAIN_RATIO = 1.1  # M over the bound of the disturbance
-SAMPLES_PER_ATC = 50  # samples in the ATC
+SAMPLES_PER_ATC = 50  # samples in one ATC
 QUICK_LAG = 1  # index of the first ATC of a quick audit
 
 

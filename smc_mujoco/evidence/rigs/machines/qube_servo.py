@@ -21,7 +21,7 @@ START_TIME = 2.0  # s: before, the pendulum is caught
 BARS = 9  # of the commutator; its two brushes bridge two bars at 18 places a turn
 PITCH = math.tau / BARS  # rad
 ANGLE_COUNT = 80  # that are tried in a pitch, 0.5 degrees apart; chosen
-FRICTION_SPEED = 0.05  # rad/s, at which dry friction is at its limit in that balance; chosen
+FRICTION_SPEED = 0.05  # rad/s, at which dry friction nears its limit in `zero`; chosen
 MIN_PROBABILITY = 0.95  # of the angles within a sixteenth of a pitch: below it a brush's is not known; chosen
 PERIOD, STEP = 2e-3, 5e-4  # s; the fit is the same to 0.3 % at half the step
 ORIGIN = "identified here from eight records by least squares in closed loop, after a wide search with two of them"
@@ -64,10 +64,10 @@ def ripples(q, x: np.ndarray) -> np.ndarray:
 def zero(q, record: Record) -> dict[str, float]:
     """Return the angle of a brush in a record, whose arm was somewhere when its encoder was switched on; {} if unknown.
 
-    As the motion is measured, the arm's balance gives the torque that an even motor lacks. Its terms go through the
-    same cubics, and what inertia and friction explain does not count. Each angle of a brush explains a part of the
-    rest. The angle is known if those nearby have MIN_PROBABILITY, of all angles and of an even motor. That is too
-    sure of short records: of 12 angles from quarters of the public ones 4 are wrong.
+    The arm's balance, with the measured motion, gives the torque that a motor without ripple lacks. Its terms go
+    through the same cubics, and what inertia and friction explain is taken out. Each angle of a brush explains a part
+    of the rest. The angle is known if those near it have MIN_PROBABILITY among all angles and "no ripple". For short
+    records that is too sure: of 12 angles from quarters of the public records 4 are wrong.
     """
     theta, alpha, u = (record[name][round(START_TIME / PERIOD) :] for name in ("theta", "alpha", "plant_input"))
     if not q.ripple or len(u) <= 2 * STATE_SAMPLES or not np.ptp(u):
