@@ -53,8 +53,8 @@ class LinearLaw:
     d: tuple[float, ...]
     inputs: tuple[str, ...]  # keys of INPUTS
     name: str  # of the law
-    discrete: bool  # whether the matrices are those of a step
-    control_period: float | None  # s, for which they are; None for any
+    discrete: bool  # whether the matrices give the step of one control period
+    control_period: float | None  # s, of the run for which that step is; None for any
 
     @property
     def __name__(self) -> str:
@@ -132,8 +132,8 @@ def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: st
     Args:
       K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m; or matrices
         (A, B, C, D) or (A, B, C, D, dt). Without dt, or with dt = 0, it is of continuous time, and discretised by
-        Tustin's rule with the control period of the run. With dt = True it is a step of any period, with dt in s one of
-        this control period.
+        Tustin's rule with the control period of the run. With dt = True it is the step of any control period; with dt
+        in s, of that control period.
       inputs: what K reads, in its order: error (r - x), error_rate (r' - v), x, v, r, dr, ddr, and q, dq of the joint
         without actuator that this one moves. Default: error, and error_rate if K has two inputs.
       name: of the law.

@@ -1,9 +1,9 @@
 """A trace as an .mcap file: the moving machine, and its signals as curves, for Foxglove and Rerun.
 
-Messages are protobuf, which both read; Rerun 0.41 shows nothing of JSON. The machine is in Foxglove's own kinds:
-FrameTransforms the pose of every body in the world, SceneUpdate the shapes that move with the bodies, which Rerun does
-not draw. Each of x, v, u, applied, s, d, r, force and reaction is a topic, whose messages have a number for each joint.
-The scenario is JSON in the file's metadata.
+Messages are protobuf, which both read; Rerun 0.41 does not show JSON. The machine is in Foxglove's own kinds of
+message: FrameTransforms has the pose of every body in the world. SceneUpdate has the shapes that move with the bodies;
+Rerun does not draw them. Each of x, v, u, applied, s, d, r, force and reaction is a topic, whose messages have a number
+for each joint. The scenario is JSON in the file's metadata.
 """
 
 import re
@@ -61,7 +61,7 @@ def write(trace: Trace, file: Path) -> None:
 
 
 def message_of(joints: Sequence[str]) -> Any:
-    """Return a protobuf message with a number for each joint. Letters that its names cannot have become _."""
+    """Return the class of a protobuf message with a number for each joint. Characters that its names lack become _."""
     from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
     file = descriptor_pb2.FileDescriptorProto(name="smc_mujoco/joints.proto", package="smc_mujoco", syntax="proto3")
@@ -76,7 +76,7 @@ def message_of(joints: Sequence[str]) -> Any:
 
 
 def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return samples, (m,), MAX_POSE_RATE a second, and the bodies' places, (m, nbody, 3), and quaternions."""
+    """Return sample indices, (m,), MAX_POSE_RATE a second, and the bodies' places, (m, nbody, 3), and quaternions."""
     machines = shapes(trace.scenario)
     data = [mujoco.MjData(machine.model) for machine in machines]
     first = machines[0].model

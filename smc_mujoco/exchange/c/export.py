@@ -35,11 +35,11 @@ def law_to_c(law: Component | Template | str, numbers: str = "double", joints: i
     Args:
       law: a Law, its Template, or its text, see `law`.
       numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16 bits.
-      joints: for how many joints a law of many joints is written. Default: as many as it has values of a gain.
+      joints: the number of joints for which a law of many joints is written. Default: the number of a gain's values.
 
     Raises:
-      ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python without translation,
-        which is quoted.
+      ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python that cannot be
+        translated, which the error quotes.
     """
     if numbers not in NUMBER_BYTES:
         raise unknown("type of numbers", numbers, NUMBER_BYTES)

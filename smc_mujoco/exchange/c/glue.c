@@ -1,6 +1,6 @@
-/* The law, whatever its smc_real, as the callback calls laws: inputs, parameters, memory, outputs, all of doubles.
- * Compiled with the law itself, in one unit, so that a law of another type is a compiler's error. For the law's names,
- * macros among them, there is no header of C's own here, and every name begins with smc_.
+/* Calls the law, whatever its smc_real, as the callback calls laws: inputs, gains, memory and outputs are doubles.
+ * Compiled in one unit with the law itself, so that a law of another type is a compiler error. All other names, also
+ * of macros, are the law's: this file includes no header of the C library, and its names begin with smc_.
  */
 #include SMC_SOURCE
 #include "smc_law.h"
@@ -14,7 +14,7 @@ enum { SMC_EACH = 1 }; /* numbers of each gain, of each slot of memory, of u and
 typedef char smc_measurement_as_in_smc_law_h[sizeof(smc_measurement) == SMC_INPUTS * sizeof(smc_real) ? 1 : -1];
 #endif
 
-#define SMC_BEYOND (1LL << 40) /* sandbox.py: wrote beyond its memory; one more: beyond out; FAULTS */
+#define SMC_BEYOND (1LL << 40) /* codes of FAULTS in sandbox.py: wrote beyond its memory; one more: beyond out */
 
 extern int smc_mujoco_gains, smc_mujoco_memory; /* set when the library is loaded */
 extern const int smc_mujoco_joints;
@@ -28,7 +28,7 @@ static unsigned smc_mujoco_arithmetic(void)
 {
     unsigned short smc_x87; /* C's library and MuJoCo's compiler round by this one */
     __asm__ volatile("fnstcw %0" : "=m"(smc_x87));
-    return (__builtin_ia32_stmxcsr() & 0xffc0u) | (unsigned)smc_x87 << 16; /* without the marks of what has happened */
+    return (__builtin_ia32_stmxcsr() & 0xffc0u) | (unsigned)smc_x87 << 16; /* without the flags of past exceptions */
 }
 
 static void smc_mujoco_restore(unsigned smc_was)
@@ -172,7 +172,7 @@ long long smc_mujoco_entry(const double *smc_in, const double *smc_gains, double
     const unsigned smc_was = smc_mujoco_arithmetic();
     long long smc_code;
     int smc_i;
-    for (smc_i = 0; smc_i < 2 * SMC_EACH; smc_i++) smc_out[smc_i] = __builtin_nan(""); /* left out, it ends the run */
+    for (smc_i = 0; smc_i < 2 * SMC_EACH; smc_i++) smc_out[smc_i] = __builtin_nan(""); /* unset, it ends the run */
     smc_code = smc_mujoco_call(smc_in, smc_gains, smc_memory, smc_out);
     if (smc_mujoco_arithmetic() == smc_was) return smc_code;
     smc_mujoco_restore(smc_was);

@@ -17,7 +17,7 @@ TYPE_PATTERN = r"(?:const )?(?:smc_real|int(?:16|32)_t)"
 NOT_IN_C = """arguments await catch class debugger delete eval export extends finally function import in instanceof
 interface let new null of package private protected public super this throw try undefined var with yield Math NaN
 Infinity"""
-RENAMED_FUNCTIONS = {"fabs": "abs"}  # of a function of C's math.h, in JavaScript's Math
+RENAMED_FUNCTIONS = {"fabs": "abs"}  # name in C's math.h -> name in JavaScript's Math
 # Functions of math.h that JavaScript does not have.
 WRITTEN_OUT = {
     "copysign": "const copysign = (a, b) => (b < 0 || Object.is(b, -0) ? -Math.abs(a) : Math.abs(a));",

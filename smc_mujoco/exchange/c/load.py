@@ -163,8 +163,8 @@ def law_from_c(
 
     Args:
       source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
-        `smc_law.h`, which the file may include, describes the function. A file that defines SMC_JOINTS before it is
-        of so many joints.
+        `smc_law.h`, which the file may include, describes the function. A file that defines SMC_JOINTS before that
+        has a law of so many joints.
       gains: name -> default or Gain, in the order of the function's gains[]. If the file has smc_law_gains, they
         change its defaults.
       memory: number of state variables per channel. Default: smc_law_memory of the file, or 8.
@@ -183,7 +183,7 @@ def law_from_c(
 
     Raises:
       ScenarioError: no such file or function, a compiler error, a function of another type, a set-up that fails,
-        crashes or does not end, and with isolate a law that does.
+        crashes or does not end, or with isolate a law that fails its trial.
 
     Nothing checks C while it runs. A law that accesses other memory crashes the process or changes the numbers of
     other runs; one that does not return hangs it. Try a new law with isolate=True, or with

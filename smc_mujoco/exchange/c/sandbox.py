@@ -112,7 +112,7 @@ def sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
 
 
-# libraries through ctypes, in the script and in the process that runs the law
+# libraries through ctypes, in the separate process and in the one that runs the law
 
 
 def entry(path: str, symbol: str):

@@ -154,7 +154,7 @@ class Program:
         self.symbol, self.joints = f"smc_{component.kind}", joints
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
-        self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, kinds; None while in progress
+        self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, result kinds; None in progress
         self.used_names = {self.symbol, *ARGUMENTS, *RESERVED}
         self.slots = 0  # of memory
 
@@ -562,7 +562,7 @@ class Function:
         yield " ".join([*loops, line])
 
     def last_call(self, place: Value, value: Value) -> str:
-        """Take back the call that has just computed a value, if it can write to a place itself; else an empty text."""
+        """Take back and return the call that has just computed a value, if it can write to a place itself; else ""."""
         end = f", {value.pointer});"
         if not (place.pointer and self.before and value.pointer in self.temporaries and self.before[-1].endswith(end)):
             return ""
@@ -616,7 +616,7 @@ class Function:
         return method(node)
 
     def numeric(self, node: ast.expr) -> Value:
-        """Translate an expression that is a number or an array; within an elementwise one its element."""
+        """Translate an expression that is a number or an array; an array in an elementwise one to its element."""
         value = self.value(node)
         if value.kind in ARGUMENTS:
             raise refuse(node, f"{value.text} as a number")
@@ -1005,7 +1005,7 @@ class Function:
         return array
 
     def sized(self, function: Any, node: ast.Call) -> Value:
-        """Translate len, and arrays of one number."""
+        """Translate len, and arrays that are filled with one number."""
         if len(node.args) != 1:
             raise refuse(node, "a call with another number of arguments")
         if function is len:

@@ -62,7 +62,7 @@ SYMBOLS = (  # names that the linker sees
     "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
     "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared",
 )  # fmt: skip
-# In C, the rest of a function that returns where there is no model.
+# In C, a function's return for a run without the model, and all that follows it.
 UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL)
 
 

@@ -35,8 +35,8 @@ from smc_mujoco.simulation import scenario as defaults
 from smc_mujoco.simulation.conditions import SENSOR_NOISE, SINE
 
 MODEL_FIELDS = frozenset({"f", "g", "fq", "gq"})  # fields of the measurement that need the nominal mechanism
-SLIDER_FACTOR = 10.0  # of a gain, up and down, on a slider where tuning has no range: chosen
-MAX_ACRONYM_LETTERS = 3  # letters of a name, at most, that is written in capitals, such as PID
+SLIDER_FACTOR = 10.0  # of a slider's ends over and under the gain, where tuning has no range: chosen
+MAX_ACRONYM_LETTERS = 3  # names of at most so many letters are written in capitals, such as PID
 OPENING_LAWS = ("observer_free", "classical")  # laws with which the page opens: the paper's, and classical sliding mode
 
 

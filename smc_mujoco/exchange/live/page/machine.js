@@ -306,7 +306,7 @@ class Machine {
     } else {
       const [, depth, height] = model.geom_aabb.subarray(6 * handle + 3, 6 * handle + 6);
       foot.addScaledVector(out, height + arrow.off_rail * width);
-      if (channels.length > 1) foot.y -= depth + width; // before what the cart carries
+      if (channels.length > 1) foot.y -= depth + width; // in front of what the cart carries
     }
     const length = reach * Math.abs(share);
     force.visible = Math.abs(share) > arrow.shortest && along.lengthSq() > 0.5;

@@ -6,13 +6,13 @@ import * as functions from "./components.js"; // laws, surfaces, estimators
 import { Stage } from "./machine.js";
 import { History, overTime, phasePlane } from "./plots.js";
 
-const SECONDS = 10; // that the plots show: chosen
+const SECONDS = 10; // span of the plots, s: chosen
 const MAX_FRAME = 0.1; // s: after a frame that took longer, only this much time is simulated
 const TICKS = 1000; // along a slider
 const MAX_NAME = 40; // characters of a name from a link that the page repeats
 const WORDS = { NaN, Infinity, "-Infinity": -Infinity }; // words in facts.json for numbers that JSON lacks
 const SIDES = ["a", "b"];
-const PARTS = { surface: "surfaces", velocity: "estimators" }; // of a controller beside its law -> where their facts are
+const PARTS = { surface: "surfaces", velocity: "estimators" }; // controller part beside its law -> key of its facts
 const COUNTS = [64, 256, 1024, 4096, 16384]; // of an encoder, per revolution or metre: what the page offers
 
 const $ = (id) => document.getElementById(id);
@@ -40,8 +40,8 @@ function opening(plant) {
   return { plant, ...numbers, counts: 0, a: controller(start[0]), b: controller(start[1] ?? "") };
 }
 
-// Return the choice that the page's address holds. What it lacks, or has wrong, is that of `opening`. What it names and
-// the page does not have is added to `missing`.
+// Return the choice that the page's address holds, with that of `opening` for all that it lacks or has wrong. What it
+// names but the page does not have is added to `missing`.
 function fromAddress(missing) {
   const given = new URLSearchParams(location.hash.slice(1));
   const lacks = (kind, key) => missing.push(`the ${kind} “${given.get(key).slice(0, MAX_NAME)}”`);
@@ -385,7 +385,7 @@ function slider({ name, label, unit, least, most, value, step }, put) {
 
 const of = (side) => running.find((each) => each.side === side);
 
-// The formula of a law, surface or estimator, and a slider for each gain that is to choose. `put` takes {gain: number}.
+// Return the formula of a law, surface or estimator, and a slider for each gain to choose. `put` takes {gain: number}.
 function gainSliders({ formula, source, order }, values, ranges, put) {
   const shown = order.filter((name) => ranges[name]); // not an initial value, an exponent, the size of a table
   return [
@@ -400,7 +400,7 @@ function gainSliders({ formula, source, order }, values, ranges, put) {
   ];
 }
 
-// The choice of a side's surface or velocity estimator, and its gains.
+// Return the choice of a side's surface or velocity estimator, and its gains.
 function partForm(side, part, title) {
   const kind = facts[PARTS[part]];
   const ranges = plantFacts()[part === "surface" ? "surface_ranges" : "estimator_ranges"];
