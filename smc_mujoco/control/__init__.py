@@ -1,1 +1,1 @@
-"""Functions without a simulator: laws, surfaces, estimators, policies."""
+"""Functions without a simulator: laws, surfaces, estimators; and sets of gains."""

@@ -315,7 +315,7 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
 
 
 def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict[str, Gain]:
-    """Return the gains of a decorator, numbers or Gains, as Gains, after known ones, whose defaults they can change."""
+    """Return a decorator's gains, numbers or Gains, as Gains. They follow the known ones and can change these."""
     if not isinstance(gains, Mapping | None):
         raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
     checked: dict[str, Gain] = {}

@@ -13,9 +13,9 @@ DIFFERENCE_STEP = 1e-6  # rad or m, and per second, of central differences: abou
 
 
 def linearised(plant: Plant) -> tuple[float, float, float]:
-    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin. A network has those of its least stable channel.
+    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin.
 
-    Neighbours are at rest.
+    For a network they are those of its least stable channel, with the neighbours at rest.
     """
     if plant.unmodelled:
         raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")

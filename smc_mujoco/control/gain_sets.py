@@ -60,7 +60,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
-    The remainder of a run's seed by the number of sets of gains is the number of its set. Set 0 is the best.
+    A run with this seed has the gains of set number `seed` modulo the number of sets. Set 0 is the best.
     """
     base = find_law(name)
     find("set of gains", gains, KNOWN_SETS)
