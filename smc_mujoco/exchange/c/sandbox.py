@@ -287,7 +287,7 @@ class Trial:
         return Fenced(struct.unpack(f"{count}d", saved) if saved else [0.0] * count)
 
     def call(self, y: list[float], memory: Fenced) -> tuple[int, list[float], list[float]]:
-        """Call the law, and record the call for the sanitizers."""
+        """Record the call for the sanitizers, and return what the law answers."""
         self.calls.write(struct.pack(f"{len(y)}d", *y))
         return self.answer(y, memory)
 
