@@ -82,7 +82,7 @@ def compare(
     figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
-    rig: Annotated[str | None, typer.Option(help="A machine: its sets replace plants and conditions.")] = None,
+    rig: Annotated[str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")] = None,
     traces: Annotated[str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")] = "none",
     noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
