@@ -174,20 +174,20 @@ class Advice(Tables):
         shown, more = self.choices[:MAX_ROWS], [choice.law.name for choice in self.choices[MAX_ROWS:]]
         over = f" over {len(self.conditions)} conditions" * (len(self.conditions) > 1)
         medians = f" Medians{over}, with {100 * LEVEL:g} % intervals over {self.samples}." * (not self._untested)
-        text = "place by failed runs, then by mean rank, behind laws that dominate: better somewhere, worse nowhere."
+        text = "Places: by failed runs, then mean rank, behind laws that dominate (better somewhere, worse nowhere)."
         text += medians + f" {counted(len(more), 'more law')}: {first_of(more)}." * bool(more)
-        text += " *: no law is better in any condition, every run has a value, and samples are enough to tell."
+        text += " *: no law is better in any condition, every run has a value, and there are enough samples to tell."
         bare = any(not choice.below(need) for choice in shown for need in self.needs)
-        text += " No interval: its ends are equal, or one is a run without a value." * bare
+        text += " Where there is no interval, its ends are equal, or one end is a run without a value." * bare
         if self._shared and len(self._shared) < len(self.comparison.laws):
             text += f" Sets of gains, which are the sample of a law that has several: {first_of(self._shared)}."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in shown}):
             text += f" {capital(sources)}."
-        text += " –: settles too seldom to be advised." * any(not choice.fit for choice in shown)
+        text += " –: the law settles too seldom to be advised." * any(not choice.fit for choice in shown)
         metrics = [NEEDS[need].name for need, _ in self.blocks]
         floors = zip(metrics, self.comparison.floors.tolist(), strict=True)
         relevant = relevance(self.comparison.relevant, floors, self.plant.unit)
-        return f"{text} Ahead: by more than the least relevant difference, {relevant}."
+        return f"{text} Ahead means by more than the least relevant difference, {relevant}."
 
     @property
     def samples(self) -> str:

@@ -340,7 +340,7 @@ def key(boards: Sequence[Board]) -> str:
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     words += (
         ". Marked: no law is better, and no run failed. A winner is better than every other law in a paired test"
-        f"{several}; how much: by pairs of runs, not by the medians; ahead: by more than the least relevant "
+        f"{several}. Pairs of runs tell by how much, not the medians. Ahead means by more than the least relevant "
         f"difference, {relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])}."
     )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)

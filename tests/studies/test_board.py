@@ -173,8 +173,8 @@ def test_a_group_is_a_table_and_no_board_is_said(boards):
     html = several._repr_html_()
     assert bold(html)[::2] == ["duffing, nominal: 20 seeds", "duffing, noise: 20 seeds"]
     assert several.to_latex().count(r"\begin{tabular}") == 2
-    assert "in a paired test, corrected for 2 comparisons a metric; how much" in html
-    assert "in a paired test; how much" in boards._repr_html_()
+    assert "in a paired test, corrected for 2 comparisons a metric. Pairs of runs tell by how much" in html
+    assert "in a paired test. Pairs of runs tell by how much" in boards._repr_html_()
     assert "no boards" in Boards()._repr_html_()
     assert Boards().to_latex() == ""
 
