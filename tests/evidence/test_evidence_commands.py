@@ -147,6 +147,7 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.audit.evidence.check": {
             "paper": {"authors": "A. B and others", "title": "C" * 90},
             "counts": {"supported": 2},
+            "quick": True,
         },
     },
     "report": {

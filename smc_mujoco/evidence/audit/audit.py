@@ -41,6 +41,11 @@ class Audit:
     used: Mapping[str, Mapping[str, Mapping[str, Used]]]  # claim -> set of gains -> run's key -> run that it used
     sealable: bool  # whether all runs were made here, none taken from a table
 
+    @property
+    def name(self) -> str:
+        """The paper's name, and that the audit was quick."""
+        return self.paper.name + ", quick audit" * self.quick
+
     def save(self, path: str | Path) -> Path:
         """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict, sealed by a hash.
 
@@ -59,7 +64,7 @@ class Audit:
         """Write a badge, an .svg file with the number of claims by verdict."""
         from smc_mujoco.evidence.audit.figure import save_badge
 
-        return save_badge(self.paper.name, self.claims, path)
+        return save_badge(self.name, self.claims, path)
 
     def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
         """Draw every check as a multiple of its threshold, a row for each claim; options as of `smc.figure`."""

@@ -118,7 +118,9 @@ def papers(
     if check:
         data = evidence.check(check)
         counts = ", ".join(f"{count} {verdict}" for verdict, count in data["counts"].items())
-        terminal.note(f"the seal is whole: {data['paper']['authors']}, {data['paper']['title']}: {counts}", wrap=True)
+        about = f"{data['paper']['authors']}, {data['paper']['title']}"
+        quick = ", in a quick audit" if data["quick"] else ""
+        terminal.note(f"the seal is whole: {about}: {counts}{quick}", wrap=True)
     if new or check:
         return
     lines = {name: f"{known.authors}: {known.title} ({known.contents})" for name, known in paper.papers().items()}

@@ -70,7 +70,7 @@ def page(done: Audit, seal: str, runs: int, figure: bytes) -> str:
         quick=done.quick,
         sections=SECTIONS,
         link=lambda what: "verdict",
-        badge=uri("image/svg+xml", badge(done.paper.name, done.claims).encode()),
+        badge=uri("image/svg+xml", badge(done.name, done.claims).encode()),
         figure=figure,
         runs=runs,
         seal=seal,

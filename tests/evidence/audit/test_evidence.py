@@ -197,6 +197,8 @@ def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
     assert head.get_title().get_text() == "Claims of A. Nobody: Small"
     assert (tmp_path / "checks.svg").is_file()
     assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == figure.badge("small", done.claims)
+    quick = dataclasses.replace(done, quick=True).badge(tmp_path / "quick.svg")
+    assert quick.read_text(encoding="utf-8") == figure.badge("small, quick audit", done.claims)
     assert done._repr_html_() == done.claims._repr_html_()
 
 
