@@ -62,7 +62,7 @@ SAID = {
     margins: [
         f"at most {percent(margins.TOLERATED_ERROR)} of its scale",
         f"up to {WORDS[max(len(kind.levels) for kind in margins.MARGIN_KINDS.values())]} levels",
-        f"an {part(1 / uncertainty.JITTER_SHARES)} of one of jitter, or {percent(margins.FINE)} of other levels",
+        f"an {part(1 / uncertainty.JITTER_SHARES)} of one (jitter) or {percent(margins.FINE)} (others)",
     ],
     margins.margins: [
         f"runs of {margins.QUICK_DURATION:g} s and search to within {margins.QUANTA[margins.COARSE]} control periods",
@@ -74,7 +74,7 @@ SAID = {
         f"for {percent(region.HORIZONS[0])} of the duration",
         f"for {percent(region.HORIZONS[1])}, and those still undecided for the whole duration",
         f"throughout the last {part(1 / region.EARLY_PARTS)} of the run",
-        f"smaller by a {part(1.0 - region.MAX_EARLY_RATIO)} than in the first",
+        f"is a {part(1.0 - region.MAX_EARLY_RATIO)} smaller than in the first",
         f"less than {short(region.REST_TOLERANCE)} of X",
         f"throughout the last {percent(conventions.LAST_PART)} of the run",
         f"at most {percent(round(region.MAX_FINAL_RATIO - 1.0, 9))} larger than in the first",
@@ -97,7 +97,7 @@ SAID = {
         f"w = h times 1 s^2 = {short(objective.Objective().weight)} s^3",
         f"costs {objective.Objective().weight * 2.0 / conditions.CONTROL_PERIOD:g} s^2",
     ],
-    gains_for.gains_for: [f"Of {len(gains_for.SPEEDS)} speeds, from a {part(gains_for.SPEEDS[0])} to ten times"],
+    gains_for.gains_for: [f"of {len(gains_for.SPEEDS)} from a {part(gains_for.SPEEDS[0])} to ten times"],
     step_halving: [f"by more than {percent(step_halving.TOLERANCE)}"],
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
@@ -107,7 +107,7 @@ SAID = {
     attack: [f"at most {attack.MAX_CORNERS}, each"],
     uncertainty.default_class: [
         f"up to a {part(uncertainty.DEFAULT_FORCE_SHARE)} of the force",
-        f"varies by {part(1.0 - uncertainty.DEFAULT_FRICTION_SCALE[0])} of it",
+        f"friction within {percent(1.0 - uncertainty.DEFAULT_FRICTION_SCALE[0])}",
     ],
     smc.Scenario: [
         f"Default: {scenario.U_MAX:g}, or the limit",
