@@ -10,7 +10,7 @@ SLOPE = 6.0  # N/s, slope of that force
 
 def classical_margins(gains):
     """What the switching gain exceeds, N, with s' = u + d + c v and |v| up to 0.5."""
-    return {"k > D + c |v|, N": gains["k"] - FORCE - 0.25 * gains["c"]}
+    return {"k > D + c |v|, N": gains["k"] - FORCE - 0.5 * gains["c"]}
 
 
 def twisting_margins(gains):
