@@ -164,7 +164,9 @@ class Board(Tables):
             return f"no winner: {self.why}"
         if len(self.best) == len(self.entries):
             return f"no winner: {'all' if len(self.best) > 2 else 'both'} laws are level"
-        return f"no winner, undefeated: {joined(self.best)}"
+        unclear = [entry.law for entry in self.entries if entry.law not in self.best and not self.losses(entry.law)]
+        doubt = f"; too few samples to tell whether {joined(unclear)} {'is' if len(unclear) == 1 else 'are'} beaten"
+        return f"no winner, undefeated: {joined(self.best)}{doubt * bool(unclear)}"
 
     def _search(self, law: str) -> str:
         """Return how the gains of a law that wins were searched, after a comma, if not by the rule."""
@@ -338,10 +340,11 @@ def key(boards: Sequence[Board]) -> str:
         words += f"; of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less"
     family = max(board.family for board in boards)
     several = f", corrected for {family} comparisons a metric" * (family > 1)
+    least = relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])
     words += (
-        ". Marked: no law is better, and no run failed. A winner is better than every other law in a paired test"
-        f"{several}. Pairs of runs tell by how much, not the medians. Ahead means by more than the least relevant "
-        f"difference, {relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])}."
+        ". Marked: no law is better, no run failed, and there are enough samples to tell. A winner is better than "
+        f"every other law in a paired test{several}. Pairs of runs tell by how much, not the medians. Ahead means by "
+        f"more than the least relevant difference, {least}."
     )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))

@@ -276,7 +276,8 @@ def _worst_cases(
 
 def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
     """Return plant -> laws to compare on it. What cannot run is refused here, before gains are searched."""
-    compared = {plant.name: [law_or_template(law) for law in _chosen(laws, plant)] for plant in trial.plants}
+    given = None if laws is None else [law_or_template(law) for law in listed_laws(laws)]  # a file is read once
+    compared = {plant.name: given or [law_or_template(law) for law in _usual(plant)] for plant in trial.plants}
     every = {id(law): law for its in compared.values() for law in its}.values()
     check_names(trial.plants, [coerce.law(law) for law in every], trial.conditions)
     for plant, condition in itertools.product(trial.plants, trial.conditions):
@@ -284,10 +285,8 @@ def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
     return compared
 
 
-def _chosen(laws: Any, plant: Plant) -> list[Any]:
-    """Return the laws to compare on a plant."""
-    if laws is not None:
-        return listed_laws(laws)
+def _usual(plant: Plant) -> list[Any]:
+    """Return the laws to compare on a plant if none are given."""
     known = [name for name in gain_sets.LAWS if fits(catalogue()[name], plant)]
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]

@@ -764,7 +764,17 @@ def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
     (block,) = board.blocks
     assert (block.runs, block.samples) == (20, 20)
     assert (block.best, block.undecided, board.winner, board.losses("a")) == (("b",), ("c",), None, ["c0"])
-    assert board.result == "no winner, undefeated: b"
+    assert board.result == "no winner, undefeated: b; too few samples to tell whether c is beaten"
+
+
+def test_of_equal_laws_none_stands_alone_for_lack_of_samples():
+    draws = np.random.default_rng(2)
+    for _ in range(20):
+        laws = {name: draws.lognormal(sigma=0.15, size=(4, 8)) for name in "abc"}
+        for board in leaderboard(stand(laws), ["itae"], ("plant", "condition")):
+            unbeaten = {law for law in laws if not board.losses(law)}
+            told = board.winner or board.too_few or "level" in board.result
+            assert told or all(re.search(rf"\b{law}\b", board.result) for law in unbeaten)
 
 
 def test_compare_counts_distinct_runs_of_each_pair():
