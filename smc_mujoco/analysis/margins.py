@@ -38,7 +38,7 @@ from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, Noise
-from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
 VELOCITY_NOISE_RATIO = 5.0  # 1/s, noise of the velocity over that of the position: that of the study's sensor
@@ -282,7 +282,7 @@ def margins_of(
     cells = [(base, find("kind of margin", kind, MARGIN_KINDS)) for base in bases for kind in kinds]
     searches = [kind.search(base, resolution) for base, kind in cells]
     going = dict(enumerate(searches))
-    done = 0
+    done, broken = 0, {}
 
     def tolerated(groups: Sequence[Sequence[Scenario]]) -> list[bool]:
         """Run groups of scenarios, and return whether all of a group are tolerated. Traces are not kept."""
@@ -294,12 +294,15 @@ def margins_of(
         results = [True] * len(groups)
         for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, expected))):
             results[owners[i]] &= tolerates(trace)
+            if trace.broken:
+                broken.setdefault(trace.scenario.law.name, trace.broken)
         done += now
         return results
 
     without = tolerated([[base] for base in bases])
     going = {i: search for i, search in going.items() if without[i // len(kinds)]}
     find_boundaries(going, lambda tried: tolerated([cells[i][1].scenarios(cells[i][0], level) for i, level in tried]))
+    warn_of_broken(broken)
     return [
         Margin(
             plant=base.plant.name,

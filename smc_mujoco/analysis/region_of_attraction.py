@@ -45,7 +45,7 @@ from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant
-from smc_mujoco.simulation.trace import Trace
+from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 EARLY_PARTS = 3  # an early verdict considers the last of so many equal parts of a run
@@ -149,7 +149,7 @@ def basin_of(
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
-    undecided, done = list(np.ndindex(*outcome.shape)), 0.0
+    undecided, done, broken = list(np.ndindex(*outcome.shape)), 0.0, {}
     for i, horizon in enumerate(HORIZONS):
         shortened = dataclasses.replace(base, duration=horizon * base.duration)
         needed = done + len(undecided) * base.work * sum(HORIZONS[i:])
@@ -158,6 +158,8 @@ def basin_of(
             batch = undecided[begin : begin + size]
             cases = [dataclasses.replace(shortened, x0=x[k], v0=v[j]) for j, k in batch]
             for index, trace in stream(cases, threads, summed(report, done, needed)):
+                if trace.broken:
+                    broken.setdefault(base.law.name, trace.broken)
                 verdict = verdict_of(trace, x, v, final=horizon == HORIZONS[-1])
                 if verdict is None:
                     left.append(batch[index])
@@ -165,6 +167,7 @@ def basin_of(
                     outcome[batch[index]], decided_at[batch[index]] = verdict, shortened.duration
             done += len(cases) * shortened.work
         undecided = left
+    warn_of_broken(broken)
     return Basin(
         plant=base.plant.name,
         law=base.law.name,

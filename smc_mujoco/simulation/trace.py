@@ -4,7 +4,9 @@ import csv
 import dataclasses
 import math
 import os
+import warnings
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from smc_mujoco.common import annexes, html
-from smc_mujoco.common.errors import ScenarioError, find, one_line, words
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, one_line, users_stacklevel, words
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
@@ -117,6 +119,11 @@ class Trace:
     def plant_diverged(self) -> bool:
         """Whether the run failed because its plant diverged, not because its law or a signal failed."""
         return self.diverged_at is not None and (self.failure is None or self.failure.startswith(PLANT_DIVERGED))
+
+    @property
+    def broken(self) -> str:
+        """How the law or a signal failed, in a sentence; "" if neither did."""
+        return "" if self.failure is None or self.plant_diverged else self.failure
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for several.
@@ -307,3 +314,9 @@ def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | Non
         if stream.read(1):  # the checksum is compared at the end
             raise ScenarioError(f"its {name} is longer than it says")
     return array
+
+
+def warn_of_broken(laws: Mapping[str, str]) -> None:
+    """Warn of laws that failed by themselves, name -> `Trace.broken`: it is no property of theirs, but a mistake."""
+    for name, failure in laws.items():
+        warnings.warn(f"{name} failed by itself in a run: {failure}", ScenarioWarning, users_stacklevel())

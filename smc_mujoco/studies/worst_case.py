@@ -26,6 +26,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import warn_of_broken
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.cache import cached
 
@@ -208,6 +209,8 @@ def worst_case(
         drawing.draw(np.random.default_rng([seed, 0]))
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
         search.search(np.random.default_rng([seed, 1]), early[:FIRST_MEMBERS])
+    if broken := drawing.broken or search.broken:
+        warn_of_broken({scenario.law.name: broken})
     worst = max(search.worst, drawing.worst, key=lambda tried: tried.key)
     return WorstCase(
         value=float(worst.key[0]),

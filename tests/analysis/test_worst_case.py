@@ -251,7 +251,8 @@ def test_a_failed_run_is_the_worst():
     def fragile(y, gains, memory):
         return (-10.0 * y.x - 5.0 * y.v) / (0.0 if y.v > 3.0 else 1.0), 0.0
 
-    worst = smc.worst_case(scenario(law=fragile, u_max=50.0), within=smc.Uncertainty(disturbance=20.0), budget=32)
+    with pytest.warns(smc.ScenarioWarning, match="fragile failed by itself in a run: .*division by zero"):
+        worst = smc.worst_case(scenario(law=fragile, u_max=50.0), within=smc.Uncertainty(disturbance=20.0), budget=32)
     assert worst.value == np.inf
     assert smc.run(worst.scenario).failure
 

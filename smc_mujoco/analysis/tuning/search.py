@@ -165,8 +165,8 @@ def _warn_of_result(tuned: Tuned, chatters: bool) -> None:
 
 def _failure_of_law(traces: Sequence[Trace]) -> str:
     """Return how the first run failed, if the law fails in every run, and the plant in none; else ""."""
-    fails = all(trace.failure is not None and not trace.plant_diverged for trace in traces)
-    return traces[0].failure or "" if fails else ""
+    fails = all(trace.broken for trace in traces)
+    return traces[0].broken if fails else ""
 
 
 def _broken(law: Component, failure: str) -> BrokenLawError:

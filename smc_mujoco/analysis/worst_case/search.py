@@ -73,6 +73,7 @@ class Search:
         self.members, self.metric, self.budget, self.threads, self.report = members, metric, budget, threads, report
         self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
+        self.broken = ""  # how the law or a signal failed first, in a sentence
         self.swing: Trace | None = None  # the first run under a relay of e', or without a force, for its frequency
 
     @property
@@ -117,6 +118,7 @@ class Search:
 
     def _key(self, trace: Trace) -> tuple[float, float]:
         if trace.failure is not None:
+            self.broken = self.broken or trace.broken
             return FAILED_KEY
         groups = by_group(trace)
         value, error = self.metric.worst(groups), CATALOGUE["rms_error"].worst(groups)
