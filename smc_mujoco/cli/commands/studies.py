@@ -90,8 +90,8 @@ def compare(
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is better, and how sure.
 
     A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of the package for the
-    plant, or is tuned by the same rule, some seconds for each law on each plant. If you stop the command, it continues
-    when you start it again. One run of each of your laws is replayed: it must get its commands from its measurements
+    plant, or is tuned by the same rule, seconds to minutes for each law on each plant. If you stop the command, it
+    continues when you start it again. One run of each of your laws is replayed: it must get its commands from its measurements
     alone. --law all compares every general law. With --rig a line for each metric says if one law wins on all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
