@@ -91,8 +91,9 @@ def compare(
 
     A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of the package for the
     plant, or is tuned by the same rule, seconds to minutes for each law on each plant. If you stop the command, it
-    continues when you start it again. One run of each of your laws is replayed: it must get its commands from its measurements
-    alone. --law all compares every general law. With --rig a line for each metric says if one law wins on all sets.
+    continues when you start it again. One run of each of your laws is replayed: it must get its commands from its
+    measurements alone. --law all compares every general law. With --rig a line for each metric says if one law wins on
+    all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
 
