@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import NoReturn, TypeVar
 
+from smc_mujoco.common.errors import ScenarioError, shown
+
 V = TypeVar("V")
 
 
@@ -23,4 +25,6 @@ class Frozen(dict[str, V]):
 
 def frozen(mapping: Mapping[str, V]) -> Frozen[V]:
     """Return a frozen copy."""
+    if not isinstance(mapping, Mapping):
+        raise ScenarioError(f"{shown(mapping)} is no mapping: give a dict")
     return Frozen(mapping)

@@ -130,6 +130,12 @@ def test_two_laws_may_have_one_abbreviation():
     assert said == "unknown law 'TA': did you mean 'terminal_adaptive' or 'twisting_adaptive'?"
 
 
+@pytest.mark.parametrize("value", ["text", [1.0], 0.5])
+def test_what_is_no_mapping_is_refused_in_a_sentence(value):
+    with pytest.raises(ScenarioError, match="is no mapping: give a dict"):
+        frozen(value)
+
+
 def test_a_frozen_mapping_does_not_change():
     values = frozen({"a": 1})
     changes = (lambda: values.update(b=2), values.clear, values.popitem, lambda: values.pop("a"))
