@@ -9,7 +9,7 @@ first 2 s. Without it ("tracking", w = 0), chattering costs nothing.
 
 The conditions are those in which laws are ranked: nominal, noise, delay, a sine and a constant disturbance, and 30 %
 less and 30 % more mass. Their runs have seeds, noise and initial states that no grid uses, so no law is judged on runs
-that it was tuned on.
+that it was tuned on. `evaluator.objectives` computes J on instances that no search has seen either.
 
 A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure. This is more than
 any other run costs, and decreases with t. With a bound on predicted chattering, gains beyond it cost more than that.
@@ -34,6 +34,7 @@ DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settl
 CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
 DEFAULT_STARTS = Starts()
 SEEDS_PER_TUNING = 1000  # each condition uses one of them
+UNSEEN = 2**51 // SEEDS_PER_TUNING  # instances from this one on belong to no search
 FAILURE_COST = 1e9  # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
 
 
@@ -103,6 +104,10 @@ class Objective:
         tracking = min(metrics.itae(trace) / start, FAILURE_COST)
         bound = float(np.max(trace.scenario.resolved.u_max)) if self.u_max is None else self.u_max
         return tracking, metrics.tv(trace) / (bound * self.duration)
+
+    def unseen(self, plant: Plant | str, law: Component, instance: int) -> list[Scenario]:
+        """Return one run for each condition, of an instance 0, 1, ... that no search uses."""
+        return self.scenarios(plant, law, UNSEEN + instance)
 
     def excess(self, case: Scenario) -> float:
         """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to the amplitude."""
