@@ -6,11 +6,13 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo test slow quick attack check docs tagged build report live gains gallery bench lock setup
+.PHONY: help demo promised test slow quick attack check docs lowest tagged build report live gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+
+promised: check test docs lowest ## all that a change must pass; the workflows run the same targets, each in a job
 
 demo: setup ## the inverted pendulum under the paper's four laws: scores, traces, a figure, a film
 	$(BIN)/smc-mujoco run scenes/inverted_pendulum.py
@@ -46,6 +48,12 @@ docs: ## the documentation as a site, site/index.html
 	@./setup.sh requirements-docs.lock
 	@# this variable leaves out the theme's notice that it is maintained until May 2027; --quiet would hide warnings from --strict
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict -f docs/site/mkdocs.yml
+
+lowest: ## the quick tests under the oldest versions that pyproject.toml allows, in .cache/lowest
+	@python3 -m venv --clear .cache/lowest
+	@.cache/lowest/bin/python -m pip install --quiet uv
+	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all]" --group test
+	.cache/lowest/bin/python -m pytest --quick
 
 tagged: ## whether TAG, such as v0.1.0, is the tag of this version
 	@version=v$$(sed -n 's/^__version__ = "\(.*\)"$$/\1/p' smc_mujoco/common/version.py); test "$$TAG" = "$$version" || \

@@ -82,7 +82,7 @@ def vectors(table: Table) -> None:
         warnings.simplefilter("ignore")  # glfw misses a display that nobody asked for
         theirs = gymnasium.make_vec("InvertedPendulum-v5", num_envs=COPIES, vectorization_mode="sync")
     count = 20 if QUICK else 50
-    skip = theirs.unwrapped.envs[0].unwrapped.frame_skip
+    skip = theirs.unwrapped.envs[0].unwrapped.frame_skip  # pyright: ignore[reportAttributeAccessIssue] of a vector of environments
 
     def steps(environments) -> Callable[[], object]:
         actions = np.zeros(environments.action_space.shape, environments.action_space.dtype)

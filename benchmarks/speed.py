@@ -190,7 +190,7 @@ def gymnasium_steps() -> tuple[Callable[[], object], int]:
             s = state[3] + 3.0 * state[1]
             state, *_ = environment.step(np.array([3.0 * np.sign(s)], np.float32))
 
-    return action, count * environment.frame_skip
+    return action, count * environment.frame_skip  # pyright: ignore[reportAttributeAccessIssue] of gymnasium's MuJoCo environments
 
 
 def opensmc_steps() -> tuple[Callable[[], object], int]:

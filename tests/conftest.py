@@ -16,9 +16,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from syrupy.assertion import SnapshotAssertion
 
 pytest_plugins = ["pytester"]
+# on a busy machine an example takes as long as it takes
+settings.register_profile("any_clock", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any_clock")
 
 ROOT = Path(__file__).parents[1]
 VARYING = {  # in a sentence: members of a catalogue, addresses, and what Python, numba and MuJoCo say in some version

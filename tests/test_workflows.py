@@ -56,6 +56,17 @@ def test_a_workflow_s_command_is_one_of_the_makefile_or_of_a_page():
             assert {SHARED.sub("", one) for one in written_out(command, workflow)} <= KNOWN, workflow
 
 
+def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_share():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    (promised,) = re.findall(r"^promised: (.*?) ##", makefile, re.MULTILINE)
+    assert (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()[-1].split()[-1] == "promised"
+    of_push = [yaml.safe_load(file.read_text(encoding="utf-8")) for file in WORKFLOWS]
+    of_push = [data["jobs"] for data in of_push if "push" in data[True]]  # YAML 1.1 reads `on` as true
+    made = {step["run"] for named in of_push for job in named.values() for step in job["steps"] if "run" in step}
+    targets = {command.split()[1] for command in made if command.startswith("make ")}
+    assert targets == {*promised.split(), "slow"}  # the slow tests have a job of their own
+
+
 def test_workflows_have_the_pythons_of_the_package():
     about = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     classified = re.findall(r"Python :: (3\.\d+)", about)

@@ -103,7 +103,7 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
     from smc_mujoco.draw.decimate import end, finite
 
     traces = [finite(trace) for trace in traces]
-    shown = [panel for panel in panels.overview(traces) if panel.quantity in ("x", "u")]
+    shown = [panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)]
     with style.page():
         import matplotlib
 

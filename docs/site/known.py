@@ -70,9 +70,8 @@ def tasks() -> dict[str, list[str]]:
 
 def entries() -> dict[str, list[str]]:
     """Return title -> the names on a page of the reference, with their modules."""
-    found = {
-        task: [f"{smc._ORIGINS[name]}.{name}" for name in its if name in smc._ORIGINS] for task, its in tasks().items()
-    }
+    origins = smc._ORIGINS  # pyright: ignore[reportAttributeAccessIssue] private
+    found = {task: [f"{origins[name]}.{name}" for name in its if name in origins] for task, its in tasks().items()}
     return found | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
 
 

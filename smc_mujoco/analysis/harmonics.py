@@ -384,7 +384,7 @@ def describing_function(
     for first in range(0, 2 * samples, CHUNK_SAMPLES):
         at = np.arange(first, min(first + CHUNK_SAMPLES, 2 * samples))
         turns = np.exp(1j * math.tau * (at + 0.5) / samples)
-        motion = [amplitude * turns.real, -amplitude * omega * turns.imag]
+        motion = [amplitude * turns.real, -amplitude * omega * turns.imag]  # pyright: ignore[reportAttributeAccessIssue] complex numbers have both
         u, _ = controller(first, {DT: h, LIMIT: math.inf}, motion, [FREE_MASS], memories)
         total += (u[at >= samples] / turns[at >= samples]).sum()
     return complex(total) * 2.0 / samples / amplitude

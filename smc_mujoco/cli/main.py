@@ -43,7 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="replace")  # a character that the terminal lacks is shown as ?
+        # a character that the terminal lacks is shown as ?
+        stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue] Python made it a TextIOWrapper
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
     if threading.current_thread() is threading.main_thread():  # ends as Ctrl-C does, and leaves no half-written files

@@ -126,7 +126,7 @@ class _CodePickler(pickle._Pickler):
     def memoize(self, obj: Any) -> None:
         """Note an object as written, except constants: whether equal ones are one object depends on the compiler."""
         if not isinstance(obj, tuple | str | bytes | CodeType):
-            super().memoize(obj)
+            super().memoize(obj)  # pyright: ignore[reportAttributeAccessIssue] of the pickler in Python
 
     def persistent_id(self, obj: Any) -> str | None:
         """Return the name of an object that is written by its name; None for others."""

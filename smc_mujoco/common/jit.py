@@ -154,7 +154,7 @@ def attempting(count: int, estimates: bool = False) -> Callable:
     def attempt(typingctx, body, arguments, outputs):
         resolved = body.get_call_type(typingctx, tuple(arguments), {})
         returned = resolved.return_type
-        items = list(returned.types if isinstance(returned, types.BaseTuple) else [returned])
+        items = list(returned.types if isinstance(returned, types.BaseTuple) else [returned])  # pyright: ignore[reportAttributeAccessIssue] tuples of numba have it
         if not all(isinstance(item, types.Integer | types.Float | types.Boolean) for item in items):
             raise internals.TypingError(f"it returns {returned} instead of numbers")
         if len(items) != count and not (estimates and len(items) == 1):
@@ -318,7 +318,7 @@ class Function:
             self._cfunc = compiled(SIGNATURE, body, cache)
         except Exception as error:  # numba raises many types; each means that it cannot compile the function
             raise NotCompilable(reason(error)) from None
-        self.address: int = self._cfunc.address
+        self.address: int = self._cfunc.address  # pyright: ignore[reportAttributeAccessIssue] numba's own
 
 
 class AtAddress:

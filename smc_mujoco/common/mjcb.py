@@ -92,4 +92,4 @@ def _install(callbacks: dict[str, Any]) -> None:
 
 
 def _python(callback: Any) -> bool:
-    return callback is not None and not isinstance(callback, ctypes._CFuncPtr)
+    return callback is not None and not isinstance(callback, ctypes._CFuncPtr)  # pyright: ignore[reportAttributeAccessIssue] the base of all C functions

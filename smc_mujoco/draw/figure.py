@@ -256,7 +256,7 @@ def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]
     lasting = [ax for ax, part, _ in rows if part.traces[0].diverged_at is None]
     ranges = [ax.get_ylim() for ax in lasting or [ax for ax, *_ in rows]]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
-    places = [tick for tick in MaxNLocator(3).tick_values(low, high).tolist() if low <= tick <= high]
+    places = [tick for tick in np.asarray(MaxNLocator(3).tick_values(low, high)).tolist() if low <= tick <= high]
     for ax in (frame, *(ax for ax, *_ in rows)):
         ax.set(ylim=(low, high), yticks=[places[0], places[-1]])
     for ax, *_ in rows[:-1]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backend_bases import get_registered_canvas_class
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.font_manager import FontProperties
@@ -231,12 +232,12 @@ class Spaced(AutoLocator):
 
     def __call__(self) -> list[float]:
         """Return the ticks of the visible range."""
-        assert self.axis is not None
+        assert isinstance(self.axis, Axis)
         low, high = sorted(self.axis.get_view_interval())
         box, formatter, ticks = self.axis.axes.bbox, self.axis.get_major_formatter(), []
         for count in range(MAX_TICKS, 0, -1):
             self.set_params(nbins=count)
-            ticks = [tick for tick in self.tick_values(low, high).tolist() if low <= tick <= high]
+            ticks = [tick for tick in np.asarray(self.tick_values(low, high)).tolist() if low <= tick <= high]
             widest = max((style.width(text, self.size) for text in formatter.format_ticks(ticks)), default=0.0)
             pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low) if ticks[1:] else 0.0
             if widest + TICK_GAP * self.size <= pitch:

@@ -110,11 +110,11 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None."""
         if self.render_mode is None:
             return None
-        if self.renderer is None:
-            self.renderer = gl.renderer(self.setting.model)
+        if (renderer := self.renderer) is None:
+            renderer = self.renderer = gl.renderer(self.setting.model)
         mujoco.mj_forward(self.setting.model, self.data)
-        self.renderer.update_scene(self.data, camera=0 if self.setting.model.ncam else -1)
-        return self.renderer.render()
+        renderer.update_scene(self.data, camera=0 if self.setting.model.ncam else -1)
+        return renderer.render()
 
     def close(self) -> None:
         """Close the renderer."""

@@ -6,7 +6,6 @@ Copy i moves like the single environment with seed + i, to 1e-12. After the end 
 one in the next step, which ignores the action, as gymnasium's own vector environments do (AutoresetMode.NEXT_STEP).
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -58,8 +57,9 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         self.num_envs = whole("num_envs", num_envs, 1, MAX_COPIES)
         self.setting = Setting(plant, task, changes, edit=remove_scenery)
         disable_unused_constraints(self.setting.model)
-        steps = math.inf if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
-        self.max_samples = min(self.setting.scenario.samples, steps)
+        samples = self.setting.scenario.samples
+        steps = samples if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
+        self.max_samples = min(samples, steps)
         self.single_action_space = action_space(self.setting)
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)

@@ -184,9 +184,9 @@ def _system(K: Any) -> System:
     if isinstance(K, tuple | list) and len(K) in (4, 5):
         return _matrices(K[0], K[1], K[2], K[3], K[4] if len(K) == 5 else None)
     if all(hasattr(K, name) for name in "ABCD"):
-        return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))
+        return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     if all(hasattr(K, name) for name in ("num", "den")):
-        return _realisation(K.num, K.den, getattr(K, "dt", None))
+        return _realisation(K.num, K.den, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     raise ScenarioError(f"K is {shown(K)}: {CURE}")
 
 

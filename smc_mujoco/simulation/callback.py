@@ -70,7 +70,7 @@ def _ctype(node: object) -> Any:
         case ast_nodes.ValueType() if node.name.startswith("mjt"):  # an enum
             return ctypes.c_int
         case ast_nodes.StructDecl() | ast_nodes.AnonymousStructDecl():
-            fields = [(field.name, _ctype(field.type)) for field in node.fields]
+            fields = [(field.name, _ctype(field.type)) for field in node.fields]  # pyright: ignore[reportAttributeAccessIssue] unnamed unions are in no such struct
             return type("Struct", (ctypes.Structure,), {"_fields_": fields})
     raise LayoutError(f"has a field of unknown C type {node}")
 

@@ -124,7 +124,7 @@ class WorstCases(Tables, list[WorstCase]):
         """Kendall's tau between the order by median and the order by worst found; NaN for fewer than two laws."""
         from scipy.stats import kendalltau
 
-        return float(kendalltau([case.median for case in self], [case.value for case in self]).statistic)
+        return float(kendalltau([case.median for case in self], [case.value for case in self]).statistic)  # pyright: ignore[reportAttributeAccessIssue] scipy's stubs lack it
 
     @property
     def title(self) -> str:

@@ -198,7 +198,7 @@ def test_holding_the_command_costs_half_a_period_of_delay(plant):
     assert few - more == pytest.approx(4.5e-4, abs=2e-6)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     plant=st.sampled_from(PLANTS),
     lam=st.floats(0.05, 40.0),
@@ -244,7 +244,7 @@ def test_under_the_tolerated_force_the_plant_comes_to_rest_at_the_limit(plant):
     assert steady_error(trace) == pytest.approx(most, rel=1e-3)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(plant=st.sampled_from(PLANTS), k1=st.floats(1.0, 10.0), most=st.floats(1e-3, 0.5))
 def test_the_tolerated_force_is_the_largest_up_to_the_limit(plant, k1, most):
     """Of the law's pull less the plant's own, on a grid that ends at `most`."""

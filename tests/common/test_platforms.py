@@ -64,11 +64,11 @@ def test_without_process_groups_a_late_command_dies_with_its_children(monkeypatc
 
 @pytest.mark.skipif(not hasattr(os, "setsid"), reason="it is about systems that have it")
 def test_a_command_is_late_in_time_though_a_process_of_another_session_holds_its_pipes():
-    leaves = "import os, time; os.fork() or (os.setsid(), time.sleep(20))"
+    leaves = "import os, time; os.fork() or (os.setsid(), time.sleep(120))"
     begun = time.monotonic()
     with pytest.raises(process.TimedOut):
         process.timed([sys.executable, "-c", leaves], 0.5)
-    assert time.monotonic() - begun < 15.0
+    assert time.monotonic() - begun < 100.0
 
 
 @pytest.mark.parametrize("platform", ["darwin", "win32"])

@@ -760,7 +760,7 @@ def random_runs(draw):
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(random_runs(), st.sampled_from([-8.0, -1.0, 0.125, 4.0]), st.sampled_from([-4.0, 0.5]))
 def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentages(trace, c, k):
     if not np.any(trace.x[0] - trace.r[0]) and not np.any(np.ptp(trace.r, axis=0)):
@@ -776,7 +776,7 @@ def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentage
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(random_runs(), st.randoms(use_true_random=False))
 def test_permuting_channels_changes_nothing(trace, random):
     order = list(range(trace.x.shape[1]))
@@ -786,7 +786,7 @@ def test_permuting_channels_changes_nothing(trace, random):
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(random_runs(), WHOLE, WHOLE)
 def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
     moved = dataclasses.replace(trace, t=trace.t + start, x=trace.x + shift, r=trace.r + shift)
@@ -795,7 +795,7 @@ def test_moving_the_origin_of_x_or_t_changes_only_the_peak(trace, shift, start):
     assert after == pytest.approx(before, rel=1e-12, nan_ok=True)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(random_runs())
 def test_metrics_respect_their_orders(trace):
     scores = m.score(trace)

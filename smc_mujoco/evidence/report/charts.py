@@ -65,7 +65,7 @@ def panels(
     fig = make_subplots(1, len(titles), subplot_titles=titles, horizontal_spacing=gap)
     font = {"size": 12, "color": style.INK}
     fig.update_annotations(font=font, xanchor="left", align="left", yanchor="bottom", yshift=4)
-    for title, axis in zip(fig.layout.annotations, fig.select_xaxes(), strict=True):
+    for title, axis in zip(fig.layout.annotations, fig.select_xaxes(), strict=True):  # pyright: ignore[reportAttributeAccessIssue] plotly makes it
         title.x = axis.domain[0]
     sides = dict(zip("lrtb", margin, strict=True))
     fig.update_layout(height=height, margin=sides, showlegend=False)
@@ -171,7 +171,7 @@ def basins(drawn: "Sequence[Basin]", after: Sequence[float]) -> go.Figure:
     """Draw the maps of one plant: a panel a law, x across, x' up; `after` is from `convergence_times` of all maps."""
     fig, places = panels([words.bold(words.law(basin.law)) for basin in drawn], 232, (54, 8, 24, 44), 0.02)
     unit = drawn[0].unit
-    for place, basin, title in zip(places, drawn, fig.layout.annotations, strict=True):
+    for place, basin, title in zip(places, drawn, fig.layout.annotations, strict=True):  # pyright: ignore[reportAttributeAccessIssue] plotly makes it
         title.font.color = words.colour(basin.law)
         fig.add_trace(_plane(basin.x, basin.v, region.colour_indices(basin, after), region.COLOURS), **place)
     for place, basin in zip(places, drawn, strict=True):

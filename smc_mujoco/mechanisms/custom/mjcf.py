@@ -87,7 +87,7 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
     if isinstance(model, mujoco.MjSpec):
         return _of_spec(model)
     if pymjcf is not None and isinstance(model, pymjcf.RootElement):
-        return _of_text(model.to_xml_string(), model.get_assets())
+        return _of_text(model.to_xml_string(), model.get_assets())  # pyright: ignore[reportAttributeAccessIssue] dm_control's own
     if text:
         return _of_text(str(model), {} if assets is None else assets)
     if not isinstance(model, str | os.PathLike):
