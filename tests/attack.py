@@ -200,7 +200,7 @@ class World:
         )
         Path("arm.xml").write_text(wild.ARM)
         Path("law.c").write_text(smc.law_to_c("classical"))
-        self.tuned = smc.tune("duffing", "classical", budget=1, objective=Objective(duration=0.2))
+        self.tuned = smc.tune("duffing", "classical", budget=1, objective=Objective(duration=0.2), searches=1)
         self.tuned.save("tuned.json")
         self.sane = SANE | {
             "scenarios": [self.scenario],

@@ -14,7 +14,7 @@ from smc_mujoco.simulation.signals import Signal
 pytestmark = pytest.mark.quick
 
 OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have it
-    "frozen": {"margins.Search", "_Ledger", "Frames", "BorrowedData", "Tip", "runs.Runs"},
+    "frozen": {"margins.Search", "Trials", "Frames", "BorrowedData", "Tip", "runs.Runs"},
     "eq": {
         *("Linear", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData", "runs.Runs"),
         *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse", "Mechanism"),
@@ -26,7 +26,7 @@ OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have 
     "slots": {"Functions", "Packed", "Prepared"},
 }
 POSITIONAL = {  # made by position, as signals and parts of machines are
-    *("Clock", "Wave", "StepChange", "_Ledger", "Member", "Added", "LinearLaw", "File", "Network", "Policy", "Gain"),
+    *("Clock", "Wave", "StepChange", "Trials", "Member", "Added", "LinearLaw", "File", "Network", "Policy", "Gain"),
     *("Frames", "Audit", "Robustness", "Identified", "Columns", "Piece", "Point", "Slopes", "rig.Part", "Quantity"),
     *("Reached", "FmuLaw", "Source", "BorrowedData", "NominalModel", "UserFields", "UserModel", "Tip", "Condition"),
     *("Jump", "Noise", "Functions", "Packed", "Prepared", "Mechanism", "runs.Runs"),

@@ -10,11 +10,9 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import gains_for, ranking, step_halving
 from smc_mujoco.analysis import region_of_attraction as region
-from smc_mujoco.analysis.tuning import objective, result, search, search_space
+from smc_mujoco.analysis.tuning import objective, search, search_space, stages
 from smc_mujoco.analysis.worst_case import search as attack
 from smc_mujoco.analysis.worst_case import uncertainty
-from smc_mujoco.common.files import read_json
-from smc_mujoco.control import gain_sets
 from smc_mujoco.envs import tasks
 from smc_mujoco.evidence.accuracy import scaling
 from smc_mujoco.metrics import catalogue, conventions, limit_cycle, tip
@@ -48,16 +46,6 @@ def under(condition: str) -> dict:
     return conditions.NAMED[condition].on(smc.plant("duffing"), 1.0)
 
 
-TUNED = read_json(Path(gain_sets.__file__).parent / "tuned_gains" / "tuned.json")["plants"]
-DYNAMIC = TUNED["duffing"]["dynamic"]["ends"]
-
-
-def searched(first_page: bool) -> list[bool]:
-    """Whether each search has converged, for the laws of the report's first page or for the others."""
-    laws = [(name, found) for plant in TUNED.values() for name, found in plant.items()]
-    return [found["converged"] for name, found in laws if (name in gain_sets.LAWS) == first_page]
-
-
 SAID = {
     margins: [
         f"at most {percent(margins.TOLERATED_ERROR)} of its scale",
@@ -81,14 +69,13 @@ SAID = {
     ],
     region.basin: [f"V is {region.VELOCITY_RATIO:g} X per second"],
     search: [
-        f"A start has {search.EVALUATIONS_PER_GAIN} evaluations for each gain",
-        f"An {part(search.SCREENED_SHARE)} screens",
-        f"A {part(search.EVOLVED_SHARE)} evolves",
-        f"when {WORDS[result.AGREEING_STARTS]} starts end within {percent(result.AGREEMENT_TOLERANCE)} of the best J",
-        f"knows {result.MAX_SETS} near-optimal sets",
-        f"near-optimal within {percent(result.NEAR_OPTIMAL_TOLERANCE)} of the best J",
-        f"rounded to {WORDS[search.GAIN_DIGITS]} digits",
-        f"descends {['once', 'twice'][len(search.FIRST_RADII) - 1]}",
+        {12: "twelve in a comparison"}[search.SEARCHES],
+        f"A search has {search.BUDGET} evaluations for each gain",
+        f"An {part(stages.SCREENED_SHARE)} screens",
+        f"A {part(stages.EVOLVED_SHARE)} evolves",
+        f"lower J by less than {percent(stages.PATIENCE)}",
+        f"differ by more than {percent(search.AGREEMENT)}",
+        f"rounded to {WORDS[stages.GAIN_DIGITS]} digits",
     ],
     search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
     search_space.at_bound: [f"within {percent(search_space.BOUND_MARGIN)} of a bound"],
@@ -150,9 +137,9 @@ SAID = {
     tasks: [f"T(rms(w) / {tasks.RATE_MARGIN:g})", f"within {tasks.SWING_UP_SPREAD:g} rad of hanging"],
     plugin.smc_golden._fixture_function: [f"within {percent(golden.RELATIVE)} of their recorded value"],
     ROOT / "docs" / "mathematics.md": [
-        f"Of the {len(searched(True))} searches for the report's first page {sum(searched(True))} have converged",
-        f"of the {len(searched(False))} for other laws, with three starts each, {sum(searched(False))}",
-        f"end at {', '.join(f'{end:.2f}' for end in DYNAMIC[:2])} and {DYNAMIC[2]:.2f} s²",
+        f"A search has {search.BUDGET} evaluations for each gain",
+        f"lower $J$ by less than {percent(stages.PATIENCE)}",
+        f"differ by more than {percent(search.AGREEMENT)}",
     ],
     ROOT / "docs" / "design.md": [f"fails at |x| or |v| beyond {short(controller.MAX_STATE)}"],
 }

@@ -16,7 +16,6 @@ from helpers.episodes import dm_control_suite
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.cli import main
 from smc_mujoco.cli import scene as show
@@ -56,8 +55,8 @@ RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].start
 # What is asked for less of than a page does: as much code runs, in a tenth of the time.
 SHORTLY, BRIEFLY = Objective(duration=0.5), Objective(conditions=("nominal",), duration=0.25)
 LITTLE = {
-    "compare": {"seeds": 2, "duration": 0.3},
-    "tune": {"objective": SHORTLY},
+    "compare": {"seeds": 2, "duration": 0.3, "searches": 2, "budget": 4},
+    "tune": {"objective": SHORTLY, "searches": 2},
     "identify": {"most": 2},
     "worst_case": {"budget": 8},
     "still": {"size": (640, 360)},
@@ -100,7 +99,6 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         warnings.simplefilter("ignore", smc.PlainLoopWarning)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.setattr(search, "BUDGET", 8)  # of the tunings in `smc.compare`
     monkeypatch.setattr(fair_gains, "Objective", lambda: BRIEFLY)
     monkeypatch.setattr(ensemble, "runs", with_little(ensemble.runs, {"seeds": 2, "duration": 0.3}))
     for name, little in LITTLE.items():

@@ -117,7 +117,7 @@ def design(base: Scenario, amplitude: float | None, frequency: float | None = No
     if math.isnan(tolerated.value):
         words = f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance"
         warnings.warn(words, ScenarioWarning, users_stacklevel())
-    law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions, converged=True))
+    law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions))
     return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)
 
 

@@ -143,6 +143,18 @@ call = _calling(64)  # (address, inputs, parameters, memory, outputs) -> status
 call_int = _calling(32)  # the same for a C function that returns an int: the register's upper half is undefined
 
 
+@intrinsic
+def call_callback(typingctx, address, model, data):
+    """Call the C function void(model, data) at an address."""
+
+    def codegen(context, builder, signature, args):
+        function = ir.FunctionType(ir.VoidType(), [ir.IntType(64)] * 2).as_pointer()
+        builder.call(builder.inttoptr(args[0], function), args[1:])
+        return context.get_dummy_value()
+
+    return types.none(*[types.intp] * 3), codegen
+
+
 @functools.cache
 def attempting(count: int, estimates: bool = False) -> Callable:
     """Return a compiled function: it stores the `count` numbers of body(*arguments). It returns 1 if body raised, or 0.

@@ -4,11 +4,10 @@
     law("duffing", "classical", "study")       # as first chosen
 
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
-- tuned: the near-optimal gains of a search by `tuning`, for every general law, with a cost of the variation of u: up to
-  24 sets of gains. The runs of a study use them in turn, so that gains are part of the sample. `tuned(...).converged`
-  tells whether the starts of the search agree. The laws of LAWS have a search of the full budget, all others of three
-  starts.
-- tracking: the same for the laws of LAWS, of one start, without that cost.
+- tuned: the gains that independent searches by `tuning` found, for every general law, with a cost of the variation of
+  u. The runs of a study use their sets in turn, run i that of search i, so that gains are part of the sample. The laws
+  of LAWS have twelve searches. All others have three, which no verdict follows from.
+- tracking: the same for the laws of LAWS, of three searches, without that cost.
 - default: the default gains of the law.
 
 `tuned_gains/` has a file for each set. `make gains` computes them again, except the set "study".
@@ -57,10 +56,11 @@ def file_of(gains: str) -> Path:
 STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 
 
-def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> Component:
+def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int | None = None) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
-    A run with this seed has the gains of set number `seed` modulo the number of sets. Set 0 is the best.
+    A run with this seed has the gains of search number `seed` modulo their number. Without a seed: the gains with the
+    least J of all searches.
     """
     base = find_law(name)
     find("set of gains", gains, KNOWN_SETS)
@@ -72,7 +72,8 @@ def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int = 0) -> C
         values = find("law of the paper's study", STUDY_ALIASES.get(name, name), of_plant)
     else:
         shipped = tuned(plant, name, gains)
-        values, search = shipped.sets[seed % len(shipped.sets)], shipped.search
+        values = shipped.best if seed is None else shipped.sets[seed % len(shipped.sets)]
+        search = shipped.search
     law = dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
@@ -104,24 +105,35 @@ def in_set(plant: Plant, name: str, gains: str) -> bool:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class TunedGains:
-    """The near-optimal gains of a law on a plant, and the result of their search."""
+    """The gains of a law on a plant, and the searches that found them."""
 
-    sets: tuple[Mapping[str, float], ...]  # each name -> value; the best first
-    objective: float  # J of the best, s^2, see `analysis.tuning.objective`
-    converged: bool | None  # whether three starts of the search ended within 1 % of the best J; None if it had fewer
-    ends: tuple[float, ...]  # best J of each start, s^2
-    evaluations: int  # number of sets of gains that were evaluated
+    sets: tuple[Mapping[str, float], ...]  # each name -> value; of each search, in order
+    objectives: tuple[float, ...]  # J of each, s^2, see `analysis.tuning.objective`; each search has its own runs
+    evaluations: int  # number of sets of gains that the searches evaluated
     seed: int
     at_bound: Mapping[str, str]  # gain -> "lower" or "upper", for those of the best gains at a bound of the search
-    front: tuple[tuple[float, float], ...]  # tracking in s^2 and variation in 1/s of the Pareto front
-    best: tuple[float, float]  # tracking and variation of the best gains, which are on the front
+    near: Mapping[str, tuple[float, float]]  # gain -> its range in sets within 3 % of their search's best
+    front: tuple[tuple[float, float], ...]  # tracking in s^2 and variation in 1/s, Pareto front of the first search
+    first: tuple[float, float]  # tracking and variation of the first search's best gains, which are on the front
     rule: str  # the search, in words
     versions: Mapping[str, str]  # of the packages that the numbers depend on
 
     @property
+    def objective(self) -> float:
+        """The least J of a search, s^2."""
+        return min(self.objectives)
+
+    @property
+    def best(self) -> Mapping[str, float]:
+        """The gains with the least J."""
+        return self.sets[self.objectives.index(self.objective)]
+
+    @property
     def search(self) -> source.Search:
-        """The search: its rule, evaluations, and whether its starts agree."""
-        return source.Search(rule=self.rule, evaluations=self.evaluations, converged=self.converged)
+        """The searches: their rule, number and evaluations, and how far their J differ."""
+        spread = max(self.objectives) / self.objective - 1.0
+        count = len(self.sets)
+        return source.Search(rule=self.rule, evaluations=self.evaluations, searches=count, spread=spread)
 
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
@@ -172,7 +184,7 @@ def _package_gains(gains: str) -> dict[tuple[str, str], TunedGains]:
     """Return the gains of a set in this package, by plant and law."""
     data = read_json(file_of(gains))
     return {
-        (plant, name): _from_record(record | {"rule": data["rule"]})
+        (plant, name): _from_record({"rule": data["rule"]} | record)
         for plant, laws in data["plants"].items()
         for name, record in laws.items()
     }
@@ -185,7 +197,8 @@ def _from_record(record: Mapping[str, Any]) -> TunedGains:
     fields["sets"] = tuple(dict(zip(names, values, strict=True)) for values in fields["sets"])
     fields |= {
         "front": tuple(map(tuple, fields["front"])),
-        "best": tuple(fields["best"]),
-        "ends": tuple(fields["ends"]),
+        "first": tuple(fields["first"]),
+        "objectives": tuple(fields["objectives"]),
+        "near": {name: tuple(ends) for name, ends in fields["near"].items()},
     }
     return TunedGains(**fields)

@@ -2,7 +2,7 @@
 
     smc.law("classical").source                            # default
     smc.law("classical", k=3).source                       # yours
-    smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA from several starts, ...)
+    smc.tune("duffing", "classical").law.source            # tuned here (CMA-ES and COBYQA, 12 searches, ...)
 
 A source belongs to one set of gains. A law whose gains are replaced has the source "yours".
 """
@@ -25,17 +25,28 @@ KINDS = {
     STUDY: "those of a published study",
     YOURS: "given by the user",
 }
-ENDED = {True: "converged", False: "not converged", None: "convergence not tested"}
+
+MAX_SPREAD = 1.0  # larger ones are told as a multiple
+
+
+def spread_in_words(searches: int, spread: float, others: int = 0) -> str:
+    """Return how far J of searches differ: "12 searches, J up to 4.1 % above the least"; "3 to 12 searches, ..."."""
+    number = f"{others} to {searches}" * (others not in (0, searches)) or f"{searches}"
+    if number == "1":
+        return "1 search"
+    above = f"{100.0 * spread:.2g} % above" if spread < MAX_SPREAD else f"{1.0 + spread:.2g} times"
+    return f"{number} searches, J up to {above} the least"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Search:
-    """A search for gains."""
+    """The searches for gains behind a law."""
 
-    rule: str  # how it searches, in words; its name stands before the first comma, colon or bracket
-    evaluations: int  # number of sets of gains that it tried
-    converged: bool | None = None  # whether its starts agree, see `analysis.tuning`; None if it had too few starts
-    about_defaults: bool = False  # whether its starts were drawn about the law's defaults, because a gain has no unit
+    rule: str  # how they search, in words; its name stands before the first comma, colon or bracket
+    evaluations: int  # number of sets of gains that they tried, together
+    searches: int = 1  # their number; each shares nothing with the others
+    spread: float = 0.0  # by how much the largest J that one of them ended with exceeds the least, as a share of it
+    about_defaults: bool = False  # whether they were drawn about the law's defaults, because a gain has no unit
 
     @property
     def name(self) -> str:
@@ -44,8 +55,8 @@ class Search:
 
     @property
     def ended(self) -> str:
-        """Whether the search has converged, in words."""
-        return ENDED[self.converged]
+        """How far the searches agree, in words."""
+        return spread_in_words(self.searches, self.spread)
 
     def __str__(self) -> str:
         return f"{self.name}, {self.evaluations} evaluations, {self.ended}"
@@ -105,17 +116,12 @@ def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> st
 
 
 def _search_text(searches: Mapping[str, Sequence[Search]]) -> str:
-    """Return the searches of several laws in words, with the laws whose search did not converge."""
+    """Return the searches of several laws in words."""
     every = [search for of_law in searches.values() for search in of_law]
-    counts, ends = sorted({search.evaluations for search in every}), {search.ended for search in every}
+    evaluations, counts = sorted({search.evaluations for search in every}), [search.searches for search in every]
     text = f"{' or '.join(dict.fromkeys(search.name for search in every))}, "
-    text += f"{' to '.join(map(str, dict.fromkeys([counts[0], counts[-1]])))} evaluations"
-    if len(ends) == 1:
-        return f"{text}, {every[0].ended}"
-    for end in (ENDED[False], ENDED[None]):
-        if laws := [law for law, of_law in searches.items() if any(search.ended == end for search in of_law)]:
-            text += f", {end}: {joined(laws)}"
-    return text
+    text += f"{' to '.join(map(str, dict.fromkeys([evaluations[0], evaluations[-1]])))} evaluations, "
+    return text + spread_in_words(max(counts), max(search.spread for search in every), min(counts))
 
 
 def untuned_laws(words: Mapping[str, str]) -> list[str]:

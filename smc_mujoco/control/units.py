@@ -56,7 +56,7 @@ class Gain:
     positive: bool = False  # whether it must be greater than 0
     nonnegative: bool = False  # whether it must be at least 0
     held: bool = False  # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
-    over: str | None = None  # the gain that the law divides it by, b in the force k / b: tuning bounds k by u_max b
+    over: str | None = None  # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
     shared: bool = False  # whether it is one number for all joints in a law of many joints, instead of a vector
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:

@@ -3,7 +3,8 @@
     pareto([tune("duffing", law) for law in ("observer_free", "classical")], "fronts.svg")
 
 Down and to the left is better. A front has the gains that no others of the search beat in both terms. No tried gains
-lie below the staircase. The chosen gains have the least objective, see `analysis.tuning.objective`.
+lie below the staircase. The chosen gains have the least objective, see `analysis.tuning.objective`. Searches have other
+runs each, so a front is that of the first one, whose runs are the same for every law.
 """
 
 import itertools
@@ -76,7 +77,7 @@ def _front(ax: Axes, tuned: Tuned, mark: str, colour: str) -> Line2D:
     x = [tried.tracking for tried in tuned.front]
     y = [max(tried.variation, MIN_VARIATION) for tried in tuned.front]
     ax.step(x, y, where="post", color=colour, marker=mark, ms=style.points(4.5), mec="none", alpha=0.9)
-    chosen = min(tuned.history, key=lambda tried: tried.objective)
+    chosen = tuned.searches[0].chosen
     ax.plot([chosen.tracking], [max(chosen.variation, MIN_VARIATION)], color=colour, marker=mark, zorder=3, **_ring())
-    label = f"{words}: J = {tuned.objective:.3g} s²"
+    label = f"{words}: J = {chosen.objective:.3g} s²"
     return Line2D([], [], color=colour, lw=style.points(3), marker=mark, ms=style.points(7), mec="none", label=label)

@@ -152,13 +152,18 @@ def cores(threads: int | None = None) -> int:
 
 
 class ScenarioBatch:
-    """Scenarios of one key (`Prepared.key`) in one Batch. Make and run it while the callback is installed."""
+    """Scenarios of one key (`Prepared.key`) in one Batch. Make and run it while the callback is installed.
 
-    def __init__(self, prepared: Sequence[Prepared], threads: int):
+    Without `constraints`, no limit, contact, dry friction or equality constraint acts.
+    """
+
+    def __init__(self, prepared: Sequence[Prepared], threads: int, constraints: bool = True):
         self.prepared = prepared
         self.scenarios = scenarios = [item.scenario.resolved for item in prepared]
         first, count = scenarios[0], len(scenarios)
         self.base, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
+        if not constraints:
+            self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
         set_fields = models.put_values(self.model, self.base, first, 0)
         self.scratch = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.scratch)
@@ -172,17 +177,27 @@ class ScenarioBatch:
             self.packed.append(packed)
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
-        self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
-        self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
+        self.reset()
         self.put_initial_states()
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
         self.calls = 0  # callbacks that each simulation should have had by now
         self.set_parameters(0, range(count))
 
+    def reset(self) -> None:
+        """Put MuJoCo's states at the model's defaults, and tell the callback which record is whose."""
+        count = len(self.scenarios)
+        self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
+        self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
+
     def run(self, report: Report) -> list[Trace]:
         """Simulate all scenarios to the end, and return their traces."""
+        self.simulate(report)
+        return [self.trace(i) for i in range(len(self.scenarios))]
+
+    def simulate(self, report: Report) -> None:
+        """Simulate all scenarios to the end. Their samples are then in `logs`."""
         total = self.scenarios[0].samples * self.scenarios[0].steps
         jumps = sorted({s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
         for step, next_step in itertools.pairwise([0, *jumps, total]):
@@ -190,7 +205,6 @@ class ScenarioBatch:
                 self.set_parameters(step, [i for i, s in enumerate(self.scenarios) if s.jump_step == step])
             self.advance(next_step - step, report)
         self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
-        return [self.trace(i) for i in range(len(self.scenarios))]
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
         """Set the true parameters that hold from a physics step on, in the simulations of these indices."""
@@ -256,11 +270,16 @@ class ScenarioBatch:
         """Return the Trace of simulation i."""
         code, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
         failure = None if code == state.FINE else self.failure(i, code)
-        if failure is None and (self.model.npair or self.scenarios[i].plant.own):
-            warnings = self.batch.get_data(i, self.scratch).warning
-            if any(warnings[kind].number for kind in FULL_WARNINGS):
-                failure, step = LOST_CONTACTS, 0
+        if failure is None and self.lost_contacts(i):
+            failure, step = LOST_CONTACTS, 0
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
+
+    def lost_contacts(self, i: int) -> bool:
+        """Return whether MuJoCo had no room for all contacts of simulation i."""
+        if not (self.model.npair or self.scenarios[i].plant.own):
+            return False
+        warnings = self.batch.get_data(i, self.scratch).warning
+        return any(warnings[kind].number for kind in FULL_WARNINGS)
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""

@@ -25,6 +25,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of
 from smc_mujoco.analysis.paired_runs import SETTLES, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, checked_share, linked, ranked, ranks
+from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
 from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
 from smc_mujoco.control import gain_sets, source
@@ -52,11 +53,12 @@ class Extent(NamedTuple):
     """How much is run."""
 
     duration: float  # s, of a run
-    budget: int  # sets of gains that a tuning tries
+    searches: int  # of a tuning
+    budget: int  # sets of gains that a search tries, for each gain
     parts: int  # divisor of an adversary's budget
 
 
-FULL, QUICK = Extent(5.0, 96, 1), Extent(3.0, 32, 3)
+FULL, QUICK = Extent(5.0, search.SEARCHES, search.BUDGET, 1), Extent(3.0, 3, 16, 3)
 
 
 def which(
@@ -88,7 +90,8 @@ def which(
       seeds: runs of a law in each condition, each with another start and other noise.
       duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
       out: folder for gains and runs, which another call reads.
-      quick: shorter runs, and a third of the evaluations of a tuning and of an adversary's runs.
+      quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64, and a third of an adversary's
+        runs.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
       starts, relevant, noise_key, threads, progress: as in `compare`.
       within: the class for the need "robust". Default: that of `worst_case`.
@@ -103,7 +106,7 @@ def which(
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
-    candidates = _candidates(trial, _suited(machine, wanted, laws), extent.budget)
+    candidates = _candidates(trial, _suited(machine, wanted, laws), extent)
     table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
     worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
@@ -187,9 +190,9 @@ def _has(law: Component | Template, properties: Sequence[str]) -> bool:
     return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
-def _candidates(trial: Trial, laws: Sequence[Component | Template], budget: int) -> dict[str, Candidate]:
+def _candidates(trial: Trial, laws: Sequence[Component | Template], extent: Extent) -> dict[str, Candidate]:
     """Return name of the law -> the law with gains; raise ScenarioError if two laws have one name."""
-    (candidates,) = trial.gains({trial.plants[0].name: laws}, budget).values()
+    (candidates,) = trial.gains({trial.plants[0].name: laws}, searches=extent.searches, budget=extent.budget).values()
     by_name = {candidate.law.name: candidate for candidate in candidates}
     if len(by_name) < len(candidates):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")

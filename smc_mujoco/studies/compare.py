@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
 
+QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
 MAX_BLOCKS = 12  # plants times conditions that have a table each; if there are more, each plant has one table
 
 
@@ -169,7 +170,7 @@ def compare(
     laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
-    seeds: int = 16,
+    seeds: int = search.SEARCHES,
     tune: bool = True,
     worst: bool | Uncertainty = False,
     executor: "executors.Workers | None" = None,
@@ -179,7 +180,8 @@ def compare(
     duration: float | None = None,
     starts: Starts | None = None,
     gains: str = "tuned",
-    budget: int | None = None,
+    searches: int | None = None,
+    budget: int = search.BUDGET,
     quick: bool = False,
     defaults: bool = False,
     relevant: float = RELEVANT,
@@ -191,15 +193,16 @@ def compare(
     """Compare laws on plants in conditions, with gains by one rule for all, and say which is better and how sure it is.
 
     A law whose gains you gave keeps them. Any other law has those that come with the package for the plant, or is tuned
-    by one rule, yours too. Gains and runs are kept in the folder: after a kill, the same call goes on from there.
-    One run of each of your laws on each plant in each condition is replayed, see `replay`.
+    by one rule, yours too: run i has the gains that search i found, so twelve searches are twelve answers to "what do
+    I get if I tune it?". The folder keeps each search and each run: after a kill, the same call goes on from there. One
+    run of each of your laws on each plant in each condition is replayed, see `replay`.
 
     Args:
       laws: names, or your own laws. Default: those of the report's first page, or else all that suit the plant.
       plants: names, or Plants, such as one from your own MJCF. Default: the paper's five.
       conditions: names, such as "noise + coulomb", texts, or your own, see `condition`. Default: one of each kind.
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
-        law, and the next of the law's sets of gains.
+        law, and the gains of the next search. With more seeds than searches, runs take these in turn.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
       worst: whether to search the worst case of each law on each plant too; or the class in which to search it.
       executor, noise_key, traces: as in `study`. Default: this machine, a new key, no traces.
@@ -208,8 +211,9 @@ def compare(
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      budget: largest number of sets of gains that a tuning tries. Default: that of `tune`, or a third of it if quick.
-      quick: shorter runs and searches; by default three plants and three conditions.
+      searches: searches of a tuning, which share nothing. Default: 12, or 6 if quick, which few verdicts follow from.
+      budget: largest number of sets of gains that a search tries, for each gain.
+      quick: shorter runs and fewer searches; by default three plants and three conditions.
       threads, progress: as in `run`.
 
     Raises:
@@ -219,7 +223,9 @@ def compare(
     workers = executors.as_executor("local" if executor is None else executor)
     _check_names(metrics, gains, out)
     trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
-    candidates = _candidates(trial, laws, tune, gains, budget, search.BUDGET // (3 if quick else 1))
+    number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
+    number, budget = whole("searches", number, 1, search.MAX_SEARCHES), whole("budget", budget, 1, search.MAX_BUDGET)
+    candidates = _candidates(trial, laws, tune, gains, number, budget)
     table = trial.run(candidates, count, executor=workers, traces=traces, noise_key=noise_key)
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
@@ -254,12 +260,11 @@ def _trial(
 
 
 def _candidates(
-    trial: Trial, laws: Any, tune: bool, gains: str, budget: int | None, default_budget: int
+    trial: Trial, laws: Any, tune: bool, gains: str, searches: int, budget: int
 ) -> dict[str, list[Candidate]]:
     """Return plant -> its laws with gains."""
-    tries = default_budget if budget is None else whole("budget", budget, 1, MAX_ITEMS)
-    options: dict[str, Any] = {"tune": tune and gains == "tuned", "gains": gains, "shipped_budget": budget is None}
-    return trial.gains(_checked(trial, laws), tries, **options)
+    options: dict[str, Any] = {"tune": tune and gains == "tuned", "gains": gains}
+    return trial.gains(_checked(trial, laws), searches=searches, budget=budget, **options)
 
 
 def _worst_cases(

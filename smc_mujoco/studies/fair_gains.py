@@ -1,9 +1,9 @@
 """Trials of laws on plants: their gains, all by one rule, their runs and their worst cases.
 
 A law has the gains that the user gave it, else those that come with the package for the plant, else those that a search
-by the same rule finds: with the same bound on u, the same starts and as many evaluations. A law that cannot be tuned
-keeps its defaults, and its remark says why. A search ends with several sets of near-optimal gains. The run of seed s
-has set s modulo their number, so that a comparison holds over the gains with which a tuning may end.
+by the same rule finds: with the same bound on u, the same starts, as many searches and as many evaluations. A law that
+cannot be tuned keeps its defaults, and its remark says why. Each search ends with its own gains. The run of seed s has
+those of search s modulo their number, so that a comparison holds over the gains with which a tuning may end.
 """
 
 import dataclasses
@@ -16,6 +16,7 @@ from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
+from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
@@ -28,7 +29,6 @@ from smc_mujoco.simulation.conditions import Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import WorstCase, cached_worst_case
@@ -38,7 +38,7 @@ class Candidate(NamedTuple):
     """A law with its gains for a plant."""
 
     law: Component  # with the best gains
-    sets: tuple[Component, ...]  # the law with each set of gains; the runs take them in turn
+    sets: tuple[Component, ...]  # the law with the gains of each search; the runs take them in turn
     remark: str = ""  # on the gains, besides their source
 
     def __call__(self, seed: int) -> Component:
@@ -67,7 +67,7 @@ def _without_search(plant: Plant, law: Component | Template, gains: str) -> Cand
     if ours and not plant.unscaled and gain_sets.in_set(plant, law.name, gains):
         count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
-        return Candidate(sets[0], sets)
+        return Candidate(gain_sets.law(plant, law.name, gains), sets)
     return _default(law, f"tuning is not possible here: {plant.unscaled.partition(':')[0]}") if plant.unscaled else None
 
 
@@ -88,7 +88,8 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
     without_unit = list(search_space.without_unit(default))
     have = "have no unit, so their" if len(without_unit) > 1 else "has no unit, so its"
     words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"
-    return Candidate(sets[0], sets, words * bool(without_unit))
+    best = dataclasses.replace(default, gains=tuned.law.gains).sourced(its.kind, its.search)
+    return Candidate(best, sets, words * bool(without_unit))
 
 
 class Trial(NamedTuple):
@@ -102,52 +103,54 @@ class Trial(NamedTuple):
     threads: int | None
     progress: bool
 
-    def gains(
-        self, laws: Mapping[str, Sequence[Component | Template]], budget: int, **options: Any
-    ) -> dict[str, list[Candidate]]:
+    def gains(self, laws: Mapping[str, Sequence[Component | Template]], **options: Any) -> dict[str, list[Candidate]]:
         """Return plant -> its laws with gains, see `gains_on` for the options."""
-        return {plant.name: self.gains_on(plant, laws[plant.name], budget, **options) for plant in self.plants}
+        return {plant.name: self.gains_on(plant, laws[plant.name], **options) for plant in self.plants}
 
     def gains_on(
         self,
         plant: Plant,
         laws: Sequence[Component | Template],
-        budget: int,
+        searches: int = search.SEARCHES,
+        budget: int = search.BUDGET,
         tune: bool = True,
         gains: str = "tuned",
-        shipped_budget: bool = True,
     ) -> list[Candidate]:
         """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
 
-        If some laws have shipped gains, the others are tuned from the starts of those, and with their budget if
-        `shipped_budget`. Laws without given gains come as templates. The folder keeps the results of searches.
+        If some laws have shipped gains, the others are tuned from the starts of those. Laws without given gains come as
+        templates. The folder keeps each search.
         """
         known, starts = [_without_search(plant, law, gains) for law in laws], self.starts
         if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known):
-            starts, budget = None, search.BUDGET if shipped_budget else budget
+            starts = None
 
         def missing(law: Component | Template) -> Candidate:
-            return self.tuned(plant, law, budget, starts) if tune else _default(law)
+            return self.tuned(plant, law, starts, searches, budget) if tune else _default(law)
 
         return [candidate or missing(law) for law, candidate in zip(laws, known, strict=True)]
 
-    def tuned(self, plant: Plant, law: Component | Template, budget: int, starts: Starts | None) -> Candidate:
+    def tuned(
+        self, plant: Plant, law: Component | Template, starts: Starts | None, searches: int, budget: int
+    ) -> Candidate:
         """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
         usual, default = Objective(), coerce.law(law)
         conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
         goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
         try:
-            (first, *_) = goal.scenarios(plant, default, 0)
+            (first, *_) = goal.scenarios(plant, default)
             template = law if isinstance(law, Template) else default.template
             ranges = template and (dict(template.gains), dict(template.conditions))
             depends = [run_key.key(first), goal.describe(), fingerprint.of((default.function, ranges))]
             with warnings.catch_warnings():
                 for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
                     warnings.filterwarnings("ignore", words, ScenarioWarning)
+                folder = self.folder / "gains"
+                options = {"searches": searches, "folder": folder / "searches"}
                 tuned = cached(
-                    self.folder / "gains" / f"{plant.name}-{law.name}-{budget}.json",
+                    folder / f"{plant.name}-{law.name}-{searches}-{budget}.json",
                     depends,
-                    lambda: search.tune(plant, law, budget, 0, goal, self.threads, self.progress),
+                    lambda: search.tune(plant, law, budget, 0, goal, self.threads, self.progress, **options),
                     lambda made, path: made.save(path),
                     result.load,
                 )

@@ -9,17 +9,14 @@ from typing import Any
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import to_json
-from smc_mujoco.mechanisms.custom.mjcf import digest_of
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.codes import Hashes, code_hashes
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_condition
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
-PACKAGE = "smc_mujoco."
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
 NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
-# Plant -> hashes of its code and files, shared by the runs of a study. Each study has a new dict: files may change.
-Hashes = dict[Plant, list[str]]
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
     "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
 )  # fmt: skip
@@ -38,7 +35,7 @@ def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes |
     data = data or description(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
-    codes = _codes(scenario, {} if plants is None else plants)
+    codes = code_hashes(scenario, {} if plants is None else plants)
     text = to_json([data, codes, fingerprint.package(*UNRELATED_FOLDERS)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -46,7 +43,7 @@ def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes |
 def portable_key(scenario: Scenario) -> str:
     """Return a hash, 16 hex digits, of the scenario and of the code of its parts alone: the same on every machine."""
     data = description(scenario) | {"versions": None, "condition": None}  # the condition's name adds nothing
-    return hashlib.sha256(to_json([data, _codes(scenario, {})], sort_keys=True).encode()).hexdigest()[:16]
+    return hashlib.sha256(to_json([data, code_hashes(scenario, {})], sort_keys=True).encode()).hexdigest()[:16]
 
 
 def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
@@ -84,34 +81,6 @@ def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
     differ = [name for name in changed if getattr(scenario, name) is not None]  # the rest are defaults
     name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
     return name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
-
-
-def _codes(s: Scenario, plants: Hashes) -> list[str]:
-    """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's parts and plant."""
-    functions = [part.function for part in (*s.law.parts, s.velocity, s.surface) if part is not None]
-    known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
-    signals = [type(signal) for signal in known if signal is not None]
-    parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
-    foreign = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
-    if s.plant not in plants:
-        plants[s.plant] = _plant_codes(s.plant)
-    return [fingerprint.of(thing) for thing in (*functions, *signals, *foreign)] + plants[s.plant]
-
-
-def _plant_codes(plant: Plant) -> list[str]:
-    """Return hashes of a user's parts of a plant: functions, and the model, which `build` may read from a file."""
-    builds = *plant.contacts.items(), *plant.mechanisms.items()
-    if plant.build.__module__.startswith(PACKAGE):
-        return [fingerprint.of(thing) for thing in (plant.fields, plant.nominal, *builds) if _of_a_user(thing)]
-    functions = plant.build, plant.fields, plant.nominal, builds
-    return [*(fingerprint.of(thing) for thing in functions), digest_of(plant.spec())]
-
-
-def _of_a_user(thing: Any) -> bool:
-    """Return whether a function is not of this package, or any function in nested tuples is not."""
-    if isinstance(thing, tuple):
-        return any(map(_of_a_user, thing))
-    return callable(thing) and not (thing.__module__ or "").startswith(PACKAGE)  # generated code has no module
 
 
 def _condition_text(data: dict[str, Any]) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
+from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
@@ -28,7 +29,6 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import warn_of_broken
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.cache import cached
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure

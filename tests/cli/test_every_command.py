@@ -44,7 +44,7 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
     "--relevant 0.05 --out there --defaults --disturbance 2 --threads 2": ["studies.adviser.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
-    "tune duffing pid --objective tracking --budget 7 --seed 3 --out there.json "
+    "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],
     "margins": ["analysis.margins.margins"],
     "margins --quick": ["analysis.margins.margins"],
@@ -88,7 +88,7 @@ PRINTED = [  # command lines that are run to their ends
     "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
     "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
     "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
-    "tune duffing classical --budget 2 --condition nominal --out t.json",
+    "tune duffing classical --searches 2 --budget 32 --condition nominal --out t.json",
     "compare duffing --law classical,pid --gains default --condition nominal --seeds 1 --duration 0.1 --out c "
     "--figure f.pdf --latex f.tex",
     "compare --rig simple_pendulum_ak80 --law classical --seeds 1 --duration 0.1 --noise-key 0 --out r",

@@ -28,6 +28,7 @@ from smc_mujoco.analysis.region_of_attraction import load as load_map
 from smc_mujoco.analysis.tuning import result
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common import files
+from smc_mujoco.common.cache import cached
 from smc_mujoco.common.files import from_json, plain, reading, replacing, to_json, writable
 from smc_mujoco.evidence.audit.audit import document
 from smc_mujoco.evidence.audit.paper import new
@@ -36,7 +37,6 @@ from smc_mujoco.evidence.report import rigs
 from smc_mujoco.evidence.rigs import records
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import scene
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.testing import golden
 
 WORDS = st.sampled_from(["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"])
@@ -119,9 +119,11 @@ def test_maps_of_both_versions(tmp_path):
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_tunings(tmp_path):
-    tuned = smc.tune("duffing", "classical", budget=8, objective=Objective(conditions=("nominal",), duration=0.2))
+    goal = Objective(conditions=("nominal",), duration=0.2)
+    tuned = smc.tune("duffing", "classical", budget=8, objective=goal, searches=1)
     worst = tuned.history[0]._replace(objective=math.inf, tracking=math.inf)
-    odd = dataclasses.replace(tuned, before=math.nan, history=(*tuned.history[1:], worst))
+    found = dataclasses.replace(tuned.searches[0], history=(*tuned.history[1:], worst))
+    odd = dataclasses.replace(tuned, before=math.nan, searches=(found,))
     strict(odd.save(tmp_path / "a.json").read_text())
     assert same(result.load(tmp_path / "a.json"), odd)
     assert result.load(tmp_path / "a.json").history == odd.history

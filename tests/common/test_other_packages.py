@@ -18,6 +18,7 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
 from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
+from smc_mujoco.simulation import codes
 from smc_mujoco.studies import run_key, scene
 
 ROOT = Path(__file__).parents[2]
@@ -204,12 +205,14 @@ def test_a_package_brings_the_gains_of_its_law(install):
     with pytest.raises(smc.ScenarioError, match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune"):
         gain_sets.law("duffing", "tuned_law")
     budget, brief = 8, Objective(conditions=("nominal",), duration=0.2)
-    tuned = smc.tune("duffing", "tuned_law", budget, objective=brief)
+    tuned = smc.tune("duffing", "tuned_law", budget, objective=brief, searches=2)
     tuned.save(folder / "tuned_gains" / "tuned" / "duffing-tuned_law.json")
     assert [gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))] == [
         dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets
     ]
-    assert gain_sets.tuned("duffing", "tuned_law").converged is None
+    shipped = gain_sets.tuned("duffing", "tuned_law").search
+    assert (shipped.rule, shipped.searches, shipped.evaluations) == (tuned.rule, 2, tuned.evaluations)
+    assert shipped.spread == pytest.approx(tuned.spread, abs=1e-5)
 
 
 def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):
@@ -241,8 +244,8 @@ def test_a_study_hashes_a_package_s_plant_once(install, tmp_path, monkeypatch):
         hashed_plants=PLANT.replace("NAME", "hashed_plant")
         + "build = hashed_plant.build\nhashed_plant = dataclasses.replace(hashed_plant, build=lambda n: build(n))\n",
     )
-    hashed, real = [], run_key.digest_of
-    monkeypatch.setattr(run_key, "digest_of", lambda spec: hashed.append(spec) or real(spec))
+    hashed, real = [], codes.digest_of
+    monkeypatch.setattr(codes, "digest_of", lambda spec: hashed.append(spec) or real(spec))
     runs = smc.grid(["hashed_plant"], ["classical", "pid"], ["nominal"], seeds=4, duration=0.02, gains="default")
     smc.study(runs, tmp_path / "study")
     assert len(hashed) == 1

@@ -34,7 +34,7 @@ def files(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def tuned():
-    return smc.tune("duffing", smc.law("boundary_layer", k=0.01), budget=4)
+    return smc.tune("duffing", smc.law("boundary_layer", k=0.01), budget=4, searches=1)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
 
 
 def test_gains_of_your_own_law_are_named_where_its_code_is_missing(files):
-    smc.tune("duffing", smc.law("mine.py"), budget=1).save("mine.json")
+    smc.tune("duffing", smc.law("mine.py"), budget=1, searches=1).save("mine.json")
     gains = json.loads((files / "mine.json").read_text())["scenario"]["law"]["gains"]
     with pytest.raises(smc.ScenarioError, match=r"law mine of mine\.json is your own: give .* FILE\.py\(k=") as error:
         smc.law("mine.json")

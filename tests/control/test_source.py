@@ -56,10 +56,11 @@ def test_a_law_is_the_users_only_with_gains_of_the_user():
 
 def test_the_search_is_that_of_the_file():
     law, tuning = gain_sets.law("duffing", "classical"), gain_sets.tuned("duffing", "classical")
+    spread = max(tuning.objectives) / min(tuning.objectives) - 1.0
     assert law.source.search == source.Search(
-        rule=tuning.rule, evaluations=tuning.evaluations, converged=tuning.converged
+        rule=tuning.rule, evaluations=tuning.evaluations, searches=len(tuning.sets), spread=spread
     )
-    assert f", {tuning.evaluations} evaluations, " in str(law.source)
+    assert f", {tuning.evaluations} evaluations, {len(tuning.sets)} searches, J up to" in str(law.source)
 
 
 @pytest.mark.parametrize("kind", sets())
@@ -109,18 +110,29 @@ def test_words_name_each_source_once_with_its_laws():
     assert source.in_words(laws) == "gains: a and c default, b study"
     assert source.in_words({"a": laws["a"], "none": [source.Source()]}) == "gains: default"
     assert source.in_words({"none": [source.Source()]}) == ""
-    search = source.Search(rule="CMA-ES (three starts), in logarithms", evaluations=288, converged=False)
-    assert str(smc.law("pid").sourced("shipped", search).source) == "shipped (CMA-ES, 288 evaluations, not converged)"
+    search = source.Search(rule="CMA-ES (as published), in logarithms", evaluations=288)
+    assert str(smc.law("pid").sourced("shipped", search).source) == "shipped (CMA-ES, 288 evaluations, 1 search)"
 
 
-def test_searches_of_several_laws_are_one_phrase_that_names_those_that_did_not_converge():
-    first, other = (source.Search(rule="CMA-ES", evaluations=n, converged=n < 100) for n in (90, 200))
+@pytest.mark.parametrize(
+    ("spread", "words"), [(0.0, "0 % above the least"), (0.0412, "4.1 % above the least"), (2.0, "3 times the least")]
+)
+def test_the_spread_of_searches_is_told(spread, words):
+    assert source.spread_in_words(12, spread) == f"12 searches, J up to {words}"
+
+
+def test_searches_of_several_laws_are_one_phrase():
+    first, other = (source.Search(rule="CMA-ES", evaluations=30 * n, searches=n, spread=n / 100) for n in (3, 12))
     laws = {
         "a": [smc.law("pid").sourced("shipped", first).source],
         "b": [smc.law("pid").sourced("shipped", other).source],
     }
-    assert source.in_words(laws) == "gains: shipped (CMA-ES, 90 to 200 evaluations, not converged: b)"
-    assert source.in_words({"a": laws["a"]}) == "gains: shipped (CMA-ES, 90 evaluations, converged)"
+    assert source.in_words(laws) == (
+        "gains: shipped (CMA-ES, 90 to 360 evaluations, 3 to 12 searches, J up to 12 % above the least)"
+    )
+    assert source.in_words({"a": laws["a"]}) == (
+        "gains: shipped (CMA-ES, 90 evaluations, 3 searches, J up to 3 % above the least)"
+    )
 
 
 def test_an_unknown_kind_is_refused():

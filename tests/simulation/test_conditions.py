@@ -260,7 +260,7 @@ def test_named_law_is_another_in_tables(tmp_path):
     again = smc.Table.read(tmp_path).scenario(0)
     assert again == runs[0]
     assert again.law.function is QUICK.function
-    assert smc.tune("duffing", slow, 2, conditions="nominal").law.name == "slow"
+    assert smc.tune("duffing", slow, 2, conditions="nominal", searches=1).law.name == "slow"
 
 
 def test_grid_warns_of_gains_for_other_parameters():
@@ -329,25 +329,26 @@ def test_a_region_of_a_model_is_asked_for_its_reach(arm):
 def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
     refused(lambda: smc.tune(arm, "observer_free", budget=4, conditions="nominal"))
     goal = Objective(conditions=("nominal",), duration=0.5)
-    found = smc.tune(arm, "observer_free", 4, objective=goal, conditions=[WORN], starts=smc.starts(x0=0.4))
+    found = smc.tune(arm, "observer_free", 4, objective=goal, conditions=[WORN], starts=smc.starts(x0=0.4), searches=1)
     assert [one.name for one in found.definition.conditions] == ["worn gear"]
     assert found.scales["X"] == 0.4
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:no set of gains")
 def test_tune_has_the_bound_of_a_grid(arm):
     starts = smc.starts(x0=0.4)
-    found = smc.tune(arm, "pid", 2, conditions="nominal", starts=starts)
+    found = smc.tune(arm, "pid", 2, conditions="nominal", starts=starts, searches=1)
     (run,) = smc.grid(arm, found.law, starts=starts)
     assert found.definition.u_max == run.resolved.u_max == 20.0
     assert "|u| <= 20" in str(found.definition)
-    assert smc.tune(arm, "pid", 2, objective=Objective(u_max=5.0), starts=starts).definition.u_max == 5.0
+    assert smc.tune(arm, "pid", 2, objective=Objective(u_max=5.0), starts=starts, searches=1).definition.u_max == 5.0
 
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_an_objective_of_ones_own_is_saved_and_read_back(arm, tmp_path):
     goal = Objective(conditions=("nominal", WORN), duration=0.5, starts=smc.starts(x0=0.4, by=0.1))
-    found = smc.tune("duffing", "observer_free", 4, objective=goal)
+    found = smc.tune("duffing", "observer_free", 4, objective=goal, searches=1)
     assert result.load(found.save(tmp_path / "it.json")) == found
 
 

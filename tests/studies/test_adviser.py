@@ -372,14 +372,14 @@ def trial(folder, starts=None):
 def test_laws_are_tuned_as_the_packages_own_gains_were_where_these_are_compared(monkeypatch):
     asked = []
     monkeypatch.setattr(
-        fair_gains.Trial, "tuned", lambda self, plant, law, budget, starts: asked.append((budget, starts))
+        fair_gains.Trial, "tuned", lambda self, plant, law, starts, *effort: asked.append((starts, *effort))
     )
-    known, other = adviser.QUICK.budget, smc.starts(x0=0.5)
+    other = smc.starts(x0=0.5)
     mine = law_function(gains={"k": 2.0})(lambda y, gains, memory: (-gains.k * y.e, y.e))
     laws = [catalogue()["classical"], mine]
     for plant in (smc.plant("duffing"), smc.plant("duffing", M=2.0)):
-        trial(Path("gains"), other).gains_on(plant, laws, known)
-    assert asked == [(search.BUDGET, None), (known, other), (known, other)]
+        trial(Path("gains"), other).gains_on(plant, laws, 3, 16)
+    assert asked == [(None, 3, 16), (other, 3, 16), (other, 3, 16)]
 
 
 def test_gains_of_the_package_are_taken_where_there_are_some(folder):
@@ -398,17 +398,15 @@ def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder
 
     heavy, tuned, tune = smc.plant("duffing", M=2.0), [], search.tune
     monkeypatch.setattr(search, "tune", lambda *args, **named: tuned.append(tune(*args, **named)) or tuned[-1])
-    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(budget=16))
+    monkeypatch.setattr(adviser, "FULL", adviser.FULL._replace(searches=2, budget=8))
     monkeypatch.setattr(fair_gains, "Objective", functools.partial(Objective, duration=1.0))
     options = {"laws": [my_pd], "needs": "fast,continuous", "out": folder} | COMMON
     options |= {"seeds": 2, "duration": 1.0, "conditions": "nominal"}
     found = smc.which(heavy, **options)
-    assert re.match(
-        r"gains: tuned here \(CMA-ES and COBYQA from several starts, 1\d evaluations", found.choices[0].gains
-    )
+    assert re.match(r"gains: tuned here \(CMA-ES and COBYQA, [23]\d evaluations, 2 searches", found.choices[0].gains)
     assert found.law.function is my_pd.function
     assert found.law.gains == tuned[0].law.gains != my_pd.defaults
-    assert (tuned[0].budget, tuned[0].plant) == (16, heavy)
+    assert (tuned[0].budget, len(tuned[0].searches), tuned[0].plant) == (8, 2, heavy)
     assert smc.which(heavy, **options).law == found.law
     assert len(tuned) == 1
 
@@ -440,7 +438,7 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
         (duffing, held),
         (dataclasses.replace(duffing, build=build), my_spring),
     ):
-        trial(folder).tuned(plant, law, 4, None)
+        trial(folder).tuned(plant, law, None, 3, 16)
     assert asked[0] == asked[1]
     assert len({str(depends) for depends in asked}) == 3
 
@@ -448,12 +446,12 @@ def test_kept_gains_are_searched_again_where_the_search_or_the_plants_code_diffe
 def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeypatch):
     tuned = types.SimpleNamespace(before=1.0, objective=2.0, law=FAST)
     monkeypatch.setattr(fair_gains, "cached", lambda *rest: tuned)
-    own = trial(folder).tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None)
+    own = trial(folder).tuned(smc.plant("duffing"), smc.law("observer_free"), None, 3, 16)
     assert (own.law, own.remark) == (smc.law("observer_free"), "its defaults, better than those tried")
     assert own.law.source.kind == FAST.source.kind
     tuned.before, tuned.bounds = 3.0, FAST.gains
     tuned.sets = [types.SimpleNamespace(gains=tuple(FAST.gains.values())), types.SimpleNamespace(gains=(5.0, 2.5))]
-    found = trial(folder).tuned(smc.plant("duffing"), smc.law("observer_free"), 4, None)
+    found = trial(folder).tuned(smc.plant("duffing"), smc.law("observer_free"), None, 3, 16)
     assert (found.law, found.remark) == (FAST, "")
     assert [found(seed).gains["k1"] for seed in range(3)] == [2.0, 2.5, 2.0]
 

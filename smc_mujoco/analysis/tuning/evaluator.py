@@ -1,15 +1,283 @@
-"""The objective J of laws with given gains."""
+"""J of candidates, on runs that keep their memory from one candidate to the next.
+
+    evaluate = Evaluator(goal, cases, ("lam", "k1"))      # once a search
+    evaluate([(6.0, 2.5), (6.0, 3.0)])                    # an Evaluation for each
+
+A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator prepares them once, puts
+the gains of each candidate into the buffers that compiled code reads, and takes J from the logs. It has three engines:
+MuJoCo, in a Batch that lasts; the plant's `equation`, which may only find gains; and the reference loop, for laws that
+do not compile. J is that of `Objective.terms`.
+"""
 
 import dataclasses
-from collections.abc import Sequence
+import functools
+import math
+import warnings
+from collections.abc import Callable, Hashable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit, types
 
-from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Objective
+from smc_mujoco.analysis.tuning import equation
+from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Evaluation, Objective
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.jit import compiled, pointer
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
+from smc_mujoco.simulation.run import PlainLoopWarning, ScenarioBatch, cores, memory_for, run
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.state import log_at
+
+MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "the reference loop"  # engines
+Gains = tuple[float, ...]
+
+
+class Ended(NamedTuple):
+    """What J needs of a run: the time at which it failed, s, or None, and its log, (K + 1, n) LOG."""
+
+    failed_at: float | None
+    log: np.ndarray
+
+
+class Evaluator:
+    """J of candidates in the runs of one search.
+
+    Args:
+      goal: the objective.
+      cases: the runs of a candidate, as `Objective.scenarios` returns them, all with the same law.
+      names: the gains that a candidate consists of.
+      threads: as in `run`.
+      by_equation: whether the plant's equation replaces MuJoCo where it can.
+      constraints: whether limits and contacts act in MuJoCo.
+      slots: how many candidates MuJoCo runs at once.
+    """
+
+    def __init__(
+        self,
+        goal: Objective,
+        cases: Sequence[Scenario],
+        names: Sequence[str],
+        threads: int | None = None,
+        by_equation: bool = False,
+        constraints: bool = True,
+        slots: int = 1,
+    ):
+        self.goal, self.cases, self.names, self.threads = goal, list(cases), tuple(names), cores(threads)
+        prepared = [prepare(case) for case in self.cases]
+        if any(item.why_not for item in prepared):
+            self.engine, self._run = PYTHON, None
+        elif by_equation and all(map(equation.fits, prepared)):
+            self.engine, self._run = EQUATION, _Equations(prepared, self.names, self.threads)
+        else:
+            self.engine, self._run = MUJOCO, _Batches(prepared, self.names, self.threads, constraints, slots)
+
+    def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
+        """Return the evaluations of sets of gains."""
+        terms = self._terms_of_traces(candidates) if self._run is None else self._run(candidates, self._terms)
+        size, made = len(self.cases), []
+        for k, gains in enumerate(candidates):
+            tracking, variation = (float(sum(term)) for term in zip(*terms[k * size : (k + 1) * size], strict=True))
+            cost = tracking + self.goal.weight * variation + self.excess(gains)
+            made.append(Evaluation(gains, cost, tracking, variation))
+        return made
+
+    def law(self, gains: Gains) -> Component:
+        """Return the law with these gains."""
+        return with_gains(self.cases[0].law, self.names, gains)
+
+    def excess(self, gains: Gains) -> float:
+        """Return what a candidate's predicted chattering costs, s^2."""
+        if self.goal.chattering is None:
+            return 0.0
+        return self.goal.excess(dataclasses.replace(self.cases[0], law=self.law(gains)))
+
+    def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[tuple[float, float]]:
+        laws = [self.law(gains) for gains in candidates]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PlainLoopWarning)  # the runs of the law's own gains have warned
+            traces = run([dataclasses.replace(case, law=law) for law in laws for case in self.cases], self.threads)
+        return [self.goal.terms_of_run(trace) for trace in traces]
+
+    def _terms(self, index: int, ended: Ended) -> tuple[float, float]:
+        """Return tracking and variation of the run of a case, given by its index."""
+        case = self.cases[index]
+        if ended.failed_at is None:
+            itae, start, tv = sums(ended.log, case.control_period)
+            if math.isfinite(itae):
+                return self.goal.terms_of_sums(case, itae, start, tv)
+            errors = np.isfinite(ended.log["x"] - ended.log["r"]).all(axis=1)
+            return self.goal.terms_of_failure(int(np.argmin(errors)) * case.control_period)
+        return self.goal.terms_of_failure(ended.failed_at)
+
+
+Terms = Callable[[int, Ended], tuple[float, float]]
+
+
+def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
+    """Return the law with other gains, without a warning for violated conditions of its theorem."""
+    return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
+
+
+def _batched(candidates: Sequence[Gains], size: int) -> list[Sequence[Gains]]:
+    return [candidates[first : first + size] for first in range(0, len(candidates), size)]
+
+
+class _Gains:
+    """Where the gains of a run are among its numbers."""
+
+    def __init__(self, law: Component, names: Sequence[str], record: Any, packed: Packed, n: int):
+        width, at = n if law.joint else 1, int(record["law"]["parameters"])
+        self.values = state.view(packed.numbers, at, (len(law.gains), width))
+        self.rows = [list(law.gains).index(name) for name in names]
+
+    def put(self, gains: Gains) -> None:
+        """Set the gains that a candidate has."""
+        for row, gain in zip(self.rows, gains, strict=True):
+            self.values[row] = gain
+
+
+class _Equations:
+    """The runs by the equation: as many candidates at once as there are threads."""
+
+    def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int):
+        self.cases, self.threads = len(prepared), threads
+        self.runs = [equation.EquationRun(item) for _ in range(threads) for item in prepared]
+        law, n = prepared[0].scenario.law, prepared[0].scenario.plant.n
+        self.gains = [_Gains(law, names, one.record[0], one.packed, n) for one in self.runs]
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[tuple[float, float]]:
+        made: list[tuple[float, float]] = []
+        for some in _batched(candidates, self.threads):
+            runs = range(len(some) * self.cases)
+            each = functools.partial(self._one, some, terms)
+            made += map(each, runs) if self.pool is None else self.pool.map(each, runs)
+        return made
+
+    def _one(self, candidates: Sequence[Gains], terms: Terms, i: int) -> tuple[float, float]:
+        """Return the terms of run i of some candidates."""
+        one = self.runs[i]
+        one.restart()
+        self.gains[i].put(candidates[i // self.cases])
+        one.simulate()
+        record = one.record[0]
+        failed = record["failure"] != state.FINE
+        time = float(record["failed_step"]) * one.scenario.physics_step if failed else None
+        return terms(i % self.cases, Ended(time, one.log))
+
+
+class _Batches:
+    """The runs by MuJoCo: a Batch for each group of cases that can share one."""
+
+    def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int, constraints: bool, slots: int):
+        groups: dict[Hashable, list[int]] = {}
+        for index, item in enumerate(prepared):
+            groups.setdefault(item.key, []).append(index)
+        self.cases, self.slots = len(prepared), slots
+        self.groups = list(groups.values())
+        with callback.installed():
+            self.batches = [
+                _Again([prepared[i] for i in its] * slots, names, threads, constraints) for its in self.groups
+            ]
+
+    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[tuple[float, float]]:
+        made: list[tuple[float, float]] = []
+        for some in _batched(candidates, self.slots):
+            rows: list[tuple[float, float]] = [(0.0, 0.0)] * (len(some) * self.cases)
+            for its, batch in zip(self.groups, self.batches, strict=True):
+                ended = batch.again([gains for gains in some for _ in its])
+                for k, one in enumerate(ended):
+                    index = its[k % len(its)]
+                    rows[k // len(its) * self.cases + index] = terms(index, one)
+            made += rows
+        return made
+
+
+class _Again(ScenarioBatch):
+    """A ScenarioBatch that runs again and again, each time with other gains."""
+
+    def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int, constraints: bool):
+        super().__init__(prepared, threads, constraints)
+        self.first_records = self.records.copy()
+        self.first_numbers = [packed.numbers.copy() for packed in self.packed]
+        self.start = {
+            name: self.batch.bind(name).copy() for name in ("qpos", "qvel", *["history"] * bool(self.model.nhistory))
+        }
+        law, n = prepared[0].scenario.law, prepared[0].scenario.plant.n
+        self.gains = [_Gains(law, names, *pair, n) for pair in zip(self.records, self.packed, strict=True)]
+
+    def again(self, gains: Sequence[Gains]) -> list[Ended]:
+        """Run the first simulations, as many as gains are given, from their start."""
+        count = len(gains)
+        self.records[:] = self.first_records
+        self.records["failure"][count:] = state.INTERRUPTED  # they are not stepped
+        for one, first in zip(self.packed, self.first_numbers, strict=True):
+            one.numbers[:] = first
+        for its, values in zip(self.gains, gains, strict=False):
+            its.put(values)
+        self.errors.clear()
+        self.calls = 0
+        with callback.installed(), memory_for(self.prepared):
+            self.reset()
+            for name, values in self.start.items():
+                self.batch.bind(name)[:] = values
+            if self.fields:
+                self.set_parameters(0, range(len(self.scenarios)))
+            self.simulate(lambda steps: None)
+            return [self._ended(i) for i in range(count)]
+
+    def _ended(self, i: int) -> Ended:
+        step = int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
+        if self.records["failure"][i] == state.FINE:
+            return Ended(0.0 if self.lost_contacts(i) else None, self.logs[i])
+        return Ended(step, self.logs[i])
+
+
+def sums(log: np.ndarray, period: float) -> tuple[float, float, float]:
+    """Return ITAE, sum |x0| and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace do."""
+    out = np.empty(3)
+    _sums().ctypes(state.address(log), *log.shape, period, state.address(out))
+    itae, start, tv = out.tolist()
+    return itae, start, tv
+
+
+@functools.cache
+def _sums() -> Any:
+    """Return the compiled `sums`, void(log, samples, channels, period, results)."""
+    ours = callback.magic()  # so that the code in the cache is that of these sources
+
+    def body(log, samples, n, period, out):
+        if ours != 0.0:
+            _write_sums(log, samples, n, period, pointer(out))
+
+    integer = types.intp
+    return compiled(types.void(integer, integer, integer, types.float64, integer), body, cache=True)
+
+
+@njit(error_model="numpy")
+def _write_sums(log, samples, n, period, out):
+    """Write ITAE, sum |x0| and TV into an array of three numbers."""
+    itae, start, tv, before = 0.0, 0.0, 0.0, 0.0
+    for k in range(samples):
+        error = 0.0
+        for i in range(n):
+            sample = log_at(log, k * n + i)
+            error += abs(sample.x - sample.r)
+            if k == 0:
+                start += abs(sample.x)
+        now = k * period * error
+        itae += 0.5 * (before + now) * period
+        before = now
+    for i in range(n):
+        total = 0.0
+        for k in range(1, samples):
+            total += abs(log_at(log, k * n + i).u - log_at(log, (k - 1) * n + i).u)
+        tv = max(tv, total)
+    out[0], out[1], out[2] = itae, start, tv
 
 
 def objectives(
@@ -34,9 +302,6 @@ def objectives(
     cases = [goal.unseen(plant, law, number) for law, number in zip(laws, numbers, strict=True)]
     if halved:
         cases = [[dataclasses.replace(c, physics_step=0.5 * c.resolved.physics_step) for c in its] for its in cases]
-    size, traces = len(goal.conditions), run([case for its in cases for case in its], threads)
-    totals = []
-    for i, its in enumerate(cases):
-        tracking, variation = goal.terms(traces[i * size : (i + 1) * size])
-        totals.append(tracking + goal.weight * variation + goal.excess(its[0]))
-    return np.array(totals)
+    traces = iter(run([case for its in cases for case in its], threads))
+    made = [goal.evaluation(its[0], [next(traces) for _ in its]) for its in cases]
+    return np.array([one.objective for one in made])

@@ -17,7 +17,7 @@ any other run costs, and decreases with t. With a bound on predicted chattering,
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,9 +33,25 @@ from smc_mujoco.simulation.trace import Trace
 DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
 CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
 DEFAULT_STARTS = Starts()
-SEEDS_PER_TUNING = 1000  # each condition uses one of them
-UNSEEN = 2**51 // SEEDS_PER_TUNING  # instances from this one on belong to no search
+SEEDS_PER_SEARCH = 1000  # each condition uses one of them
+MAX_SEARCHES = 1000  # of a tuning
+MAX_TUNING_SEED = 10**9
+UNSEEN = MAX_SEARCHES * (MAX_TUNING_SEED + 1)  # instances from this one on belong to no search
 FAILURE_COST = 1e9  # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
+
+
+class Evaluation(NamedTuple):
+    """One set of gains, in the order of `Tuned.bounds`: J = tracking + weight variation."""
+
+    gains: tuple[float, ...]
+    objective: float
+    tracking: float
+    variation: float
+
+    @property
+    def failed(self) -> bool:
+        """Whether one of its runs failed."""
+        return self.tracking >= FAILURE_COST
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -56,7 +72,7 @@ class Objective:
 
     def __post_init__(self):
         conditions = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
-        if not 0 < len(conditions) <= SEEDS_PER_TUNING:
+        if not 0 < len(conditions) <= SEEDS_PER_SEARCH:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
         checked_starts(self.starts)
@@ -76,15 +92,21 @@ class Objective:
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return values | {"conditions": list(map(str, self.conditions)), "starts": dataclasses.asdict(self.starts)}
 
-    def scenarios(self, plant: Plant | str, law: Component, seed: int) -> list[Scenario]:
-        """Return one run for each condition. Every candidate gets the same initial states and the same noise."""
+    def scenarios(self, plant: Plant | str, law: Component, seed: int = 0, search: int = 0) -> list[Scenario]:
+        """Return one run for each condition, of a search of a tuning with this seed.
+
+        Every candidate of a search gets the same initial states and the same noise, those of other searches get others.
+        """
+        return self._instance(plant, law, MAX_SEARCHES * seed + search)
+
+    def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         first = Scenario(plant=plant, law=law, **common)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]
         cases = []
         for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):
             self.starts.check_condition(condition.name, changes)
-            case = self.starts.place(dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_TUNING * seed + i)
+            case = self.starts.place(dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_SEARCH * number + i)
             if not any(case.resolved.x0):
                 where = f"starts at 0 under {condition.name!r}, where a law has nothing to do"
                 raise ScenarioError(f"{case.plant.name} {where}: {START_CURE}")
@@ -96,18 +118,30 @@ class Objective:
         tracking, variation = zip(*map(self.terms_of_run, traces), strict=True)
         return sum(tracking), sum(variation)
 
+    def evaluation(self, case: Scenario, traces: list[Trace], gains: tuple[float, ...] = ()) -> Evaluation:
+        """Return the evaluation of a candidate, given its first case and the traces of all."""
+        tracking, variation = self.terms(traces)
+        cost = tracking + self.weight * variation + self.excess(case)
+        return Evaluation(gains, float(cost), float(tracking), float(variation))
+
     def terms_of_run(self, trace: Trace) -> tuple[float, float]:
         """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its cost, and 0."""
         if trace.diverged_at is not None:
-            return FAILURE_COST * (2.0 - min(trace.diverged_at / self.duration, 1.0)), 0.0
-        start = float(np.abs(trace.x[0]).sum())
-        tracking = min(metrics.itae(trace) / start, FAILURE_COST)
-        bound = float(np.max(trace.scenario.resolved.u_max)) if self.u_max is None else self.u_max
-        return tracking, metrics.tv(trace) / (bound * self.duration)
+            return self.terms_of_failure(trace.diverged_at)
+        return self.terms_of_sums(trace.scenario, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace))
+
+    def terms_of_sums(self, case: Scenario, itae: float, start: float, tv: float) -> tuple[float, float]:
+        """Return the terms of a run with this ITAE, sum |x0| and TV."""
+        bound = float(np.max(case.resolved.u_max)) if self.u_max is None else self.u_max
+        return min(itae / start, FAILURE_COST), tv / (bound * self.duration)
+
+    def terms_of_failure(self, time: float) -> tuple[float, float]:
+        """Return the terms of a run that fails at a time, s."""
+        return FAILURE_COST * (2.0 - min(time / self.duration, 1.0)), 0.0
 
     def unseen(self, plant: Plant | str, law: Component, instance: int) -> list[Scenario]:
         """Return one run for each condition, of an instance 0, 1, ... that no search uses."""
-        return self.scenarios(plant, law, UNSEEN + instance)
+        return self._instance(plant, law, UNSEEN + instance)
 
     def excess(self, case: Scenario) -> float:
         """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to the amplitude."""

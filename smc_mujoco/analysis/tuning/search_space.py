@@ -7,12 +7,11 @@ The plant has four scales, from which each gain's scale follows:
     M = 1 / g(0)        inertia, kg m^2 or kg
     T = sqrt(M X / u_max)   time in which the actuator moves the plant by X (by X / 2, from rest)
 
-A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5. A gain that is a force
-by itself, such as lambda of -lambda tanh(s), is searched up to F, because the actuator cannot give more. A law may
-divide a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k is at most u_max b,
-for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`. With the model a law
-divides by the plant's g instead, and its k is declared as a force. Gains k and b are tuned without the model: with it,
-the force k / g may be larger than u_max where g is less than b.
+A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5, and a search may leave
+this box by a decade. That holds for forces too, such as lambda of -lambda tanh(s): the actuator clips the command of
+every law alike, so a law with 2 a in place of lambda, or 1 / tau in place of k, has the same search. A law may divide
+a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as
+a force, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
 A law declares the unit of each gain, and which gains the search leaves as they are: initial values, exponents, table
 sizes, a plant's parameters, filters and number formats of a processor. A gain of unknown unit is searched over as many
@@ -32,7 +31,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component, unit_cure
-from smc_mujoco.control.units import FORCE, Gain, Unit
+from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.grid import START_CURE
 
@@ -98,7 +97,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
             bounds[name] = (defaults[name] * 10**-HALF_WIDTH, defaults[name] * 10**HALF_WIDTH)
         elif (gain_unit := unit(law, name)) is not None and not _gain(law, name).held:
             scale = gain_unit.of(plant_scales)
-            bounds[name] = (scale * 10**-HALF_WIDTH, scale if gain_unit == FORCE else scale * 10**HALF_WIDTH)
+            bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**HALF_WIDTH)
     if not bounds:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")
     return bounds
@@ -111,17 +110,14 @@ def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
     return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
 
 
-def actuator_limits(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
-    """Return the upper bound of each gain that the law divides by another one: u_max b for the force k / b."""
+def force_limits(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
+    """Return the largest value of each gain k that the law divides by another one, b: that of a force, times b."""
     declared = law.template.gains if law.template else {}
-    values = {**law.gains, **gains}
-    return {name: u_max * values[gain.over] for name, gain in declared.items() if gain.over is not None}
+    values, largest = {**law.gains, **gains}, u_max * 10 ** (HALF_WIDTH + WIDENING)
+    return {name: largest * values[gain.over] for name, gain in declared.items() if gain.over is not None}
 
 
-def widened(law: Component, bounds: Box) -> dict[str, tuple[float, float]]:
-    """Return bounds a decade wider on either side, except above the actuator's limit."""
+def widened(bounds: Box) -> dict[str, tuple[float, float]]:
+    """Return bounds a decade wider on either side."""
     factor = 10**WIDENING
-    return {
-        name: (low / factor, high * (1 if _gain(law, name).unit == FORCE else factor))
-        for name, (low, high) in bounds.items()
-    }
+    return {name: (low / factor, high * factor) for name, (low, high) in bounds.items()}

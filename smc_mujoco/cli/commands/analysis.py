@@ -30,12 +30,12 @@ def tune(
     objective: Annotated[
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
-    budget: Annotated[
-        int | None, typer.Option(min=1, help="Sets of gains to try at most; default: several starts of the search.")
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the search and of the noise.")] = 0,
+    searches: Annotated[int, typer.Option(min=1, help="Searches, which share nothing.")] = 12,
+    budget: Annotated[int, typer.Option(min=1, help="Sets of gains that a search tries at most, for each gain.")] = 64,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the searches and of the noise.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Also write gains, history and provenance to a file.")
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Also write gains, history and provenance to a file, and each search."),
     ] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
@@ -45,7 +45,9 @@ def tune(
 
     Each gain is searched over the same number of decades about a scale that follows from its unit and the plant. The
     objective is error times time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise,
-    delay, a sine and a constant disturbance, 30 % more and 30 % less mass. The same seed gives the same gains.
+    delay, a sine and a constant disturbance, 30 % more and 30 % less mass. Each search has its own start, noise and
+    initial states, so their results show how much a tuning decides by chance. The same seed gives the same gains. With
+    --out each search is kept in the folder FILE-searches: if you stop the command, it continues there.
 
     Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
@@ -54,8 +56,10 @@ def tune(
 
     options.check_files(out)
     terminal, start = Terminal(), options.starts(x0)
-    tries, tested = budget or search.BUDGET, options.conditions(condition) or None
-    tuned = search.tune(plant, law, tries, seed, objective, threads, True, tested, start)
+    tested, folder = options.conditions(condition) or None, out and out.with_name(f"{out.stem}-searches")
+    tuned = search.tune(
+        plant, law, budget, seed, objective, threads, True, tested, start, searches=searches, folder=folder
+    )
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
     if out:

@@ -69,7 +69,7 @@ def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
     condition: options.Conditions = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")] = 16,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")] = 12,
     tune: Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")] = True,
     worst: Annotated[bool, typer.Option("--worst", help="Also search the worst case of each law.")] = False,
     quick: options.Quick = False,

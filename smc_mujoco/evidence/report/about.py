@@ -102,4 +102,4 @@ def _source(plant: str, law: str, name: str) -> str:
         return "chosen by hand before any comparison"
     its = sets.tuned(plant, law, name)
     bounds = f"; at a bound: {', '.join(its.at_bound)}" if its.at_bound else ""
-    return f"shipped ({its.search}); the best of {len(its.sets)}; objective {its.objective:.4g} s²{bounds}"
+    return f"shipped ({its.search}); least objective {its.objective:.4g} s²{bounds}"

@@ -9,9 +9,9 @@ from typing import TypeVar
 
 from smc_mujoco.analysis.ranking import RELEVANT
 from smc_mujoco.common import progress
+from smc_mujoco.common.cache import cached
 from smc_mujoco.evidence.accuracy.accuracy import DEFAULT_SEEDS, PERIODS
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.study import FULL as GRID
 from smc_mujoco.studies.study import QUICK as QUICK_GRID
 from smc_mujoco.studies.study import Extent

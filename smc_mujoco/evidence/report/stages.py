@@ -20,6 +20,7 @@ from smc_mujoco.analysis import region_of_attraction as regions
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.paired_runs import SETTLES
 from smc_mujoco.analysis.region_of_attraction import Basin
+from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.control import gain_sets as sets
@@ -37,7 +38,6 @@ from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.board import Board
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.leaderboard import leaderboard
 from smc_mujoco.studies.noise_key import DRAWN, has_user_code
 from smc_mujoco.studies.study import study
@@ -290,5 +290,5 @@ def fronts(plan: Plan) -> tuple[Front, ...]:
             with contextlib.suppress(ScenarioError):
                 tuned = sets.tuned(plant, law, GAINS)
                 tracking, variation = zip(*tuned.front, strict=True)
-                pairs.append(Front(plant=plant, law=law, tracking=tracking, variation=variation, chosen=tuned.best))
+                pairs.append(Front(plant=plant, law=law, tracking=tracking, variation=variation, chosen=tuned.first))
     return tuple(pairs)

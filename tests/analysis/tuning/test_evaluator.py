@@ -1,13 +1,18 @@
 """What the evaluator of J promises: the same J as the runs of `smc.run`, on the instances that are asked for."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning.evaluator import objectives
+from smc_mujoco.analysis.tuning import equation, search
+from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, PYTHON, Evaluator, objectives
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import itae, tv
 from smc_mujoco.simulation.grid import GRID_SEEDS
+from smc_mujoco.simulation.prepare import prepare
 
 BRIEF = Objective(conditions=("nominal", "noise"), duration=0.5)
 
@@ -31,9 +36,148 @@ def test_instances_of_objectives_belong_to_no_search_and_no_study():
     unseen = {case.seed for i in range(50) for case in BRIEF.unseen("duffing", law, i)}
     assert len(unseen) == 100
     assert min(unseen) >= GRID_SEEDS
-    seen = {case.seed for seed in (0, 1, 10**9) for case in BRIEF.scenarios("duffing", law, seed)}
-    assert not seen & unseen
+    searches = [(seed, search) for seed in (0, 1, 10**9) for search in (0, 1, 999)]
+    seen = [case.seed for one in searches for case in BRIEF.scenarios("duffing", law, *one)]
+    assert len(set(seen)) == len(seen)
+    assert not {*seen} & unseen
+    assert min(seen) >= GRID_SEEDS
 
 
 def test_an_instance_for_each_law_is_asked_for(refused):
     refused(lambda: objectives("duffing", [smc.law("classical")], BRIEF, instances=[1, 2]))
+
+
+# both engines against smc.run
+
+SECOND = Objective(duration=1.0)  # under all seven conditions
+FACTORS = (1.0, 0.6, 1.7)  # of a law's shipped gains
+
+
+def mine(y, gains, memory):
+    memory[0] += y.dt * y.e
+    return -gains.k * (y.de + gains.c * y.e) - gains.k * memory[0], y.de + gains.c * y.e
+
+
+MINE = smc.law_function(gains={"k": 3.0, "c": 2.0}, memory=1)(mine)()
+
+
+@smc.law_function(gains={"k": 3.0})
+def raises(y, gains, memory):
+    if y.t > 0.2 and gains.k > 5.0:
+        raise ValueError("k")
+    return -gains.k * (y.de + 2.0 * y.e), y.e
+
+
+@smc.law_function(gains={"k": 3.0, "c": 2.0})
+def uncompiled(y, gains, memory):
+    return -gains.k * (y.de + gains.c * sum(map(float, [str(y.e)]))), y.e
+
+
+def cases_of(plant, law, goal=SECOND):
+    given = gain_sets.law(plant, law) if isinstance(law, str) else law
+    return goal.scenarios(plant, given, 3)
+
+
+def by_runs(cases, names, gains, goal=SECOND):
+    """J of gains by the public way, in the same runs."""
+    law = dataclasses.replace(cases[0].law, gains={**cases[0].law.gains, **dict(zip(names, gains, strict=True))})
+    return goal.evaluation(cases[0], smc.run([dataclasses.replace(case, law=law) for case in cases])).objective
+
+
+CONTINUOUS = [
+    ("duffing", "observer_free"),
+    ("inverted_pendulum", "pid"),
+    ("van_der_pol", MINE),
+    ("pendulum_network", "extended_state"),
+    ("inverted_pendulum_network", "boundary_layer"),
+]
+CHATTERING = [("duffing", "twisting"), ("inverted_pendulum", "classical"), ("van_der_pol", "super_twisting")]
+
+
+@pytest.mark.parametrize("by_equation", [True, False], ids=[EQUATION, MUJOCO])
+@pytest.mark.parametrize(
+    ("plant", "law", "tolerance"), [(*one, 1e-9) for one in CONTINUOUS] + [(*one, 1e-2) for one in CHATTERING]
+)
+def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_equation):
+    cases = cases_of(plant, law)
+    names = tuple(search._task(plant, cases[0].law, SECOND, 64, 0, 1).box)
+    candidates = [tuple(factor * cases[0].law.gains[name] for name in names) for factor in FACTORS]
+    evaluate = Evaluator(SECOND, cases, names, threads=2, by_equation=by_equation, slots=2)
+    assert evaluate.engine == (EQUATION if by_equation else MUJOCO)
+    found = [one.objective for one in evaluate(candidates)]
+    assert found == pytest.approx([by_runs(cases, names, gains) for gains in candidates], rel=tolerance)
+
+
+def test_an_equation_of_the_wrong_sign_mass_or_disturbance_has_another_objective():
+    """So the comparison above sees each of them: by more than a hundred thousand times its tolerance."""
+    cases = cases_of("duffing", "observer_free")
+    plant = cases[0].plant
+    runs = [equation.EquationRun(prepare(case)) for case in cases]
+
+    def objective(change):
+        total = 0.0
+        for one in runs:
+            one.restart()
+            change(one)
+            one.simulate()
+            total += np.trapezoid(np.arange(1001) * np.abs(one.log["x"][:, 0]))
+        return total
+
+    def heavier(one):
+        for parameters in one.parameters:
+            parameters[list(plant.parameters).index(plant.mass)] *= 1.001
+
+    def of_another_sign(one):
+        one.packed.disturbances["stream"] = 0.0
+        one.run["xfrc_applied"] = one.run["qvel"]
+
+    right = objective(lambda one: None)
+    assert objective(lambda one: None) == right
+    for change in (heavier, of_another_sign):
+        assert abs(objective(change) / right - 1.0) > 1e-4
+        runs = [equation.EquationRun(prepare(case)) for case in cases]
+
+
+@pytest.mark.parametrize("by_equation", [True, False], ids=[EQUATION, MUJOCO])
+@pytest.mark.parametrize("law", [raises(), MINE], ids=["raising", "with memory"])
+def test_an_objective_does_not_depend_on_the_candidates_before(law, by_equation):
+    """Not after those that raise or diverge, nor on their order, nor on how many run at once."""
+    goal = Objective(conditions=("nominal", "noise", "delay_10ms", "jump_mild"), duration=3.0)
+    cases = goal.scenarios("van_der_pol", law, 1)
+    names = tuple(law.gains)
+    candidates = [tuple(k * value for value in law.gains.values()) for k in (1.0, 1e9, 2.5, 0.01, 1.3)]
+    options = {"threads": 1, "by_equation": by_equation}
+    evaluate = Evaluator(goal, cases, names, slots=3, **options)
+    together = evaluate(candidates)
+    assert [evaluate([one])[0] for one in reversed(candidates)] == together[::-1]
+    assert Evaluator(goal, cases, names, slots=1, **options)(candidates) == together
+    expected = [by_runs(cases, names, gains, goal) for gains in candidates]
+    assert [one.objective for one in together] == pytest.approx(expected, rel=1e-9)
+    assert any(one.failed for one in together) == (law.name == "raises")
+
+
+def test_what_is_more_than_its_equation_is_run_by_mujoco():
+    for plant, condition in (("duffing", "coulomb"), ("duffing", "encoder"), ("double_pendulum", "nominal")):
+        goal = Objective(conditions=("nominal", condition), duration=0.2)
+        law = smc.law("observer_free")
+        evaluate = Evaluator(goal, goal.scenarios(plant, law), ("lam",), by_equation=True)
+        assert evaluate.engine == MUJOCO
+        cases = evaluate.cases
+        assert evaluate([(5.0,)])[0].objective == pytest.approx(by_runs(cases, ("lam",), (5.0,), goal), rel=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore:.*does not compile")
+def test_a_law_that_does_not_compile_has_the_objective_of_its_runs():
+    goal = Objective(conditions=("nominal",), duration=0.2)
+    cases = goal.scenarios("duffing", uncompiled())
+    evaluate = Evaluator(goal, cases, ("k", "c"), by_equation=True)
+    assert evaluate.engine == PYTHON
+    assert evaluate([(2.0, 3.0)])[0].objective == by_runs(cases, ("k", "c"), (2.0, 3.0), goal)
+
+
+def test_without_constraints_no_limit_acts():
+    """A pendulum that falls on a stop: with constraints it rests there."""
+    goal = Objective(conditions=("contact",), duration=1.0)
+    cases = goal.scenarios("inverted_pendulum", smc.law("observer_free", lam=0.001))
+    with_stop, without = (Evaluator(goal, cases, ("lam",), constraints=one)([(0.001,)])[0] for one in (True, False))
+    assert without.objective > 1.1 * with_stop.objective

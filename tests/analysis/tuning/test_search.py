@@ -1,7 +1,6 @@
 """What tuning promises: one rule for every law, the same gains for the same seed, never worse for a larger budget."""
 
 import dataclasses
-import itertools
 import json
 import math
 import re
@@ -13,14 +12,14 @@ import pytest
 from helpers.words import words
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import ranking
-from smc_mujoco.analysis.tuning import search, search_space
-from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Objective
-from smc_mujoco.analysis.tuning.result import MAX_SETS, Evaluation, compare, load
-from smc_mujoco.analysis.tuning.search import EVALUATIONS_PER_GAIN, SPARE_EVALUATIONS, tune
+from smc_mujoco.analysis.tuning import search, search_space, stages
+from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, Evaluator
+from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Evaluation, Objective
+from smc_mujoco.analysis.tuning.result import compare, load
+from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.cli import main
 from smc_mujoco.control.law import catalogue
-from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.control.units import FORCE, TIME, Gain, Unit
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.metrics.catalogue import itae, tv
 from smc_mujoco.studies.fair_gains import Trial
@@ -41,16 +40,16 @@ def one_gain(y, gains, memory):
 @pytest.fixture(scope="module")
 def found():
     """One tuning, for those tests that only look at it."""
-    return tune("duffing", "observer_free", budget=32, seed=3, objective=SHORT)
+    return tune("duffing", "observer_free", budget=16, seed=3, objective=SHORT, searches=3)
 
 
 @pytest.fixture(scope="module")
 def rival():
     """Another law's, on equal terms."""
-    return tune("duffing", "classical", budget=32, seed=3, objective=SHORT)
+    return tune("duffing", "classical", budget=16, seed=3, objective=SHORT, searches=3)
 
 
-# the same seed, a larger budget
+# searches
 
 
 def test_tracking_is_a_share_of_where_a_run_starts():
@@ -61,155 +60,154 @@ def test_tracking_is_a_share_of_where_a_run_starts():
     assert variation == 0.0
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:no set of gains")
 def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(found):
-    assert tune("duffing", "observer_free", budget=32, seed=3, objective=SHORT, threads=1) == found
-    other = tune("duffing", "observer_free", budget=4, seed=4, objective=SHORT)
-    assert other.history[-1].gains not in {e.gains for e in found.history}
+    assert tune("duffing", "observer_free", 16, 3, SHORT, threads=1, searches=3) == found
 
 
-@pytest.mark.slow
-def test_a_larger_budget_repeats_the_starts_of_a_smaller_one_and_is_never_worse(monkeypatch):
-    monkeypatch.setattr(search, "_spread", lambda *_: None)
-    runs = [
-        tune("duffing", "observer_free", budget=k * 2 * EVALUATIONS_PER_GAIN + SPARE_EVALUATIONS, objective=LEAN)
-        for k in (1, 3)
-    ]
-    longest = runs[-1]
-    assert [len(one.ends) for one in runs] == [1, 3]
-    for one in runs:
-        assert one.ends == longest.ends[: len(one.ends)]
-        assert one.history == longest.history[: len(one.history)]
-        assert one.objective == min(one.ends) == min(e.objective for e in one.history)
-    assert longest.converged is not None
-    assert runs[0].converged is None
+def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatch):
+    drawn, draw = [], np.random.default_rng
+    monkeypatch.setattr(search.np.random, "default_rng", lambda seed: drawn.append(seed) or draw(seed))
+    first = tune("duffing", "observer_free", budget=16, seed=3, objective=SHORT, searches=1)
+    assert first.searches == found.searches[:1]
+    assert [3, 0] in drawn
+    gains = [{one.gains for one in made.history} for made in found.searches]
+    assert not gains[0] & gains[1]
+    seeds = [case.seed for i in range(3) for case in search._task("duffing", found.law, SHORT, 16, 3, 1).cases(i)]
+    assert len(set(seeds)) == len(seeds) == 21
 
 
-def test_candidates_are_screened_cheaply_and_descents_are_accurate(monkeypatch):
-    """Euler's method chooses where a descent begins, RK4 decides: its objective is the one that counts."""
-    methods, run = [], search.run
-    monkeypatch.setattr(
-        search,
-        "run",
-        lambda cases, threads: methods.extend(c.resolved.integrator for c in cases) or run(cases, threads),
-    )
-    tuned = tune("duffing", "observer_free", budget=2 * EVALUATIONS_PER_GAIN, objective=LEAN)
-    assert (
-        methods.count("Euler")
-        == tuned.screened
-        == 2 * EVALUATIONS_PER_GAIN // 8 + 2 * EVALUATIONS_PER_GAIN // 2 // 6 * 6
-    )
-    assert methods.count("RK4") == len(tuned.history) + 1  # and the law's own gains
-    assert 2 * EVALUATIONS_PER_GAIN // 8 < len(tuned.history) <= 3 * 2 * EVALUATIONS_PER_GAIN // 8 + 4
+@pytest.mark.parametrize("killed_in", [1, 2])
+def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(found, killed_in, monkeypatch, tmp_path):
+    made, real = [], search.Task.search
+
+    def one(task, i, *rest):
+        if i == killed_in and len(made) == killed_in:
+            made.append("killed")
+            raise KeyboardInterrupt
+        made.append(i)
+        return real(task, i, *rest)
+
+    monkeypatch.setattr(search.Task, "search", one)
+    again = {"budget": 16, "seed": 3, "objective": SHORT, "searches": 3, "folder": tmp_path / "kept"}
+    with pytest.raises(KeyboardInterrupt):
+        tune("duffing", "observer_free", **again)
+    tuned = tune("duffing", "observer_free", **again)
+    assert made == [*range(killed_in), "killed", *range(killed_in, 3)]
+    whole, resumed = (one.save(tmp_path / name) for one, name in ((found, "whole.json"), (tuned, "resumed.json")))
+    assert whole.read_bytes() == resumed.read_bytes()
+    tune("duffing", "observer_free", **again)
+    assert len(made) == 4
+    assert len(list((tmp_path / "kept").iterdir())) == 3
+    tune("duffing", "observer_free", **again | {"budget": 17})
+    assert made[4:] == [0, 1, 2]
 
 
-@pytest.mark.parametrize(
-    ("ends", "verdict"),
-    [
-        ((1.0, 1.009), None),
-        ((1.0, 1.009, 1.0099), True),
-        ((1.0, 1.009, 1.011), False),
-        ((1.3, 1.011, 1.0, 1.004, 2.0), False),
-        ((1.3, 1.009, 1.0, 1.004, 2.0), True),
-    ],
-)
-def test_a_search_has_converged_when_three_starts_end_within_a_percent_of_the_best(found, ends, verdict):
-    assert dataclasses.replace(found, ends=ends).converged is verdict
+def test_the_gains_of_search_i_are_set_i_and_the_law_has_those_of_the_least_objective(found):
+    assert found.sets == [one.best for one in found.searches]
+    least = min(found.sets, key=lambda one: one.objective)
+    assert tuple(found.gains.values()) == least.gains
+    assert found.objective == least.objective
+    assert found.spread == max(one.objective for one in found.sets) / least.objective - 1.0
+    record = found.record()
+    assert record["sets"] == [one.gains for one in found.sets]
+    assert record["objectives"] == pytest.approx([one.objective for one in found.sets], rel=1e-5)
 
 
-@pytest.mark.slow
-def test_a_search_ends_when_it_has_converged_and_knows_enough_sets_of_gains(monkeypatch):
-    monkeypatch.setattr(search, "converged", lambda ends: len(ends) == 2)
-    monkeypatch.setattr(search, "near_optimal", lambda history: history[:MAX_SETS])
-    assert len(tune("duffing", "observer_free", objective=LEAN).ends) == 2
-    monkeypatch.setattr(search, "near_optimal", lambda history: history[: MAX_SETS - 1])
-    assert (
-        len(tune("duffing", "observer_free", budget=6 * EVALUATIONS_PER_GAIN + SPARE_EVALUATIONS, objective=LEAN).ends)
-        == 3
-    )
-
-
-def test_a_search_that_knows_few_sets_ends_with_random_steps_from_these_within_its_bounds():
-    """J is near-optimal within 0.05 decades of the origin, where three sets are known, far closer to each other."""
-
-    class Ledger:
-        left, evaluations = (
-            SPARE_EVALUATIONS,
-            [Evaluation((10.0**z, 10.0**-z), 1.0, 1.0, 0.0) for z in (0.0, 1e-4, -1e-4)],
-        )
-
-        def cost(self, logs):
-            J = 1.0 + 12.0 * float(logs @ logs)
-            self.evaluations.append(Evaluation(tuple((10.0**logs).tolist()), J, J, 0.0))
-            return J
-
-    ledger = Ledger()
-    search._spread(ledger, {"a": (0.5, 1.05), "b": (0.5, 2.0)}, np.random.default_rng(0))
-    near = search.near_optimal(ledger.evaluations)
-    assert len(near) == MAX_SETS
-    assert np.ptp(np.log10([one.gains for one in near]), axis=0).min() > 0.02  # a hundred times as far apart
-    assert max(one.gains[0] for one in ledger.evaluations) <= 1.05 * (1 + 1e-12)
-
-
-def test_sets_are_near_optimal_distinct_and_cover_what_is_near_optimal(found):
-    """The best first; no more than 24; the farthest from it is among them, and what costs 4 % more is not."""
-    line = [Evaluation((10.0 ** (k / 100), 1.0), 1.0 + k / 2500, 1.0, 0.0) for k in range(101)]
-    tuned = dataclasses.replace(found, history=tuple(reversed(line)), objective=1.0)
-    assert len(search.near_optimal(tuned.history)) == 76
-    sets = tuned.sets
-    assert sets[0] == line[0]
-    assert len(set(sets)) == MAX_SETS
-    assert line[75] in sets
-    places = sorted(math.log10(one.gains[0]) for one in sets)
-    assert max(b - a for a, b in itertools.pairwise(places)) <= 0.06  # 0.75 decades in 24 sets
-    assert [one.gains for one in sets[1:]] != sorted(one.gains for one in sets[1:])
-    assert tuned.record()["sets"] == [one.gains for one in sets]
-
-
-def test_runs_of_two_laws_make_as_many_samples_as_the_law_with_fewer_sets_has(found):
-    """Sets that runs use in turn link their runs: 8 and 13 of them would make a single sample."""
-    few, many = (dataclasses.replace(found, history=_near(k)).sets for k in (8, 13))
-    runs = range(24)
-    linked = ranking.linked(*(np.array([k % len(sets) for k in runs]) for sets in (few, many)))
-    assert linked is not None
-    assert len(set(linked)) == len(few) == 6
-
-
-def _near(count):
-    return tuple(Evaluation((1.0 + k / 100, 1.0), 1.0, 1.0, 0.0) for k in range(count))
-
-
-def test_what_is_not_integrated_by_rk4_is_run_as_it_is_in_both_rounds():
-    cases = Objective(conditions=("coulomb",)).scenarios("duffing", smc.law("classical"), 0)
-    assert search._under_euler(cases[0]) == cases[0]
-    assert cases[0].resolved.integrator == "implicitfast"
-
-
-@pytest.mark.filterwarnings("ignore:no set of gains")
-@pytest.mark.parametrize("budget", [1, 7, 64])
-def test_it_stops_at_the_budget_and_no_set_of_gains_is_paid_for_twice(budget):
-    tuned = tune("duffing", "observer_free", budget=budget, objective=LEAN)
-    assert 0.6 * budget <= tuned.evaluations <= budget
-    assert tuned.history
-    assert len({e.gains for e in tuned.history}) == len(tuned.history)
-
-
-def test_a_law_of_one_gain_is_tuned():
-    law = smc.law_function(gains={"k": Gain(1.0, Unit(force=1, position=-1, time=1), positive=True)})(one_gain)
-    tuned = tune("duffing", law, budget=EVALUATIONS_PER_GAIN, objective=LEAN)
-    assert tuned.screened == EVALUATIONS_PER_GAIN // 8
-    assert tuned.objective < tuned.before
-
-
-def test_the_cost_of_the_best_gains_can_be_repeated(found):
-    traces = smc.run(found.definition.scenarios(found.plant, found.law, found.seed))
-    again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 0.5) for t in traces)
-    assert again == pytest.approx(found.objective, rel=1e-12)
+def test_each_objective_on_record_is_that_of_the_runs_of_its_own_search(found):
+    for i, one in enumerate(found.searches):
+        law = dataclasses.replace(found.law, gains=dict(zip(found.bounds, one.best.gains, strict=True)))
+        traces = smc.run(found.definition.scenarios(found.plant, law, found.seed, i))
+        again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 0.5) for t in traces)
+        assert again == pytest.approx(one.best.objective, rel=1e-12)
     assert [t.scenario.input_delay for t in traces] == [0.0, 0.0, 0.01, *[0.0] * 4]
     assert [t.scenario.noise.position > 0.0 for t in traces] == [False, True, *[False] * 5]
     assert [bool(t.scenario.disturbance) for t in traces] == [False] * 3 + [True] * 2 + [False] * 2
     assert [t.scenario.mismatch.get("mass", 1.0) for t in traces] == [1.0] * 5 + [0.7, 1.3]
+
+
+def test_a_search_whose_equation_differs_from_mujoco_is_made_again_by_mujoco(found, monkeypatch):
+    """A wrong nominal model cannot decide gains: here it has another inertia."""
+    plant = smc.plant("duffing")
+    wrong = dataclasses.replace(plant, nominal=_of_twice_the_force)
+    tuned = tune(wrong, "observer_free", budget=16, seed=3, objective=SHORT, searches=1)
+    assert tuned.searches[0].engine == MUJOCO
+    assert found.searches[0].engine == EQUATION
+    assert tuned.searches[0].best.objective < 1.1 * found.searches[0].best.objective
+    monkeypatch.setattr(search, "AGREEMENT", math.inf)
+    assert tune(wrong, "observer_free", budget=16, seed=3, objective=SHORT, searches=1).searches[0].engine == EQUATION
+
+
+def _of_twice_the_force(x, v, i, p):
+    return (p.alpha * x[i] - p.beta * x[i] ** 3 - p.delta * v[i]) / p.M, 2.0 / p.M
+
+
+def test_gains_as_good_are_those_of_sets_within_three_percent(found):
+    line = [Evaluation((10.0 ** (k / 100), 1.0), 1.0 + k / 2500, 1.0, 0.0) for k in range(101)]
+    one = dataclasses.replace(found.searches[0], history=tuple(reversed(line)))
+    assert one.near(found.bounds) == {"lam": (1.0, pytest.approx(10**0.75)), "k1": (1.0, 1.0)}
+    both = dataclasses.replace(found, searches=(one, dataclasses.replace(one, history=line[:3])))
+    assert both.near == one.near(found.bounds)
+
+
+def test_a_search_has_three_stages_and_screens_at_less_cost(monkeypatch):
+    """Behind friction MuJoCo makes all of them: with one step a control period, until a descent begins."""
+    goal = Objective(conditions=("coulomb",), duration=0.1)
+    made = []
+    monkeypatch.setattr(search, "Evaluator", lambda *args, **named: made.append(Evaluator(*args, **named)) or made[-1])
+    tuned = tune("duffing", "observer_free", objective=goal, searches=1)
+    by_equation, accurate, cheap = made
+    assert [one.engine for one in made] == [MUJOCO] * 3
+    assert [one.cases[0].resolved.physics_step for one in (accurate, cheap)] == [2.5e-4, 1e-3]
+    assert by_equation.cases == accurate.cases
+    (one,) = tuned.searches
+    screened = one.evaluations - len(one.history)
+    assert 2 * 64 // 8 < screened <= 2 * 64 // 8 + 2 * 64 // 2
+    assert 6 < len(one.history) <= 2 * 64 - screened
+
+
+@pytest.mark.parametrize(
+    ("plant", "fields", "constraints"),
+    [("duffing", {}, False), ("duffing", {"friction": smc.Coulomb(0.3)}, True), ("pendubot", {}, False)],
+)
+def test_constraints_are_left_out_only_where_they_are_limits(plant, fields, constraints):
+    assert search._only_limits(smc.Scenario(plant=plant, law="none", **fields)) is not constraints
+
+
+def test_what_needs_a_shorter_step_keeps_its_own():
+    late = smc.Scenario(plant="duffing", law="none", friction=smc.Coulomb(0.3), input_delay=5e-4)
+    assert search._coarse(late) is late
+    plain = search._coarse(smc.Scenario(plant="duffing", law="none"))
+    assert plain.resolved.integrator == "Euler"
+
+
+@pytest.mark.filterwarnings("ignore:no set of gains")
+@pytest.mark.parametrize("budget", [1, 4, 32])
+def test_a_search_stops_at_its_budget_and_no_set_of_gains_is_paid_for_twice(budget):
+    (one,) = tune("duffing", "observer_free", budget=budget, objective=LEAN, searches=1).searches
+    assert 1 <= one.evaluations <= 2 * budget
+    assert len({e.gains for e in one.history}) == len(one.history)
+
+
+@pytest.mark.filterwarnings("ignore:no set of gains")
+def test_a_descent_ends_when_it_gains_too_little():
+    """It finds the minimum of a bowl of log gains, and does not spend its budget on the last digits."""
+    costs = []
+
+    class Bowl:
+        def cost(self, logs):
+            costs.append(1.0 + float(logs @ logs))
+            return costs[-1]
+
+    stages._descend(Bowl(), {"a": (0.1, 10.0), "b": (0.1, 10.0)}, np.array([0.3, -0.2]), 200)
+    assert min(costs) < 1.001
+    assert 12 < len(costs) < 40
+    assert min(costs[:-6]) <= 1.001 * min(costs)
+
+
+def test_a_law_of_one_gain_is_tuned():
+    law = smc.law_function(gains={"k": Gain(1.0, Unit(force=1, position=-1, time=1), positive=True)})(one_gain)
+    tuned = tune("duffing", law, objective=LEAN, searches=1)
+    assert tuned.objective < tuned.before
 
 
 @pytest.mark.slow
@@ -220,7 +218,7 @@ def test_tuning_beats_the_default_gains(found, rival):
 
 def test_the_front_is_what_no_other_evaluation_beats(found):
     front = found.front
-    assert found.objective == min(e.objective for e in front)
+    assert found.searches[0].chosen in front
     for e in front:
         assert not any(o.tracking <= e.tracking and o.variation < e.variation for o in found.history)
     assert [e.variation for e in front] == sorted((e.variation for e in front), reverse=True)
@@ -244,24 +242,46 @@ def test_a_gain_is_searched_three_decades_wide_about_its_scale():
     assert [high / low for low, high in box.values()] == pytest.approx([1000.0] * 3)
 
 
-def test_a_force_is_searched_up_to_what_the_actuator_gives_and_no_further():
+def test_a_force_is_searched_as_every_gain_is():
     scales = {"X": 2.0, "F": 6.0, "M": 1.0, "T": 0.5}
-    assert search_space.box(smc.law("twisting"), scales)["r1"] == (pytest.approx(6.0 / 10**1.5), 6.0)
+    assert search_space.box(smc.law("twisting"), scales)["r1"] == (
+        pytest.approx(6.0 / 10**1.5),
+        pytest.approx(6.0 * 10**1.5),
+    )
     box = search_space.box(smc.law("observer_free"), scales)
-    wider = search_space.widened(smc.law("observer_free"), box)
-    assert wider["lam"] == (pytest.approx(box["lam"][0] / 10), 6.0)
-    assert wider["k1"] == (pytest.approx(box["k1"][0] / 10), pytest.approx(box["k1"][1] * 10))
+    wider = search_space.widened(box)
+    for name in ("lam", "k1"):
+        assert wider[name] == (pytest.approx(box[name][0] / 10), pytest.approx(box[name][1] * 10))
 
 
-@pytest.mark.parametrize("law", ["extended_state", "disturbance_observer"])
-def test_a_gain_over_another_is_searched_up_to_what_the_actuator_gives(law):
-    tuned = tune("duffing", law, budget=EVALUATIONS_PER_GAIN, objective=LEAN)
-    order = list(tuned.bounds)
-    forces = [e.gains[order.index("k")] / e.gains[order.index("b")] for e in tuned.history]
-    assert 5.0 < max(forces) <= 6.0 * (1.0 + search_space.ROUNDING_TOLERANCE)
-    assert sum(force > 6.0 * (1.0 - search_space.ROUNDING_TOLERANCE) for force in forces) > 3
-    beyond = dataclasses.replace(tuned, law=dataclasses.replace(tuned.law, gains={**tuned.law.gains, "k": 1e3}))
-    assert beyond.at_bound["k"] == "upper"
+def test_a_gain_over_another_is_searched_as_far_as_a_force():
+    law = smc.law("extended_state")
+    assert search_space.force_limits(law, {"b": 2.0}, 6.0) == {"k": pytest.approx(12.0 * 10**2.5)}
+    task = search._task("duffing", law, LEAN, 4, 0, 1)
+    trials = stages.Trials(None, None, tuple(task.box), None, None)
+    trials.limit = lambda gains: search_space.force_limits(law, gains, 6.0)
+    gains = dict(zip(task.box, trials.gains([5.0] * len(task.box)), strict=True))
+    assert gains["k"] == pytest.approx(6.0 * 10**2.5 * gains["b"], rel=1e-3) or gains["k"] == 1e5
+
+
+def twin(y, gains, memory):
+    s = y.de + y.e / gains.tau
+    return -2.0 * gains.a * math.tanh(s), s
+
+
+TWIN = {"a": Gain(3.0, FORCE, positive=True), "tau": Gain(0.4, TIME, positive=True)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
+def test_a_law_written_with_other_gains_ends_as_well(plant):
+    """-lam tanh(s) as -2 a tanh(s), with tau = 1 / k1. Where |u| <= 6 held lam, the second won 12 of 17 blocks."""
+    goal = Objective(conditions=("nominal", "noise", "constant"), duration=3.0)
+    other = smc.law_function(gains=TWIN)(twin)
+    one, two = (tune(plant, law, objective=goal, searches=3) for law in ("observer_free", other))
+    pairs = zip(one.sets, two.sets, strict=True)
+    assert [a.objective / b.objective for a, b in pairs] == pytest.approx([1.0] * 3, abs=0.01)
+    assert not {*one.at_bound, *two.at_bound}
 
 
 def test_a_gain_is_divided_by_one_that_the_law_has(refused):
@@ -269,20 +289,20 @@ def test_a_gain_is_divided_by_one_that_the_law_has(refused):
 
 
 def test_a_held_gain_keeps_its_value():
-    tuned = tune("duffing", smc.law("adaptive", k0=1.25), budget=5, objective=LEAN)
+    tuned = tune("duffing", smc.law("adaptive", k0=1.25), budget=2, objective=LEAN, searches=1)
     assert tuned.law.gains["k0"] == 1.25
     assert set(tuned.bounds) == {"gamma", "c"}
 
 
 def test_the_search_knows_nothing_of_the_gains_it_is_given():
-    one, other = (tune("duffing", smc.law("classical", k=k), budget=20, objective=LEAN) for k in (0.5, 5.0))
+    one, other = (tune("duffing", smc.law("classical", k=k), budget=10, objective=LEAN, searches=1) for k in (0.5, 5.0))
     assert one.history == other.history
     assert one.before != other.before
 
 
 def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
     with pytest.warns(smc.ScenarioWarning, match=r"failing's when and k have no unit.*Gain\("):
-        tuned = tune("duffing", failing(), budget=5, objective=LEAN)
+        tuned = tune("duffing", failing(), budget=2, objective=LEAN, searches=1)
     for name, (low, high) in tuned.bounds.items():
         assert low * high == pytest.approx(failing().gains[name] ** 2)
 
@@ -295,12 +315,12 @@ def test_a_gain_without_a_unit_that_is_not_positive_is_refused(refused):
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     own = catalogue()["observer_free"]
     odd = dataclasses.replace(own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)})
-    tuned = tune(
-        "duffing", odd, budget=2 * EVALUATIONS_PER_GAIN, objective=Objective(conditions=("nominal",), duration=1.5)
-    )
+    goal = Objective(conditions=("nominal",), duration=1.5)
+    tuned = tune("duffing", odd, objective=goal, searches=1)
     low, high = tuned.bounds["lam"]
     assert tuned.searched["lam"] == (pytest.approx(low / 10), pytest.approx(10 * high))
     assert high < tuned.gains["lam"] <= 10 * high
+    assert tuned.at_bound == {"lam": "upper"}
 
 
 @pytest.mark.parametrize(("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")])
@@ -329,7 +349,8 @@ def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, rival, refus
     assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
     assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
     unequal = {
-        "budget": dataclasses.replace(rival, budget=33),
+        "budget": dataclasses.replace(rival, budget=17),
+        "searches": dataclasses.replace(rival, searches=rival.searches[:2]),
         "rule": dataclasses.replace(rival, rule="by hand"),
         "objective": dataclasses.replace(rival, definition=Objective(duration=0.5, u_max=12.0)),
         "seed": dataclasses.replace(rival, seed=4),
@@ -354,18 +375,19 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     path = found.save(tmp_path / "new" / "it.json")
     assert load(path) == found
     held = json.loads(path.read_text())
-    assert held["budget"] == 32
-    assert held["record"]["sets"][0] == list(found.gains.values())
+    assert held["budget"] == 16
+    assert list(found.gains.values()) in held["record"]["sets"]
     assert held["definition"]["conditions"] == ["nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
 
 
 def test_a_tuning_says_what_was_searched_and_how(found, tmp_path, snapshot):
-    gains = {"lam": 2.0, "k1": 3.0}, {"lam": 6.0, "k1": 1e-3}
+    gains = {"lam": 2.0, "k1": 3.0}, {"lam": 600.0, "k1": 1e-3}
     plain, extreme = (dataclasses.replace(found, law=dataclasses.replace(found.law, gains=one)) for one in gains)
-    failing = dataclasses.replace(plain, ends=(1.0, 1.005, 1.0101), screened=0, history=found.history[:1])
-    agreeing = dataclasses.replace(plain, ends=(1.0, 1.005, 1.0099))
-    tables = [one.tables[0] for one in (plain, extreme, failing, agreeing)]
+    alone = dataclasses.replace(plain, searches=found.searches[:1])
+    far = found.searches[0].best._replace(objective=7.0 * found.objective)
+    apart = dataclasses.replace(plain, searches=(dataclasses.replace(found.searches[0], best=far), *found.searches[1:]))
+    tables = [one.tables[0] for one in (plain, extreme, alone, apart)]
     said = [words(f"{one.title} {one.headings} {one.rows} {one.notes}") for one in tables] + [words(repr(plain))]
     goals = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")), Objective(weight=0.0)
     stored = sorted(json.loads(found.save(tmp_path / "a.json").read_text()))
@@ -393,12 +415,14 @@ def test_bad_input_is_one_sentence(refused):
         {"law": "hierarchical"},
         {"plant": "cart_pole", "law": "classical"},
         {"budget": 0},
+        {"searches": 0},
+        {"searches": 1001},
         {"budget": 2.5},
         {"seed": -1},
         {"objective": "best"},
         {"threads": 0},
     ]:
-        given = {"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN} | changed
+        given = {"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN, "searches": 1} | changed
         refused(lambda given=given: tune(**given))
 
 
@@ -414,8 +438,8 @@ def mistyped(y, gains, memory):
 @pytest.mark.parametrize("function", [not_yet, mistyped])
 def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, monkeypatch, tmp_path, refused):
     law = smc.law_function(gains={"k": 3.0})(function)
-    monkeypatch.setattr(search, "_search", None)
-    refused(lambda: Trial([], [], 1.0, None, tmp_path, None, False).gains_on(smc.plant("duffing"), [law], 4))
+    monkeypatch.setattr(search.Task, "search", None)
+    refused(lambda: Trial([], [], 1.0, None, tmp_path, None, False).gains_on(smc.plant("duffing"), [law]))
 
 
 @pytest.mark.filterwarnings("ignore:.* no unit")
@@ -429,8 +453,8 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
 
         return sensor_lost
 
-    refused(lambda: tune("duffing", made(0.0), budget=EVALUATIONS_PER_GAIN, objective=LEAN))
-    assert not tune("duffing", made(2.0), budget=8, objective=LEAN).sets[0].failed
+    refused(lambda: tune("duffing", made(0.0), objective=LEAN, searches=1))
+    assert not tune("duffing", made(2.0), budget=8, objective=LEAN, searches=1).sets[0].failed
 
 
 def test_a_bad_objective_is_refused(refused):
@@ -466,20 +490,15 @@ def call(tmp_path, monkeypatch, capsys):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("always")
 def test_the_command_prints_gains_and_writes_what_it_found(call, tmp_path):
-    code, out, err = call("duffing", "classical", "--budget", "3", "--objective", "tracking", "--out", "k.json")
+    given = "duffing", "classical", "--budget", "2", "--searches", "2", "--objective", "tracking", "--out", "k.json"
+    code, out, err = call(*given)
     tuned = load(tmp_path / "k.json")
     assert code == 0
     assert f"{tuned.gains['k']:g}" in out
-    assert f"objective {tuned.objective:.4g} s², with the law's own gains {tuned.before:.4g} s²; 3 sets" in out
+    assert f"objective {tuned.objective:.4g} s², with the law's own gains {tuned.before:.4g} s²; " in out
     assert tuned.definition == Objective(weight=0.0, u_max=6.0)
     assert ("no set of gains" in err) == (tuned.objective > tuned.before)
-
-
-@pytest.mark.filterwarnings("always")
-def test_the_command_says_when_the_laws_own_gains_are_better(call):
-    _, out, err = call("duffing", "super_twisting", "--budget", "1")
-    assert "1 set of gains" in out
-    assert re.fullmatch(WORSE.replace("classical", "super_twisting"), err.removeprefix("smc-mujoco: ").rstrip())
+    assert len(list((tmp_path / "k-searches").iterdir())) == len(tuned.searches) == 2
 
 
 WORSE = (
@@ -489,13 +508,13 @@ WORSE = (
 
 
 def test_warns_if_and_only_if_the_laws_own_gains_are_better():
-    first = tune("duffing", smc.law("classical", k=0.5), budget=20, objective=LEAN)
+    first = tune("duffing", smc.law("classical", k=0.5), objective=SHORT, searches=1)
     assert first.objective < first.before
     with pytest.warns(smc.ScenarioWarning, match=WORSE) as caught:
-        again = tune("duffing", first.law, budget=1, objective=LEAN)
+        again = tune("duffing", first.law, budget=1, objective=SHORT, searches=1)
     assert again.objective > again.before
     assert [Path(one.filename).name for one in caught] == ["test_search.py"]
-    tune("duffing", first.law, budget=20, objective=LEAN)  # as good as its own: a warning would be an error
+    tune("duffing", first.law, objective=SHORT, searches=1)  # as good as its own: a warning would be an error
 
 
 @pytest.mark.parametrize(
@@ -547,7 +566,8 @@ def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
 
 
 @pytest.mark.usefixtures("coarse_grid")
+@pytest.mark.filterwarnings("ignore:no set of gains")
 def test_it_warns_if_all_gains_tried_chatter_too_much():
     with pytest.warns(smc.ScenarioWarning, match="are predicted to chatter with more than 1e-12"):
-        tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12)
+        tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12, searches=1)
     assert tuned.objective > 2.0 * FAILURE_COST

@@ -22,13 +22,13 @@ import pytest
 
 from smc_mujoco.analysis import chattering
 from smc_mujoco.common import gl
+from smc_mujoco.common.cache import cached
 from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, films, page, report, stages, words
 from smc_mujoco.evidence.report import scores as scores_of
 from smc_mujoco.evidence.report.plan import QUICK, Bars, Work
 from smc_mujoco.evidence.report.scores import Score
-from smc_mujoco.studies.cache import cached
 from smc_mujoco.studies.leaderboard import leaderboard
 from tests.evidence.report.test_page import Place, boards_of
 

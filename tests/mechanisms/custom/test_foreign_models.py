@@ -95,7 +95,7 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     law = smc.law("pid")
     if not plant.unscaled:
         brief = Objective(conditions=("nominal",), duration=0.2)
-        law = smc.tune(plant, "pid", budget=4, objective=brief, starts=smc.starts(x0=start)).law
+        law = smc.tune(plant, "pid", budget=4, objective=brief, searches=1, starts=smc.starts(x0=start)).law
         assert law.source.kind in ("tuned here", "default")  # where no set of gains tried is better
     else:
         with pytest.raises(smc.ScenarioError, match="nominal model"):

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TypeVar
 
-from smc_mujoco.analysis.tuning import result
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.files import reading, writable
+from smc_mujoco.common.version import versions
 
 T = TypeVar("T")
 
@@ -23,7 +23,7 @@ def cached(
     The file's name ends in two hashes. One is of `depends` (as JSON), the code and the versions. The other is of the
     content, so that a changed file is not read. When a file is written, files with other hashes are removed.
     """
-    text = json.dumps([depends, fingerprint.package(), result.versions()], sort_keys=True, default=str)
+    text = json.dumps([depends, fingerprint.package(), versions()], sort_keys=True, default=str)
     stem = f"{path.stem}-{hashlib.sha256(text.encode()).hexdigest()[:12]}"
     for file in path.parent.glob(f"{stem}-{'?' * 12}{path.suffix}"):
         with contextlib.suppress(Exception):  # damaged bytes may raise any exception: compute the result again

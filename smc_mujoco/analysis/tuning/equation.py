@@ -1,0 +1,164 @@
+"""The runs of an objective without MuJoCo: a plant's equation, integrated by RK4 under the same compiled controller.
+
+A search evaluates thousands of runs, and its best gains are then run by MuJoCo, whose J is the one on record. So this
+engine may only find gains. It takes a fifteenth of MuJoCo's time, and its J differs from MuJoCo's by rounding, which
+laws that chatter magnify to about 1e-3.
+
+The equation is the compiled nominal model of the plant, with the true parameters: x_i'' = f_i(x, v) + g_i(x) (u_i +
+d_i). Its state stands in an mjData, in which the callback of every run reads and writes as in a run of MuJoCo. A law,
+a signal or a sensor thus has one implementation.
+"""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numba import njit, types
+
+from smc_mujoco.common.jit import call, call_callback, compiled, pointer, record_at
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
+from smc_mujoco.mechanisms.plant import SEEN, Plant
+from smc_mujoco.simulation import callback, cfunctions, state
+from smc_mujoco.simulation.cfunctions import seen_at
+from smc_mujoco.simulation.model import with_values
+from smc_mujoco.simulation.prepare import Prepared, pack
+from smc_mujoco.simulation.signals import Push
+from smc_mujoco.simulation.state import channel_at, simulation_at
+
+# One run: addresses of mjModel, mjData and the record, of the callback and the nominal model, of the plant's parameters
+# before and after a jump, which comes at `jump_step` (-1: never), of fields of mjData, of what the nominal model reads,
+# and of SCRATCH numbers a channel.
+FIELDS = ("qpos", "qvel", "ctrl", "xfrc_applied", "sensordata", "userdata")
+OWNERS, CHANGES = ("model", "data", "record"), ("before", "after", "jump_step")
+ADDRESSES = (*OWNERS, "callback", "nominal", *CHANGES, *FIELDS, "seen", "scratch")
+RUN = np.dtype([(name, "i8") for name in ADDRESSES])
+run_at = record_at(RUN)
+SCRATCH = 12  # state at a step's start, and measured; velocities and accelerations of four stages
+
+
+def fits(prepared: Prepared) -> bool:
+    """Return whether a run's mechanism is nothing but its plant's equation, in compiled functions, under RK4."""
+    s = prepared.scenario.resolved
+    other = isinstance(s.plant.nominal, NominalModel) or s.plant.unmodelled or s.plant.direct or s.plant.free
+    plain = s.plain_equation and not s.actuator and s.sensor is None and s.integrator == "RK4"
+    on_joints = not any(d.cartesian or isinstance(d, Push) for d in s.disturbance)
+    return bool(plain and on_joints and not other and not prepared.why_not)
+
+
+class EquationRun:
+    """A run that can be repeated, with its record, numbers and log as in a ScenarioBatch, and an mjData."""
+
+    def __init__(self, prepared: Prepared):
+        s = self.scenario = prepared.scenario.resolved
+        n, plant = s.plant.n, s.plant
+        self.log = np.full((s.samples + 1, n), np.nan, state.LOG)
+        self.record = np.zeros(1, state.SIMULATION)
+        self.record[0], self.packed = pack(prepared, self.log)
+        self.first_record, self.first_numbers = self.record.copy(), self.packed.numbers.copy()
+        self.model = with_values(prepared.mechanism.model, prepared.scenario)
+        self.data = mujoco.MjData(self.model)
+        self.channels = prepared.mechanism.channels
+        self.scratch = np.zeros(SCRATCH * n)
+        at = state.address(self.scratch)
+        self.seen = np.array([(0, n, at + 16 * n, at + 24 * n, at)], SEEN)
+        self.parameters = [_parameters(plant, s.factors(step)) for step in (0, max(s.jump_step, 0))]
+        self.nominal = cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters))
+        functions = callback.callback().address, self.nominal.address
+        owners = self.model._address, self.data._address, state.address(self.record)
+        fields = (getattr(self.data, name).ctypes.data for name in FIELDS)
+        changes = *map(state.address, self.parameters), s.jump_step
+        self.run = np.array([(*owners, *functions, *changes, *fields, state.address(self.seen), at)], RUN)
+
+    def restart(self) -> None:
+        """Put record, numbers and state at the start of the run."""
+        self.record[:] = self.first_record
+        self.packed.numbers[:] = self.first_numbers
+        for name in FIELDS:
+            getattr(self.data, name)[:] = 0.0
+        self.data.userdata[:] = callback.magic(), state.address(self.record)
+        self.data.qpos[self.channels["qpos"]] = self.scenario.x0
+        self.data.qvel[self.channels["qvel"]] = self.scenario.v0
+
+    def simulate(self) -> None:
+        """Run to the end. The samples are then in `log`, and a failure in `record`."""
+        _loop().ctypes(state.address(self.run))
+
+
+def _parameters(plant: Plant, factors: Mapping[str, float]) -> np.ndarray:
+    values = vars(plant.values(factors))
+    return np.array([values[name] for name in plant.parameters], float)
+
+
+@functools.cache
+def _loop() -> Any:
+    """Return the compiled loop of a run, void(address of its RUN), from numba's cache on disk if it is there."""
+    ours = callback.magic()  # so that the code in the cache is that of these sources
+
+    def simulate(address):
+        run = run_at(address, 0)
+        if pointer(run.userdata)[0] == ours:
+            _simulate(run, simulation_at(run.record, 0))
+
+    return compiled(types.void(types.intp), simulate, cache=True)
+
+
+@njit(error_model="numpy")
+def _simulate(run, sim):
+    """Take all steps of a run, with a callback at every stage of RK4, and one at the end, for the last sample."""
+    n, h, qpos, qvel = sim.n, sim.step, pointer(run.qpos), pointer(run.qvel)
+    x, v = pointer(run.scratch), pointer(run.scratch + 8 * n)
+    speed, a = pointer(run.scratch + 32 * n), pointer(run.scratch + 64 * n)
+    for step in range((sim.samples - 1) * sim.steps):
+        parameters = run.before if run.jump_step < 0 or step < run.jump_step else run.after
+        for i in range(n):
+            channel = channel_at(sim.channels, i)
+            x[i], v[i] = qpos[channel.qpos], qvel[channel.qvel]
+        for stage in range(4):
+            past = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+            for i in range(n):
+                channel, before = channel_at(sim.channels, i), (stage - 1) * n + i
+                if stage > 0:
+                    qpos[channel.qpos], qvel[channel.qvel] = x[i] + past * speed[before], v[i] + past * a[before]
+                speed[stage * n + i] = qvel[channel.qvel]
+            if not _accelerate(run, sim, parameters, run.scratch + 64 * n + 8 * stage * n):
+                return
+        for i in range(n):
+            channel, first, last = channel_at(sim.channels, i), n + i, 3 * n + i
+            qpos[channel.qpos] = x[i] + h / 6.0 * (speed[i] + 2.0 * (speed[first] + speed[n + first]) + speed[last])
+            qvel[channel.qvel] = v[i] + h / 6.0 * (a[i] + 2.0 * (a[first] + a[n + first]) + a[last])
+    _call_back(run, sim)
+
+
+@njit(error_model="numpy", inline="always")
+def _call_back(run, sim):
+    """Call the callback at the state in mjData, with sensors that read it. Return whether the run has not failed."""
+    qpos, qvel, sensors = pointer(run.qpos), pointer(run.qvel), pointer(run.sensordata)
+    for i in range(sim.n):
+        channel = channel_at(sim.channels, i)
+        sensors[channel.x_sensor], sensors[channel.v_sensor] = qpos[channel.qpos], qvel[channel.qvel]
+    call_callback(run.callback, run.model, run.data)
+    return sim.failure == state.FINE
+
+
+@njit(error_model="numpy")
+def _accelerate(run, sim, parameters, a):
+    """Write the accelerations (n,) at a stage's state to an address. Return whether the run has not failed."""
+    if not _call_back(run, sim):
+        return False
+    n, seen, out = sim.n, seen_at(run.seen, 0), sim.model
+    qpos, qvel, ctrl, xfrc = pointer(run.qpos), pointer(run.qvel), pointer(run.ctrl), pointer(run.xfrc_applied)
+    x, v = pointer(run.scratch + 16 * n), pointer(run.scratch + 24 * n)
+    for i in range(n):
+        channel = channel_at(sim.channels, i)
+        x[i], v[i] = qpos[channel.qpos], qvel[channel.qvel]
+    for i in range(n):
+        channel, seen.i = channel_at(sim.channels, i), i
+        if call(run.nominal, run.seen, parameters, 0, run.record + state.AT.model) != 0:
+            sim.failure, sim.failed_step = state.DIVERGED, (sim.calls - 1) // sim.stages
+            return False
+        pointer(a)[i] = out.f + out.g * (ctrl[channel.ctrl] + channel.sign * xfrc[channel.xfrc])
+    return True
