@@ -8,15 +8,18 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from smc_mujoco.analysis.ranking import first_of_kind, without_rounding
+from smc_mujoco.analysis.ranking import first_of_kind
 from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown
+from smc_mujoco.common.files import from_json
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
 
-MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller differences of u matter on no machine; chosen
+MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller values of u matter on no machine; chosen
+EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have four digits; chosen
+ROUNDING = 1e-9  # in SI units: results that differ by less in all metrics repeat each other
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 GROUPS = ("plant", "condition")
 LAW_ENTRIES = ("law", "model", "surface", "velocity", "versions")  # of a description; they may differ within a cell
@@ -51,6 +54,37 @@ def values(table: Columns, metric: str) -> np.ndarray:
     return np.isinf(scores).astype(float) if metric == SETTLES else scores
 
 
+class ByRow(NamedTuple):
+    """A metric of the rows of a table, each (rows,)."""
+
+    values: np.ndarray  # see `values`
+    halves: np.ndarray  # y', the same at half the physics step: inf for a run that then failed, NaN for none
+    trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
+
+
+def by_row(table: Columns, metric: str) -> ByRow:
+    """Return a metric of the rows of a table, with what is charged to it."""
+    name, whole = "settling_time" if metric == SETTLES else metric, values(table, metric)
+    halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
+    halves = np.where(np.isnan(whole), np.nan, halves)
+    if metric == SETTLES:
+        return ByRow(whole, np.where(np.isnan(halves), np.nan, np.isinf(halves)), np.full(whole.shape, np.nan))
+    return ByRow(whole, halves, _from_json(table, "trends", name, np.nan))
+
+
+def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndarray:
+    """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run that failed."""
+    try:
+        texts = table.column(column)
+    except ScenarioError:  # a table without the column
+        return np.full(len(table.column("seed")), np.nan)
+    known: dict[str, float] = {}
+    for text in set(texts.tolist()) - {None}:
+        numbers = from_json(text)
+        known[text] = float(numbers.get(name, absent)) if numbers else np.inf
+    return np.array([np.nan if text is None else known[text] for text in texts.tolist()], float)
+
+
 def failed(table: Columns) -> np.ndarray:
     """Return which rows are runs that failed."""
     lost = np.array([failure is not None for failure in table.column("failure")], bool)
@@ -74,6 +108,8 @@ class Scores(NamedTuple):
     values: dict[str, np.ndarray]  # NaN where not all laws ran, or every law did the same as with an earlier seed
     outcomes: dict[str, np.ndarray]  # as `Group.outcome`
     sets: dict[str, np.ndarray]  # as `Group.sets`
+    halves: dict[str, np.ndarray]  # as `ByRow.halves`
+    trends: dict[str, np.ndarray]  # as `ByRow.trends`
 
 
 class Group:
@@ -107,11 +143,11 @@ class Group:
         """The number of seeds of each block in which every law ran."""
         return tuple(self.common.sum(axis=1).tolist())
 
-    def scores(self, by_row: np.ndarray) -> Scores:
+    def scores(self, by_row: ByRow) -> Scores:
         """Return the scores of the laws in the blocks in which a metric applies."""
-        cube = np.where(self.rows >= 0, by_row[self.rows], np.nan)
+        cube, *charged = (np.where(self.rows >= 0, of_row[self.rows], np.nan) for of_row in by_row)
         if np.isnan(cube).all():
-            return Scores([], {}, {}, {})
+            return Scores([], {}, {}, {}, {}, {})
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
             laws, where = ", ".join(self.laws), ", ".join(self.name.values())
@@ -119,9 +155,8 @@ class Group:
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
-        parts = (
-            dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in (cube, self.outcome, self.sets)
-        )
+        cubes = cube, self.outcome, self.sets, *charged
+        parts = (dict(zip(self.laws, of[:, blocks][:, :, seeds], strict=True)) for of in cubes)
         return Scores(blocks.tolist(), *parts)
 
 
@@ -172,7 +207,10 @@ def _outcomes(table: Columns) -> np.ndarray:
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that is newer than the table
             columns.append(np.array(table.column(name), float))
-    numbers = np.ascontiguousarray(without_rounding(np.stack(columns, axis=1)))
+    share, exponent = np.frexp(np.stack(columns, axis=1))  # to 20 binary digits, and below 1e-9 to 0
+    with np.errstate(over="ignore", invalid="ignore"):
+        numbers = np.ascontiguousarray(np.ldexp(np.round(share * 2**20), exponent - 20))
+    numbers[np.abs(numbers) < ROUNDING] = 0.0
     numbers[np.isnan(numbers)] = math.nan  # a single bit pattern
     return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
 
@@ -199,21 +237,29 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
     return {law: tuple(known) for law, known in by_law.items()}
 
 
-def floor(scenario: Scenario | None, unit: str) -> float:
-    """Return the largest difference of a metric in this unit that matters on no machine, however small its values.
+def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
+    """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where it is not known.
 
-    For a position it is what the sensor does not resolve: the larger of half a count of the encoder and the standard
-    deviation of the noise; for a share of the initial error, that over the largest |x0| of a driven channel. For u and
-    its variation it is MIN_COMMAND_SHARE of the bound on u, because u of a joint that friction holds varies by less.
+    With X0 the largest |x0| of a driven channel and T the duration it is, for
+
+    - an error of the last part, and for shares of the start: the larger of half a count of the encoder, the standard
+      deviation of the noise and eps X0;
+    - other errors: eps X0; integrals of errors: that of an error that is eps X0 throughout, and so on;
+    - a time: one control period; what counts events: one in the run;
+    - u and its variation: MIN_COMMAND_SHARE of the bound on u, because u of a joint that friction holds varies by less.
     """
-    if scenario is not None and unit in ("{u}", "{u}/s"):
-        return MIN_COMMAND_SHARE * max((bound for bound in scenario.limits if math.isfinite(bound)), default=0.0)
-    if scenario is None or unit not in ("{x}", "%"):
+    if scenario is None or metric == SETTLES:
         return 0.0
-    driven = [group for group in channel_groups(scenario) if group.driven]
-    counts = [scenario.sensor.quantum(group.unit == "rad") for group in driven] if scenario.sensor else []
-    resolution = max(scenario.noise.position, *(count / 2 for count in counts), 0.0)
-    if unit == "{x}":
-        return resolution
-    x0 = max(abs(scenario.resolved.x0[i]) for group in driven for i in group.channels)
-    return 100.0 * resolution / x0 if x0 else 0.0
+    entry = CATALOGUE[metric]
+    driven, T = [group for group in channel_groups(scenario) if group.driven], scenario.duration
+    start = max((abs(scenario.resolved.x0[i]) for group in driven for i in group.channels), default=0.0)  # X0
+    least = eps * start
+    counts = [scenario.sensor.quantum(group.unit == "rad") / 2 for group in driven] if scenario.sensor else []
+    seen = max(scenario.noise.position, *counts, least)
+    u = MIN_COMMAND_SHARE * max((bound for bound in scenario.limits if math.isfinite(bound)), default=0.0)
+    by_unit = {
+        "s": scenario.control_period, "{x}": seen if entry.late else least, "%": 100.0 * seen / start if start else 0.0,
+        "{x} s": least * T, "{x} s^2": least * T**2 / 2, "({x})^2 s": least**2 * T,
+        "{u}": u, "{u}/s": u, "({u})^2 s": u**2 * T, "{force}": u, "1": eps, "1/s": 1 / T, "Hz": 1 / T,
+    }  # fmt: skip
+    return by_unit.get(entry.unit, 0.0)

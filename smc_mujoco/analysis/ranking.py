@@ -1,20 +1,26 @@
 """Comparison of laws on the runs that they share: which law is better in which block, and places over all blocks.
 
-Blocks and samples are as in `bootstrap`. For two laws, runs that are linked by a shared set of gains of either law are
-one sample, whose difference is the median of theirs. A run that repeats the results of both laws is not counted.
+Blocks and samples are as in `bootstrap`. A unit is a run: the gains that one search found, in one instance of the
+conditions. Runs that are linked by a shared set of gains of either law are one unit, whose lead is the median of
+theirs. A run that repeats the results of both laws is not counted.
 
-The test. The difference of two laws in a sample is the logarithm of the ratio of their values. For shares, and where
-3 % of a value is less than what matters (see `paired_runs.floor`), it is the difference of the values. A law is better
-than another if Wilcoxon's signed-rank test rejects that its values are lower by the least relevant difference or less:
-the interval of the ratio lies beyond that difference. Besides, its median must not be the higher one, and it must not
-fail more often.
+The lead. With y a law's value in a run, y' that of the same run at half the physics step, and rho how the value changes
+over the last fifth of the run,
 
-The test (F. Wilcoxon, Biometrics Bulletin 1(6), 1945) is exact if differences are symmetric about their centre, as
-those of two equal laws are, whatever the distribution. The estimate is the median of the means of all pairs of
-differences (J. L. Hodges, E. L. Lehmann, Annals of Mathematical Statistics 34(2), 1963). The interval has the centres
-that the test does not reject. Simulation of 24 pairs chose this test among three: the sign test has too little
-power, and Student's t is wrong in 16 % of samples in place of 2.5 % where the differences have a long tail to the left
-(the signed ranks in 4 %), and cannot take an infinite value.
+    high = max(y, y') max(1, rho)^5         low = min(y, y') min(1, rho)^5
+    d_i  = log( max(low of the rival, q) / max(high of the law, q) )        one for each unit i
+
+q is the smallest value that matters in the problem, see `paired_runs.floor`. rho^5 is the value after as much time
+again, if the trend goes on: only a law that rises and a rival that falls are charged. rho is the median of a law's
+runs in a block, and 1 if it differs from 1 by no more than what is relevant. Where only some of the runs were repeated
+at half the step, the median of their relative changes widens the others. For shares, d is the difference.
+
+The test. A law is better than a rival if the number of pairs i <= j with d_i + d_j > -2 log(1 - r) is too large for the
+exact law of the signed ranks; r is the share that is relevant. That is F. Wilcoxon's test (Biometrics Bulletin 1(6),
+1945) in the form of J. W. Tukey: it rejects that the law is not lower by the share r. It is monotone: a law never loses
+a win because a value of its own falls, or one of its rival's rises. It does not depend on units. Besides, the law must
+not fail more often. The estimate is the median of the means of all pairs (J. L. Hodges, E. L. Lehmann, Annals of
+Mathematical Statistics 34(2), 1963), and an interval has the centres that the test does not reject.
 
 The correction. There are two families, over all blocks of a metric in a table, however the table is grouped into
 boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided p-values.
@@ -26,12 +32,15 @@ boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statisti
 - Pairs. The family is all pairs of laws in all blocks. The probability that any law is wrongly called better than
   another is at most 5 %, in addition to that of a wrong winner.
 
-A block without a test has one value of each law, which is no sample. There a law is better if its value is lower by
-more than the least relevant difference. The block belongs to neither family. A law with a run that failed, or has no
-value, wins nothing. In every order the laws with fewer such runs come first.
+No winner. Two laws are level only if there are 12 units or more and the interval of their ratio, at the pairs' level,
+lies within 10 %. Otherwise one cannot tell, and `least_visible_lead` says which lead would have been seen.
+
+A block without a test has one value of each law, which is no sample. There a law is better if d exceeds -log(1 - r).
+The block belongs to neither family. A law with a run that failed, or has no value, wins nothing. In every order the
+laws with fewer such runs come first.
 
 A law is among the best if no other is better. One exception: where another law's median is relevantly lower, and two
-laws have too few samples for any verdict, the law is undecided, and not among the best.
+laws have too few units for any verdict, the law is undecided, and not among the best.
 """
 
 import functools
@@ -46,8 +55,15 @@ from smc_mujoco.analysis.bootstrap import LEVEL, middle
 from smc_mujoco.common.errors import number
 
 MAX_EXACT = 60  # samples; with more the normal approximation of the rank sum is used
-RELEVANT = 0.03  # default share of the larger value that is relevant; chosen
-ROUNDING = 1e-9  # in SI units: smaller differences are a tie, because they depend on how runs are integrated
+RELEVANT = 0.03  # r, default share of the larger value that is relevant; chosen
+TREND_POWER = 5  # the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
+LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
+MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
+MAX_STEP_CHANGE = 0.25  # a median that half the physics step moves by more is marked; chosen
+MAX_WIDENING = 1e3  # of a logarithm: more than the range of floating-point numbers, but finite
+MAX_RISE = 60.0  # of log rho: a value that has vanished within the last fifth of a run has fallen enough
+POWER = 0.8  # with which the least visible lead is seen
+NORMAL_SPREAD = 0.954  # median of the absolute difference of two draws from a normal law, over its standard deviation
 
 
 class Rank(NamedTuple):
@@ -62,13 +78,13 @@ class Rank(NamedTuple):
 class Effect(NamedTuple):
     """How a law's values compare with a rival's, in one block."""
 
-    value: float  # ratio of the law's values to the rival's, or their difference if not `relative`
+    value: float  # ratio of the law's values to the rival's
     low: float  # of its interval, at the level that the correction leaves for one comparison
     high: float
-    relative: bool
-    ahead: int  # number of samples in which the law is better by more than the least relevant difference
-    samples: int
-    sets: bool  # whether the samples are sets of gains; otherwise they are seeds
+    ahead: int  # number of units in which the law is better by more than what is relevant
+    samples: int  # number of units
+    sets: bool  # whether the units are sets of gains; otherwise they are seeds
+    visible: float  # the least lead that would have been seen, as a share; 1 if none would
 
 
 class Limits(NamedTuple):
@@ -76,17 +92,18 @@ class Limits(NamedTuple):
 
     pair: float
     winner: float
+    first: float = 0.0  # of Holm's first step for winners
 
 
 class Comparison:
     """Every law compared with every other in every block.
 
     Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a run. If they are
-    `shares`, 0.0 or 1.0, means are compared instead of medians. Floors are lower bounds on the least relevant
-    difference, and `untested` says whether a value is no sample, such as a worst case: one for all blocks, or one for
-    each. Outcomes and sets are law -> a number per cell, equal if two seeds gave the same result, or had the same
-    gains; default: all results differ, and all gains are the same. Limits are given where the blocks belong to a larger
-    family.
+    `shares`, 0.0 or 1.0, means are compared instead of medians. Floors are the q of the blocks, and `untested` says
+    whether a value is no sample, such as a worst case: one for all blocks, or one for each. Outcomes and sets are law
+    -> a number per cell, equal if two seeds gave the same result, or had the same gains; default: all results differ,
+    and all gains are the same. Limits are given where the blocks belong to a larger family. `halves` and `trends` are
+    law -> y' and rho of each run, NaN where they are not known; default: nowhere.
     """
 
     def __init__(
@@ -99,12 +116,17 @@ class Comparison:
         relevant: float = RELEVANT,
         limits: Limits | None = None,
         untested: ArrayLike = False,
+        halves: Mapping[str, ArrayLike] | None = None,
+        trends: Mapping[str, ArrayLike] | None = None,
     ):
         def stacked(by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
             return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
 
         self.laws, self.shares, self.relevant = tuple(sorted(scores)), shares, checked_share(relevant)
         self.cells = cells = stacked(scores, float)  # (laws, blocks, seeds)
+        unknown = np.full(cells.shape, math.nan)
+        self.halves = unknown if halves is None else stacked(halves, float)  # as cells, at half the physics step
+        rises = unknown if trends is None else stacked(trends, float)
         blocks = range(cells.shape[1])
         self.floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
         self.untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
@@ -113,24 +135,18 @@ class Comparison:
         ran = ~np.isnan(cells[0])
         # (laws, blocks), number of sets of gains of a law's runs
         self.sets = np.array([[np.unique(of_law[k, ran[k]]).size for k in blocks] for of_law in gains])
-        # (blocks, laws, laws), whether differences are logarithms of ratios: if the relevant shares exceed the floor
-        large = middle(cells).T * (self.relevant or RELEVANT) >= np.maximum(self.floors, ROUNDING)[:, None]
-        large &= ~np.any(cells < 0, axis=2).T
-        self.relative = large[:, :, None] & large[:, None, :] & (not shares)
-        # (blocks, laws, laws, seeds), second law's value minus the first's by sample, then NaN
+        low, high = bounds(cells, self.halves, rises, self.floors, shares, self.relevant)
+        self.beyond = self.relevant if shares else -math.log1p(-self.relevant)  # what d must exceed
+        # (blocks, laws, laws, seeds), d of the first law over the second by unit, then NaN
         of_block = [None] * len(blocks) if results is None else results.swapaxes(0, 1)
-        self.differences = np.stack(
-            [_differences(cells[:, k], self.relative[k], of_block[k], gains[:, k]) for k in blocks]
-        )
-        # (blocks, laws, laws), the least relevant difference of a law that is better than another
-        absolute = least_difference(self.centres.T[:, None, :], self.floors[:, None, None], self.relevant)
-        absolute = self.relevant if shares else absolute
-        self.shifts = np.where(self.relative, -math.log1p(-self.relevant), absolute)
+        self.leads = np.stack([_leads(low[:, k], high[:, k], ran[k], of_block[k], gains[:, k]) for k in blocks])
         # (blocks, laws, laws), one-sided p-value, not corrected, that a law is better; 1 of itself; 0 or 1 if untested
-        beyond = self.differences - self.shifts[..., None]
-        self.p = np.where(self.untested[:, None, None], 1.0 - np.any(beyond > 0.0, axis=3), p_values(beyond))
+        exceeding = self.leads - self.beyond
+        self.p = np.where(self.untested[:, None, None], 1.0 - np.any(exceeding > 0.0, axis=3), p_values(exceeding))
         self.p[:, *np.diag_indices(len(self.laws))] = 1.0
         self.limits = limits or corrected_limits([self])  # of the p-values, after the correction
+        self._plain = cells if shares else _logarithms(cells, self.floors)
+        self._gains, self._results = gains, results
 
     @functools.cached_property
     def centres(self) -> np.ndarray:
@@ -149,21 +165,22 @@ class Comparison:
 
     @functools.cached_property
     def samples(self) -> np.ndarray:
-        """The number of samples of two laws, (blocks, laws, laws)."""
-        return (~np.isnan(self.differences)).sum(axis=3)
+        """The number of units of two laws, (blocks, laws, laws)."""
+        return (~np.isnan(self.leads)).sum(axis=3)
 
     @functools.cached_property
     def _eligible(self) -> np.ndarray:
-        """Whether a law has no higher median than another, and no more runs without a value, (blocks, laws, laws)."""
-        centre, lacking = self.centres.T, self.without_value.T
-        lower = centre[:, :, None] <= centre[:, None, :]
-        return lower & (lacking[:, :, None] <= lacking[:, None, :])
+        """Whether a law has no more runs without a value than another, (blocks, laws, laws)."""
+        lacking = self.without_value.T
+        return lacking[:, :, None] <= lacking[:, None, :]
 
     @functools.cached_property
     def _relevantly_lower(self) -> np.ndarray:
         """Whether the median of a law is lower than another's by what is relevant, (blocks, laws, laws)."""
-        lowered = self.centres - least_difference(self.centres, self.floors, self.relevant)
-        return lowered.T[:, None, :] > self.centres.T[:, :, None]
+        centre, floors = self.centres.T, self.floors[:, None, None]
+        if self.shares:
+            return centre[:, None, :] - centre[:, :, None] > self.relevant
+        return exceeds(centre[:, None, :], centre[:, :, None], floors, self.relevant)
 
     @functools.cached_property
     def winners(self) -> list[str | None]:
@@ -192,12 +209,18 @@ class Comparison:
         return np.any(self.better, axis=1).T | lacking
 
     @functools.cached_property
+    def level(self) -> np.ndarray:
+        """Whether two laws are level: the interval of their ratio lies within 10 %, (blocks, laws, laws)."""
+        margin = LEVEL_SHARE if self.shares else -math.log1p(-LEVEL_SHARE)
+        within = p_values(self.leads + margin) <= self.limits.pair
+        level = within & within.swapaxes(1, 2) & (self.samples >= MIN_LEVEL_UNITS) & ~self.untested[:, None, None]
+        level[:, *np.diag_indices(len(self.laws))] = True
+        return level
+
+    @functools.cached_property
     def tied(self) -> np.ndarray:
-        """Whether neither law is better, fails less often or has a relevantly lower median in a block, (laws, laws)."""
-        lacking = self.without_value.T
-        fails_less = lacking[:, :, None] < lacking[:, None, :]
-        differs = np.any(self._relevantly_lower | self.better | fails_less, axis=0)
-        return ~np.logical_or(differs, differs.T)
+        """Whether two laws are level in every block, (laws, laws)."""
+        return self.level.all(axis=0)
 
     @functools.cached_property
     def undecided(self) -> np.ndarray:
@@ -214,54 +237,156 @@ class Comparison:
     def effect(self, block: int, law: str, rival: str, winner: bool = True) -> Effect:
         """Return how a law compares with a rival in a block, at the level of a winner's comparison or of any pair's."""
         a, b = self.laws.index(law), self.laws.index(rival)
-        differences, relative = self.differences[block, a, b], bool(self.relative[block, a, b])
-        shift = interval(-differences, self.limits.winner if winner else self.limits.pair)
+        error = self.limits.winner if winner else self.limits.pair
+        leads, lags = self.leads[block, a, b], self.leads[block, b, a]
         with np.errstate(over="ignore"):
-            ends = np.exp(shift) if relative else np.array(shift)
+            ends = np.exp([interval(lags, error)[1], -interval(leads, error)[1]])
+            plain = _difference(self._plain[b, block], self._plain[a, block])
+            value = np.exp(-interval(self._by_unit(plain, block, a, b), error)[0])
         return Effect(
-            *ends.tolist(),
-            relative=relative,
-            ahead=int((differences > self.shifts[block, a, b]).sum()),
+            value=float(np.clip(value, *ends)),
+            low=float(ends[0]),
+            high=float(ends[1]),
+            ahead=int((leads > self.beyond).sum()),
             samples=int(self.samples[block, a, b]),
             sets=bool(self.sets[[a, b], block].max() > 1),
+            visible=self.visible(block, law, rival),
         )
 
+    def visible(self, block: int, law: str, rival: str) -> float:
+        """Return the least lead of a law over a rival that is seen with a probability of 80 %, as a share.
 
-def _differences(cells: np.ndarray, relative: np.ndarray, results: np.ndarray | None, sets: np.ndarray) -> np.ndarray:
-    """Return `Comparison.differences` of one block, (laws, laws, seeds); cells, sets and results are (laws, seeds)."""
-    k, ran = len(cells), ~np.isnan(cells[:1])
-    differences = np.full((k, *cells.shape), math.nan)
-    for a in range(k - 1):
-        pairs = _pairwise(cells[a], cells[a + 1 :], relative[a, a + 1 :])
-        for b, row in enumerate(pairs, a + 1):
-            if results is not None:
-                row[~first_of_kind(results[[a, b]][:, None], ran)[0]] = math.nan
-            row[:] = _by_sample(row, sets[a], sets[b])
-        differences[a, a + 1 :], differences[a + 1 :, a] = pairs, -pairs
-    return differences
+        It makes up for what half the step and trends charge, too.
+        """
+        a, b = self.laws.index(law), self.laws.index(rival)
+        lead = least_visible_lead(self.leads[block, a, b], self.limits.first, self.relevant)
+        plain = self._by_unit(_difference(self._plain[b, block], self._plain[a, block]), block, a, b)
+        charged = _difference(plain, self.leads[block, a, b])
+        known = charged[np.isfinite(charged)]
+        return 1.0 - (1.0 - lead) * math.exp(-max(float(np.median(known)), 0.0)) if known.size else lead
+
+    def step_change(self, block: int, law: str) -> tuple[float, float] | None:
+        """Return the medians of a law's runs that were repeated at half the physics step, before and after; else None.
+
+        They are returned where half the step moves the median by more than a quarter, see MAX_STEP_CHANGE.
+        """
+        a = self.laws.index(law)
+        whole, half = self.cells[a, block], self.halves[a, block]
+        if self.shares or not (again := ~np.isnan(half)).any():
+            return None
+        before, after = (float(middle(values[again][None, None])[0, 0]) for values in (whole, half))
+        q = float(self.floors[block])
+        moved = exceeds(max(before, after), min(before, after), q, MAX_STEP_CHANGE / (1.0 + MAX_STEP_CHANGE))
+        return (before, after) if moved else None
+
+    def _by_unit(self, by_run: np.ndarray, block: int, a: int, b: int) -> np.ndarray:
+        """Return values by run, (seeds,), as values by unit of two laws."""
+        results = None if self._results is None else self._results[[a, b], block]
+        there = ~np.isnan(self.cells[0, block])
+        return _centres(by_run, *_units(there, results, self._gains[a, block], self._gains[b, block]))
 
 
-def _pairwise(law: np.ndarray, rivals: np.ndarray, relative: np.ndarray) -> np.ndarray:
-    """Return by how much rivals' values (rivals, seeds) are higher than a law's (seeds,); 0 if both are inf."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratios = np.log(np.abs(rivals)) - np.log(np.abs(law))
-        differences = np.where(relative[:, None], ratios, rivals - law)
-    equal = (rivals == law) | (np.isinf(rivals) & np.isinf(law))
-    return np.where(equal, 0.0, differences)
+def bounds(
+    cells: np.ndarray, halves: np.ndarray, trends: np.ndarray, floors: np.ndarray, shares: bool, relevant: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return low and high of every run, (laws, blocks, seeds): logarithms, or the shares themselves."""
+    repeated = ~np.isnan(halves)
+    if shares:
+        return np.where(repeated, np.fmin(cells, halves), cells), np.where(repeated, np.fmax(cells, halves), cells)
+    no_floor = np.zeros(len(floors))
+    whole, half = _logarithms(cells, no_floor), _logarithms(halves, no_floor)
+    change = np.abs(_difference(_logarithms(halves, floors), _logarithms(cells, floors)))
+    widening = np.zeros(cells.shape[:2])
+    known = repeated.any(axis=2)
+    widening[known] = np.minimum(np.nanmedian(change[known], axis=1), MAX_WIDENING)  # of a law in a block
+    low = np.where(repeated, np.fmin(whole, half), whole - widening[..., None])
+    high = np.where(repeated, np.fmax(whole, half), whole + widening[..., None])
+    rising = _rises(trends, relevant)[..., None]
+    q = np.log(np.maximum(floors, np.finfo(float).tiny))[None, :, None]
+    low, high = low + TREND_POWER * np.minimum(rising, 0.0), high + TREND_POWER * np.maximum(rising, 0.0)
+    return np.maximum(low, q), np.maximum(high, q)
 
 
-def _by_sample(differences: np.ndarray, sets: np.ndarray, rival_sets: np.ndarray) -> np.ndarray:
-    """Return the median difference of each sample, then NaN: runs linked by a set of gains are one sample."""
-    runs = np.flatnonzero(~np.isnan(differences))
-    labels = linked(sets[runs], rival_sets[runs])
+def _rises(trends: np.ndarray, relevant: float) -> np.ndarray:
+    """Return log rho of each law in each block, (laws, blocks); 0 where it is not relevant, or not known."""
+    rho, known = np.ones(trends.shape[:2]), ~np.isnan(trends).all(axis=2)
+    rho[known] = np.nanmedian(trends[known], axis=1)
+    with np.errstate(divide="ignore"):
+        rise = np.log(rho)
+    return np.where(np.abs(rise) > (relevant or RELEVANT), np.clip(rise, -MAX_RISE, MAX_RISE), 0.0)
+
+
+def _logarithms(values: np.ndarray, floors: np.ndarray) -> np.ndarray:
+    """Return the logarithms of values (laws, blocks, seeds), at least those of the blocks' floors."""
+    return np.log(np.maximum(np.abs(values), np.maximum(floors, np.finfo(float).tiny)[None, :, None]))
+
+
+def _difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a - b; 0 where both are the same infinity."""
+    with np.errstate(invalid="ignore"):
+        return np.where((a == b) & np.isinf(a), 0.0, a - b)
+
+
+def _leads(
+    low: np.ndarray, high: np.ndarray, ran: np.ndarray, results: np.ndarray | None, sets: np.ndarray
+) -> np.ndarray:
+    """Return `Comparison.leads` of one block, (laws, laws, units); low, high, results and sets are (laws, seeds)."""
+    k = len(low)
+    leads = np.full((k, *low.shape), math.nan)
+    for a in range(k):
+        for b in range(a + 1, k):
+            units = _units(ran, None if results is None else results[[a, b]], sets[a], sets[b])
+            leads[a, b] = _centres(_difference(low[b], high[a]), *units)
+            leads[b, a] = _centres(_difference(low[a], high[b]), *units)
+    return leads
+
+
+def _units(
+    ran: np.ndarray, results: np.ndarray | None, sets: np.ndarray, rival_sets: np.ndarray
+) -> tuple[np.ndarray, tuple[int, ...] | None]:
+    """Return the runs of two laws that count, without those that repeat earlier ones, and the number of their unit."""
+    runs = np.flatnonzero(ran if results is None else first_of_kind(results[:, None], ran[None])[0])
+    return runs, linked(sets[runs], rival_sets[runs])
+
+
+def _centres(by_run: np.ndarray, runs: np.ndarray, labels: tuple[int, ...] | None) -> np.ndarray:
+    """Return the median of each unit, then NaN; without labels each run is a unit, in its place."""
+    centres = np.full(by_run.shape, math.nan)
     if labels is None:
-        return differences
-    centres = np.full(differences.shape, math.nan)
-    for sample in range(max(labels) + 1):
-        ordered = np.sort(differences[runs[np.array(labels) == sample]])
+        centres[runs] = by_run[runs]
+        return centres
+    for unit in range(max(labels) + 1):
+        ordered = np.sort(by_run[runs[np.array(labels) == unit]])
         low, high = ordered[(ordered.size - 1) // 2], ordered[ordered.size // 2]
-        centres[sample] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
+        centres[unit] = 0.0 if low == -high else (low + high) / 2  # also of two opposite infinite values
     return centres
+
+
+def least_visible_lead(leads: ArrayLike, error: float, relevant: float = RELEVANT) -> float:
+    """Return the least lead that the test sees with a probability of 80 %, as a share; 1 if it can see none.
+
+    With n units whose d (n,) have the standard deviation s, and t the quantiles of Student's law,
+
+        L = 1 - (1 - r) exp( -(t(error) + t(0.2)) s sqrt(pi / 3n) )
+
+    The factor is that of the signed ranks' efficiency under a normal law. s is the median of |d_i - d_j| over 0.954.
+
+    Args:
+      leads: d of the units, NaN for none.
+      error: one-sided level of the first step of Holm's method.
+      relevant: r.
+    """
+    from scipy.special import stdtrit
+
+    known = np.asarray(leads, float)
+    known = known[~np.isnan(known)]
+    n = known.size
+    if n < 2 or min_p(n) > error:
+        return 1.0
+    i, j = np.triu_indices(n, 1)
+    spread = float(np.median(np.abs(_difference(known[i], known[j])))) / NORMAL_SPREAD
+    quantiles = stdtrit(n - 1, 1.0 - error) + stdtrit(n - 1, POWER)
+    return float(1.0 - (1.0 - relevant) * math.exp(-quantiles * spread * math.sqrt(math.pi / (3 * n))))
 
 
 def linked(*sets: np.ndarray) -> tuple[int, ...] | None:
@@ -312,8 +437,9 @@ def corrected_limits(comparisons: Sequence[Comparison]) -> Limits:
             p, diagonal = one.p[~one.untested], np.eye(len(one.laws), dtype=bool)
             pairs.append(np.minimum(p, p.transpose(0, 2, 1))[:, *np.triu_indices(len(one.laws), 1)].ravel())
             winners.append(np.where(diagonal, 0.0, p).max(axis=2).min(axis=1))
-    error = 1.0 - LEVEL
-    return Limits(*(_holm(np.concatenate([*each, []]), error / 2) for each in (pairs, winners)))
+    error = (1.0 - LEVEL) / 2  # two-sided
+    of_pair, of_winner = (np.concatenate([*each, []]) for each in (pairs, winners))
+    return Limits(_holm(of_pair, error), _holm(of_winner, error), error / max(of_winner.size, 1))
 
 
 def _holm(p: np.ndarray, error: float) -> float:
@@ -337,41 +463,24 @@ def ranks(comparison: Comparison) -> list[Rank]:
 
 def ranked(centres: np.ndarray, floors: np.ndarray, lacking: ArrayLike = 0, relevant: float = RELEVANT) -> np.ndarray:
     """Return the ranks of laws in each block (laws, blocks): by numbers of runs without a value, then by medians."""
-    lowered = centres - least_difference(centres, floors, relevant)
     lacking = np.broadcast_to(lacking, centres.shape)
     behind = lacking[:, None] > lacking[None]
-    behind |= (lacking[:, None] == lacking[None]) & (lowered[:, None] > centres[None])
+    behind |= (lacking[:, None] == lacking[None]) & exceeds(centres[:, None], centres[None], floors, relevant)
     return (len(centres) + 1 + behind.sum(axis=1) - behind.sum(axis=0)) / 2
 
 
 # relevant differences
 
 
-def least_difference(value: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
-    """Return the least relevant difference between a value >= 0 and a smaller one.
-
-    It is the larger of a share of the value and the resolution, see `paired_runs.floor`. Any difference from inf is
-    relevant.
-    """
-    share = relevant * np.where(np.isinf(value), 0.0, np.abs(value))
-    return np.maximum(share, np.maximum(resolution, ROUNDING))
-
-
-def exceeds(a: ArrayLike, b: ArrayLike, resolution: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
-    """Return whether a is larger than b by more than the least relevant difference; a, b >= 0."""
-    return np.asarray(a) - least_difference(a, resolution, relevant) > np.asarray(b)
+def exceeds(a: ArrayLike, b: ArrayLike, floor: ArrayLike = 0.0, relevant: float = RELEVANT) -> np.ndarray:
+    """Return whether a is larger than b by more than what is relevant, with both at least the floor q; a, b >= 0."""
+    larger, smaller = np.asarray(np.maximum(a, floor)), np.asarray(np.maximum(b, floor))
+    return np.asarray((larger > smaller) & ((1.0 - relevant) * larger > smaller))
 
 
 def checked_share(relevant: float) -> float:
     """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
     return number("relevant", relevant, low=0.0, high=0.5)
-
-
-def without_rounding(values: np.ndarray) -> np.ndarray:
-    """Round values so that rounding errors vanish: 0 below 1e-9, else 20 binary digits."""
-    share, exponent = np.frexp(np.where(np.abs(values) < ROUNDING, 0.0, values))
-    with np.errstate(over="ignore"):
-        return np.ldexp(np.round(share * 2**20), exponent - 20)
 
 
 # the signed-rank test
@@ -380,22 +489,27 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
 def p_values(differences: ArrayLike) -> np.ndarray:
     """Return the one-sided p-values with which differences (..., n), NaN for none, lie above 0; 1 without any.
 
-    A difference of 0 counts as negative. Ties share their ranks, and the distribution is that of the shared ranks.
+    The statistic is the number of pairs i <= j whose sum is above 0: without ties and zeros, the sum of the positive
+    ranks. Ties and zeros lower it, so that the test keeps its level.
     """
-    from scipy.stats import rankdata
-
     rows = np.atleast_2d(np.asarray(differences, float))
     shape, rows = rows.shape[:-1], rows.reshape(-1, rows.shape[-1])
-    there = ~np.isnan(rows)
-    sizes = np.where(there, np.minimum(np.abs(rows), np.finfo(float).max), math.inf)
-    twice = np.where(there, np.rint(2 * rankdata(sizes, axis=1)), 0).astype(int)  # whole numbers, also where ranks tie
-    above = np.where(rows > 0, twice, 0).sum(axis=1)
-    distinct, which = np.unique(np.sort(twice, axis=1), axis=0, return_inverse=True)
-    p = np.empty(len(rows))
-    for i, ranks in enumerate(distinct):
-        same = which.ravel() == i
-        p[same] = _tail(tuple(ranks[ranks > 0].tolist()), above[same])
+    sizes = (~np.isnan(rows)).sum(axis=1)
+    p = np.ones(len(rows))
+    for n in np.unique(sizes[sizes > 0]).tolist():
+        same = sizes == n
+        of_size = rows[same]
+        sums = np.array([_positive_pairs(row[~np.isnan(row)]) for row in of_size])
+        p[same] = _tail(tuple(range(2, 2 * n + 1, 2)), 2 * sums)
     return p.reshape(shape)
+
+
+def _positive_pairs(values: np.ndarray) -> int:
+    """Return the number of pairs i <= j of values (n,) whose sum is above 0; opposite infinities have none."""
+    ordered = np.sort(values)
+    above = values.size - np.searchsorted(ordered, -values, side="right")  # of each value, by all values, itself too
+    alone = int((values > 0).sum())
+    return (int(above.sum()) - alone) // 2 + alone
 
 
 def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]:

@@ -42,6 +42,16 @@ def depends_on_step(scenario: Scenario) -> bool:
     return scenario.resolved.integrator != "RK4"
 
 
+def repeats_all(scenario: Scenario) -> bool:
+    """Return whether every run is repeated at half the step: the integrator is not RK4, or constraints may act."""
+    return scenario.realistic or depends_on_step(scenario)
+
+
+def halved(scenario: Scenario) -> Scenario:
+    """Return the same scenario at half its physics step. Raise ScenarioError if that is too short."""
+    return dataclasses.replace(scenario, physics_step=0.5 * scenario.resolved.physics_step)
+
+
 def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: int | None = None) -> list[StepChange]:
     """Return how half the physics step changes the limit cycle of each run.
 
@@ -51,8 +61,7 @@ def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: i
       threads: as in `run`.
     """
     scenarios = [trace.scenario for trace in traces]
-    halved = [dataclasses.replace(one, physics_step=0.5 * one.resolved.physics_step) for one in scenarios]
-    again = run(halved, threads=threads)
+    again = run([halved(one) for one in scenarios], threads=threads)
 
     def cycle(trace: Trace) -> tuple[float, float]:
         return largest_cycle(trace) if channel is None else channel_cycle(trace, channel)

@@ -209,7 +209,7 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
 def _html(cell: Cell) -> html.Html:
     """Return a cell as HTML, with the lines below in smaller letters."""
     text = html.strong(cell.text) if cell.strong else html.text(cell.text)
-    below = "<br>".join(html.text(line) for line in (cell.below, cell.alarm) if line)
+    below = "<br>".join(html.text(line) for part in (cell.below, cell.alarm) for line in part.splitlines())
     return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>') if below else text
 
 
@@ -220,8 +220,9 @@ def _tex_line(cells: Iterable[str]) -> str:
 def _tex_cell(cell: Cell) -> str:
     """Return a cell as LaTeX, with the line below in brackets beside it."""
     text, below = (re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", line) for line in (cell.text, cell.below))
+    below, alarm = (", ".join(lines.splitlines()) for lines in (below, cell.alarm))
     strong = f"\\textbf{{{tex(text)}}}" if cell.strong else tex(text)
-    return (f"{strong} [{tex(below)}]" if below else strong) + (f", {tex(cell.alarm)}" if cell.alarm else "")
+    return (f"{strong} [{tex(below)}]" if below else strong) + (f", {tex(alarm)}" if alarm else "")
 
 
 def tex(text: str) -> str:

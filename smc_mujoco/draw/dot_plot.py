@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
-from smc_mujoco.analysis.paired_runs import GROUPS, SETTLES, Columns, groups, sources, values
+from smc_mujoco.analysis.paired_runs import GROUPS, SETTLES, Columns, by_row, groups, sources
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.draw import page as pages
@@ -91,10 +91,10 @@ def plot(
 
 def _intervals(table: Columns, metrics: Sequence[str]) -> dict[tuple[str, str, str, str], Interval]:
     """Return (metric, plant, condition, law) -> the median, or the share of runs that settle, with its interval."""
-    by_row, intervals = {metric: values(table, metric) for metric in metrics}, {}
+    of_metric, intervals = {metric: by_row(table, metric) for metric in metrics}, {}
     for group in groups(table, GROUPS):
         for metric in metrics:
-            scores = group.scores(by_row[metric])
+            scores = group.scores(of_metric[metric])
             for law, of_law in scores.values.items():
                 interval = median_of(of_law, linked(*scores.sets[law]))
                 if metric == SETTLES:

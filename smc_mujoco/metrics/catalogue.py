@@ -67,6 +67,25 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     }
 
 
+def trends(trace: Trace) -> dict[str, float]:
+    """Return name -> rho of the metrics of the last part: their value over that of the run without its last fifth.
+
+    A run in which such a metric falls has not yet reached its end. Metrics that are 0 in either part are left out.
+
+    Raises:
+      ScenarioError: the run diverged, failed or holds NaN.
+    """
+    refuse(trace)
+    earlier, whole = conventions.by_group(conventions.first_part(trace)), conventions.by_group(trace)
+    found = {}
+    for m in metrics():
+        if m.late and not m.refusal(trace.scenario.plant):
+            now, before = m.worst(whole), m.worst(earlier)
+            if now > 0.0 and before > 0.0:
+                found[m.name] = now / before
+    return found
+
+
 @metric("s", need="fast")
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
@@ -117,19 +136,19 @@ def peak(trace: Trace) -> float:
     return np.abs(trace.x).max()
 
 
-@metric("{x}")
+@metric("{x}", late=True)
 def steady_error(trace: Trace) -> float:
     """|mean of e over the samples of the last part|, worst channel."""
     return np.abs(error(trace)[last_part(trace)].mean(axis=0)).max()
 
 
-@metric("{x}", need="accurate")
+@metric("{x}", need="accurate", late=True)
 def ultimate_bound(trace: Trace) -> float:
     """Largest |e| in the last part, worst channel."""
     return np.abs(error(trace)[last_part(trace)]).max()
 
 
-@metric("{x}")
+@metric("{x}", late=True)
 def ripple(trace: Trace) -> float:
     """Peak-to-peak e in the last part, worst channel; what is left of a transient counts."""
     return np.ptp(error(trace)[last_part(trace)], axis=0).max()
@@ -194,7 +213,7 @@ def tv(trace: Trace) -> float:
     return np.abs(np.diff(trace.u, axis=0)).sum(axis=0).max()
 
 
-@metric("{u}/s", label="TV rate", command=True, need="calm")
+@metric("{u}/s", label="TV rate", command=True, need="calm", late=True)
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 
@@ -290,7 +309,7 @@ def spread_settling_time(trace: Trace) -> float:
     return last_exit(trace.t, np.ptp(trace.x, axis=1), SETTLING_BAND * scale(trace))
 
 
-@metric("{x}", network=True)
+@metric("{x}", network=True, late=True)
 def spread_bound(trace: Trace) -> float:
     """Largest max_i x_i - min_i x_i in the last part."""
     return np.ptp(trace.x[last_part(trace)], axis=1).max()

@@ -107,6 +107,7 @@ class Metric:
     network: bool = False  # whether it compares channels, and so needs several of a kind
     realistic: bool = False  # whether it is meaningful only for mechanisms with friction, contacts or other parts
     command: bool = False  # whether it is computed from u or s, which free joints do not have
+    late: bool = False  # whether it is of the last part alone, so that it has a trend, see `trends`
     # Value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN
     absent: float = math.nan
 
@@ -226,6 +227,12 @@ def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
     start, end = trace.t[[0, -1]]
     return slice(int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None)
+
+
+def first_part(trace: Trace) -> Trace:
+    """Return the trace without the last part, but for its first sample."""
+    count = last_part(trace).start + 1
+    return dataclasses.replace(trace, **{name: getattr(trace, name)[:count] for name in ("t", *LOGGED)})
 
 
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:

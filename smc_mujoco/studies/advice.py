@@ -115,9 +115,9 @@ class Advice(Tables):
         return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
 
     def dominated(self, law: str) -> list[str]:
-        """Return the laws that dominate a law: better than it in some block, and worse in none."""
+        """Return the laws that a law dominates: it is better than them in some block, and worse in none."""
         rivals = (name for name in self.compared if name != law)
-        return [name for name in rivals if self.wins(name, law) and not self.wins(law, name)]
+        return [name for name in rivals if self.wins(law, name) and not self.wins(name, law)]
 
     @property
     def level(self) -> list[str]:
@@ -127,7 +127,7 @@ class Advice(Tables):
 
     @property
     def tied(self) -> list[str]:
-        """The laws that are level with the advised law, and whose medians do not differ relevantly from its."""
+        """The laws that are level with the advised law in every block, see `Comparison.level`."""
         laws, first = self.comparison.laws, self.compared[0]
         return [name for name in self.compared[1:] if self.comparison.tied[laws.index(first), laws.index(name)]]
 
@@ -317,7 +317,7 @@ class Advice(Tables):
         first, *others = self.compared
         if self._too_few:
             return f"How sure: not at all, with {self.samples}."
-        beaten = [name for name in others if first in self.dominated(name)]
+        beaten = [name for name in others if name in self.dominated(first)]
         mixed = [name for name in others if self.wins(name, first)]
         unsure = [name for name in self.level if name not in self.tied]
         it = first if self.all_level else "it"  # no law is advised where all are level
@@ -348,8 +348,7 @@ class Advice(Tables):
             effect = self.comparison.effect(worst, first, rival, winner=False)
             where = f" under {self.blocks[worst][1]}, where it does worst," * (len(blocks) > 1)
             if math.isfinite(effect.value):
-                unit = NEEDS[need].unit_for(self.plant.unit, self.effort)
-                parts.append(f"{need}{where} {size_in_words(effect, unit)}, {ahead_in_words(effect)}")
+                parts.append(f"{need}{where} {size_in_words(effect)}, {ahead_in_words(effect)}")
         return f"{first} against {rival}: {'; '.join(parts)}" if parts else ""
 
     @property

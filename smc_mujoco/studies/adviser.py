@@ -246,11 +246,13 @@ def _contest(
     ran = paired_runs.scenarios(table, group)
     comparison = Comparison(
         _stacked([its.values for its in scores.values()], laws, math.nan),
-        [paired_runs.floor(ran[k], NEEDS[need].unit) for need, k in blocks],
+        [paired_runs.floor(ran[k], NEEDS[need].name) for need, k in blocks],
         outcomes=_stacked([its.outcomes for its in scores.values()], laws),
         sets=_stacked([its.sets for its in scores.values()], laws),
         relevant=relevant,
         untested=[need == ROBUST for need, _ in blocks],
+        halves=_stacked([its.halves for its in scores.values()], laws, math.nan),
+        trends=_stacked([its.trends for its in scores.values()], laws, math.nan),
     )
     order = _order(comparison, _restraint(table, group, ran, plant, relevant))
     order += [Rank(law, math.nan, math.nan, best=False) for law in group.laws if law not in laws]
@@ -273,10 +275,11 @@ def _contest(
 def _scores(need: str, table: Table, group: Group, worst: Mapping[str, Sequence[WorstCase]]) -> Scores:
     """Return the scores of all laws on a need; for "robust" the values of their worst cases, (conditions, 1)."""
     if need != ROBUST:
-        return group.scores(paired_runs.values(table, NEEDS[need].name))
+        return group.scores(paired_runs.by_row(table, NEEDS[need].name))
     values = {law: np.array([[case.value] for case in cases]) for law, cases in worst.items()}
     zeros = dict.fromkeys(values, np.zeros((len(group.blocks), 1), np.int64))
-    return Scores([*range(len(group.blocks))], values, zeros, zeros)
+    unknown = dict.fromkeys(values, np.full((len(group.blocks), 1), math.nan))
+    return Scores([*range(len(group.blocks))], values, zeros, zeros, unknown, unknown)
 
 
 def _median(need: str, scores: Scores, law: str) -> Interval:
@@ -302,10 +305,10 @@ def _restraint(
     """Return law -> its mean rank on each of the metrics of `ties`."""
     mean_ranks, laws = [], group.laws
     for metric in ties(plant):
-        scores = group.scores(paired_runs.values(table, metric.name))
+        scores = group.scores(paired_runs.by_row(table, metric.name))
         if scores.blocks:
             centres = np.array([np.nanmedian(scores.values[law], axis=1) for law in laws])
-            floors = np.array([paired_runs.floor(ran[k], metric.unit) for k in scores.blocks])
+            floors = np.array([paired_runs.floor(ran[k], metric.name) for k in scores.blocks])
             mean_ranks.append(ranked(centres, floors, relevant=relevant).mean(axis=1))
     return {law: tuple(float(mean[i]) for mean in mean_ranks) for i, law in enumerate(laws)}
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, SETTLES
-from smc_mujoco.analysis.ranking import Effect, Rank, min_p
+from smc_mujoco.analysis.ranking import LEVEL_SHARE, MAX_STEP_CHANGE, POWER, Effect, Rank, min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -20,8 +20,9 @@ from smc_mujoco.studies.worst_case import WorstCase
 
 MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
 MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
-MIN_DIFFERENCE = 1e-9  # smaller differences are not printed, see `number`
 MAX_NAMES = 6  # in a sentence; chosen
+MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
+LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -37,17 +38,16 @@ class Entry:
 
 
 class Lead(NamedTuple):
-    """The law in front in a block, its closest rival (with the largest p-value), and how they compare, in a unit."""
+    """The law in front in a block, its closest rival (with the largest p-value), and how they compare."""
 
     law: str
     rival: str
     effect: Effect
-    unit: str
 
     @property
     def words(self) -> str:
         """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 runs"."""
-        return f"{size_in_words(self.effect, self.unit, self.rival)}, {ahead_in_words(self.effect)}"
+        return f"{size_in_words(self.effect, self.rival)}, {ahead_in_words(self.effect)}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -64,6 +64,9 @@ class Block:
     lead: Lead | None  # None for one law, for "settles", or if the law in front has runs without a value
     seeds: int  # in which every law ran
     runs: int  # distinct runs in these seeds; in the other seeds every law repeats the result of an earlier one
+    level: bool  # whether the `best` laws are all level with each other
+    visible: Mapping[str, float]  # law -> the least lead that would have been seen, a share; {} without a test
+    by_step: Mapping[str, tuple[float, float]]  # law -> medians at the step and at half of it, where they differ much
     samples: int  # largest number of samples of any two laws, see `ranking`; for one law, of its runs
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is named the winner
@@ -150,8 +153,7 @@ class Board(Tables):
         these = ", for these gains" * all(block.sets == 1 for block in self.blocks)
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
-            # ratios come before differences, and are ordered by the end of their interval
-            closest = max(leads, key=lambda lead: lead.effect.high if lead.effect.relative else -math.inf, default=None)
+            closest = max(leads, key=lambda lead: lead.effect.high, default=None)
             how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
             return f"{self.winner} wins{f' {blocks}' * (len(self.blocks) > 1)}{how}{self._search(self.winner)}{these}"
         results = []
@@ -163,10 +165,34 @@ class Board(Tables):
         if self.why:
             return f"no winner: {self.why}"
         if len(self.best) == len(self.entries):
-            return f"no winner: {'all' if len(self.best) > 2 else 'both'} laws are level"
+            which = "all laws" if len(self.best) > 2 else "both laws"
+            return f"no winner: {f'{which} are {LEVEL_WORDS}' if self.level else self.cannot_tell}"
         unclear = [entry.law for entry in self.entries if entry.law not in self.best and not self.losses(entry.law)]
         doubt = f"; too few samples to tell whether {joined(unclear)} {'is' if len(unclear) == 1 else 'are'} beaten"
-        return f"no winner, undefeated: {joined(self.best)}{doubt * bool(unclear)}"
+        apart = f"; {LEVEL_WORDS if self.level else self.cannot_tell}" if len(self.best) > 1 else ""
+        return f"no winner, undefeated: {joined(self.best)}{apart}{doubt * bool(unclear)}"
+
+    @property
+    def level(self) -> bool:
+        """Whether the laws that are not beaten are level with each other in every block."""
+        return all(block.level for block in self.blocks)
+
+    @property
+    def cannot_tell(self) -> str:
+        """That laws cannot be told apart, and the largest of the least leads that would have been seen, in words."""
+        visible = [block.visible[law] for block in self.blocks for law in self.best if law in block.visible]
+        if not visible:
+            return "cannot tell them apart"
+        lead = f"a lead of {_percent(max(visible))} %" if max(visible) < MAX_VISIBLE else "no lead"
+        return f"cannot tell them apart: {lead} would have been seen"
+
+    def visible(self, law: str) -> float:
+        """Return the largest, over the blocks, of the least leads that would have been seen, a share; NaN for none."""
+        return max((block.visible[law] for block in self.blocks if law in block.visible), default=math.nan)
+
+    def step_change(self, law: str) -> tuple[float, float] | None:
+        """Return the medians of a law at the physics step and at half of it, in the first block that is marked."""
+        return next((block.by_step[law] for block in self.blocks if law in block.by_step), None)
 
     def _search(self, law: str) -> str:
         """Return how the gains of a law that wins were searched, after a comma, if not by the rule."""
@@ -206,25 +232,27 @@ class Board(Tables):
         return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}" if entry.failed else ""
 
 
-def size_in_words(effect: Effect, unit: str = "", rival: str = "") -> str:
+def size_in_words(effect: Effect, rival: str = "") -> str:
     """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
-    if effect.low == effect.high == float(effect.relative):
+    if math.isnan(effect.value) or effect.value in (0.0, math.inf):
+        return f"{rival or 'the other'} {'has no value' if effect.value == 0.0 else 'alone has a value'} in most runs"
+    if effect.low == effect.high == 1.0:
         return "no difference"
-    if not effect.relative and max(map(abs, effect[:3])) < MIN_DIFFERENCE:
-        return f"no difference of {MIN_DIFFERENCE:g} or more"
-    endless = math.isinf(effect.high) and effect.low == (0.0 if effect.relative else -math.inf)
-    if effect.relative and effect.high < MAX_RATIO_OF_TIMES_LESS:
-        times = [number(1 / value) if value else "inf" for value in (effect.value, effect.high, effect.low)]
-        words, span = f"{times[0]} times less", f"{times[1]} to {times[2]} times"
-    elif effect.relative and effect.low > MIN_RATIO_OF_TIMES_AS_MUCH:
-        value, low, high = ("inf" if math.isinf(value) else number(value) for value in effect[:3])
-        words, span = f"{value} times as much", f"{low} to {high} times"
+    endless = effect.low == 0.0 and math.isinf(effect.high)
+    if effect.high < MAX_RATIO_OF_TIMES_LESS:
+        times = [number(1 / value) if value else "" for value in (effect.value, effect.high, effect.low)]
+        words = f"{times[0]} times less"
+        span = f"{times[1]} to {times[2]} times" if times[2] else f"{times[1]} times or more"
+    elif effect.low > MIN_RATIO_OF_TIMES_AS_MUCH:
+        value, low, high = map(number, effect[:3])
+        words = f"{value} times as much"
+        span = f"{low} times or more" if math.isinf(effect.high) else f"{low} to {high} times"
     else:
-        saved = [float(effect.relative) - value for value in (effect.value, effect.high, effect.low)]
+        saved = [1.0 - value for value in (effect.value, effect.high, effect.low)]
         less = saved[0] >= 0
         value, *ends = saved if less else [0.0 - saved[k] for k in (0, 2, 1)]
-        shown, unit = (_percent, " %") if effect.relative else (number, f" {unit}" * (unit not in ("", "1")))
-        words, span = f"{shown(value)}{unit} {'less' if less else 'more'}", f"{' to '.join(map(shown, ends))}{unit}"
+        words, (low, high) = f"{_percent(value)} % {'less' if less else 'more'}", map(_percent, ends)
+        span = f"{low} % or more" if math.isinf(ends[1]) else f"{low} to {high} %"
     named = f" {'as' if words.endswith(' as much') else 'than'} {rival}" * bool(rival)
     return f"{words}{named} ({'too few for an interval' if endless else span})"
 
@@ -329,7 +357,11 @@ def _cell(board: Board, entry: Entry) -> Cell:
     """Return a law's median, strong if no law is better, no run failed and there are enough runs for a winner."""
     median = size(entry.interval.median, board.metric)
     best = entry.rank.best and median != "" and not board.too_few and not board.barred
-    return Cell(median, spread(entry.interval, board.metric), best, alarm=board.failures(entry))
+    visible, change = board.visible(entry.law), board.step_change(entry.law)
+    seen = f"sees {_percent(visible)} %" if visible < MAX_VISIBLE else "sees no lead" * (not math.isnan(visible))
+    step = " to ".join(size(value, board.metric) for value in change) + " by the step" if change else ""
+    lines = "\n".join(filter(None, (spread(entry.interval, board.metric), seen)))
+    return Cell(median, lines, best, alarm="\n".join(filter(None, (board.failures(entry), step))))
 
 
 def key(boards: Sequence[Board]) -> str:
@@ -346,23 +378,33 @@ def key(boards: Sequence[Board]) -> str:
         f"every other law in a paired test{several}. Pairs of runs tell by how much, not the medians. Ahead means by "
         f"more than the least relevant difference, {least}."
     )
+    if any(block.visible for board in boards for block in board.blocks):
+        words += (
+            " 'sees 24 %': a lead of 24 % between the law and the one in front would have been seen in "
+            f"{100 * POWER:g} % of such comparisons."
+        )
+    if any(block.by_step for board in boards for block in board.blocks):
+        words += (
+            " 'by the step': the medians at the physics step and at half of it, which differ by more than "
+            f"{100 * MAX_STEP_CHANGE:g} %."
+        )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))
     return f"{words} {capital(gains)}." if gains else words
 
 
 def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad or m") -> str:
-    """Return the least relevant difference in words: a share, and lower bounds by unit; `x` is that of positions."""
+    """Return the least relevant difference in words: a share, and q by unit; `x` is the unit of positions."""
     of_unit: dict[str, float] = {}
     for metric, floor in floors:
         unit = "" if metric == SETTLES else CATALOGUE[metric].unit.removesuffix("/s")
         of_unit[unit] = max(floor, of_unit.get(unit, 0.0))
     words = f"{100 * share:g} % of the larger value"
-    if resolved := of_unit.get("{x}"):
-        words += f", for positions at least what the sensor resolves, up to {number(resolved)} {x}"
-    if of_unit.get("{u}"):
-        words += f", for u and its variation at least {100 * MIN_COMMAND_SHARE:g} % of its bound"
-    return words
+    parts = [f"up to {number(resolved)} {x} of a position"] if (resolved := of_unit.get("{x}")) else []
+    parts += [f"{100 * MIN_COMMAND_SHARE:g} % of the bound on u"] * bool(of_unit.get("{u}"))
+    return (
+        f"{words}, where values below what the problem can show count as equal ({', '.join(parts)})" if parts else words
+    )
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:

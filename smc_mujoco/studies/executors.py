@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.extras import extra
-from smc_mujoco.metrics.catalogue import score
+from smc_mujoco.common.files import to_json
+from smc_mujoco.metrics.catalogue import score, trends
 from smc_mujoco.simulation.prepare import Prepared, prepare
 from smc_mujoco.simulation.run import Report, stream
 from smc_mujoco.simulation.scenario import Scenario
@@ -50,7 +51,8 @@ def result_columns(trace: Trace) -> ResultColumns:
     if trace.failure is not None:
         return failed
     try:
-        return failed | {name: value for name, value in score(trace).items() if not math.isnan(value)}
+        known = {name: value for name, value in score(trace).items() if not math.isnan(value)}
+        return failed | known | {"trends": to_json(trends(trace))}
     except ScenarioError as error:  # not finite, though nothing failed
         return failed | {"failure": str(error)}
 

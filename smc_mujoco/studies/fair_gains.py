@@ -164,7 +164,8 @@ class Trial(NamedTuple):
         """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""
         grid = self.plants, lambda plant: candidates[plant.name], self.conditions, range(seeds)
         runs = all_combinations(*grid, self.duration, self.starts)
-        return study(runs, self.folder, replay=True, threads=self.threads, progress=self.progress, **options)
+        options |= {"replay": True, "half_steps": True, "threads": self.threads, "progress": self.progress}
+        return study(runs, self.folder, **options)
 
     def attack(self, name: str, scenario: Scenario, within: Uncertainty | None, budget: int | None = None) -> WorstCase:
         """Return the worst case of a scenario, which the folder keeps under a name."""

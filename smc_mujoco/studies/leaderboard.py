@@ -6,15 +6,13 @@ the same on every board that has it. The winner of a board with several blocks w
 for the plants and conditions of the table, over initial states and noise, and over the gains with which the laws ran.
 """
 
-import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of, share_interval
-from smc_mujoco.analysis.paired_runs import SETTLES, Columns, Group, Scores
+from smc_mujoco.analysis.paired_runs import SETTLES, ByRow, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown
@@ -62,7 +60,7 @@ def leaderboard(
     _check_worst(table, worst or {})
     boards = Boards()
     boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
-    by_row = {name: paired_runs.values(table, name) for name in dict.fromkeys(metrics)}
+    by_row = {name: paired_runs.by_row(table, name) for name in dict.fromkeys(metrics)}
     groups = list(paired_runs.groups(table, by))
     every = groups if set(by) == set(paired_runs.GROUPS) else list(paired_runs.groups(table, paired_runs.GROUPS))
     families = {name: _family(table, every, values, name, relevant) for name, values in by_row.items()}
@@ -103,9 +101,7 @@ def _board(
     unit = UNITS[metric]
     if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):
         unit = unit.replace("({u})", "V").replace("{u}", "V")
-    blocks = tuple(
-        _block(group, comparison, at, k, untuned, _unit(metric, unit, ran[k])) for at, k in enumerate(scores.blocks)
-    )
+    blocks = tuple(_block(group, comparison, at, k, untuned) for at, k in enumerate(scores.blocks))
     return Board(
         group=group.name,
         metric=metric,
@@ -115,7 +111,9 @@ def _board(
         family=family,
         relevant=comparison.relevant,
         resolution=float(comparison.floors.max()),
-        by_step=metric.startswith("chattering") and any(map(depends_on_step, filter(None, ran))),
+        by_step=metric.startswith("chattering")
+        and bool(np.isnan(comparison.halves).all())
+        and any(map(depends_on_step, filter(None, ran))),
     )
 
 
@@ -123,13 +121,20 @@ def _compared(
     scores: Scores, ran: Sequence[Scenario | None], metric: str, relevant: float, limits: Limits
 ) -> Comparison:
     """Compare the scores of laws in a metric; `ran` has a scenario of each block of the group."""
-    floors = [paired_runs.floor(ran[k], UNITS[metric]) for k in scores.blocks]
-    return Comparison(scores.values, floors, metric == SETTLES, scores.outcomes, scores.sets, relevant, limits)
+    return Comparison(
+        scores.values,
+        [paired_runs.floor(ran[k], metric) for k in scores.blocks],
+        shares=metric == SETTLES,
+        outcomes=scores.outcomes,
+        sets=scores.sets,
+        relevant=relevant,
+        limits=limits,
+        halves=scores.halves,
+        trends=scores.trends,
+    )
 
 
-def _family(
-    table: Columns, blocks: Sequence[Group], by_row: np.ndarray, metric: str, relevant: float
-) -> tuple[Limits, int]:
+def _family(table: Columns, blocks: Sequence[Group], by_row: ByRow, metric: str, relevant: float) -> tuple[Limits, int]:
     """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
     comparisons = []
     for group in blocks:
@@ -143,15 +148,8 @@ def _family(
     return corrected_limits(comparisons), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
 
 
-def _unit(metric: str, unit: str, scenario: Scenario | None) -> str:
-    """Return the unit of a board for the plant of a run; "" where it is not known."""
-    if metric == SETTLES or scenario is None:
-        return "" if "{" in unit else unit
-    return dataclasses.replace(CATALOGUE[metric], unit=unit).unit_for(scenario.plant.unit)
-
-
-def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple[str, ...], unit: str) -> Block:
-    """Return block k of a group, which is block `at` of the comparison, with values in `unit`."""
+def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple[str, ...]) -> Block:
+    """Return block k of a group, which is block `at` of the comparison."""
     plant, condition = group.blocks[k]
     sets = comparison.sets[:, at]
     return Block(
@@ -162,7 +160,10 @@ def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple
         best=comparison.best[at],
         undecided=tuple(np.array(comparison.laws)[comparison.undecided[:, at]].tolist()),
         ahead=comparison.winners[at],
-        lead=_lead(comparison, at, unit),
+        lead=_lead(comparison, at),
+        level=_level(comparison, at),
+        visible=_visible(comparison, at),
+        by_step={law: change for law in comparison.laws if (change := comparison.step_change(at, law))},
         seeds=group.seeds[k],
         runs=int(comparison.seeds[at]),
         samples=int(comparison.samples[at].max()) if len(comparison.laws) > 1 else int(comparison.seeds[at]),
@@ -171,7 +172,7 @@ def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple
     )
 
 
-def _lead(comparison: Comparison, at: int, unit: str) -> Lead | None:
+def _lead(comparison: Comparison, at: int) -> Lead | None:
     """Return how the law in front of a block compares with its closest rival, that with the largest p-value."""
     if len(comparison.laws) < 2 or comparison.shares:
         return None
@@ -183,7 +184,29 @@ def _lead(comparison: Comparison, at: int, unit: str) -> Lead | None:
     rival = max((i for i in order if i != first), key=lambda i: comparison.p[at, first, i])
     names = comparison.laws[first], comparison.laws[rival]
     effect = comparison.effect(at, *names)
-    return Lead(*names, effect, unit) if math.isfinite(effect.value) and effect.samples else None
+    return Lead(*names, effect) if effect.samples else None
+
+
+def _level(comparison: Comparison, at: int) -> bool:
+    """Return whether the laws of a block that are not beaten are all level with each other."""
+    best = [comparison.laws.index(law) for law in comparison.best[at]]
+    return bool(comparison.level[at][np.ix_(best, best)].all()) and not comparison.undecided[:, at].any()
+
+
+def _visible(comparison: Comparison, at: int) -> dict[str, float]:
+    """Return law -> the least lead that would have been seen between it and the law in front; {} without a test.
+
+    For the law in front it is that over its closest rival.
+    """
+    if len(comparison.laws) < 2 or comparison.shares or comparison.untested[at]:
+        return {}
+    lacking = comparison.without_value[:, at]
+    order = sorted(range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at]))
+    first, *others = order
+    rival = max(others, key=lambda i: comparison.p[at, first, i])
+    pairs = {first: (first, rival)} | {other: (first, other) for other in others}
+    names = comparison.laws
+    return {names[i]: comparison.visible(at, names[a], names[b]) for i, (a, b) in sorted(pairs.items())}
 
 
 def _entries(

@@ -236,12 +236,12 @@ def _all(some: Sequence[str], labels: Sequence[str]) -> str:
 
 def _exceeds(a: float, b: float, resolution: float) -> bool:
     """Return whether a is larger than b by more than the least relevant difference; inf is not larger than inf."""
-    return a != b and bool(exceeds(a, b, resolution=resolution))
+    return a != b and bool(exceeds(a, b, resolution))
 
 
 def _floor(measure: Measure, run: Trace) -> float:
-    """Return the largest difference of a metric that matters on no machine, as on leaderboards; 0 for a function."""
-    return floor(run.scenario, CATALOGUE[measure].unit) if isinstance(measure, str) else 0.0
+    """Return the smallest value of a metric that matters, as on leaderboards; 0 for a function."""
+    return floor(run.scenario, measure) if isinstance(measure, str) else 0.0
 
 
 def _unit(measure: Measure, run: Trace) -> str:

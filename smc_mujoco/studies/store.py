@@ -9,7 +9,7 @@ import functools
 import hashlib
 import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +70,16 @@ class Store:
         path = self.parts / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
         table.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
+
+    def rows(self, names: Iterable[str]) -> Iterator[dict[str, Any]]:
+        """Yield the rows of finished runs, part by part."""
+        places: dict[Path, list[int]] = {}
+        for name in names:
+            path, i = self.where[name]
+            places.setdefault(path, []).append(i)
+        for path, indices in places.items():
+            if (part := self._read(path)) is not None:
+                yield from part.take(indices).to_pylist()
 
     def row(self, name: str) -> dict[str, Any]:
         """Return the row of a finished run in its part."""

@@ -5,6 +5,7 @@ your other parts, and the versions of the packages. A run with a result in the f
 changed.
 """
 
+import contextlib
 import dataclasses
 import hashlib
 import json
@@ -18,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.analysis.step_halving import halved, repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
-from smc_mujoco.common.files import slug, write_json
+from smc_mujoco.common.files import slug, to_json, write_json
 from smc_mujoco.common.progress import counter
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.gain_sets import LAWS
@@ -40,6 +42,7 @@ from smc_mujoco.studies.table import Table
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 TRACES = ("none", "worst", "all")  # choices of traces to save
+REPEATED_SEEDS = 4  # one seed in so many is repeated at half the step, where no constraint acts under RK4; chosen
 REPLAYS = "replays.json"  # file in a study's folder
 OTHER_SCORES = "run again, it has other scores: the law keeps a state of its own, or reads a clock"
 
@@ -75,6 +78,7 @@ def study(
     traces: str = "none",
     noise_key: int | str = 0,
     replay: bool = False,
+    half_steps: bool = False,
 ) -> Table:
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return it.
 
@@ -96,6 +100,8 @@ def study(
         that no law can know its noise.
       replay: whether to replay one run of each of your laws on each plant in each condition, see `smc.replay`. A run
         whose commands do not follow from its measurements counts as failed.
+      half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no winner that the step
+        decides: all of them where constraints may act or the integrator is not RK4, elsewhere one seed in four.
 
     Raises:
       ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that are missing or die.
@@ -112,11 +118,15 @@ def study(
     for scenario in noise.keyed(_checked(scenarios), noise_key, Path(out), resume):
         by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
     store.open(resume)
-    missing = {name: scenario for name, scenario in by_key.items() if name not in store.where}
-    if progress and (done := len(by_key) - len(missing)):
-        print(f"{done} of {len(by_key)} runs are in {printable(str(store.parts))}", file=sys.stderr)
+    repeated = _repeated(by_key, plants) if half_steps else {}
+    every = by_key | {name: scenario for name, scenario in repeated.values() if name not in by_key}
+    missing = {name: scenario for name, scenario in every.items() if name not in store.where}
+    if progress and (done := len(every) - len(missing)):
+        print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     _compute(missing, store, plants, where, threads, progress, folder if traces == "all" else None)
     changes = {name: run_key.source(scenario) for name, scenario in by_key.items()}
+    for name, scores in _half_step_scores(repeated, store).items():
+        changes[name] = changes[name] | {"half_step": scores}
     if replay:
         for name, columns in _replayed(by_key, store, Path(out), threads, progress).items():
             changes[name] = changes[name] | columns
@@ -155,6 +165,27 @@ def _compute(
         else:
             with executors.opened(where) as pool:
                 executors.compute_elsewhere(executors.batches(missing.values(), 1), pool, finish, stepped)
+
+
+def _repeated(runs: Mapping[str, Scenario], plants: run_key.Hashes) -> dict[str, tuple[str, Scenario]]:
+    """Return hash -> hash and scenario of the same run at half the physics step, for the runs that are repeated."""
+    again = {}
+    for name, scenario in runs.items():
+        if repeats_all(scenario) or scenario.seed % REPEATED_SEEDS == 0:
+            with contextlib.suppress(ScenarioError):  # its step cannot be halved
+                half = halved(scenario).named(scenario.condition)
+                again[name] = run_key.key(half, plants=plants), half
+    return again
+
+
+def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store) -> dict[str, str]:
+    """Return hash -> the scores of the repeated run as JSON; {} for one that failed."""
+    names = [metric.name for metric in metrics()]
+    scores = {
+        row["hash"]: to_json({name: row[name] for name in names if row[name] is not None})
+        for row in store.rows({half for half, _ in repeated.values()})
+    }
+    return {name: scores[half] for name, (half, _) in repeated.items() if half in scores}
 
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:

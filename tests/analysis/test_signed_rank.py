@@ -14,8 +14,7 @@ pytestmark = pytest.mark.quick
 NAN = np.nan
 SAMPLES = [
     [0.1, 0.3, 0.2, 0.4],
-    [1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5],  # ties share their ranks
-    [0.0, 0.0, 1.0, -1.0, 2.0],  # a difference of 0 counts as negative
+    [1.0, 1.1, -2.0, 3.0, 3.1, 3.2, -0.5],
     [NAN, 0.7, -0.2, NAN, 0.2, 0.9],
     [np.inf, 2.0, -1.0, np.inf],
 ]
@@ -32,6 +31,16 @@ def share_of_signs(differences) -> float:
 @pytest.mark.parametrize("differences", SAMPLES, ids=len)
 def test_a_p_value_is_the_share_of_signs_with_as_large_a_rank_sum(differences):
     assert p_values(differences) == pytest.approx(share_of_signs(differences), abs=1e-12)
+
+
+@pytest.mark.parametrize("differences", [[1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5], [0.0, 0.0, 1.0, -1.0, 2.0]], ids=len)
+def test_ties_and_zeros_only_raise_a_p_value(differences):
+    pairs = list(itertools.combinations_with_replacement(differences, 2))
+    untied = np.arange(1.0, len(differences) + 1)
+    as_many = sum(a + b > 0 for a, b in pairs)
+    sums = [np.dot(untied, signs) for signs in itertools.product((0.0, 1.0), repeat=len(untied))]
+    assert p_values(differences) == pytest.approx(np.mean(np.array(sums) >= as_many), abs=1e-12)
+    assert p_values(differences) >= share_of_signs(differences)
 
 
 @pytest.mark.parametrize("error", [0.025, 0.1])

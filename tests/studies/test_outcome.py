@@ -81,15 +81,15 @@ def test_most_names_who_never_settles():
 
 
 def test_positions_that_the_sensor_does_not_tell_apart_are_tied_as_on_leaderboards():
-    runs = {label: made(RUN, 0.2, size) for label, size in {"a": 1.0, "b": 5.0, "c": 7.0}.items()}
-    # 1.1e-3, 5.5e-3 and 7.7e-3 m
+    runs = {label: made(RUN, 0.2, size) for label, size in {"a": 1.0, "b": 4.0, "c": 7.0}.items()}
+    # 1.1e-3, 4.4e-3 and 7.7e-3 m
     assert Outcome(traces={"nominal": runs}).least("ultimate_bound") == "a (0.00110 m)"
     noise = smc.Noise(position=5e-3)
     runs = {
         label: dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, noise=noise))
         for label, run in runs.items()
     }
-    assert Outcome(traces={"nominal": runs}).least("ultimate_bound") == "a and b tied (0.00110 to 0.00550 m)"
+    assert Outcome(traces={"nominal": runs}).least("ultimate_bound") == "a and b tied (0.00110 to 0.00440 m)"
 
 
 def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():

@@ -140,7 +140,7 @@ def _compare_on_rig(
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
     chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
     scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, replay=True)
+    table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, replay=True, half_steps=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant)
     terminal.print(boards)
     terminal.note(ensemble.verdict(boards))

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.paired_runs import SETTLES
-from smc_mujoco.analysis.ranking import ROUNDING
 from smc_mujoco.common.text import every, joined
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.accuracy.scaling import ORDER_BAND
@@ -95,8 +94,8 @@ def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
             continue
         best = min((s for s in scores if s.best), key=lambda s: s.median, default=None)
         if best is not None and math.isfinite(best.median):
-            resolution = max(best.floor, ROUNDING)
-            times, rounded = score.median / max(best.median, resolution), best.median < resolution
+            least = max(best.median, best.floor)
+            times, rounded = score.median / least if least else math.inf, best.median < best.floor
             arrives = settles(by_cell, plant, condition, best.law)
             lost.append(Loss(metric, plant, condition, score.median, best.median, best.law, times, rounded, arrives))
     return sorted(lost, key=lambda loss: -loss.times)

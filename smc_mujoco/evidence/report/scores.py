@@ -8,7 +8,6 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.evidence.report import words
-from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.studies.board import Board
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def scores(table: "Table", boards: Sequence[Board]) -> tuple[Score, ...]:
     failed = Counter(tuple(cell) for *cell, failure in zip(*columns, strict=True) if failure is not None)
     order = list(dict.fromkeys(columns[2]))
     blocks = {(block.plant, block.condition, board.metric): block for board in boards for block in board.blocks}
-    by_row = {metric: paired_runs.values(table, metric) for metric in words.TABLE_METRICS}
+    by_row = {metric: paired_runs.by_row(table, metric) for metric in words.TABLE_METRICS}
     rows = []
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
@@ -69,7 +68,7 @@ def scores(table: "Table", boards: Sequence[Board]) -> tuple[Score, ...]:
                     failed=failed[plant, condition, law],
                     runs=block.runs,
                     sample=block.sample,
-                    floor=paired_runs.floor(ran, CATALOGUE[metric].unit),
+                    floor=paired_runs.floor(ran, metric),
                 )
                 rows.append(score)
     return tuple(rows)

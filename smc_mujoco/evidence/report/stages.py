@@ -158,9 +158,8 @@ def grid(work: Work) -> Table:
     runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
     with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
         key = DRAWN if any(map(has_user_code, runs)) else 0  # the paper's claims share the runs of the package's laws
-        return study(
-            runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, noise_key=key, replay=True
-        )
+        options: dict[str, Any] = {"noise_key": key, "replay": True, "half_steps": True}
+        return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, **options)
 
 
 def judged_claims(work: Work, table: Table) -> Claims:
