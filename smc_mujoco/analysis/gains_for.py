@@ -162,7 +162,8 @@ def _force_headroom(base: Scenario) -> float:
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
     force = min(accelerations) if with_model else u_max
     limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
-    limits |= search_space.actuator_limits(law, {}, u_max)
+    declared = law.template.gains if law.template else {}  # the force k / b of a gain k that is divided by b
+    limits |= {name: u_max * law.gains[gain.over] for name, gain in declared.items() if gain.over is not None}
     sizes = [
         limits[name] / abs(gain) for name, gain in law.gains.items() if name in limits and 0.0 < abs(gain) < math.inf
     ]
