@@ -85,6 +85,18 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         yield Bar(what, whole, counted, lambda bar: print(bar, file=sys.stderr), LINE_PERIOD, LINE_PERIOD)
 
 
+def note(text: str) -> None:
+    """Say something about work that begins, on stderr."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def about(seconds: float) -> str:
+    """Return a duration in words that promise no more than they know: "about 40 s", "about 3 minutes"."""
+    if seconds < 95.0:
+        return f"about {max(1, round(seconds, -1 if seconds > 10.0 else None)):.0f} s"
+    return f"about {round(seconds / 60.0):.0f} minutes"
+
+
 @contextlib.contextmanager
 def _in_cell() -> Iterator[Callable[[Bar], None]]:
     """Yield what draws a bar in a notebook's cell, where it vanishes in the end. Rich would need ipywidgets."""

@@ -6,6 +6,7 @@ cannot be tuned keeps its defaults, and its remark says why. Each search ends wi
 those of search s modulo their number, so that a comparison holds over the gains with which a tuning may end.
 """
 
+import contextlib
 import dataclasses
 import warnings
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
+from smc_mujoco.common.progress import about, note
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -105,6 +107,8 @@ class Trial(NamedTuple):
 
     def gains(self, laws: Mapping[str, Sequence[Component | Template]], **options: Any) -> dict[str, list[Candidate]]:
         """Return plant -> its laws with gains, see `gains_on` for the options."""
+        if self.progress:
+            self._announce(laws, **options)
         return {plant.name: self.gains_on(plant, laws[plant.name], **options) for plant in self.plants}
 
     def gains_on(
@@ -121,22 +125,61 @@ class Trial(NamedTuple):
         If some laws have shipped gains, the others are tuned from the starts of those. Laws without given gains come as
         templates. The folder keeps each search.
         """
-        known, starts = [_without_search(plant, law, gains) for law in laws], self.starts
-        if any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known):
-            starts = None
+        known, starts = self._known(plant, laws, gains)
 
         def missing(law: Component | Template) -> Candidate:
             return self.tuned(plant, law, starts, searches, budget) if tune else _default(law)
 
         return [candidate or missing(law) for law, candidate in zip(laws, known, strict=True)]
 
+    def _known(
+        self, plant: Plant, laws: Sequence[Component | Template], gains: str
+    ) -> tuple[list[Candidate | None], Starts | None]:
+        """Return the laws that need no search, None for others, and the starts of the searches for those."""
+        known = [_without_search(plant, law, gains) for law in laws]
+        shipped = any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known)
+        return known, None if shipped else self.starts
+
+    def _announce(
+        self,
+        laws: Mapping[str, Sequence[Component | Template]],
+        searches: int = search.SEARCHES,
+        budget: int = search.BUDGET,
+        tune: bool = True,
+        gains: str = "tuned",
+    ) -> None:
+        """Say which laws are tuned on which plants, by how many searches, and for about how long, on stderr."""
+        seconds, named = 0.0, dict[str, list[str]]()
+        for plant in self.plants if tune else ():
+            known, starts = self._known(plant, laws[plant.name], gains)
+            new = [law for law, candidate in zip(laws[plant.name], known, strict=True) if candidate is None]
+            for law in new:
+                file = self._file(plant, law, searches, budget)
+                if not any(file.parent.glob(f"{file.stem}-*")):
+                    with contextlib.suppress(ScenarioError):  # told by `tuned`
+                        goal = self._goal(plant, starts)
+                        seconds += searches * search.expected_seconds(plant, law, goal, budget, self.threads)
+                        named.setdefault(law.name, []).append(plant.name)
+        if named:
+            what = "; ".join(f"{law} on {joined(plants)}" for law, plants in named.items())
+            each = f"{searches} searches each" if searches > 1 else "1 search each"
+            note(f"tuning {what}: {each}, {about(seconds)}")
+
+    def _file(self, plant: Plant, law: Component | Template, searches: int, budget: int) -> Path:
+        """Return the path of a tuning, without its hashes."""
+        return self.folder / "gains" / f"{plant.name}-{law.name}-{searches}-{budget}.json"
+
+    def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
+        """Return the objective of searches on a plant."""
+        usual = Objective()
+        conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
+        return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
+
     def tuned(
         self, plant: Plant, law: Component | Template, starts: Starts | None, searches: int, budget: int
     ) -> Candidate:
         """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
-        usual, default = Objective(), coerce.law(law)
-        conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
-        goal = dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
+        goal, default = self._goal(plant, starts), coerce.law(law)
         try:
             (first, *_) = goal.scenarios(plant, default)
             template = law if isinstance(law, Template) else default.template
@@ -145,10 +188,10 @@ class Trial(NamedTuple):
             with warnings.catch_warnings():
                 for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
                     warnings.filterwarnings("ignore", words, ScenarioWarning)
-                folder = self.folder / "gains"
-                options = {"searches": searches, "folder": folder / "searches"}
+                file = self._file(plant, law, searches, budget)
+                options = {"searches": searches, "folder": file.parent / "searches"}
                 tuned = cached(
-                    folder / f"{plant.name}-{law.name}-{searches}-{budget}.json",
+                    file,
                     depends,
                     lambda: search.tune(plant, law, budget, 0, goal, self.threads, self.progress, **options),
                     lambda made, path: made.save(path),

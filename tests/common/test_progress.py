@@ -161,3 +161,11 @@ def test_what_is_not_shown_draws_nothing(cell, capsys):
     with progress.counter(0, 0, shown=True) as stepped:
         stepped(1)
     assert (cell, capsys.readouterr()) == ([], ("", ""))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(0.1, "1 s"), (7.4, "7 s"), (34.0, "30 s"), (94.0, "90 s"), (100.0, "2 minutes"), (3600.0, "60 minutes")],
+)
+def test_a_duration_is_told_in_words(seconds, words):
+    assert progress.about(seconds) == f"about {words}"

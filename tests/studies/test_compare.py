@@ -142,6 +142,17 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
     assert tuned.bounds["lam"] == pytest.approx((4.0 * 10**-1.5, 4.0 * 10**1.5))
 
 
+def test_what_is_tuned_is_said_before_it_starts_and_only_once(tmp_path, capsys, monkeypatch):
+    """Two laws need two searches on each of two plants, of 30 s or 20 s, and one law has shipped gains."""
+    monkeypatch.setattr(search, "expected_seconds", lambda plant, law, *_: 30.0 if plant.name == "duffing" else 20.0)
+    options = {"duration": 0.1, "searches": 2, "budget": 1, "tune": True, "out": tmp_path, "progress": True}
+    laws = [my_law, plain_law, "classical"]
+    for said in (["tuning my_law on duffing and inverted_pendulum; plain_law on duffing and inverted_pendulum: "], []):
+        smc.compare(laws, PLANTS, "nominal", 1, **options)
+        lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("tuning ")]
+        assert lines == [f"{line}2 searches each, about 3 minutes" for line in said]
+
+
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
     made = smc.compare([my_law, smc.law("classical")], "duffing", "nominal", 8, False, out=tmp_path, **SHORT)
     assert kinds(made) == {"my_law": "default", "classical": "shipped"}

@@ -17,6 +17,7 @@ from helpers.words import words
 import smc_mujoco as smc
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Rank
+from smc_mujoco.common import cache
 from smc_mujoco.common.tabular import plain
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
@@ -25,7 +26,6 @@ from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import (
     arms,
-    cache,
     executors,
     pickling,
     replay,

@@ -150,7 +150,7 @@ def _call_back(run, sim):
 
 @njit(error_model="numpy")
 def _accelerate(run, sim, parameters, a):
-    """Write the accelerations (n,) at a stage's state to an address. Return whether the nominal model raised nothing."""
+    """Write the accelerations (n,) at a stage's state to an address. Return False if the nominal model raises."""
     n, seen, out = sim.n, seen_at(run.seen, 0), sim.model
     qpos, qvel, ctrl, xfrc = pointer(run.qpos), pointer(run.qvel), pointer(run.ctrl), pointer(run.xfrc_applied)
     x, v = pointer(run.scratch + 16 * n), pointer(run.scratch + 24 * n)

@@ -23,7 +23,9 @@ defines what is minimised.
 """
 
 import dataclasses
+import math
 import os
+import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -43,6 +45,7 @@ from smc_mujoco.analysis.tuning.objective import (
 )
 from smc_mujoco.analysis.tuning.result import Found, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
+from smc_mujoco.analysis.tuning.stages import EVOLVED_SHARE, SCREENED_SHARE
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_stacklevel, whole
@@ -65,6 +68,8 @@ SEARCHES = 12  # of a tuning: then twelve runs of two laws decide between them, 
 BUDGET = 64  # evaluations of a search, for each gain
 MAX_BUDGET = 10_000
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
+# Of a search's budget that is used, as a rule: by its descent, and by all stages. A descent ends early.
+LAST_SHARE, USUAL_SHARE = 0.1, 0.7
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
     "CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, noise and initial states,"
@@ -219,6 +224,25 @@ def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed
     scales = search_space.scales(first.plant, bound, first.model == "nominal", reach)
     box = search_space.box(first.law, scales)
     return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
+
+
+def expected_seconds(
+    plant: Plant, law: Component | Template, goal: Objective, budget: int, threads: int | None
+) -> float:
+    """Return about how long a search takes, s, from the time of evaluations in the middle of its box."""
+    task = _task(plant, coerce.law(law), goal, budget, 0, threads)
+    middle = tuple(math.sqrt(low * high) for low, high in task.box.values())
+    accurate = Evaluator(task.goal, task.cases(0), tuple(task.box), threads, by_equation=True)
+    engines = [accurate] if accurate.engine == EQUATION else [_cheap(accurate), accurate]
+
+    def seconds(evaluate: Evaluator) -> float:
+        evaluate([middle])  # compiles
+        start = time.perf_counter()
+        evaluate([middle])
+        return time.perf_counter() - start
+
+    shares = (USUAL_SHARE,) if len(engines) == 1 else (SCREENED_SHARE + EVOLVED_SHARE, LAST_SHARE)
+    return task.size * sum(share * seconds(one) for share, one in zip(shares, engines, strict=True))
 
 
 def _cheap(accurate: Evaluator) -> Evaluator:
