@@ -31,10 +31,10 @@ from smc_mujoco.simulation.state import channel_at, simulation_at
 
 # One run: addresses of mjModel, mjData and the record, of the callback and the nominal model, of the plant's parameters
 # before and after a jump, which comes at `jump_step` (-1: never), of fields of mjData, of what the nominal model reads,
-# and of SCRATCH numbers a channel.
+# and of SCRATCH numbers a channel. `memoryless`: 1 if the disturbances depend on time alone.
 FIELDS = ("qpos", "qvel", "ctrl", "xfrc_applied", "sensordata", "userdata")
 OWNERS, CHANGES = ("model", "data", "record"), ("before", "after", "jump_step")
-ADDRESSES = (*OWNERS, "callback", "nominal", *CHANGES, *FIELDS, "seen", "scratch")
+ADDRESSES = (*OWNERS, "callback", "nominal", *CHANGES, "memoryless", *FIELDS, "seen", "scratch")
 RUN = np.dtype([(name, "i8") for name in ADDRESSES])
 run_at = record_at(RUN)
 SCRATCH = 12  # state at a step's start, and measured; velocities and accelerations of four stages
@@ -70,7 +70,7 @@ class EquationRun:
         functions = callback.callback().address, self.nominal.address
         owners = self.model._address, self.data._address, state.address(self.record)
         fields = (getattr(self.data, name).ctypes.data for name in FIELDS)
-        changes = *map(state.address, self.parameters), s.jump_step
+        changes = *map(state.address, self.parameters), s.jump_step, not any(d.memory for d in s.disturbance)
         self.run = np.array([(*owners, *functions, *changes, *fields, state.address(self.seen), at)], RUN)
 
     def restart(self) -> None:
@@ -124,8 +124,8 @@ def _simulate(run, sim):
                 if stage > 0:
                     qpos[channel.qpos], qvel[channel.qvel] = x[i] + past * speed[before], v[i] + past * a[before]
                 speed[stage * n + i] = qvel[channel.qvel]
-            if stage > 0 and sim.disturbance_count == 0:
-                sim.calls += 1  # all that the callback does here
+            if (stage > 0 and sim.disturbance_count == 0) or (stage == 2 and run.memoryless != 0):
+                sim.calls += 1  # all that the callback does here: disturbances at the time of stage 1 are there already
             elif not _call_back(run, sim):
                 return
             if not _accelerate(run, sim, parameters, run.scratch + 64 * n + 8 * stage * n):
