@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
-from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, SETTLES
+from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES, UNITS
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, MAX_STEP_CHANGE, POWER, Effect, Rank, min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
@@ -20,6 +20,7 @@ from smc_mujoco.studies.worst_case import WorstCase
 
 MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
 MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
+LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
 MAX_NAMES = 6  # in a sentence; chosen
 MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
@@ -134,11 +135,13 @@ class Board(Tables):
     @property
     def label(self) -> str:
         """The metric in words, such as "ultimate bound"."""
-        return "share that settles" if self.metric == SETTLES else CATALOGUE[self.metric].label
+        return LABELS.get(self.metric) or CATALOGUE[self.metric].label
 
     @property
     def where(self) -> str:
         """The plant and the conditions in words, such as " on duffing under noise"."""
+        if self.metric == OBJECTIVE:
+            return f" on {self.group['plant']}"
         return f" on {self.group['plant']} under {first_of(block.condition for block in self.blocks)}"
 
     @property
@@ -305,6 +308,8 @@ def size(value: float, metric: str) -> str:
     """Return a median as text: "" for NaN, a share in percent."""
     if math.isnan(value):
         return ""
+    if metric == OBJECTIVE:
+        return number(value)
     return f"{100 * value:.0f}" if metric == SETTLES else CATALOGUE[metric].text(value)
 
 
@@ -320,6 +325,8 @@ def heading(board: Board) -> str:
     """Return a metric's label with its unit, if that is known."""
     if board.metric == SETTLES:
         return "settles (%)"
+    if board.metric == OBJECTIVE:
+        return "J (s^2)"
     plant = catalogue().get(board.group["plant"])
     metric = dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)  # in V where commands are voltages
     unit = metric.unit_for(plant.unit) if plant else "" if "{" in metric.unit else metric.unit
@@ -397,7 +404,7 @@ def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad o
     """Return the least relevant difference in words: a share, and q by unit; `x` is the unit of positions."""
     of_unit: dict[str, float] = {}
     for metric, floor in floors:
-        unit = "" if metric == SETTLES else CATALOGUE[metric].unit.removesuffix("/s")
+        unit = UNITS[metric].removesuffix("/s")
         of_unit[unit] = max(floor, of_unit.get(unit, 0.0))
     words = f"{100 * share:g} % of the larger value"
     parts = [f"up to {number(resolved)} {x} of a position"] if (resolved := of_unit.get("{x}")) else []

@@ -34,7 +34,7 @@ from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
-from smc_mujoco.studies.leaderboard import METRICS, leaderboard
+from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, Extent
 from smc_mujoco.studies.table import Table
@@ -230,6 +230,9 @@ def compare(
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant, found)
+    unseen = trial.unseen(candidates, count, int(table.column("noise_key")[0]))
+    sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
+    boards[:0] = objective_boards(unseen, sources, defaults, relevant)
     return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found)
 
 

@@ -8,18 +8,26 @@ those of search s modulo their number, so that a comparison holds over the gains
 
 import contextlib
 import dataclasses
+import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from smc_mujoco.analysis.tuning import result, search, search_space
+from smc_mujoco.analysis.tuning.evaluator import objectives
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
+<<<<<<< HEAD
 from smc_mujoco.common.progress import about, note
+=======
+from smc_mujoco.common.progress import bar
+>>>>>>> 2bbe7e28 (Compare: J on runs that no search has seen is the first row)
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -31,7 +39,8 @@ from smc_mujoco.simulation.conditions import Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.study import study
+from smc_mujoco.studies.leaderboard import Unseen
+from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import WorstCase, cached_worst_case
 
@@ -46,6 +55,24 @@ class Candidate(NamedTuple):
     def __call__(self, seed: int) -> Component:
         """Return the law with the gains of the run with this seed."""
         return self.sets[seed % len(self.sets)]
+
+    def unseen(
+        self, plant: Plant, goal: Objective, count: int, noise_key: int, threads: int | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return J on instances 0, 1, ..., that of one in four at half the physics step, and the sets' numbers."""
+        instances, again = range(count), range(0, count, REPEATED_SEEDS)
+        options = {"threads": threads, "noise_key": noise_key}
+        values = objectives(plant, [self(i) for i in instances], goal, instances, **options)
+        halves = np.full(count, math.nan)
+        halves[::REPEATED_SEEDS] = objectives(plant, [self(i) for i in again], goal, again, halved=True, **options)
+        return values, halves, np.arange(count) % len(self.sets)
+
+
+def _goal(plant: Plant, starts: Starts | None) -> Objective:
+    """Return the objective of tuning on a plant: the usual one, in the conditions that the plant has."""
+    usual = Objective()
+    conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
+    return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
 
 def law_or_template(law: Component | Template | str) -> Component | Template:
@@ -179,7 +206,11 @@ class Trial(NamedTuple):
         self, plant: Plant, law: Component | Template, starts: Starts | None, searches: int, budget: int
     ) -> Candidate:
         """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
+<<<<<<< HEAD
         goal, default = self._goal(plant, starts), coerce.law(law)
+=======
+        goal, default = _goal(plant, starts), coerce.law(law)
+>>>>>>> 2bbe7e28 (Compare: J on runs that no search has seen is the first row)
         try:
             (first, *_) = goal.scenarios(plant, default)
             template = law if isinstance(law, Template) else default.template
@@ -209,6 +240,21 @@ class Trial(NamedTuple):
         runs = all_combinations(*grid, self.duration, self.starts)
         options |= {"replay": True, "half_steps": True, "threads": self.threads, "progress": self.progress}
         return study(runs, self.folder, **options)
+
+    def unseen(self, candidates: Mapping[str, Sequence[Candidate]], count: int, noise_key: int) -> dict[str, Unseen]:
+        """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is left out."""
+        found, several = {}, [(plant, c) for plant in self.plants for c in candidates[plant.name]]
+        with bar("J on runs that no search has seen", len(several), self.progress, counted=True) as shown:
+            for plant in self.plants:
+                goal, its = _goal(plant, self.starts), {}
+                for candidate in candidates[plant.name]:
+                    with contextlib.suppress(ScenarioError):
+                        its[candidate.law.name] = candidate.unseen(plant, goal, count, noise_key, self.threads)
+                    shown.advance(1.0)
+                if len(its) == len(candidates[plant.name]):
+                    values, halves, sets = ({law: one[k] for law, one in its.items()} for k in range(3))
+                    found[plant.name] = Unseen(values, halves, sets, len(goal.conditions) * goal.duration**2 / 2.0)
+        return found
 
     def attack(self, name: str, scenario: Scenario, within: Uncertainty | None, budget: int | None = None) -> WorstCase:
         """Return the worst case of a scenario, which the folder keeps under a name."""

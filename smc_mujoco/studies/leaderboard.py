@@ -7,23 +7,31 @@ for the plants and conditions of the table, over initial states and noise, and o
 """
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of, share_interval
-from smc_mujoco.analysis.paired_runs import SETTLES, ByRow, Columns, Group, Scores
+from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, ByRow, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import depends_on_step
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.control.source import DEFAULT, Source
-from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
 from smc_mujoco.studies.worst_case import WorstCase
 
-UNITS = {SETTLES: ""} | {name: metric.unit for name, metric in CATALOGUE.items()}
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
+
+
+class Unseen(NamedTuple):
+    """J of the laws on one plant, on instances that no search has seen: law -> (instances,)."""
+
+    values: Mapping[str, np.ndarray]  # s^2
+    halves: Mapping[str, np.ndarray]  # the same at half the physics step, NaN where it was not computed
+    sets: Mapping[str, np.ndarray]  # the number of the set of gains
+    least: float  # s^2, J of an error that is X0 throughout
 
 
 def leaderboard(
@@ -56,7 +64,7 @@ def leaderboard(
     if isinstance(metrics, str) or not metrics:
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
     for name in metrics:
-        find("metric", name, UNITS)
+        find("metric", name, {known: unit for known, unit in UNITS.items() if known != OBJECTIVE})
     _check_worst(table, worst or {})
     boards = Boards()
     boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
@@ -75,6 +83,45 @@ def leaderboard(
             if scores.blocks:
                 comparison = _compared(scores, ran, metric, relevant, limits)
                 boards.append(_board(group, scores, ran, metric, comparison, untuned, sources, family))
+    return boards
+
+
+def objective_boards(
+    unseen: Mapping[str, Unseen],
+    sources: Mapping[str, Mapping[str, tuple[Source, ...]]],
+    defaults: bool,
+    relevant: float,
+) -> list[Board]:
+    """Return a board of J on unseen instances for each plant; `sources` is plant -> law -> those of its gains."""
+
+    def compared(plant: str, limits: Limits) -> Comparison:
+        its = unseen[plant]
+        return Comparison(
+            its.values, EPS * its.least, sets=its.sets, relevant=relevant, limits=limits, halves=its.halves
+        )
+
+    alone = [compared(plant, Limits(0.0, 0.0)) for plant in unseen]
+    limits, boards = corrected_limits(alone), []
+    for plant in unseen:
+        comparison = compared(plant, limits)
+        its = sources.get(plant, {})
+        untuned = () if defaults else tuple(law for law in its if any(one.kind == DEFAULT for one in its[law]))
+        count = len(next(iter(unseen[plant].values.values())))
+        block = _block((plant, "unseen runs"), count, comparison, 0, untuned)
+        sets = {law: np.atleast_2d(numbers) for law, numbers in unseen[plant].sets.items()}
+        boards.append(
+            Board(
+                group={"plant": plant},
+                metric=OBJECTIVE,
+                unit=UNITS[OBJECTIVE],
+                entries=_entries(comparison, sets, its),
+                blocks=(block,),
+                family=sum(len(one.laws) > 1 for one in alone) or 1,
+                relevant=relevant,
+                resolution=float(comparison.floors.max()),
+                by_step=False,
+            )
+        )
     return boards
 
 
@@ -101,7 +148,9 @@ def _board(
     unit = UNITS[metric]
     if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):
         unit = unit.replace("({u})", "V").replace("{u}", "V")
-    blocks = tuple(_block(group, comparison, at, k, untuned) for at, k in enumerate(scores.blocks))
+    blocks = tuple(
+        _block(group.blocks[k], group.seeds[k], comparison, at, untuned) for at, k in enumerate(scores.blocks)
+    )
     return Board(
         group=group.name,
         metric=metric,
@@ -148,13 +197,12 @@ def _family(table: Columns, blocks: Sequence[Group], by_row: ByRow, metric: str,
     return corrected_limits(comparisons), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
 
 
-def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple[str, ...]) -> Block:
-    """Return block k of a group, which is block `at` of the comparison."""
-    plant, condition = group.blocks[k]
+def _block(name: tuple[str, str], seeds: int, comparison: Comparison, at: int, untuned: tuple[str, ...]) -> Block:
+    """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
     sets = comparison.sets[:, at]
     return Block(
-        plant=plant,
-        condition=condition,
+        plant=name[0],
+        condition=name[1],
         medians=dict(zip(comparison.laws, comparison.centres[:, at].tolist(), strict=True)),
         lacking=dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True)),
         best=comparison.best[at],
@@ -164,7 +212,7 @@ def _block(group: Group, comparison: Comparison, at: int, k: int, untuned: tuple
         level=_level(comparison, at),
         visible=_visible(comparison, at),
         by_step={law: change for law in comparison.laws if (change := comparison.step_change(at, law))},
-        seeds=group.seeds[k],
+        seeds=seeds,
         runs=int(comparison.seeds[at]),
         samples=int(comparison.samples[at].max()) if len(comparison.laws) > 1 else int(comparison.seeds[at]),
         sets=int(sets[sets > 1].min()) if (sets > 1).any() else 1,
