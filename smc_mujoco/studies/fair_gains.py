@@ -23,11 +23,7 @@ from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
-<<<<<<< HEAD
-from smc_mujoco.common.progress import about, note
-=======
-from smc_mujoco.common.progress import bar
->>>>>>> 2bbe7e28 (Compare: J on runs that no search has seen is the first row)
+from smc_mujoco.common.progress import about, bar, note
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
@@ -66,13 +62,6 @@ class Candidate(NamedTuple):
         halves = np.full(count, math.nan)
         halves[::REPEATED_SEEDS] = objectives(plant, [self(i) for i in again], goal, again, halved=True, **options)
         return values, halves, np.arange(count) % len(self.sets)
-
-
-def _goal(plant: Plant, starts: Starts | None) -> Objective:
-    """Return the objective of tuning on a plant: the usual one, in the conditions that the plant has."""
-    usual = Objective()
-    conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
-    return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
 
 def law_or_template(law: Component | Template | str) -> Component | Template:
@@ -206,11 +195,7 @@ class Trial(NamedTuple):
         self, plant: Plant, law: Component | Template, starts: Starts | None, searches: int, budget: int
     ) -> Candidate:
         """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
-<<<<<<< HEAD
         goal, default = self._goal(plant, starts), coerce.law(law)
-=======
-        goal, default = _goal(plant, starts), coerce.law(law)
->>>>>>> 2bbe7e28 (Compare: J on runs that no search has seen is the first row)
         try:
             (first, *_) = goal.scenarios(plant, default)
             template = law if isinstance(law, Template) else default.template
@@ -246,7 +231,7 @@ class Trial(NamedTuple):
         found, several = {}, [(plant, c) for plant in self.plants for c in candidates[plant.name]]
         with bar("J on runs that no search has seen", len(several), self.progress, counted=True) as shown:
             for plant in self.plants:
-                goal, its = _goal(plant, self.starts), {}
+                goal, its = self._goal(plant, self.starts), {}
                 for candidate in candidates[plant.name]:
                     with contextlib.suppress(ScenarioError):
                         its[candidate.law.name] = candidate.unseen(plant, goal, count, noise_key, self.threads)
