@@ -68,8 +68,9 @@ SEARCHES = 12  # of a tuning: then twelve runs of two laws decide between them, 
 BUDGET = 64  # evaluations of a search, for each gain
 MAX_BUDGET = 10_000
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
-# Of a search's budget that is used, as a rule: by its descent, and by all stages. A descent ends early.
-LAST_SHARE, USUAL_SHARE = 0.1, 0.7
+# How long a search takes, as a rule, in evaluations of its whole budget: its descent, which ends early; and all stages
+# by the equation, with the evaluation by MuJoCo in the end.
+LAST_SHARE, USUAL_SHARE = 0.1, 1.0
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
     "CMA-ES and COBYQA, in the logarithm of the gains: each search has its own start, seed, noise and initial states,"
