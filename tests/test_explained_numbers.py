@@ -89,8 +89,11 @@ SAID = {
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
     scaling.Scaling.as_promised: [f"within {scaling.ORDER_BAND:g} of theory's"],
-    ranking: [f"where {percent(ranking.RELEVANT)} of a value is less than what matters"],
-    ranking.without_rounding: [f"0 below {short(ranking.ROUNDING)}"],
+    ranking: [
+        f"there are {ranking.MIN_LEVEL_UNITS} units or more",
+        f"lies within {percent(ranking.LEVEL_SHARE)}",
+        f"max(1, rho)^{ranking.TREND_POWER}",
+    ],
     attack: [f"at most {attack.MAX_CORNERS}, each"],
     uncertainty.default_class: [
         f"up to a {part(uncertainty.DEFAULT_FORCE_SHARE)} of the force",
