@@ -91,7 +91,8 @@ def test_runs_use_every_set_of_gains_in_turn(found):
 def test_a_verdict_names_its_metric_plant_and_condition(found):
     assert len(found.verdicts) == len(METRICS) * 4 + 2  # and J on unseen runs on each plant
     for board, verdict in zip(found.leaderboard, found.verdicts, strict=True):
-        assert verdict.startswith(f"{board.label} on {board.group['plant']} under {board.group['condition']}: ")
+        condition = f" under {board.group['condition']}" if "condition" in board.group else ""
+        assert verdict.startswith(f"{board.label} on {board.group['plant']}{condition}: ")
         assert board.result in " ".join(repr(found).split())
 
 
