@@ -66,6 +66,8 @@ def control(address, sim, data):
         else:
             failure = _sample(address, sim, data, k, within)
         _actuate(sim, data, step)
+    elif sim.drive_step.rise_first != 0.0:
+        _give_moment(sim, data, stage)
     if sim.disturbance_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
         sample = k if stage + within == 0 else -1
@@ -352,7 +354,22 @@ def _actuate(sim, data, step):
             V = sim.scale * _step_drives(sim.drive_step, state_at(sim.states, i), v)
             if sim.drive_step.ripple != 0.0:
                 V = _rippled(sim.drive_step, V, data.qpos[channel.qpos], v)
+            if sim.drive_step.rise_first != 0.0:
+                state = state_at(sim.states, i)
+                state.middle = V
+                state.rise *= sim.scale
+                V -= state.rise
             data.ctrl[channel.ctrl] = V
+
+
+@njit(error_model="numpy", inline="always")
+def _give_moment(sim, data, stage):
+    """Give the later stages of an RK4 step the force that has its mean and first moment, see `drives._rise`."""
+    for i in range(sim.driven):
+        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        data.ctrl[channel.ctrl] = state.middle + state.rise if stage == 3 else state.middle
+        if stage == 3:  # what the actuators did in the stage before, with the mean force
+            state.force += data.actuator_force[channel.force]
 
 
 @njit(error_model="numpy", inline="always")
@@ -362,6 +379,7 @@ def _step_drives(factors, state, v):
     a, b = state.first - u, second - u
     force = u + factors.force_first * a
     state.first = u + factors.first_left * a
+    state.rise = factors.rise_first * a
     if factors.voltage != 0.0:
         bound, torque = factors.voltage, second - factors.drag * v
         mean, end = min(max(force, -bound), bound), min(max(u + factors.second_first * a, -bound), bound)
@@ -533,7 +551,7 @@ def _sum_forces(sim, data):
     """Add the forces of the last physics step on each joint: of the drive, and of friction and contacts."""
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
-        if channel.force >= 0:
+        if channel.force >= 0 and sim.drive_step.rise_first == 0.0:
             state.force += data.actuator_force[channel.force]
         state.reaction += data.qfrc_constraint[channel.qvel]
         if channel.friction_force >= 0:

@@ -91,6 +91,7 @@ class Loop:
         self.drive_step = scenario.drive_step
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
+        self.middle, self.rise = np.zeros((2, n))  # the mean force in a step of RK4, and its rise to the last stage
         self.limits = np.array(scenario.limits)
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
         self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
@@ -123,6 +124,8 @@ class Loop:
         try:
             if stage == 0:
                 self.begin_step(data, step)
+            elif self.drive_step and self.drive_step.rise_first:
+                self.give_moment(data, stage)
             fraction = (0.0, 0.5, 0.5, LAST_STAGE)[stage]
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
@@ -159,12 +162,21 @@ class Loop:
             self.delayed = self.commands[past // self.scenario.steps]
         command, v = self.delayed, data.qvel[self.channels["shaft"]]
         if self.drive_step:
+            self.rise = self.scale * self.drive_step.rise(command, self.first)
             command, self.first, self.second = self.drive_step(command, self.first, self.second, v)
-        control = self.scale * command
+        control = self.middle = self.scale * command
+        control = control - self.rise
         if self.drive_step and self.drive_step.ripple:
             moving = zip(control, data.qpos[self.channels["qpos"]], v, strict=True)
             control = np.array([rippled(self.drive_step, *each) for each in moving])
         data.ctrl[self.channels["ctrl"][self.driven]] = control[self.driven]
+
+    def give_moment(self, data: mujoco.MjData, stage: int) -> None:
+        """Give the later stages of an RK4 step the force that has its mean and first moment, see `DriveStep`."""
+        force = self.middle + self.rise if stage == 3 else self.middle
+        data.ctrl[self.channels["ctrl"][self.driven]] = force[self.driven]
+        if stage == 3:  # what the actuators did in the stage before, with the mean force
+            self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late."""
@@ -335,7 +347,8 @@ class Loop:
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
-        self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
+        if not (self.drive_step and self.drive_step.rise_first):
+            self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
         self.forces[1] += data.qfrc_constraint[self.channels["qvel"]]
         if self.has_friction.any():
             self.forces[1, self.has_friction] += data.actuator_force[self.channels["friction_force"][self.has_friction]]

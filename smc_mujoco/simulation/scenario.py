@@ -27,7 +27,7 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.contact import Contact
-from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, drive_step
+from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
@@ -399,15 +399,18 @@ def _defaults(s: Scenario) -> dict[str, Any]:
 def longest_step(s: Scenario) -> float:
     """Return the largest default physics step, s.
 
-    A drive's force changes within a step, and RK4 gets its mean. So velocities at the ends of steps are exact, and
+    A drive's force changes within a step. Behind one Lag, RK4 gets its mean and its first moment, so that velocities
+    and positions at the ends of steps are exact. Behind other drives it gets the mean: velocities are exact, and
     positions err by step^2/12 times the change of the acceleration: in a cycle of frequency omega, by (omega step)^2/12
     of its amplitude. With four steps this is 5 % in the fastest cycle of a sampled law, which lasts two samples. Cycles
-    behind a long lag are slower: a step of half the lag is enough. A force that follows u at once sets no limit.
+    behind a long delay are slower: a step of half of it is enough. A force that follows u at once sets no limit.
     """
     jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
     if not s.plain_equation:
         return min(REALISTIC_STEP, jitter)
+    one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(s.actuator[0], Lag)
     moving = [part for part in s.actuator if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited]
+    moving = [] if one_lag else moving
     return min(MAX_STEP, jitter, *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving))
 
 

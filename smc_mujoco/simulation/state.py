@@ -52,10 +52,10 @@ CHANNEL = np.dtype(
 #   last_x, last_v: the last reading that was not lost; delayed: the command after its delay
 #   first, second: the states of the drives, see `DriveStep`
 #   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
+#   middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage, see `DriveStep`
 #   stuck, stuck_at, speed: whether a friction by a formula sticks, where, and the speed at the step before
-CHANNEL_STATE = floats(
-    ("last_x", "last_v", "delayed", "first", "second", "force", "reaction", "stuck", "stuck_at", "speed")
-)
+DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
+CHANNEL_STATE = floats((*DRIVEN, "stuck", "stuck_at", "speed"))
 DRIVE_STEP = floats(DriveStep._fields)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])

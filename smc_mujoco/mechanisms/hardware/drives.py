@@ -242,6 +242,7 @@ class DriveStep(NamedTuple):
     sharpness_2: float = 0.0
     supply: float = 0.0
     constant: float = 0.0
+    rise_first: float = 0.0  # of `first` in the rise of the force within an RK4 step, from its middle to its last stage
 
     def start(self, v: Any) -> np.ndarray:
         """Return both states at the start of a run at the speeds v, (2, ...): no force, and no current."""
@@ -262,6 +263,10 @@ class DriveStep(NamedTuple):
         gap = np.clip(u + self.lagged * a - second, -self.reach, self.reach)  # closed at the limit's rate
         passing = force - 0.5 * gap * np.abs(gap) / self.reach
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
+
+    def rise(self, u: np.ndarray, first: np.ndarray) -> np.ndarray:
+        """Return by how much the force rises in a step of RK4 from its middle to its last stage."""
+        return self.rise_first * (first - u)
 
 
 def rippled(motor, V, x, v):
@@ -289,6 +294,8 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
         )  # fmt: skip
     a = lags[0] if lags else math.inf
     made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
+    if rk4 and len(lags) == 1 and rate is None and motor is None:
+        made = made._replace(rise_first=_rise(a))
     if rate is not None:
         return made._replace(reach=rate * step)
     if motor is not None:
@@ -340,6 +347,18 @@ def winding_step(b: float, rk4: bool) -> tuple[float, float]:
 def _mean(a: float) -> float:
     """Return the mean of exp(-t) over 0 .. a."""
     return -math.expm1(-a) / a
+
+
+def _rise(a: float) -> float:
+    """Return the rise that gives RK4's stages the first moment of a force exp(-t) over a step of 0 .. a.
+
+    With mean m and moment p = integral of (1 - s) f over the step s = 0 .. 1, stages of m - b, m, m, m + b with
+    b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
+    """
+    if a < SHORT_STEP:
+        return -a / 2.0 + a**2 / 4.0 - 3.0 * a**3 / 40.0
+    mean = _mean(a)
+    return 6.0 * (mean / 2.0 - (1.0 - mean) / a)
 
 
 def _passed(a: float, b: float) -> float:
