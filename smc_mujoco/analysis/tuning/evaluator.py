@@ -28,7 +28,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
-from smc_mujoco.simulation.run import PlainLoopWarning, ScenarioBatch, cores, memory_for, run
+from smc_mujoco.simulation.run import BATCH_BYTES, PlainLoopWarning, ScenarioBatch, cores, memory_for, run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.state import log_at
 
@@ -68,12 +68,13 @@ class Evaluator:
     ):
         self.goal, self.cases, self.names, self.threads = goal, list(cases), tuple(names), cores(threads)
         prepared = [prepare(case) for case in self.cases]
-        if any(item.why_not for item in prepared):
-            self.engine, self._run = PYTHON, None
-        elif by_equation and all(map(equation.fits, prepared)):
-            self.engine, self._run = EQUATION, _Equations(prepared, self.names, self.threads)
-        else:
-            self.engine, self._run = MUJOCO, _Batches(prepared, self.names, self.threads, constraints, slots)
+        with memory_for(prepared):
+            if any(item.why_not for item in prepared):
+                self.engine, self._run = PYTHON, None
+            elif by_equation and all(map(equation.fits, prepared)):
+                self.engine, self._run = EQUATION, _Equations(prepared, self.names, self.threads)
+            else:
+                self.engine, self._run = MUJOCO, _Batches(prepared, self.names, self.threads, constraints, slots)
 
     def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
@@ -122,6 +123,11 @@ def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) ->
     return dataclasses.replace(law, gains=dict(law.gains) | dict(zip(names, values, strict=True)))
 
 
+def _that_fit(prepared: Sequence[Prepared], candidates: int) -> int:
+    """Return how many candidates may run at once: at most as many as given, so that their memory is bounded."""
+    return max(1, min(candidates, BATCH_BYTES // sum(item.bytes for item in prepared)))
+
+
 def _batched(candidates: Sequence[Gains], size: int) -> list[Sequence[Gains]]:
     return [candidates[first : first + size] for first in range(0, len(candidates), size)]
 
@@ -141,18 +147,18 @@ class _Gains:
 
 
 class _Equations:
-    """The runs by the equation: as many candidates at once as there are threads."""
+    """The runs by the equation: as many candidates at once as there are threads, if memory allows."""
 
     def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int):
-        self.cases, self.threads = len(prepared), threads
-        self.runs = [equation.EquationRun(item) for _ in range(threads) for item in prepared]
+        self.cases, self.slots = len(prepared), _that_fit(prepared, threads)
+        self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
         law, n = prepared[0].scenario.law, prepared[0].scenario.plant.n
         self.gains = [_Gains(law, names, one.record[0], one.packed, n) for one in self.runs]
         self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[tuple[float, float]]:
         made: list[tuple[float, float]] = []
-        for some in _batched(candidates, self.threads):
+        for some in _batched(candidates, self.slots):
             runs = range(len(some) * self.cases)
             each = functools.partial(self._one, some, terms)
             made += map(each, runs) if self.pool is None else self.pool.map(each, runs)
@@ -177,11 +183,11 @@ class _Batches:
         groups: dict[Hashable, list[int]] = {}
         for index, item in enumerate(prepared):
             groups.setdefault(item.key, []).append(index)
-        self.cases, self.slots = len(prepared), slots
+        self.cases, self.slots = len(prepared), _that_fit(prepared, slots)
         self.groups = list(groups.values())
         with callback.installed():
             self.batches = [
-                _Again([prepared[i] for i in its] * slots, names, threads, constraints) for its in self.groups
+                _Again([prepared[i] for i in its] * self.slots, names, threads, constraints) for its in self.groups
             ]
 
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[tuple[float, float]]:

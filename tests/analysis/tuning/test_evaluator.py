@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import equation, search
+from smc_mujoco.analysis.tuning import equation, evaluator, search
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, PYTHON, Evaluator, objectives
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import gain_sets
@@ -181,3 +181,16 @@ def test_without_constraints_no_limit_acts():
     cases = goal.scenarios("inverted_pendulum", smc.law("observer_free", lam=0.001))
     with_stop, without = (Evaluator(goal, cases, ("lam",), constraints=one)([(0.001,)])[0] for one in (True, False))
     assert without.objective > 1.1 * with_stop.objective
+
+
+@pytest.mark.parametrize("by_equation", [True, False], ids=[EQUATION, MUJOCO])
+def test_memory_is_bounded_whatever_the_number_of_candidates_and_threads(by_equation, monkeypatch):
+    cases = BRIEF.scenarios("pendulum_network", smc.law("observer_free"))
+    sets = [(float(k),) for k in range(1, 6)]
+    found = []
+    for size in (2**28, 2 * sum(prepare(case).bytes for case in cases), 1):
+        monkeypatch.setattr(evaluator, "BATCH_BYTES", size)
+        evaluate = Evaluator(BRIEF, cases, ("lam",), threads=3, by_equation=by_equation, slots=3)
+        found.append((getattr(evaluate._run, "slots", None), evaluate(sets)))
+    assert [slots for slots, _ in found] == [3, 2, 1]
+    assert found[0][1] == found[1][1] == found[2][1]

@@ -114,6 +114,7 @@ def test_the_gains_of_search_i_are_set_i_and_the_law_has_those_of_the_least_obje
 
 
 def test_each_objective_on_record_is_that_of_the_runs_of_its_own_search(found):
+    traces = []
     for i, one in enumerate(found.searches):
         law = dataclasses.replace(found.law, gains=dict(zip(found.bounds, one.best.gains, strict=True)))
         traces = smc.run(found.definition.scenarios(found.plant, law, found.seed, i))
