@@ -28,6 +28,6 @@ def certificate(plant="duffing", law="observer_free", gains=None, parts=PARTS, *
         "format": "x", "u_max": 6.0, "unit": its.unit, "disturbance": 2.0, "slope": None,
         "plant": {"name": plant, "n": its.n, "parameters": dict(its.parameters), "mechanism": "equation"},
         "law": {"name": law, "gains": gains or {"lam": 6.0, "k1": 3.0}},
-        "leaves_out": {"delay": "4 ms", "noise": ""}, "parts": parts, "seal": "y",
+        "leaves_out": {"delay": {"input_delay": {"time": 0.004}}, "noise": {}}, "parts": parts, "seal": "y",
     }  # fmt: skip
     return Certificate(data=plain | changes)

@@ -5,6 +5,7 @@ import dataclasses
 import math
 import os
 from collections.abc import Mapping, Sequence
+from itertools import starmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -136,8 +137,12 @@ class Certificate:
 
     @property
     def leaves_out(self) -> Mapping[str, str]:
-        """What no theorem here is about -> what the scenario has of it, in words; "" for nothing."""
-        return dict(self.data["leaves_out"])
+        """What no theorem here is about -> what the scenario has of it, such as "Lag(tau=0.01)"; "" for nothing."""
+
+        def said(word: str, numbers: Mapping[str, float]) -> str:
+            return f"{word}({', '.join(f'{name}={value:g}' for name, value in numbers.items())})" if numbers else word
+
+        return {what: ", ".join(starmap(said, its.items())) for what, its in self.data["leaves_out"].items()}
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -6,11 +6,13 @@ derives each theorem's conditions from them, and encloses every number in a ball
     M x'' = A sin x + B x + C x^3 - (E + F x^2) x' + u + d + springs,    |d| <= d0,    |d'| <= slope
 
 where springs of stiffness kc join the neighbours of a network. A law is u = -sigma(s), s = x' + c x, where sigma(s) is
-lam tanh(s), K sat(a s / K) or k sgn(s), or one of the laws "terminal" and "super_twisting". All are odd: x >= 0 is all.
+lam tanh(s), K sat(a s / K) or k sgn(s), which the actuator clips at u_max, or one of the laws "terminal" and
+"super_twisting". All are odd: x >= 0 is all.
 """
 
 import hashlib
 import json
+import math
 import sys
 from itertools import pairwise
 from types import SimpleNamespace as Space
@@ -21,7 +23,8 @@ except ImportError:
     sys.exit("the checker needs python-flint: pip install python-flint")
 
 FORMAT = "smc-certificate/1"
-LEAVES_OUT = {"sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"}
+LEAVES_OUT = ["sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"]
+TEXTS = {"format", "name", "mechanism", "unit", "theorem", "seal"}  # what may have a text
 MARGIN_TOLERANCE, MAX_HALVINGS = 3e-4, 6  # share below the true margin; halvings of a box in both directions
 
 
@@ -40,18 +43,47 @@ def hull(a, b):
     return arb(a).union(arb(b))
 
 
-def equal(stated, derived, what):
-    """Refuse a number that differs from the derived one by more than 1e-9 of it."""
-    need(abs(arb(stated) - derived) <= abs(derived) * 1e-9 + 1e-12, f"{what} is {stated}")
+def finite(value, where="the certificate"):
+    """Refuse a certificate with other than finite numbers, and texts and truth values in their places."""
+    if isinstance(value, dict | list | tuple):
+        for name, item in value.items() if isinstance(value, dict) else enumerate(value):
+            finite(item, name if isinstance(value, dict) else where)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        need(bool(math.isfinite(value) and abs(value) < 1e300), f"{where}, which is not a finite number")
+    elif value is not None:
+        need(where in TEXTS if isinstance(value, str) else where == "holds" and isinstance(value, bool), f"{where!a}")
+
+
+def equal(stated, derived, what, terms=0):
+    """Refuse a number that differs from the derived one by more than 1e-9 of it, or of the terms that it sums."""
+    need(abs(arb(stated) - derived) <= abs(derived).max(arb(terms)) * 1e-9, f"{what} is {stated}")
 
 
 def margins(part, derived):
-    """Refuse conditions other than these, with other margins (None: checked elsewhere), or a wrong `holds`."""
+    """Refuse conditions other than these, with other margins (None: checked elsewhere), or a wrong `holds`.
+
+    A margin is derived as (its value, the size of the terms that it is the difference of). Its sign is that of the value
+    derived, or of the one told where it was checked elsewhere.
+    """
     told = {condition["name"]: condition["margin"] for condition in part["conditions"]}
     need(len(told) == len(part["conditions"]) and list(told) == list(derived), f"the conditions of {part['theorem']}")
-    for name in (name for name, value in derived.items() if value is not None):
-        equal(told[name], derived[name], f"the margin of {name}")
-    need(part["holds"] is all(m > 0 or (m == 0 and k != "reaching") for k, m in told.items()), "whether it holds")
+    kept = []
+    for name, margin in derived.items():
+        value, terms = (arb(told[name]), 0) if margin is None else margin
+        equal(told[name], value, f"the margin of {name}", terms)
+        kept.append(bool(value > 0) or (bool(value == 0) and name != "reaching"))
+        need((told[name] >= 0) is (kept[-1] or bool(value == 0)), f"the sign of {name}")
+    need(part["holds"] is all(kept), "whether it holds")
+
+
+def words(told):
+    """Refuse what is left out but fixed names, with words and their numbers below, {word: {name: number}}."""
+    need(sorted(told) == sorted(LEAVES_OUT), "what is left out")
+    for what in told.values():
+        for word, numbers in what.items():
+            need(word.isidentifier() and word.isascii() and len(word) <= 40, f"the word {word!a}")
+            known = all(n.isidentifier() and n.isascii() and type(v) in (int, float) for n, v in numbers.items())
+            need(known and len(numbers) <= 40, f"the numbers of {word}")
 
 
 def equation(plant):
@@ -69,17 +101,20 @@ def equation(plant):
 
 
 def feedback(law, u_max):
-    """Return sigma: its kind, largest value K (None: unbounded), slope a at 0, slope c of s; gains; and u_max - K."""
+    """Return sigma: its kind, largest value K (None: unbounded), slope a at 0, slope c of s; gains; and the force to spare."""
     g, name = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None}), law["name"]
-    room = lambda top: arb(0) if u_max is None else u_max - top  # noqa: E731
+    room = lambda top: (arb(0), 0) if u_max is None else (u_max - top, abs(top))  # noqa: E731
+    top = lambda force: force if u_max is None else force.min(arb(u_max))  # the actuator clips  # noqa: E731
+    spare = lambda force: (room(force)[0].max(arb(0)), room(force)[1])  # noqa: E731
     if name == "observer_free":
-        return Space(kind="tanh", K=g.lam, a=g.lam, c=g.k1, g=g, room=room(g.lam), theorems=(0, 2))
+        return Space(kind="tanh", K=top(g.lam), a=g.lam, c=g.k1, g=g, room=spare(g.lam), theorems=(0, 2))
     if name == "boundary_layer":
-        return Space(kind="sat", K=g.k, a=g.k / g.phi, c=g.c, g=g, room=room(g.k), theorems=(0, 2))
-    if name in ("classical", "terminal"):
-        need(name == "classical" or (g.b > 0 and g.bound >= 0 and bool(0.5 < g.p < 1)), "1/2 < p < 1 on v + b [x]^p")
-        c, rest, first = (g.c, 0, 0) if name == "classical" else (arb(1), g.bound, 1)  # the first of its theorems
-        return Space(kind="sgn", K=g.k, a=None, c=c, g=g, room=room(g.k + rest), theorems=(first, 3))
+        return Space(kind="sat", K=top(g.k), a=g.k / g.phi, c=g.c, g=g, room=spare(g.k), theorems=(0, 2))
+    if name == "classical":
+        return Space(kind="sgn", K=top(g.k), a=None, c=g.c, g=g, room=spare(g.k), theorems=(0, 3))
+    if name == "terminal":
+        need(g.b > 0 and g.bound >= 0 and bool(0.5 < g.p < 1), "1/2 < p < 1 on v + b [x]^p")
+        return Space(kind="sgn", K=g.k, a=None, c=arb(1), g=g, room=room(g.k + g.bound), theorems=(1, 3))
     if name == "super_twisting":
         return Space(kind=None, c=g.c, g=g, theorems=(3, 4))
     if name == "lqr":
@@ -89,7 +124,7 @@ def feedback(law, u_max):
         need(name == "pid" and g.ki == 0, f"law {name}")
         k1, k2 = g.kp, g.kd
     K = u_max and arb(u_max)  # the actuator's bound is part of a linear law
-    return Space(kind="sat", K=K, a=k2, c=k1 / k2, g=g, room=arb(0), theorems=(0, 2))
+    return Space(kind="sat", K=K, a=k2, c=k1 / k2, g=g, room=(arb(0), 0), theorems=(0, 2))
 
 
 def phi(e, x):
@@ -100,7 +135,7 @@ def phi(e, x):
 def sigma(f, s):
     """Return sigma over a ball. For sgn, s has one sign; where it ends at 0, sigma is the limit there."""
     if f.kind == "tanh":
-        return f.K * s.tanh()
+        return (f.a * s.tanh()).min(f.K).max(-f.K)
     if f.kind == "sat":
         return f.a * s if f.K is None else (f.a * s).min(f.K).max(-f.K)
     return f.K if s.mid() > 0 else -f.K
@@ -109,7 +144,8 @@ def sigma(f, s):
 def slope(f, s):
     """Return sigma' over a ball, away from 0 for sgn."""
     if f.kind == "tanh":
-        return f.K / (s.cosh() * s.cosh())
+        rate, force = f.a / (s.cosh() * s.cosh()), f.a * abs(s).tanh()
+        return arb(0) if force > f.K else rate if f.a <= f.K or force < f.K else hull(0, rate.upper()).union(rate)
     if f.kind == "sgn" or (f.K is not None and f.a * abs(s) > f.K):
         return arb(0)
     return f.a if f.K is None or f.a * abs(s) < f.K else hull(0, f.a)
@@ -127,9 +163,10 @@ def saturated(doc, part, e, f):
     for name, value in V.items():
         equal(part["V"][name], value, f"the coefficient of {name} in V")
     restoring(part["conditions"][1], e, f)
-    derived = {"damping": -abs(e.F) if e.F != 0 else e.E, "restoring": None, "actuator": f.room}
-    derived |= {"coupling": weakest} if e.n > 1 else {}
-    return derived if f.kind == "sgn" else derived | {"local": f.a * f.c - e.A - e.B}
+    derived = {"damping": (-abs(e.F) if e.F != 0 else e.E, 0), "restoring": None, "actuator": f.room}
+    derived |= {"coupling": (weakest, 0)} if e.n > 1 else {}
+    local = f.kind != "sgn" and {"local": (f.a * f.c - e.A - e.B, abs(f.a * f.c) + abs(e.A) + abs(e.B))}
+    return derived | local if local else derived
 
 
 def restoring(told, e, f):
@@ -137,7 +174,7 @@ def restoring(told, e, f):
     m, c, smooth = arb(told["margin"]), f.c, f.kind != "sgn"
     if "at" in told:
         need(told["at"] > 0 and m < 0, "the place where the law is too weak")
-        return equal(m, 1 - phi(e, arb(told["at"])) / sigma(f, c * told["at"]), "the margin of restoring")
+        return equal(m, 1 - phi(e, arb(told["at"])) / sigma(f, c * told["at"]), "the margin of restoring", 1)
     boxes, best = told["boxes"], (1 - (e.A + e.B) / (f.a * c)).min(arb(1)) if smooth else arb(1)
     joined = all(box[1] == following[0] for box, following in pairwise(boxes))
     need(joined and boxes[0][0] == 0 and boxes[-1][1] is None, "boxes from 0 to infinity, without a gap")
@@ -164,7 +201,7 @@ def levels(doc, part, e, f):
     rising = all(a < b for edges in (xs, ss) for a, b in pairwise(edges))
     need(rising and xs[0] == 0 and [-s for s in reversed(ss)] == ss and W[0] == W[0][::-1], "a symmetric, rising grid")
     need(len(W) == len(xs) and all(len(row) == len(ss) for row in W) and e.n == 1, "the size of the grid")
-    need(f.room >= 0 and 0 < inner < outer < border and all(0 <= w <= 1 for row in W for w in row), "the levels")
+    need(f.room[0] >= 0 and 0 < inner < outer < border and all(0 <= w <= 1 for row in W for w in row), "the levels")
     inside, (x, v) = [], part["start"]
     for i, (x0, x1) in enumerate(pairwise(xs)):
         for j, (s0, s1) in enumerate(pairwise(ss)):
@@ -183,7 +220,7 @@ def levels(doc, part, e, f):
         need(all(x <= box["X"] and abs(s) <= box["S"] for x, s in inside), "an inner set from which s = 0 is reached")
     elif d0 == 0:
         quadratic(part["P"], e, f, inside)
-    return {"actuator": f.room, "start": arb(outer) - at}
+    return {"actuator": f.room, "start": (arb(outer) - at, 1)}
 
 
 def falls(e, f, d0, box, corners, depth=MAX_HALVINGS):
@@ -230,9 +267,9 @@ def reaching(doc, part, e, f):
         return abs(phi(e, x) + D * v + (g.b * g.p * vs).min(g.bound) - e.M * g.b * g.p * vs) + d0
 
     edges, strips = [X * i / 64 for i in range(65)], [hull(S * j / 8, S * (j + 1) / 8) for j in range(-8, 8)]
-    least = min((g.k - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
+    least = min((f.K - push(a, b, s)).lower() for a, b in pairwise(edges) for s in strips)
     need(bool(X > 0) is bool(least > 0), "reaching")
-    return {"reaching": least, "actuator": f.room}
+    return {"reaching": (least, g.k), "actuator": f.room}
 
 
 def super_twisting(doc, part, e, f):
@@ -256,7 +293,8 @@ def super_twisting(doc, part, e, f):
     top = arb(0) if doc["u_max"] is None else (doc["u_max"] - w - g.k1 * z1).lower()
     top = top.min((g.w_max - w).lower()) if "w_max" in vars(g) else top
     slack = (L - abs(rate) * v - fast - doc["slope"]).lower()
-    return {"integral": g.k2 - doc["slope"], "slope": slack, "actuator": top}
+    size = abs(g.k2) + doc["slope"]
+    return {"integral": (g.k2 - doc["slope"], size), "slope": (slack, L), "actuator": (top, w + g.k1 * z1)}
 
 
 def seal(doc):
@@ -271,7 +309,9 @@ THEOREMS = {"level sets": levels, "saturated PD": saturated, "reaching": reachin
 def check(doc):
     """Check a certificate, the dict of its JSON. Raise Refused with the first statement that is not proven."""
     try:
-        need(doc["format"] == FORMAT and doc["seal"] == seal(doc) and set(doc["leaves_out"]) >= LEAVES_OUT, "the seal")
+        finite(doc)
+        need(doc["format"] == FORMAT and doc["seal"] == seal(doc), "the seal")
+        words(doc["leaves_out"])
         e, f = equation(doc["plant"]), feedback(doc["law"], doc["u_max"])
         strong = f.kind is None or ((f.K is None or f.K > 0) and (f.a is None or f.a > 0))
         unit, least = "rad" if "pendulum" in doc["plant"]["name"] else "m", min(doc["disturbance"], doc["slope"] or 0)
@@ -280,7 +320,7 @@ def check(doc):
         need(0 < len(theorems) == len(set(theorems)) and set(theorems) <= set(known), "a theorem of this law")
         for part in doc["parts"]:
             margins(part, THEOREMS[part["theorem"]](doc, part, e, f))
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, ZeroDivisionError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError, RecursionError) as error:
         raise Refused(f"its form, {error!r}") from None
 
 

@@ -70,13 +70,13 @@ def _loop(M: float, terms: list[float], law: SimpleNamespace, u_max: float | Non
     A, B, C, E, F = terms
     top = math.inf if u_max is None else u_max
     if law.name == "observer_free":
-        sigma, steep, c = (lambda s: law.lam * np.tanh(s)), law.lam, law.k1
+        sigma, steep, c = (lambda s: np.clip(law.lam * np.tanh(s), -top, top)), law.lam, law.k1
     elif law.name in ("classical", "terminal", "super_twisting"):
-        k = getattr(law, "k", 0.0)
+        k = min(getattr(law, "k", 0.0), top)
         sigma, steep, c = (lambda s: k * np.sign(s)), math.inf, getattr(law, "c", 1.0)
     else:
         kp, kd = linear_gains(law)
-        top = law.k if law.name == "boundary_layer" else top
+        top = min(law.k, top) if law.name == "boundary_layer" else top
         sigma, steep, c = (lambda s: np.clip(kd * s, -top, top)), kd, kp / kd
     phi, D = (lambda x: A * np.sin(x) + x * (B + C * x * x)), (lambda x: E + F * x * x)
     return Loop(M=M, c=c, d0=d0, phi=phi, D=D, sigma=sigma, steep=steep)

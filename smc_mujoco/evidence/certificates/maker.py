@@ -9,10 +9,11 @@ The plant is its equation M x'' = phi(x) - D(x) x' + u + d, integrated exactly, 
 else a machine does is in `Certificate.leaves_out`.
 """
 
+import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -83,25 +84,36 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     return certificate
 
 
-def left_out(scenario: Scenario) -> dict[str, str]:
-    """Return what the theorems leave out -> what this scenario has of it, in words; "" for nothing."""
+def left_out(scenario: Scenario) -> dict[str, dict[str, dict[str, float]]]:
+    """Return what the theorems leave out -> what this scenario has of it: words, each with its numbers in SI units."""
     s = scenario.resolved
-    late, missed, estimator = 1e3 * s.clock.jitter, 100.0 * s.clock.missed, s.velocity.name
-    clock = [f"the law acts every {1e3 * s.control_period:g} ms"]
-    clock += [f"up to {late:g} ms late"] * bool(late) + [f"{missed:g} % missed"] * bool(missed)
-    sizes = {"position": s.noise.position, "velocity": s.noise.velocity}
-    noise = [f"{name} {value:g}" for name, value in sizes.items() if value] + ["chosen errors"] * any(s.noise.errors)
-    noise += [f"velocity {estimator}"] * (estimator != "measured") + [str(s.sensor)] * bool(s.sensor)
+    noise = {name: value for name, value in (("position", s.noise.position), ("velocity", s.noise.velocity)) if value}
+    measured = {"noise": noise} if noise else {}
+    measured |= {"chosen_errors": {}} if any(s.noise.errors) else {}
+    measured |= {s.velocity.name: {}} if s.velocity.name != "measured" else {}
+    jump = {"time": s.jump.time} | dict(s.jump.factors) if s.jump else {}
+    clock = {"period": s.control_period, "jitter": s.clock.jitter, "missed": s.clock.missed}
     return {
-        "sampling": ", ".join(clock),
-        "delay": f"{1e3 * s.input_delay:g} ms" if s.input_delay else "",
-        "noise": ", ".join(noise),
-        "dry friction": ", ".join(str(part) for part in s.friction),
-        "contact": "" if s.contact.kind == "none" else s.contact.kind,
-        "drive": ", ".join(str(part) for part in s.actuator),
-        "other parameters": f"a jump {s.jump}" if s.jump else "",
-        "rounding": f"{s.integrator} in steps of {1e3 * s.physics_step:g} ms",
+        "sampling": {"samples": {name: value for name, value in clock.items() if value}},
+        "delay": {"input_delay": {"time": s.input_delay}} if s.input_delay else {},
+        "noise": measured | _numbers([s.sensor] if s.sensor else []),
+        "dry friction": _numbers(s.friction),
+        "contact": {} if s.contact.kind == "none" else {s.contact.kind: {}},
+        "drive": _numbers(s.actuator),
+        "other parameters": {"jump": jump} if jump else {},
+        "rounding": {s.integrator: {"step": s.physics_step}},
     }
+
+
+def _numbers(parts: Sequence[Any]) -> dict[str, dict[str, float]]:
+    """Return kind -> the numbers of parts; a second part of a kind has a number behind its name."""
+    found: dict[str, dict[str, float]] = {}
+    for part in parts:
+        values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
+        kind = type(part).__name__
+        kind += f"_{len(found) + 1}" * (kind in found)
+        found[kind] = {n: float(v) for n, v in values.items() if isinstance(v, int | float) and math.isfinite(v)}
+    return found
 
 
 def _check(scenario: Scenario) -> None:
@@ -161,7 +173,8 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
     def judge(theorem: str, data: dict) -> dict[str, Any] | None:
         """Return the margins of a theorem's conditions, or None if the checker refuses the data."""
         try:
-            return checker.THEOREMS[theorem](document, data, e, f)
+            derived = checker.THEOREMS[theorem](document, data, e, f)
+            return {name: value and value[0] for name, value in derived.items()}
         except checker.Refused:
             return None
 
@@ -181,10 +194,10 @@ def _parts(document: dict, scenario: Scenario, checker: Any) -> list[dict]:
         box = reaching["X"], reaching["S"]
         parts.append(reaching)
     bounded = document["disturbance"] > 0.0 or not parts[0]["holds"]
-    if single and bounded and law.name != "terminal" and f.room >= 0:
+    if single and bounded and law.name != "terminal" and f.room[0] >= 0:
         proven = functools.partial(checker.falls, e, f, checker.arb(document["disturbance"]))
         if levels := search.levels(loop, reach, _start(scenario, loop), proven, attracts, box):
-            parts.append(_levels(float(f.room), levels, scenario, _start(scenario, loop)))
+            parts.append(_levels(float(f.room[0]), levels, scenario, _start(scenario, loop)))
     return parts
 
 
