@@ -62,8 +62,8 @@ def equal(stated, derived, what, terms=0):
 def margins(part, derived):
     """Refuse conditions other than these, with other margins (None: checked elsewhere), or a wrong `holds`.
 
-    A margin is derived as (its value, the size of the terms that it is the difference of). Its sign is that of the value
-    derived, or of the one told where it was checked elsewhere.
+    A margin is derived as (its value, the size of the terms that it sums). Its sign is that of the value derived, or of
+    the one told where it was checked elsewhere.
     """
     told = {condition["name"]: condition["margin"] for condition in part["conditions"]}
     need(len(told) == len(part["conditions"]) and list(told) == list(derived), f"the conditions of {part['theorem']}")
@@ -101,7 +101,7 @@ def equation(plant):
 
 
 def feedback(law, u_max):
-    """Return sigma: its kind, largest value K (None: unbounded), slope a at 0, slope c of s; gains; and the force to spare."""
+    """Return sigma: its kind, largest value K (None: unbounded), slope a at 0, slope c of s; gains; force to spare."""
     g, name = Space(**{key: arb(value) for key, value in law["gains"].items() if value is not None}), law["name"]
     room = lambda top: (arb(0), 0) if u_max is None else (u_max - top, abs(top))  # noqa: E731
     top = lambda force: force if u_max is None else force.min(arb(u_max))  # the actuator clips  # noqa: E731

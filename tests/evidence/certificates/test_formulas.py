@@ -169,7 +169,7 @@ def test_margins_of_super_twisting_are_those_of_its_form():
     )
     assert float(checker.super_twisting(doc | {"u_max": None}, part, e, f)["actuator"][0]) == 0.0
     steep = plant(A=-0.8, E=E)  # its force is steepest at 0
-    told = float(checker.super_twisting(doc, part, steep, f)["slope"])
+    told = float(checker.super_twisting(doc, part, steep, f)["slope"][0])
     lag = M * c - E
     exact = L - (0.8 + c * lag) * v - lag * (3.0 * z1 + z2) / M - slope
     assert exact - 0.1 < told <= exact + 1e-9
