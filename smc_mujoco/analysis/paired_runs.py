@@ -81,10 +81,10 @@ def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndar
     except ScenarioError:  # a table without the column
         return np.full(len(table.column("seed")), np.nan)
     known: dict[str, float] = {}
-    for text in set(texts.tolist()) - {None}:
+    for text in {text for text in texts.tolist() if isinstance(text, str)}:
         numbers = from_json(text)
         known[text] = float(numbers.get(name, absent)) if numbers else np.inf
-    return np.array([np.nan if text is None else known[text] for text in texts.tolist()], float)
+    return np.array([known[text] if isinstance(text, str) else np.nan for text in texts.tolist()], float)
 
 
 def failed(table: Columns) -> np.ndarray:

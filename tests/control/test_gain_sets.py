@@ -37,7 +37,6 @@ def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_s
         assert all(set(one) == set(search_space.box(law, scales)) for one in known.sets), name
 
 
-@pytest.mark.xfail(reason="the gains are being searched anew, see benchmarks/gains.py")
 @pytest.mark.parametrize(("gain_set", "plant"), SETS)
 def test_every_search_is_of_the_one_rule(gain_set, plant):
     for name, known in shipped(gain_set, plant).items():
@@ -57,7 +56,6 @@ def test_every_general_law_is_a_rival():
     assert set(gains.ALIASES) <= set(catalogue())
 
 
-@pytest.mark.xfail(reason="the gains are being searched anew, see benchmarks/gains.py")
 @pytest.mark.parametrize("plant", scenarios.PLANTS)
 def test_no_gain_of_the_papers_law_is_at_a_bound(plant):
     """With |u| <= 6 on lam itself, all five were."""
@@ -79,7 +77,6 @@ def test_forms_of_a_law_take_its_gains():
     assert gains.tuned("duffing", "observer_free_single") is gains.tuned("duffing", "observer_free")
 
 
-@pytest.mark.xfail(reason="the gains are being searched anew, see benchmarks/gains.py")
 @pytest.mark.slow
 @pytest.mark.parametrize(("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")])
 def test_shipped_gains_cost_what_their_record_says(gain_set, law):
@@ -93,7 +90,6 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
         assert goal.evaluation(cases[0], run(cases)).objective == pytest.approx(expected, rel=1e-2)
 
 
-@pytest.mark.xfail(reason="the gains are being searched anew, see benchmarks/gains.py")
 @pytest.mark.slow
 def test_the_first_shipped_search_comes_out_again():
     known = gains.tuned("duffing", "observer_free")

@@ -16,6 +16,7 @@ from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.audit.paper import paper
 from smc_mujoco.evidence.certificates.loops import ONE_JOINT_TERMS
+from smc_mujoco.simulation.scenario import U_MAX
 
 CLAIMS = paper("gaber").claims
 PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
@@ -71,7 +72,7 @@ def test_comparisons_of_sentences_hold_with_the_tuned_gains():
     assert "lam)^2 < 4 M (lam k1 - phi'(0)) with tuned gains" in CLAIMS["35"].instead
     assert (D + ours.lam) ** 2 < 4.0 * M * (ours.lam * ours.k1 - slope)
     assert "boundary_layer has the same bound of u" in CLAIMS["12"].instead
-    assert loop("duffing", "boundary_layer")[1].k == ours.lam
+    assert min(loop("duffing", "boundary_layer")[1].k, ours.lam) > U_MAX
 
 
 def test_the_series_of_order_7_falls_where_claim_55_says():
