@@ -172,7 +172,7 @@ class Comparison:
     def _eligible(self) -> np.ndarray:
         """Whether a law has no more runs without a value than another, (blocks, laws, laws)."""
         lacking = self.without_value.T
-        return lacking[:, :, None] <= lacking[:, None, :]
+        return np.asarray(lacking[:, :, None] <= lacking[:, None, :])
 
     @functools.cached_property
     def _relevantly_lower(self) -> np.ndarray:

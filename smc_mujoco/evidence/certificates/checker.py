@@ -47,7 +47,7 @@ def finite(value, where="the certificate"):
     """Refuse a certificate with other than finite numbers, and texts and truth values in their places."""
     if isinstance(value, dict | list | tuple):
         for name, item in value.items() if isinstance(value, dict) else enumerate(value):
-            finite(item, name if isinstance(value, dict) else where)
+            finite(item, str(name) if isinstance(value, dict) else where)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         need(bool(math.isfinite(value) and abs(value) < 1e300), f"{where}, which is not a finite number")
     elif value is not None:

@@ -15,6 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -348,7 +349,7 @@ def test_the_checker_refuses_what_is_no_finite_number_wherever_it_stands(plant, 
     drawn = np.random.default_rng(0).choice(len(places), 12, replace=False)
     at_top = [at for at, path in enumerate(places) if len(path) == 1]
     for at in {*drawn.tolist(), *at_top}:
-        data = copy.deepcopy(whole)
+        data: Any = copy.deepcopy(whole)
         *inner, last = places[at]
         item = data
         for name in inner:
@@ -359,7 +360,7 @@ def test_the_checker_refuses_what_is_no_finite_number_wherever_it_stands(plant, 
 
 @pytest.mark.parametrize("factor", [1e-13, 1e-6, 1.0, 1e6])
 def test_units_do_not_hide_a_plant_that_feeds_its_motion(factor):
-    data = copy.deepcopy(certificate("duffing", "classical", disturbance=0.1).data)
+    data: Any = copy.deepcopy(certificate("duffing", "classical", disturbance=0.1).data)
     data["disturbance"] = 0.0
     scaled(data, factor)
     assert not refused(copy.deepcopy(data))
@@ -376,7 +377,7 @@ def test_units_do_not_hide_a_plant_that_feeds_its_motion(factor):
     ],
 )  # fmt: skip
 def test_nothing_but_words_and_numbers_stands_under_what_is_left_out(told):
-    data = copy.deepcopy(certificate("duffing", disturbance=2.0).data)
+    data: Any = copy.deepcopy(certificate("duffing", disturbance=2.0).data)
     data["leaves_out"] = dict(data["leaves_out"]) | told
     assert refused(data)
 
