@@ -220,7 +220,7 @@ class Comparison:
     @functools.cached_property
     def tied(self) -> np.ndarray:
         """Whether two laws are level in every block, (laws, laws)."""
-        return self.level.all(axis=0)
+        return np.asarray(self.level.all(axis=0))
 
     @functools.cached_property
     def undecided(self) -> np.ndarray:
