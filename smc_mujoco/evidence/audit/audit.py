@@ -168,9 +168,10 @@ def document(claims: Sequence[Claim]) -> str:
 def measure(entry: Entry, runs: Runs) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
-    A claim about all or some of the allowed gains is measured at the gains that decide it.
+    A claim about all or some of the allowed gains is measured at the gains that decide it, unless other laws have the
+    gains of another set in its search.
     """
-    if entry.over:
+    if entry.over and entry.rivals in ("", runs.gains):
         from smc_mujoco.evidence.audit import search
 
         return search.decisive(entry, runs, lambda at: _measured(entry, at))

@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from smc_mujoco.common.catalogue import KINDS, Catalogue, added, source, warn
-from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, words
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, shown, unknown, whole, words
 from smc_mujoco.common.files import reading, replacing
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets
@@ -47,6 +47,7 @@ NO_FIELDS: Mapping[str, Any] = frozen({})
 # How much of a paper was read.
 READ_PARTS: dict[str, None] = dict.fromkeys(("full text", "abstract", "textbook", "second hand", "nothing"))
 TEXT_FIELDS = ("title", "authors", "source", "read", "access", "note")  # of a paper
+SPREAD_SETS, NEAR_SETS = 6, 3  # sets of gains that a search tries over the bounds, and around the best of them
 A_TEXT, A_LIST, FIELDS_CURE = (str, "a text"), (list, "a list of names"), 'fields of a scenario, as "duration=5.0"'
 PAPER_FIELDS = {  # field of a paper -> its type and what to write
     **dict.fromkeys(TEXT_FIELDS, A_TEXT),
@@ -64,6 +65,8 @@ CLAIM_FIELDS = {  # the same of a claim
     "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
     "how": (str, "a text: how it is derived, or why it is asked"),
     "over": (str, '"all" or "some" of the gains in [allowed.LAW]'),
+    "searched": (str, "the law of these gains; without it the claim's first"),
+    "rivals": (str, "a set of gains: that of the other laws in the search; what other sets give is told beside it"),
     "late": (bool, "true or false"),
     **dict.fromkeys(("read", "words", "measured", "note", "instead", "shown_by", "quantifier"), A_TEXT),
     **dict.fromkeys(("quick", "varies", "immune"), A_TEXT),
@@ -79,6 +82,8 @@ class Allowed(NamedTuple):
 
     bounds: Mapping[str, tuple[float, float]]  # gain -> lowest and highest value, both positive
     margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None  # gains -> {condition: margin}
+    spread: int = SPREAD_SETS  # sets of gains that a search tries over the whole bounds
+    near: int = NEAR_SETS  # and around the best of them
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -89,6 +94,7 @@ class Entry(Statement):
     thresholds: tuple[Threshold, ...] = ()  # empty if the function returns checks with limits
     quick: str = ""  # what a quick audit measures instead, if that is less
     late: bool = False  # whether it looks at the runs of all other claims, and so comes after them
+    searched: str = ""  # the law whose gains are searched; the first of `laws` without it
     varies: str = ""  # why its numbers, such as timings, differ from audit to audit; they are not sealed
     immune: str = ""  # why no mutant of the law loses the claim, if none can
     plants: tuple[str, ...] = ()
@@ -384,7 +390,9 @@ def _check(entry: Entry, paper: Paper) -> None:
                 paper.law(plant, law, gains)
     if entry.over:
         find("quantifier in over", entry.over, dict.fromkeys(("all", "some")))
-        if (law := next(iter(entry.laws), "LAW")) not in paper.allowed:
+        if entry.rivals:
+            find("set of gains in rivals", entry.rivals, paper.sets)
+        if (law := entry.searched or next(iter(entry.laws), "LAW")) not in paper.allowed:
             raise ScenarioError(f"it is about {entry.over} gains, and there is no table [allowed.{law}]: write one")
 
 
@@ -395,6 +403,7 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
     margins = table.pop("margins", None)
     if margins is not None:
         margins = find(f"function of {CODE_FILE} in allowed.{law}", margins, functions)
+    spread, near = _typed("tried", table.pop("tried", [SPREAD_SETS, NEAR_SETS]), list, "two numbers, as [64, 24]")
     bounds = {}
     for gain, ends in table.items():
         find(f"gain of {law} in allowed", gain, paper.bound(law, {}).gains)
@@ -402,7 +411,7 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
         if len(pair) != 2 or not 0.0 < pair[0] < pair[1]:
             raise ScenarioError(f"allowed.{law}.{gain} is {shown(ends)}: write two positive numbers, the lower first")
         bounds[gain] = (float(pair[0]), float(pair[1]))
-    return Allowed(bounds, margins)
+    return Allowed(bounds, margins, whole("tried", spread, 1, MAX_ITEMS), whole("tried", near, 0, MAX_ITEMS))
 
 
 def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:

@@ -19,7 +19,6 @@ from smc_mujoco.evidence.audit.paper import Allowed, Entry, failed
 from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.verdict import Beside, Check, Evidence
 
-SPREAD_SETS, NEAR_SETS = 6, 3  # sets of gains tried over the whole bounds, and around the best of them
 QUICK_SPREAD_SETS, QUICK_NEAR_SETS = 2, 0  # in a quick audit
 NEAR_BOUNDS_SHARE = 0.25  # share of the bounds, on a logarithmic scale, around the best
 DRAWN_POINTS = 2000  # points drawn to find gains that meet the theorem's conditions
@@ -54,7 +53,7 @@ def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> E
 
 def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str) -> Evidence:
     """Return the evidence at the gains that decide on all plants of a claim."""
-    law, best = entry.laws[0], min if entry.over == "all" else max
+    law, best = entry.searched or entry.laws[0], min if entry.over == "all" else max
     theorem = Theorem(entry, runs)
     in_full: list[Tried] = []
     quickly: list[Tried] = []
@@ -66,7 +65,9 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
         return tried.rank[0] != (entry.over == "all")
 
     def search() -> None:
-        spread, near = (QUICK_SPREAD_SETS, QUICK_NEAR_SETS) if runs.quick else (SPREAD_SETS, NEAR_SETS)
+        spread, near = (
+            (QUICK_SPREAD_SETS, QUICK_NEAR_SETS) if runs.quick else (theorem.allowed.spread, theorem.allowed.near)
+        )
         if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
             return
         centre = best(quickly, key=lambda tried: tried.rank).gains
@@ -86,8 +87,9 @@ class Theorem:
     """What a paper asks of the gains of a claim's first law."""
 
     def __init__(self, entry: Entry, runs: Runs):
-        self.allowed: Allowed = runs.paper.allowed[entry.laws[0]]
-        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], entry.laws[0], runs.gains).gains  # of the set
+        law = entry.searched or entry.laws[0]
+        self.allowed: Allowed = runs.paper.allowed[law]
+        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], law, runs.gains).gains  # of the set
         self._failed = lambda error: failed(runs.paper, entry, error)
 
     def points(self, bounds: Bounds, count: int) -> Iterator[Gains]:

@@ -170,6 +170,7 @@ class Statement:
     how: str = ""  # how it was derived, or why it is asked
     read: str = ""  # how much was read of the place where it stands, one of `paper.READ_PARTS`
     over: str = ""  # "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter
+    rivals: str = ""  # the set of gains of other laws with which a search over gains decides; "" for each set by itself
     instead: str = ""  # what the author may claim instead, where it does not hold: a theorem or a measured bound
     shown_by: str = ""  # the command that shows that
 
@@ -291,9 +292,17 @@ def combined(
 
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
-    verdicts = {name: verdict(some, statement.quantifier, statement.over) for name, some in evidence.items()}
+    searched = {name: statement.over if statement.rivals in ("", name) else "" for name in evidence}
+    verdicts = {name: verdict(some, statement.quantifier, searched[name]) for name, some in evidence.items()}
     answers = ANSWERS if statement.whose == OURS else None
-    overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
+    if statement.rivals in verdicts:
+        rest = [f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items()]
+        beside = ", ".join(words for words in rest if not words.endswith(f"with {statement.rivals} gains"))
+        overall, flips = verdicts[statement.rivals], False
+        sentence = f"Decided by a search over the law's gains, with {statement.rivals} gains of the other laws"
+        sentence += f"; for one set of gains each: {beside}." if beside else "."
+    else:
+        overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
     if answers:
         overall, verdicts = answers[overall], {name: answers[kind] for name, kind in verdicts.items()}
     numbers: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in evidence}

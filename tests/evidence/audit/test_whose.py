@@ -79,6 +79,34 @@ def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(w
     assert decided(written(DATA.format(over="some", limit="> 9", plants=both, margins="")))[0] == "not shown"
 
 
+TWO_SETS = """
+[gains.other]
+classical = {{ k = 8.0, c = 1.0 }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("rivals", "limit", "verdict"),
+    [("paper", "> 8.5", "supported"), ("paper", "> 9", "not shown"), ("other", "< 1.5", "supported")],
+)
+def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_beside_it(written, rivals, limit, verdict):
+    data = DATA.format(over="some", limit=limit, plants='["duffing"]', margins="tried = [40, 10]")
+    data = data.replace("[allowed", TWO_SETS.format() + "[allowed").replace("over =", f'rivals = "{rivals}"\nover =')
+    (found,) = audit(written(data)).claims
+    (beside,) = {"paper", "other"} - {rivals}
+    assert (found.verdict, found.flips, found.verdicts[beside]) == (verdict, False, "refuted")
+    assert f"refuted with {beside} gains" in found.note
+    assert "sets of gains tried" not in found.beside[beside]
+    if verdict == "not shown":
+        assert found.beside[rivals]["sets of gains tried"] == 51
+
+
+def test_a_search_may_be_over_the_gains_of_another_law_than_the_first(written):
+    data = DATA.format(over="some", limit="> 3", plants='["duffing"]', margins="")
+    data = data.replace('laws = ["classical"]', 'laws = ["none", "classical"]\nsearched = "classical"')
+    assert decided(written(data))[0] == "supported"
+
+
 def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_the_best(written, snapshot):
     """No run is made: these numbers are the same on every machine."""
     margins = 'c = [0.5, 2.0]\nmargins = "margins"'
