@@ -17,10 +17,13 @@ at half the step, the median of their relative changes widens the others. For sh
 
 The test. A law is better than a rival if the number of pairs i <= j with d_i + d_j > -2 log(1 - r) is too large for the
 exact law of the signed ranks; r is the share that is relevant. That is F. Wilcoxon's test (Biometrics Bulletin 1(6),
-1945) in the form of J. W. Tukey: it rejects that the law is not lower by the share r. It is monotone: a law never loses
-a win because a value of its own falls, or one of its rival's rises. It does not depend on units. Besides, the law must
-not fail more often. The estimate is the median of the means of all pairs (J. L. Hodges, E. L. Lehmann, Annals of
-Mathematical Statistics 34(2), 1963), and an interval has the centres that the test does not reject.
+1945) in the form of J. W. Tukey: it rejects that the law is not lower by the share r. It is monotone: d never
+falls because a value of the law's own falls, or one of its rival's rises; so a winner that becomes better in its block
+stays its winner. There are two limits. Where some runs were repeated, a value that falls without that at half the step
+is a change by the step, and widens the others. And Holm's limit, below, depends on all p-values of the family. The test
+does not depend on units. Besides, the law must not fail more often. The estimate is the median of the means of all
+pairs (J. L. Hodges, E. L. Lehmann, Annals of Mathematical Statistics 34(2), 1963), and an interval has the centres that
+the test does not reject.
 
 The correction. There are two families, over all blocks of a metric in a table, however the table is grouped into
 boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided p-values.

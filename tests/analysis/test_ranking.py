@@ -517,6 +517,31 @@ def test_where_some_runs_are_repeated_the_median_change_widens_the_others():
         assert Comparison(cells, halves=halves).winners == [winner]
 
 
+@pytest.mark.parametrize("repeated", [1, 4])
+def test_a_winner_that_becomes_better_in_some_runs_stays_the_winner(repeated):
+    """In all runs y, y' or rho fall alone; where one run in four is repeated, y and y' of a run fall together."""
+    rng, wins = np.random.default_rng(7), 0
+    again = np.arange(12) % repeated == 0
+    for _ in range(120):
+        cells = {law: np.exp(rng.normal(rng.normal(0.0, 0.4, (2, 1)), 0.1, (2, 12))) for law in "abc"}
+        halves = {
+            law: np.where(again, y * np.exp(rng.normal(0.0, 0.05, (2, 12))), math.nan) for law, y in cells.items()
+        }
+        trends = {law: np.exp(rng.normal(0.05, 0.05, (2, 12))) for law in cells}
+        for block, winner in enumerate(Comparison(cells, 0.5, halves=halves, trends=trends).winners):
+            if winner is None:
+                continue
+            less = np.where(
+                (rng.random(12) < 0.4) & (np.arange(2) == block)[:, None], np.exp(-rng.exponential(1.0)), 1.0
+            )
+            parts = rng.integers(3) if repeated == 1 else 3
+            better = [of | {winner: of[winner] * less} if parts == k or (parts == 3 and k < 2) else of
+                      for k, of in enumerate((cells, halves, trends))]  # fmt: skip
+            assert Comparison(better[0], 0.5, halves=better[1], trends=better[2]).winners[block] == winner
+            wins += 1
+    assert wins > 50
+
+
 @pytest.mark.parametrize(
     ("law", "rho", "winner"), [("b", 0.86, None), ("b", 0.98, "a"), ("a", 1.16, None), ("a", 0.5, "a"), ("b", 2.0, "a")]
 )

@@ -1,0 +1,73 @@
+"""The picture of docs/winners.md: four comparisons of made-up laws A and B, decided by the package itself.
+
+`python docs/site/winners.py` draws docs/winners.svg again.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from smc_mujoco.analysis.ranking import LEVEL_SHARE, RELEVANT, Comparison
+
+FILE = Path(__file__).parents[1] / "winners.svg"
+UNITS = 12
+NUMBER = 3  # of the draw; any shows the same four verdicts
+
+
+def cases() -> list[tuple[str, Comparison]]:
+    """Return four comparisons of A with B, each with what is particular about it."""
+    drawn = np.random.default_rng(NUMBER).normal(size=(4, UNITS))
+    made = []
+    particular = {  # the spread of A's runs, its lead, the change by half the step
+        "A leads by about 20 %": (0.05, 0.2, 0.0),
+        "A and B are alike": (0.02, 0.0, 0.0),
+        "the searches differ much": (0.3, 0.1, 0.0),
+        "half the step undoes the lead": (0.04, 0.2, 0.3),
+    }
+    for name, (spread, lead, step) in particular.items():
+        a, b = np.exp(spread * drawn[len(made)]) * (1.0 - lead), np.ones(UNITS)
+        sets = dict.fromkeys("AB", np.arange(UNITS))
+        made.append((name, Comparison({"A": a, "B": b}, halves={"A": a * (1 + step), "B": b}, sets=sets)))
+    return made
+
+
+def verdict(comparison: Comparison) -> str:
+    """Return the verdict on A and B in words."""
+    if winner := comparison.winners[0]:
+        return f"{winner} beats B"
+    if comparison.level[0, 0, 1]:
+        return f"level within {100 * LEVEL_SHARE:.0f} %"
+    return f"cannot tell: would have seen {100 * comparison.visible(0, 'A', 'B'):.0f} %"
+
+
+def draw(file: Path = FILE) -> None:
+    """Draw a row for each comparison and a dot for each unit, at its lead."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    from smc_mujoco.draw import style
+
+    with style.page():
+        matplotlib.rcParams["svg.hashsalt"] = "winners"
+        figure = Figure(figsize=(7.0, 2.9), layout="constrained")
+        ax = figure.subplots()
+        ax.axvspan(-100 * LEVEL_SHARE, 100 * LEVEL_SHARE, color=style.GRID, lw=0)
+        ax.axvline(100 * RELEVANT, color=style.INK, ls="--", lw=1)
+        ax.text(100 * RELEVANT, 0.6, f" {100 * RELEVANT:.0f} %", va="top")
+        for row, (name, comparison) in enumerate(cases()):
+            as_run = 1.0 - comparison.cells[0, 0] / comparison.cells[1, 0]
+            charged = 1.0 - np.exp(-comparison.leads[0, 0, 1])
+            rows = np.full(UNITS, -row) + np.linspace(-0.22, 0.22, UNITS)
+            ax.hlines(rows, 100 * charged, 100 * as_run, color=style.MUTED, lw=1)
+            ax.plot(100 * as_run, rows, "o", ms=4, mfc="none", color=style.MUTED)
+            ax.plot(100 * charged, rows, "o", ms=4, color="#0072B2")
+            ax.text(58, -row + 0.12, name, va="bottom", color=style.MUTED)
+            ax.text(58, -row + 0.06, verdict(comparison), va="top", color=style.INK, weight="bold")
+        ax.set(xlim=(-80, 145), ylim=(-3.5, 0.65), yticks=[], xlabel="lead of A over B in a run (%)")
+        ax.set_xticks([-75, -50, -25, 0, 25, 50])
+        ax.spines["left"].set_visible(False)
+        figure.savefig(file, metadata={"Date": None, "Creator": None})
+
+
+if __name__ == "__main__":
+    draw()
