@@ -16,7 +16,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Plants: plant, plants, plant_from, Channel
     Conditions: condition, starts, Noise, Constant, Step, Sine, Pulse, Coulomb, Viscous, Encoder, Backlash, DCMotor,
         Lag
-    Compare: compare, which, tune, margins, grid, study, replay, leaderboard, Table
+    Compare: compare, which, tune, margins, grid, study, leaderboard, Table
     More to run and to look at: stream, scores, joint_scores, tip_scores, Scene, Outcome, play, clip, frames, live,
         choose_gl, ScenarioError, ScenarioWarning, GainWarning, PackageWarning, PlainLoopWarning
     Surfaces, estimators, design: surface, surfaces, surface_function, Surface, estimator, estimators,

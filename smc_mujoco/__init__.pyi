@@ -111,7 +111,6 @@ from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.outcome import Outcome as Outcome
-from smc_mujoco.studies.replay import replay as replay
 from smc_mujoco.studies.scene import Scene as Scene
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table

@@ -133,16 +133,6 @@ def present_objects_frozen():
     gc.freeze()
 
 
-@pytest.fixture(scope="module")
-def replayed_here():
-    """Replay runs of one's own laws in this process: its two processes take 2 s to start."""
-    from smc_mujoco.studies import replay
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(replay, "_in_fresh_process", lambda task, given: getattr(replay, task)(given))
-        yield
-
-
 @pytest.fixture(autouse=True, scope="session")
 def fixed_noise_key():
     """Draw the same noise key for every study, so that tests have the same numbers each time."""

@@ -24,7 +24,7 @@ from smc_mujoco.common.files import slug
 from smc_mujoco.evidence.rigs import ensemble
 from smc_mujoco.studies import fair_gains, scene
 
-pytestmark = [pytest.mark.quick, pytest.mark.usefixtures("replayed_here")]
+pytestmark = pytest.mark.quick
 
 README = PAGES[0].read_text()
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))

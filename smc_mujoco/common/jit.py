@@ -354,7 +354,10 @@ def reason(error: Exception) -> str:
 
 
 # Raises out of bounds and at division by zero. Without wrappers for Python, which would take half the time to compile.
-checked = njit(error_model="python", boundscheck=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+OPTIONS: dict[str, Any] = {"error_model": "python", "boundscheck": True}
+OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+checked = njit(**OPTIONS)
+CHECKED_OPTIONS = checked(lambda: None).targetoptions  # as numba keeps them
 _shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once for all laws
 
 
@@ -370,3 +373,15 @@ def jit(function: Callable) -> Callable:
         # shared only now: after an exception the copies may lack functions that they call
         _shared.update({f: copy for f, copy in copies.items() if (f.__module__ or "").startswith("smc_mujoco.")})
         return made
+
+
+def compiled_for(function: Callable, types: tuple[Any, ...]) -> Any:
+    """Return numba's result for a function that `jit` compiles for arguments of these types; raises NotCompilable."""
+    made: Any = jit(function)
+    try:
+        with delay_ctrl_c(), NUMBERS.given():
+            _load_numba()
+            made.compile(types)
+    except Exception as error:  # numba raises many types; each means that it cannot compile the function
+        raise NotCompilable(reason(error)) from None
+    return made.overloads[types]

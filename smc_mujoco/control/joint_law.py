@@ -201,7 +201,7 @@ def saturate(a):
 @njit
 def tanh(a):
     """Return the hyperbolic tangents of a vector. The bits are the same in Python and compiled, unlike numpy's."""
-    values = np.empty(len(a))
+    values = np.zeros(len(a))
     for i in range(len(a)):
         values[i] = math.tanh(a[i])
     return values

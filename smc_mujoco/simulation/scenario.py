@@ -214,6 +214,11 @@ class Scenario:
             return self.seed
         return int.from_bytes(hashlib.sha256(f"{self.noise_key} {self.seed}".encode()).digest()[:7]) % (MAX_SEED + 1)
 
+    @property
+    def checked(self) -> bool:
+        """Whether the code of its law, its surface and its estimator is checked, see `Law.checked`."""
+        return all(part.checked for part in (self.law, self.surface, self.velocity) if part)
+
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()
 

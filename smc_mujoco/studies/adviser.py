@@ -74,6 +74,7 @@ def which(
     threads: int | None = None,
     progress: bool = False,
     defaults: bool = False,
+    unchecked: bool = False,
     relevant: float = RELEVANT,
     noise_key: int | str = DRAWN,
     within: Uncertainty | None = None,
@@ -93,6 +94,7 @@ def which(
       quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64, and a third of an adversary's
         runs.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
+      unchecked: whether a law whose code is unchecked, see `Law.checked`, may be advised over checked ones.
       starts, relevant, noise_key, threads, progress: as in `compare`.
       within: the class for the need "robust". Default: that of `worst_case`.
 
@@ -120,6 +122,7 @@ def which(
         table=table,
         effort=effort,
         untuned=() if defaults else tuple(n for n, c in candidates.items() if c.law.source.kind == source.DEFAULT),
+        unchecked=() if unchecked else tuple(n for n, c in candidates.items() if not c.law.checked),
     )
 
 

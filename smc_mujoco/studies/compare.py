@@ -184,6 +184,7 @@ def compare(
     budget: int = search.BUDGET,
     quick: bool = False,
     defaults: bool = False,
+    unchecked: bool = False,
     relevant: float = RELEVANT,
     traces: str = "none",
     noise_key: int | str = DRAWN,
@@ -194,8 +195,8 @@ def compare(
 
     A law whose gains you gave keeps them. Any other law has those that come with the package for the plant, or is tuned
     by one rule, yours too: run i has the gains that search i found, so twelve searches are twelve answers to "what do
-    I get if I tune it?". The folder keeps each search and each run: after a kill, the same call goes on from there. One
-    run of each of your laws on each plant in each condition is replayed, see `replay`.
+    I get if I tune it?". The folder keeps each search and each run: after a kill, the same call goes on from there.
+    Laws whose code is unchecked, see `Law.checked`, are marked.
 
     Args:
       laws: names, or your own laws. Default: those of the report's first page, or else all that suit the plant.
@@ -207,7 +208,7 @@ def compare(
       worst: whether to search the worst case of each law on each plant too; or the class in which to search it.
       executor, noise_key, traces: as in `study`. Default: this machine, a new key, no traces.
       out: folder for gains and runs.
-      metrics, defaults, relevant: as in `leaderboard`.
+      metrics, defaults, unchecked, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
@@ -229,10 +230,11 @@ def compare(
     table = trial.run(candidates, count, executor=workers, traces=traces, noise_key=noise_key)
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
-    boards = leaderboard(table, metrics, by, defaults, relevant, found)
+    boards = leaderboard(table, metrics, by, defaults, relevant, found, unchecked)
     unseen = trial.unseen(candidates, count, int(table.column("noise_key")[0]))
     sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
-    boards[:0] = objective_boards(unseen, sources, defaults, relevant)
+    outside = {p: tuple(c.law.name for c in candidates[p] if not c.law.checked) for p in unseen}
+    boards[:0] = objective_boards(unseen, sources, defaults, relevant, outside, unchecked)
     return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found)
 
 

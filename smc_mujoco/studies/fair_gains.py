@@ -223,7 +223,7 @@ class Trial(NamedTuple):
         """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""
         grid = self.plants, lambda plant: candidates[plant.name], self.conditions, range(seeds)
         runs = all_combinations(*grid, self.duration, self.starts)
-        options |= {"replay": True, "half_steps": True, "threads": self.threads, "progress": self.progress}
+        options |= {"half_steps": True, "threads": self.threads, "progress": self.progress}
         return study(runs, self.folder, **options)
 
     def unseen(self, candidates: Mapping[str, Sequence[Candidate]], count: int, noise_key: int) -> dict[str, Unseen]:

@@ -64,6 +64,17 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
     }
 
 
+def withheld(scenario: Scenario) -> dict[str, Any]:
+    """Return the columns of a part that differ from those of `row`: they do not tell the noise key before the end."""
+    return {"noise_key": 0, "scenario": None} if scenario.noise_key else {}
+
+
+def secrets(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
+    """Return the columns that parts `withheld`, as the table has them."""
+    data = row(scenario, plants) if scenario.noise_key else {}
+    return {name: data[name] for name in withheld(scenario)}
+
+
 def source(scenario: Scenario) -> dict[str, str | None]:
     """Return the columns of a table that say where the run's gains come from."""
     about = scenario.law.source.about()

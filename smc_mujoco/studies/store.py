@@ -90,8 +90,8 @@ class Store:
     def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
         """Write the table of these finished runs, in this order.
 
-        `changes` is hash -> columns that replace those of the part: results of replays, and the source of the gains,
-        because the part may be from an earlier study whose gains had another source.
+        `changes` is hash -> columns that replace those of the part: scores at half the step, what a part does not tell,
+        and the source of the gains, because the part may be from an earlier study whose gains had another source.
         """
         import pyarrow as pa
 

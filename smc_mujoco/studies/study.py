@@ -7,11 +7,8 @@ changed.
 
 import contextlib
 import dataclasses
-import hashlib
-import json
 import os
 import sys
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -21,20 +18,18 @@ import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved, repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, printable, shown
-from smc_mujoco.common.files import slug, to_json, write_json
+from smc_mujoco.common.files import slug, to_json
 from smc_mujoco.common.progress import counter
-from smc_mujoco.common.text import counted
 from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, PLANTS
-from smc_mujoco.simulation.run import PlainLoopWarning, cores, run, stream
+from smc_mujoco.simulation.run import cores, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors, run_key
 from smc_mujoco.studies import noise_key as noise
 from smc_mujoco.studies.executors import Batch, ResultColumns
-from smc_mujoco.studies.replay import replays
 from smc_mujoco.studies.store import Store
 from smc_mujoco.studies.table import Table
 
@@ -43,8 +38,6 @@ IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mi
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 TRACES = ("none", "worst", "all")  # choices of traces to save
 REPEATED_SEEDS = 4  # one seed in so many is repeated at half the step, where no constraint acts under RK4; chosen
-REPLAYS = "replays.json"  # file in a study's folder
-OTHER_SCORES = "run again, it has other scores: the law keeps a state of its own, or reads a clock"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -77,7 +70,6 @@ def study(
     progress: bool = False,
     traces: str = "none",
     noise_key: int | str = 0,
-    replay: bool = False,
     half_steps: bool = False,
 ) -> Table:
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return it.
@@ -98,8 +90,6 @@ def study(
         run, else of one that never settles, else of the one with the largest ultimate bound.
       noise_key: key of all runs, see `Scenario`. "drawn": a new random key, or the folder's if the study goes on, so
         that no law can know its noise.
-      replay: whether to replay one run of each of your laws on each plant in each condition, see `smc.replay`. A run
-        whose commands do not follow from its measurements counts as failed.
       half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no winner that the step
         decides: all of them where constraints may act or the integrator is not RK4, elsewhere one seed in four.
 
@@ -114,26 +104,46 @@ def study(
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}
-    by_key: dict[str, Scenario] = {}
-    for scenario in noise.keyed(_checked(scenarios), noise_key, Path(out), resume):
-        by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
-    store.open(resume)
+    by_key = _by_key(_checked(scenarios), noise_key, store, Path(out), resume, plants)
     repeated = _repeated(by_key, plants) if half_steps else {}
     every = by_key | {name: scenario for name, scenario in repeated.values() if name not in by_key}
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
         print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     _compute(missing, store, plants, where, threads, progress, folder if traces == "all" else None)
-    changes = {name: run_key.source(scenario) for name, scenario in by_key.items()}
+    changes = {name: run_key.source(s) | run_key.secrets(s, plants) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():
         changes[name] = changes[name] | {"half_step": scores}
-    if replay:
-        for name, columns in _replayed(by_key, store, Path(out), threads, progress).items():
-            changes[name] = changes[name] | columns
     store.collect(list(by_key), changes)
+    if noise_key == noise.DRAWN:
+        noise.publish(Path(out), by_key.values())
     table = dataclasses.replace(Table.read(store.results), known=by_key)
     _save_traces(table, traces, folder, threads, progress)
     return table
+
+
+def _by_key(
+    scenarios: Iterator[Scenario],
+    noise_key: int | str,
+    store: Store,
+    out: Path,
+    resume: bool,
+    plants: run_key.Hashes,
+) -> dict[str, Scenario]:
+    """Return hash -> scenario with its noise key, and open the store. No unchecked law runs with a public key."""
+    given = list(scenarios) if noise_key == noise.DRAWN else scenarios
+    by_key: dict[str, Scenario] = {}
+    for scenario in noise.keyed(given, noise_key, out, resume):
+        by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
+    store.open(resume)
+    missing = [scenario for name, scenario in by_key.items() if name not in store.where]
+    if noise_key != noise.DRAWN or not noise.public(out) or all(scenario.checked for scenario in missing):
+        return by_key
+    print(
+        "an unchecked law may have read the noise key: a new one is drawn, and all runs are done again", file=sys.stderr
+    )
+    noise.forget(out)
+    return {run_key.key(s, plants=plants): s for s in noise.keyed(given, noise_key, out)}
 
 
 def _compute(
@@ -146,16 +156,17 @@ def _compute(
     traces: Path | None,
 ) -> None:
     """Compute runs, given by key, store their rows as they finish, and save the traces of local ones in a folder."""
-    keys = {id(scenario): key for key, scenario in missing.items()}  # made before any run: a law may change its globals
+    # made before any run: a law may change its globals
+    first = {id(scenario): {"hash": key, "checked": scenario.checked} for key, scenario in missing.items()}
 
     def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
         scenarios = [prepared.scenario for prepared in batch]
-        known = [run_key.row(scenario, plants) | {"hash": keys[id(scenario)]} for scenario in scenarios]
+        known = [run_key.row(s, plants) | run_key.withheld(s) | first[id(s)] for s in scenarios]
         store.add([row | result for row, result in zip(known, results, strict=True)])
 
     def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
         if traces:
-            for trace in finished:
+            for trace in (trace for trace in finished if not trace.scenario.noise_key):  # others are saved at the end
                 trace.save(trace_file(traces, run_key.row(trace.scenario, plants)))
         finish(batch, [executors.result_columns(trace) for trace in finished])
 
@@ -199,69 +210,6 @@ def _checked(scenarios: Any) -> Iterator[Scenario]:
         empty = False
     if empty:
         raise ScenarioError(f"scenarios is {shown(scenarios)}: give several, such as a list")
-
-
-# replays: one run of each of the user's laws on each plant in each condition, which no law can foresee
-
-
-def _replayed(
-    runs: Mapping[str, Scenario], store: Store, folder: Path, threads: int | None, progress: bool
-) -> dict[str, dict[str, Any]]:
-    """Replay chosen runs whose result is not in the folder. Return hash -> the columns that their replays change."""
-    chosen, known = _to_replay(runs), _stored_results(folder / REPLAYS)
-    if missing := [name for name in chosen if name not in known]:
-        if progress:
-            print(f"replaying {counted(len(missing), 'run')} of your laws", file=sys.stderr)
-        try:
-            known |= _replay_results({name: runs[name] for name in missing}, store, threads)
-            write_json(folder / REPLAYS, known)
-        except ScenarioError as error:
-            print(f"not replayed: {error}", file=sys.stderr)
-    nothing = dict.fromkeys((*(metric.name for metric in metrics()), "diverged_at"))
-    return {
-        name: {"replayed": True} if known[name] == "" else {**nothing, "replayed": False, "failure": known[name]}
-        for name in chosen
-        if known.get(name) is not None
-    }
-
-
-def _to_replay(runs: Mapping[str, Scenario]) -> list[str]:
-    """Return the hash of one run for each of the user's laws, on each plant in each condition.
-
-    The choice is the hash whose own hash is smallest. It depends on the noise key, so no law can foresee it.
-    """
-    groups: dict[tuple, list[str]] = {}
-    for name, scenario in runs.items():
-        if noise.has_user_code(scenario):
-            group = scenario.law.name, scenario.plant.name, run_key.condition(scenario)
-            groups.setdefault(group, []).append(name)
-    return [min(names, key=lambda name: hashlib.sha256(name.encode()).digest()) for names in groups.values()]
-
-
-def _stored_results(file: Path) -> dict[str, str | None]:
-    """Return results of replays from a file: hash -> what differs, "" for nothing, None if it cannot be replayed."""
-    try:
-        known = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return known if isinstance(known, dict) else {}
-
-
-def _replay_results(runs: Mapping[str, Scenario], store: Store, threads: int | None) -> dict[str, str | None]:
-    """Run and replay runs. Return hash -> what differs, as `_stored_results` does."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PlainLoopWarning)  # the study itself has warned
-        traces = run(list(runs.values()), threads=threads)
-    results: dict[str, str | None] = {}
-    for name, trace, replay in zip(runs, traces, replays(traces), strict=True):
-        row = store.row(name)
-        if replay.same is None and trace.failure is None:
-            print(f"not replayed: {trace.scenario.law.name}, {replay.why}", file=sys.stderr)
-        if any(row.get(column) != value for column, value in executors.result_columns(trace).items()):
-            results[name] = OTHER_SCORES
-        else:
-            results[name] = None if replay.same is None else replay.why
-    return results
 
 
 # saved traces

@@ -13,7 +13,7 @@ Columns:
 - how the run failed: `diverged_at` in s, and `failure`;
 - what `leaderboard` charges: `half_step`, the scores of the same run at half the physics step, as JSON, null where it
   was not repeated; `trends`, the ratios of the metrics of the last part to those before it, see `ranking`, as JSON;
-- `replayed`: whether its commands follow from its measurements alone, null if that was not tried, see `smc.replay`;
+- `checked`: whether the code of its law, surface and estimator reads its arguments alone, see `Law.checked`;
 - the data to repeat it, as JSON: `versions` and `scenario`.
 """
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 RUN_COLUMNS = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
 RUN_COLUMNS |= {"seed": "int64", "noise_key": "int64", "duration": "float64"}
 RESULT_COLUMNS = {"diverged_at": "float64", "failure": "string", "half_step": "string", "trends": "string"}
-RESULT_COLUMNS |= {"replayed": "bool"}
+RESULT_COLUMNS |= {"checked": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
 PREVIEW += ("settling_time", "ultimate_bound", "itae", "tv_rate", "failure")

@@ -30,19 +30,19 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "view vdp_noise --condition noise --label super_twisting": ["draw.viewer.watch"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
-    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --out there --figure f "
+    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --unchecked --out there --figure f "
     "--latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": ["studies.study.study", "studies.leaderboard.leaderboard"],
     "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
-    "--executor dask://a:1 --threads 2 --defaults --relevant 0.05 --noise-key 0": [
+    "--executor dask://a:1 --threads 2 --defaults --unchecked --relevant 0.05 --noise-key 0": [
         "studies.study.study",
         "studies.leaderboard.leaderboard",
     ],
     "which duffing": ["studies.adviser.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
-    "--relevant 0.05 --out there --defaults --disturbance 2 --threads 2": ["studies.adviser.which"],
+    "--relevant 0.05 --out there --defaults --unchecked --disturbance 2 --threads 2": ["studies.adviser.which"],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],

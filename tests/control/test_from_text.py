@@ -68,7 +68,6 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("replayed_here")
 @pytest.mark.filterwarnings("ignore:no set of gains tried")
 def test_a_tuning_goes_through_every_door(files, tuned, capsys):
     tuned.save("st.json")

@@ -388,7 +388,6 @@ def test_gains_of_the_package_are_taken_where_there_are_some(folder):
     assert found.law.source.kind == "shipped"
 
 
-@pytest.mark.usefixtures("replayed_here")
 def test_a_law_of_a_user_is_tuned_for_a_plant_once_and_its_gains_are_kept(folder, monkeypatch):
     gains = {"kp": Gain(0.01, FORCE_PER_POSITION), "kd": Gain(0.01, FORCE_PER_SPEED)}  # next to nothing
 

@@ -19,7 +19,6 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 from smc_mujoco.studies import executors, fair_gains, worst_case
 from smc_mujoco.studies.leaderboard import METRICS
 
-pytestmark = pytest.mark.usefixtures("replayed_here")
 SHORT = {"duration": 0.5, "budget": 48, "progress": False}
 PLANTS = ["duffing", "inverted_pendulum"]
 

@@ -1,20 +1,19 @@
-"""Cheats: laws that know more than their measurements. Each must be impossible, or shown in the table."""
+"""Cheats: laws that know more than their measurements. Each must be impossible, or marked in the table."""
 
 import json
 import secrets
 import sys
-import threading
-import time
+from pathlib import Path
 
 import mujoco
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.scenario import MAX_SEED
-from smc_mujoco.studies import noise_key, replay
-from smc_mujoco.studies.replay import replays
+from smc_mujoco.studies import noise_key, study
 
 NOISY = {"plant": "duffing", "duration": 0.4, "noise": smc.Noise(position=0.01, velocity=0.05)}
 CALLS = [0]
@@ -62,44 +61,6 @@ def peeks(y, gains, memory):
 
 
 @smc.law_function(gains={"k": 5.0})
-def peeks_for_s(y, gains, memory):
-    return -gains.k * (y.de + 3.0 * y.e), y.e if (data := plant_data()) is None else float(data.qpos[0])
-
-
-@smc.estimator_function
-def peeking_estimator(y, gains, memory):
-    return y.v if (data := plant_data()) is None else float(data.qvel[0])
-
-
-@smc.estimator_function
-def honest_estimator(y, gains, memory):
-    return y.v
-
-
-@smc.surface_function(gains={"c": 3.0})
-def honest_surface(y, gains, memory):
-    return y.de + gains.c * y.e, 0.0
-
-
-@smc.law_function(gains={"k": 5.0})
-def writes(y, gains, memory):
-    if (data := plant_data()) is not None:
-        data.qpos[0] *= 0.9
-    return -gains.k * (y.de + 3.0 * y.e), y.e
-
-
-@smc.law_function(gains={"k": 5.0})
-def counts_calls(y, gains, memory):
-    CALLS.append(CALLS.pop() + 1)
-    return -gains.k * (y.de + 3.0 * y.e) * (1.0 + 0.01 * (CALLS[0] * 0.618 % 1.0)), y.e
-
-
-@smc.law_function(gains={"k": 5.0})
-def reads_the_clock(y, gains, memory):
-    return -gains.k * (y.de + 3.0 * y.e) * (1.0 + 0.01 * (time.perf_counter_ns() % 7)), y.e
-
-
-@smc.law_function(gains={"k": 5.0})
 def gives_up(y, gains, memory):
     """Return NaN from the second sample on where it would do badly: at starts on one side."""
     bad = y.x > 1.55 if y.t == 0.0 else memory[0] != 0.0
@@ -111,9 +72,6 @@ def gives_up(y, gains, memory):
 def drawn(monkeypatch):
     """Draw keys here, which are fixed in all other tests."""
     monkeypatch.setattr(noise_key, "draw_key", lambda: secrets.randbelow(MAX_SEED) + 1)
-
-
-CHEATS = {law.name: law for law in (peeks, writes, counts_calls, reads_the_clock, peeks_for_s)}
 
 
 # the noise
@@ -202,100 +160,102 @@ def mine(y, gains, memory):
     assert ran(0.3, "(2.0 * WIDTH)", k=3.0) == "law mine has changed (its code)"
 
 
+@smc.law_function(gains={"k": 5.0})
+def looks(y, gains, memory):
+    """Note which files of the study tell its key while it runs."""
+    for file in filter(Path.is_file, LOOKED["folder"].rglob("*")):
+        text = str(pq.read_table(file).to_pylist()) if file.suffix == ".parquet" else file.read_bytes().decode("latin1")
+        LOOKED["calls"] += 1
+        LOOKED["told"] += [file.name] * (str(LOOKED["key"]) in text)
+    return -gains.k * (y.de + 3.0 * y.e), y.e
+
+
+LOOKED = {"calls": 0, "told": [], "folder": Path(), "key": 0}
+
+
+@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
+def test_the_key_is_in_the_folder_after_the_last_run_only(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(noise_key, "draw_key", lambda: 8_111_222_333_444_555)
+    monkeypatch.setitem(LOOKED, "folder", tmp_path / "a")
+    monkeypatch.setitem(LOOKED, "key", 8_111_222_333_444_555)
+    runs = smc.grid("duffing", ["pid", looks], "noise", seeds=2, duration=0.01)
+    smc.study(runs[::2], tmp_path / "a", noise_key="drawn", half_steps=True)  # parts, of the package's law
+    assert LOOKED["key"] == noise_key.json.loads((tmp_path / "a" / "noise_key.json").read_text())["key"]
+    (tmp_path / "a" / "results.parquet").unlink()
+    noise_key.forget(tmp_path / "a")
+    table = smc.study(runs, tmp_path / "a", noise_key="drawn", traces="all", half_steps=True)
+    told = LOOKED["told"]
+    assert LOOKED["calls"] > 20
+    first = told.index("noise_key.json")  # while the traces are made, after the last run
+    assert not told[:first]
+    assert {*table.column("noise_key").tolist()} == {LOOKED["key"]}
+    assert table.column("checked").tolist() == [run.checked for run in runs]
+    assert table.scenario(1).noise_key == LOOKED["key"]
+    assert not list((tmp_path / "state").rglob("*.json"))
+
+
+def test_a_study_that_was_killed_goes_on_with_its_key(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    runs = smc.grid("duffing", [honest, "pid"], "noise", seeds=3, duration=0.05)
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(noise_key, "publish", killed)
+        with pytest.raises(KeyboardInterrupt):
+            smc.study(runs, tmp_path / "a", noise_key="drawn")
+    assert not noise_key.public(tmp_path / "a")
+    (tmp_path / "a" / "results.parquet").unlink()
+    (kept,) = (tmp_path / "state").rglob("*.json")
+    key = json.loads(kept.read_text())["key"]
+    assert kept.stat().st_mode & 0o77 == 0
+    computed = []
+    monkeypatch.setattr(study, "_compute", lambda missing, *_: computed.extend(missing))
+    table = smc.study(runs, tmp_path / "a", noise_key="drawn")
+    assert not computed
+    assert {*table.column("noise_key").tolist()} == {key}
+    monkeypatch.undo()
+    given = smc.study(runs, tmp_path / "b", noise_key=key)
+    assert given.data.equals(table.data)
+
+
+@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
+def test_no_unchecked_law_runs_again_with_a_public_key(tmp_path, capsys):
+    runs = [smc.grid("duffing", [law], "noise", seeds=n, duration=0.01) for n in (1, 2) for law in (peeks, honest)]
+    keys = [[smc.study(its, tmp_path / its[0].law.name, noise_key="drawn").column("noise_key")[0]] for its in runs]
+    assert keys[1] == keys[3]
+    assert keys[0] != keys[2]
+    assert "an unchecked law may have read the noise key: a new one is drawn" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("key", ["often", -1, 2**53, 1.5])
 def test_a_wrong_key_is_one_sentence(tmp_path, key):
     with pytest.raises(smc.ScenarioError, match="noise_key is "):
         smc.study(smc.grid("duffing", "pid", duration=0.05), tmp_path, noise_key=key)
 
 
-# replays
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
-def test_a_replay_tells_cheats_from_honest_laws():
-    fields = NOISY | {"noise_key": 77}
-    laws = [honest(), *(law() for law in CHEATS.values()), smc.law("super_twisting"), smc.law("pid")]
-    runs = [smc.Scenario(**fields, law=law) for law in laws]
-    runs += [
-        smc.Scenario(
-            plant="inverted_pendulum", law="classical", model="nominal", sensor=smc.Encoder(4096), duration=0.4
-        ),
-        smc.Scenario(plant="double_pendulum", law=smc.law("computed_torque_sliding"), duration=0.3),
-        smc.Scenario(plant="duffing", law="pid", clock=smc.Clock(jitter=0.0005, missed=0.1), duration=0.4),
-        smc.Scenario(plant="duffing", law="pid", friction=smc.Coulomb(0.1), actuator=smc.DCMotor(), duration=0.4),
-        smc.Scenario(plant="duffing", law=honest, feedforward=smc.Sine(1.0, 2.0), input_delay=0.002, duration=0.4),
-    ]
-    quiet = fields | {"noise": smc.Noise(position=0.002, velocity=0.01), "model": "nominal"}
-    runs += [smc.Scenario(**quiet, law=law) for law in (peeks(k=0.2), honest)]  # which change u by less than 1 % of it
-    runs += [
-        smc.Scenario(**fields, law=honest, velocity=honest_estimator),
-        smc.Scenario(**fields, law="classical", surface=honest_surface),
-    ]
-    found = dict(zip([f"{i} {run.law.name}" for i, run in enumerate(runs)], replays(smc.run(runs)), strict=True))
-    assert {name.partition(" ")[2] for name, one in found.items() if not one.same} == {*CHEATS}
-    assert [one.same for name, one in found.items() if name.endswith(" peeks")] == [False, False]
-    assert "the plant does not move as recorded" in found["2 writes"].why
-    assert "the law computes other commands from its measurements alone" in found["1 peeks"].why
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """Replay in this process."""
-    monkeypatch.setattr(replay, "_in_fresh_process", lambda task, given: getattr(replay, task)(given))
+# the ranking
 
 
 @pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
-def test_an_estimator_of_a_user_s_is_replayed_without_the_plant(here):
-    brief = NOISY | {"noise_key": 77, "law": honest(k=0.2), "duration": 0.02}
-    runs = [smc.Scenario(**brief, velocity=each) for each in (peeking_estimator, honest_estimator)]
-    assert [one.same for one in replays(smc.run(runs))] == [False, True]
+def test_an_unchecked_law_is_marked_and_wins_over_no_checked_one(tmp_path):
+    table = smc.study(smc.grid("duffing", [calm, honest], "noise", 24, 0.05), tmp_path)
+    (board,) = smc.leaderboard(table, ["tv_rate"], defaults=True)
+    assert [(entry.law, entry.checked) for entry in board.entries] == [("calm", False), ("honest", True)]
+    assert board.winner is None
+    assert board.result == "no winner: calm is ahead of checked laws, but unchecked"
+    asked = smc.leaderboard(table, ["tv_rate"], defaults=True, unchecked=True)
+    assert asked[0].winner == "calm"
+    assert "unchecked" in str(asked)
+    assert "'unchecked': its code" in str(asked)
 
 
-def test_a_law_that_ends_its_process_is_a_cheat_and_one_that_cannot_be_sent_stops_no_other(here, monkeypatch):
-    lock = threading.Lock()
-
-    @smc.law_function
-    def locked(y, gains, memory):
-        return -5.0 * y.e + 0.0 * (lock is None), y.e
-
-    def ends(task, given):
-        if task == "commands_of" and any(b"honest" in law for law, _ in given):
-            raise smc.ScenarioError("a replay failed in its process")
-        return getattr(replay, task)(given)
-
-    monkeypatch.setattr(replay, "_in_fresh_process", ends)
-    runs = [smc.Scenario(plant="duffing", law=law, duration=0.01) for law in (locked, honest, smc.law("pid"))]
-    with pytest.warns(smc.PlainLoopWarning):
-        unsent, ended, fair = replays(smc.run(runs))
-    assert unsent.same is None
-    assert "cannot be sent to another process" in unsent.why
-    assert ended == (False, "the law ends the process in which it is replayed, or takes too long there")
-    assert fair.same
-
-
-@pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
-def test_a_cheat_is_a_failure_in_the_table(tmp_path, here):
-    runs = smc.grid("duffing", [honest, peeks, counts_calls, "pid"], "noise", seeds=2, duration=0.4)
-    table = smc.study(runs, tmp_path, noise_key=5, replay=True)
-    rows = {}
-    for row in table.rows():
-        rows.setdefault(row["law"], []).append((row["replayed"], row["failure"]))
-    assert sorted(rows["honest"], key=str) == [(None, None), (True, None)]
-    assert rows["pid"] == [(None, None)] * 2
-    for cheat in ("peeks", "counts_calls"):
-        ((verdict, why),) = [row for row in rows[cheat] if row[0] is not None]
-        assert verdict is False
-        assert why
-    boards = smc.leaderboard(table, ["tv_rate"])
-    assert {entry.law: entry.failed for entry in boards[0].entries} == {
-        "honest": 0,
-        "peeks": 1,
-        "counts_calls": 1,
-        "pid": 0,
-    }
-    results = json.loads((tmp_path / "replays.json").read_text())
-    assert len(results) == 3
+@smc.law_function(gains={"k": 5.0})
+def calm(y, gains, memory):
+    CALLS.append(CALLS.pop() + 1)
+    return 0.0, y.e
 
 
 # runs that fail

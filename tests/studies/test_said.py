@@ -3,15 +3,13 @@
 import dataclasses
 import math
 import pickle
-import subprocess
 import sys
 import threading
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 import pytest
-from helpers.sketch import failed, made
+from helpers.sketch import made
 from helpers.words import words
 
 import smc_mujoco as smc
@@ -28,7 +26,6 @@ from smc_mujoco.studies import (
     arms,
     executors,
     pickling,
-    replay,
     run_key,
     store,
     study,
@@ -231,7 +228,7 @@ def test_an_accuracy_has_these_runs_by_default(monkeypatch, snapshot):
     assert "\n".join([f"{threads} {gains} {scenarios[0].condition}", *runs]) == snapshot
 
 
-def test_what_cannot_be_sent_or_replayed_is_said_as_recorded(monkeypatch, capsys, tmp_path, snapshot):
+def test_what_cannot_be_sent_is_said_as_recorded(monkeypatch, snapshot):
     said = []
 
     def told(call, *given):
@@ -247,27 +244,7 @@ def test_what_cannot_be_sent_or_replayed_is_said_as_recorded(monkeypatch, capsys
     told(executors.run_on_worker, pickle.dumps([RUN]), ["key"])
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
     told(pickling.packed, threading.Lock())
-    trace = made(RUN)
-    unknown = dataclasses.replace(RUN.law, function=None)
-    said.append(replay._obstacle(dataclasses.replace(trace, scenario=dataclasses.replace(RUN, law=unknown))))
-    late = failed(trace, 1, "no"), failed(trace, 2, "no")
-    said += [replay._obstacle(one) for one in late] + [str(replay.Replay(True)), str(replay.replays([late[0]]))]
-    ended = subprocess.CompletedProcess([], 1, b"", b"Traceback\nValueError: no\n")
-    monkeypatch.setattr(replay.subprocess, "run", lambda *_, **__: ended)
-    told(replay._in_fresh_process, "verify", [])
-    monkeypatch.setattr(replay.subprocess, "run", mock.Mock(side_effect=subprocess.TimeoutExpired("x", 600.0)))
-    told(replay._in_fresh_process, "verify", [])
-    monkeypatch.setattr(study.noise, "has_user_code", lambda scenario: True)
-    monkeypatch.setattr(study.run_key, "condition", lambda scenario: "nominal")
-    monkeypatch.setattr(study, "_replay_results", mock.Mock(side_effect=smc.ScenarioError("it cannot be sent")))
-    runs = {"a": RUN, "b": dataclasses.replace(RUN, law=smc.law("pid"))}
-    said.append(str(study._replayed(runs, None, tmp_path, None, True)))
-    monkeypatch.setattr(study, "_replay_results", lambda runs, *_: dict.fromkeys(runs, "it differs") | {"b": ""})
-    for progress in (True, False):
-        found = study._replayed(runs, None, tmp_path, None, progress)
-    said += [str({name: {k: v for k, v in row.items() if v is not None} for name, row in found.items()})]
-    said += [str({name: len(row) > 2 for name, row in found.items()}), (tmp_path / "replays.json").read_text()]
-    assert "\n".join([*said, capsys.readouterr().err]) == snapshot
+    assert "\n".join(said) == snapshot
 
 
 def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):

@@ -69,6 +69,9 @@ Condition = Annotated[
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
+Unchecked = Annotated[
+    bool, typer.Option("--unchecked", help="Name a winner whose code is unchecked also over checked laws.")
+]
 Defaults = Annotated[bool, typer.Option("--defaults", help="Name a winner also over laws with default gains.")]
 Disturbance = Annotated[
     float | None, typer.Option(min=0.0, help="Bound on |d|, N or N m; default that of the plant or the condition.")

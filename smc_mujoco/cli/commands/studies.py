@@ -36,6 +36,7 @@ def which(
     relevant: options.Relevant = RELEVANT,
     out: options.Folder = Path("which"),
     defaults: options.Defaults = False,
+    unchecked: options.Unchecked = False,
     disturbance: options.Disturbance = None,
     threads: options.Threads = None,
 ) -> None:
@@ -57,7 +58,7 @@ def which(
     terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0)
     advice = advise(
         plant, tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
-        quick, threads, progress=True, defaults=defaults, relevant=relevant,
+        quick, threads, progress=True, defaults=defaults, unchecked=unchecked, relevant=relevant,
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )  # fmt: skip
     terminal.print(advice)
@@ -78,6 +79,7 @@ def compare(
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
     defaults: options.Defaults = False,
+    unchecked: options.Unchecked = False,
     out: options.Folder = Path("compared"),
     figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
@@ -91,9 +93,9 @@ def compare(
 
     A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of the package for the
     plant, or is tuned by the same rule, seconds to minutes for each law on each plant. If you stop the command, it
-    continues when you start it again. One run of each of your laws is replayed: it must get its commands from its
-    measurements alone. --law all compares every general law. With --rig a line for each metric says if one law wins on
-    all sets.
+    continues when you start it again. Laws whose code is unchecked are marked, and none is named the winner over
+    checked ones without --unchecked. --law all compares every general law. With --rig a line for each metric says if
+    one law wins on all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
 
@@ -108,14 +110,16 @@ def compare(
         if plants or condition or gains != "tuned" or worst or figure or latex or traces != "none":
             others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
             raise ScenarioError(f"--rig brings its own plant, parameter sets and gains: leave out {others}")
-        _compare_on_rig(rig, law, seeds, duration, start, relevant, defaults, out, executor, key, threads, terminal)
+        _compare_on_rig(
+            rig, law, seeds, duration, start, relevant, defaults, unchecked, out, executor, key, threads, terminal
+        )
         return
     options.check_files(None, latex, *files(figure))
     machines = options.names(plants)
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        relevant=relevant, traces=traces, noise_key=key, threads=threads,
+        unchecked=unchecked,        relevant=relevant, traces=traces, noise_key=key, threads=threads,
     )  # fmt: skip
     terminal.print(comparison)
     if latex:
@@ -129,7 +133,7 @@ def compare(
 
 def _compare_on_rig(
     rig: str, law: list[str] | None, seeds: int, duration: float | None, starts: "Starts | None", relevant: float,
-    defaults: bool, out: Path, executor: str, key: int | str, threads: int | None, terminal: Terminal,
+    defaults: bool, unchecked: bool, out: Path, executor: str, key: int | str, threads: int | None, terminal: Terminal,
 ) -> None:  # fmt: skip
     """Compare laws over the parameter sets of a rig, and say if one law wins on all sets."""
     from smc_mujoco.common import annexes
@@ -140,8 +144,8 @@ def _compare_on_rig(
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
     chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
     scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, replay=True, half_steps=True)
-    boards = leaderboard(table, defaults=defaults, relevant=relevant)
+    table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, half_steps=True)
+    boards = leaderboard(table, defaults=defaults, relevant=relevant, unchecked=unchecked)
     terminal.print(boards)
     terminal.note(ensemble.verdict(boards))
     _finish(table, out, terminal)

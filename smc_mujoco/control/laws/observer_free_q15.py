@@ -24,6 +24,7 @@ from smc_mujoco.control.units import FORCE, POSITION, RATE, SPEED, Gain
 
 UNITS, MAX_WORD = 32768, 32767
 TABLE = np.array([round(MAX_WORD * math.tanh(8.0 * i / 256)) for i in range(257)], np.int64)  # each fits 16 bits
+TABLE.flags.writeable = False
 
 
 @njit

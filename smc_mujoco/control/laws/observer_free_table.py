@@ -19,6 +19,7 @@ from smc_mujoco.control.units import FORCE, RATE, Gain
 
 MAX_STEPS, MAX_S = 256, 5.0  # steps; 1 - tanh(5) = 9.1e-5 is the error of linear interpolation at 256 steps
 TABLE = np.array([math.tanh(MAX_S * i / MAX_STEPS) for i in range(MAX_STEPS)] + [1.0])
+TABLE.flags.writeable = False
 
 
 @law_function(

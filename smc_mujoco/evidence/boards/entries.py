@@ -97,9 +97,10 @@ def _along(robot: str) -> Template:
     """Return the law along the trajectory of a robot; (x, v) are the driven joint's, (q, dq) the free one's."""
     table = read_json(TRAJECTORY_FOLDER / f"{robot}.json")
     STEP, LAST = float(table["step"]), len(table["u"]) - 1
-    X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = (
-        np.array(table[name]) for name in ("x", "v", "a", "q", "dq", "ddq", "u", "s_x", "s_v", "s_q", "s_dq")
-    )
+    names = ("x", "v", "a", "q", "dq", "ddq", "u", "s_x", "s_v", "s_q", "s_dq")
+    arrays = X, V, A, Q, DQ, DDQ, U, SX, SV, SQ, SDQ = [np.array(table[name]) for name in names]
+    for array in arrays:
+        array.flags.writeable = False  # as constants of a checked law are
 
     def law(y, gains, memory):
         place = y.t / STEP

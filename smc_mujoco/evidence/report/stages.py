@@ -158,7 +158,7 @@ def grid(work: Work) -> Table:
     runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
     with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
         key = DRAWN if any(map(has_user_code, runs)) else 0  # the paper's claims share the runs of the package's laws
-        options: dict[str, Any] = {"noise_key": key, "replay": True, "half_steps": True}
+        options: dict[str, Any] = {"noise_key": key, "half_steps": True}
         return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, **options)
 
 

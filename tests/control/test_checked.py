@@ -1,0 +1,442 @@
+"""Checked laws: no cheat is called checked, every honest law is, and the decision costs a run nothing."""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import ctypes
+import ctypes.util
+import dataclasses
+import math
+import time
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import pytest
+from llvmlite import ir
+from numba import carray, objmode
+from numba.core import types
+from numba.extending import intrinsic, lower_builtin, overload
+
+import smc_mujoco as smc
+from smc_mujoco.common.jit import call, pointer
+from smc_mujoco.control import checked, estimator, joint_law, surface
+from smc_mujoco.control.law import known_laws
+
+WRITEABLE, FROZEN = np.arange(4.0), np.arange(4.0)
+FROZEN.flags.writeable = False
+BIG = np.zeros(2**18)  # numba reads arrays of this size in place
+BIG.flags.writeable = False
+TABLE: dict[float, float] = {}
+LIST, COUNT = [1.0, 2.0], 0
+ADDRESS = 4096
+C_TIME = ctypes.CDLL(ctypes.util.find_library("c")).clock
+C_TIME.restype, C_TIME.argtypes = ctypes.c_long, []
+
+
+@numba.cfunc("float64(float64)")
+def from_elsewhere(x):
+    return 2.0 * x
+
+
+@intrinsic
+def ticks(typingctx):
+    def codegen(context, builder, signature, args):
+        kind = ir.FunctionType(ir.IntType(64), [])
+        return builder.call(builder.module.declare_intrinsic("llvm.readcyclecounter", fnty=kind), [])
+
+    return types.int64(), codegen
+
+
+@lower_builtin(np.spacing, types.float64)
+def _address(context, builder, signature, args):  # a mathematical function's name for the contents of an address
+    return builder.load(builder.inttoptr(ir.Constant(ir.IntType(64), ADDRESS), ir.DoubleType().as_pointer()))
+
+
+@lower_builtin(math.erfc, types.Float)
+def _clock(context, builder, signature, args):
+    kind = ir.FunctionType(ir.IntType(64), [])
+    now = builder.call(builder.module.declare_intrinsic("llvm.readcyclecounter", fnty=kind), [])
+    return builder.sitofp(now, ir.DoubleType())
+
+
+@lower_builtin(math.gamma, types.Float)
+def _counts(context, builder, signature, args):
+    kept = ir.GlobalVariable(builder.module, ir.DoubleType(), "kept_between_calls")
+    kept.initializer = ir.Constant(ir.DoubleType(), 0.0)
+    builder.store(builder.fadd(builder.load(kept), args[0]), kept)
+    return builder.load(kept)
+
+
+@lower_builtin(math.lgamma, types.Float)
+def _by_address(context, builder, signature, args):
+    kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()]).as_pointer()
+    return builder.call(builder.inttoptr(builder.fptosi(args[0], ir.IntType(64)), kind), args)
+
+
+@overload(np.heaviside)
+def _heaviside(a, b):
+    return lambda a, b: np.lib.stride_tricks.as_strided(a, (10_000,), (8,))[5_000]
+
+
+@numba.njit
+def helper(a):
+    return np.random.normal() * a  # noqa: NPY002
+
+
+CHEATS = {}
+
+
+def cheat(function):
+    CHEATS[function.__name__] = function
+    return function
+
+
+@cheat
+def global_dict(y, gains, memory):
+    if y.t not in TABLE:
+        TABLE[y.t] = y.x
+    return TABLE[y.t], y.e
+
+
+@cheat
+def counts_in_a_global(y, gains, memory):
+    global COUNT  # noqa: PLW0603
+    COUNT += 1
+    return -y.e * COUNT, y.e
+
+
+@cheat
+def writes_a_global_array(y, gains, memory):
+    WRITEABLE[0] += 1.0
+    return -y.e * WRITEABLE[0], y.e
+
+
+@cheat
+def reads_a_global_array(y, gains, memory):
+    return -y.e * WRITEABLE[1], y.e
+
+
+@cheat
+def reads_an_array_in_place(y, gains, memory):
+    return -y.e * BIG[1], y.e
+
+
+@cheat
+def reads_a_list(y, gains, memory):
+    return -y.e * LIST[1], y.e
+
+
+@cheat
+def reads_the_key(y, gains, memory):
+    with open("noise_key.json") as file:
+        return -y.e * len(file.read()), y.e
+
+
+@cheat
+def key_in_object_mode(y, gains, memory):
+    with objmode(size="float64"):
+        size = float(len(open("noise_key.json").read()))  # noqa: SIM115
+    return -y.e * size, y.e
+
+
+@cheat
+def time_in_object_mode(y, gains, memory):
+    with objmode(now="float64"):
+        now = time.time()
+    return -y.e * now, y.e
+
+
+@cheat
+def reads_the_clock(y, gains, memory):
+    return -y.e * time.perf_counter(), y.e
+
+
+@cheat
+def calls_ctypes(y, gains, memory):
+    return -y.e * C_TIME(), y.e
+
+
+@cheat
+def calls_a_pointer(y, gains, memory):
+    return from_elsewhere(y.e), y.e
+
+
+@cheat
+def reads_an_address(y, gains, memory):
+    return carray(pointer(ADDRESS), (1,))[0], y.e
+
+
+@cheat
+def calls_an_address(y, gains, memory):
+    return float(call(ADDRESS, 0, 0, 0, 0)), y.e
+
+
+@cheat
+def beyond_its_memory(y, gains, memory):
+    return carray(pointer(memory.ctypes.data), (10_000,))[5_000], y.e
+
+
+@cheat
+def strides_beyond_its_memory(y, gains, memory):
+    return np.lib.stride_tricks.as_strided(memory, (10_000,), (8,))[5_000], y.e
+
+
+@cheat
+def carries_beyond_its_memory(y, gains, memory):
+    return carray(memory.ctypes, (10_000,))[5_000], y.e
+
+
+@cheat
+def address_as_a_number(y, gains, memory):
+    return float(memory.ctypes.data), y.e
+
+
+@cheat
+def draws(y, gains, memory):
+    return -y.e * np.random.random(), y.e  # noqa: NPY002
+
+
+@cheat
+def draws_in_a_helper(y, gains, memory):
+    return helper(y.e), y.e
+
+
+@cheat
+def prints(y, gains, memory):
+    print(y.x)
+    return -y.e, y.e
+
+
+@cheat
+def says_in_an_exception(y, gains, memory):
+    if y.t > 1.0:
+        raise ValueError(y.x)
+    return -y.e, y.e
+
+
+@cheat
+def catches(y, gains, memory):
+    try:
+        memory[0] = 1.0 / y.e
+    except Exception:
+        memory[0] = 0.0
+    return -memory[0], y.e
+
+
+@cheat
+def counts_cycles(y, gains, memory):
+    return -y.e * ticks(), y.e
+
+
+@cheat
+def reads_what_is_left(y, gains, memory):
+    return np.empty(1000)[500], y.e
+
+
+@cheat
+def fancy_index(y, gains, memory):
+    return memory[np.array([5_000])][0], y.e
+
+
+@cheat
+def lowered_to_an_address(y, gains, memory):
+    return np.spacing(y.e), y.e
+
+
+@cheat
+def lowered_to_a_clock(y, gains, memory):
+    return math.erfc(y.e), y.e
+
+
+@cheat
+def lowered_to_a_variable(y, gains, memory):
+    return math.gamma(y.e), y.e
+
+
+@cheat
+def lowered_to_a_call(y, gains, memory):
+    return math.lgamma(y.e), y.e
+
+
+@cheat
+def overloaded(y, gains, memory):
+    return np.heaviside(memory, memory), y.e
+
+
+def made():
+    kept, array = [0.0], np.zeros(3)
+
+    @cheat
+    def counts_in_its_closure(y, gains, memory):
+        kept[0] += 1.0
+        return -y.e * kept[0], y.e
+
+    @cheat
+    def reads_its_closure_array(y, gains, memory):
+        return -y.e * array[0], y.e
+
+
+made()
+
+
+@numba.njit
+def factorial(k):
+    return 1.0 if k < 1 else k * factorial(k - 1)
+
+
+@cheat
+def calls_itself(y, gains, memory):  # which is no cheat, but numba does it by an address
+    return -y.e * factorial(3), y.e
+
+
+def reads_the_handle(y, gains, memory):
+    return y.e * float(y.dynamics), y.e
+
+
+def reads_the_handle_by_number(y, gains, memory):
+    return y.e * float(y[3]), y.e
+
+
+def makes_a_handle(y, gains, memory):
+    other = joint_law.JointMeasurement(
+        y.t, y.dt, y.model, ADDRESS, y.x, y.v, y.e, y.de, y.r, y.dr, y.ddr, y.a, y.limit, y.M, y.h, y.g
+    )
+    return joint_law.coriolis(other, y.v), y.e
+
+
+@pytest.mark.parametrize("name", CHEATS)
+def test_no_cheat_is_called_checked(name):
+    law = smc.law_function(CHEATS[name])()
+    assert not law.checked
+    assert law.why_unchecked.startswith(f"law {name} is unchecked: it ")
+    assert "\n" not in law.why_unchecked
+
+
+@pytest.mark.parametrize("function", [reads_the_handle, reads_the_handle_by_number, makes_a_handle])
+def test_no_law_of_many_joints_gets_at_the_address_of_the_model(function):
+    assert not smc.law_function(joint=True)(function)().checked
+
+
+def test_what_numba_did_not_compile_is_unchecked(tmp_path):
+    source = tmp_path / "honest.c"
+    source.write_text(
+        '#include "smc_law.h"\n'
+        "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out) "
+        "{ out[0] = -5.0 * y->e; out[1] = y->e; return 0; }\n"
+    )
+    assert smc.law_from_c(source)().why_unchecked == (
+        "law honest is unchecked: it is machine code that numba did not compile"
+    )
+
+
+TUPLES = ((1.0, 2.0), (3.0, 4.0))
+
+
+class Limits(NamedTuple):
+    low: float
+    high: float
+
+
+BOTH = Limits(-1.0, 1.0)
+
+
+@numba.njit
+def clipped(a):
+    return min(max(a, BOTH.low), BOTH.high)
+
+
+def helpers(y, gains, memory):
+    return -gains.k * clipped(y.e), y.e
+
+
+def loops(y, gains, memory):
+    total = 0.0
+    for i, row in enumerate(TUPLES):
+        for value in row:
+            total += value * i
+    k = 0
+    while k < len(memory):
+        memory[k] = memory[k - 1] + total
+        k += 1
+    return -gains.k * y.e - memory[-1], y.e
+
+
+def numpy_scalars(y, gains, memory):
+    values = np.array([y.e, y.de, 1.0]) + np.zeros(3)
+    values[:2] = np.clip(values[:2], -1.0, 1.0)
+    return -gains.k * np.tanh(values[0]) * FROZEN[1] - np.dot(values, values) + np.sign(y.e) * math.hypot(
+        y.e, y.de
+    ), y.e
+
+
+def lists(y, gains, memory):
+    values = [y.e, y.de]
+    values.append(round(y.t / y.dt) % 7)
+    return -gains.k * sum(values) + math.floor(y.x) ** 2, y.e
+
+
+def raises(y, gains, memory):
+    if y.e > 1e9:
+        raise ValueError("too far")
+    return -gains.k * y.e, y.e
+
+
+def within(y, gains, memory):
+    def doubled(a):
+        return 2.0 * a
+
+    return -gains.k * doubled(y.e), y.e
+
+
+HONEST = [helpers, loops, numpy_scalars, lists, raises, within]
+
+
+@pytest.mark.parametrize("function", HONEST, ids=lambda f: f.__name__)
+def test_an_honest_law_of_a_user_s_is_checked(function):
+    assert smc.law_function(gains={"k": 2.0})(function)().why_unchecked == ""
+
+
+def test_a_law_of_many_joints_is_checked_with_its_shared_gains():
+    @smc.law_function(joint=True, gains={"k": 2.0, "c": smc.control.units.Gain(1.0, shared=True)})
+    def product(y, gains, memory):
+        memory[:, 0] += y.dt * y.e
+        return -gains.k * (y.M @ y.e) - gains.c * joint_law.coriolis(y, y.v) - memory[:, 0], y.e
+
+    assert product().why_unchecked == ""
+
+
+CATALOGUE = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+
+
+@pytest.mark.parametrize("template", CATALOGUE, ids=lambda t: f"{t.kind}-{t.name}")
+def test_the_catalogue_is_checked(template):
+    assert template.bind({}).why_unchecked == ""
+
+
+def test_an_index_beyond_the_memory_ends_the_run():
+    @smc.law_function(memory=2)
+    def beyond(y, gains, memory):
+        return memory[100] + memory[int(1e6 * y.e)], y.e
+
+    law = beyond()
+    assert law.checked
+    assert smc.run(smc.Scenario(plant="duffing", law=law, duration=0.05)).failure is not None
+
+
+def test_the_types_are_those_with_which_the_callback_compiles():
+    from smc_mujoco.common.jit import jit
+    from smc_mujoco.simulation.cfunctions import compile_component
+
+    for law in (smc.law_function(gains={"k": 2.0})(helpers)(), smc.law_function(gains={"k": 2.0})(loops)()):
+        assert law.checked
+        before = len(vars(jit(law.function))["overloads"])
+        compile_component(law)
+        assert len(vars(jit(law.function))["overloads"]) == before == 1
+
+
+def test_the_decision_is_made_once(monkeypatch):
+    law = smc.law_function(gains={"k": 2.0})(raises)()
+    assert law.checked
+    monkeypatch.setattr(checked, "compiled_for", None)
+    assert law.checked
+    assert dataclasses.replace(law, gains={"k": 5.0}).checked
