@@ -15,8 +15,14 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-TOLERANCE = 0.1  # relative change of amplitude or frequency above which a number of chattering is marked: chosen
 MARK = "*"  # behind such a number
+MAX_SCORE_CHANGE = 0.05  # relative change of a score above which it is marked: chosen
+NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
+SCORE_NOTE = (
+    f"{MARK} changes by more than {100 * MAX_SCORE_CHANGE:g} % at half the physics step, or from a start moved by "
+    f"{NUDGE:g} of itself: the smallest and the largest value"
+)
+TOLERANCE = 0.1  # relative change of amplitude or frequency above which a number of chattering is marked: chosen
 NOTE = f"{MARK} half the physics step changes it by more than {100.0 * TOLERANCE:g} %: give a shorter physics_step"
 UNTRIED = (
     "chattering without RK4 was not compared with that of half the physics step, which may change it by more than "
@@ -50,6 +56,20 @@ def repeats_all(scenario: Scenario) -> bool:
 def halved(scenario: Scenario) -> Scenario:
     """Return the same scenario at half its physics step. Raise ScenarioError if that is too short."""
     return dataclasses.replace(scenario, physics_step=0.5 * scenario.resolved.physics_step)
+
+
+def nudged(scenario: Scenario) -> Scenario:
+    """Return the same scenario from a start that is moved by 1e-9 of itself."""
+    return dataclasses.replace(scenario, x0=tuple((1.0 + NUDGE) * x for x in scenario.resolved.x0))
+
+
+def apart(values: Sequence[float], least: float = 0.0) -> bool:
+    """Return whether scores of a run and of the same run at half the step, or nudged, are more than 5 % apart.
+
+    Values below `least` matter in no problem, see `paired_runs.floor`. NaN is a run without the score.
+    """
+    known = [max(abs(value), least) for value in values if not math.isnan(value)]
+    return len(known) > 1 and max(known) > (1.0 + MAX_SCORE_CHANGE) * min(known)
 
 
 def step_halving(traces: Sequence[Trace], channel: int | None = None, threads: int | None = None) -> list[StepChange]:

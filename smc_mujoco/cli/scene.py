@@ -1,23 +1,27 @@
 """Running a scene: from its declaration to printed scores, traces, figures and a film."""
 
 import contextlib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+from smc_mujoco.analysis.step_halving import NUDGE, apart, halved, nudged
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
-from smc_mujoco.common.errors import printable
+from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import slug
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film.camera import Camera
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies.scene import Scene
 
 Traces = Mapping[str, Mapping[str, Trace]]  # condition -> label -> Trace
+NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 Timer = Callable[[str], AbstractContextManager[None]]
 
 
@@ -30,24 +34,35 @@ def perform(
     terminal: Terminal,
     export: Sequence[str],
     question: str,
+    repeated: bool = True,
 ) -> None:
-    """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`."""
+    """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
+
+    Runs are `repeated` at half the physics step, and from a nudged start: what then differs is marked.
+    """
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
     out.mkdir(parents=True, exist_ok=True)
     traces = simulate(scene, threads, clock)
+    with clock("repeating"):
+        again = repeat(scene, threads) if repeated else {}
     for condition, runs in traces.items():
-        for table in [*tables.scores(_title(scene, condition), runs), *tables.tips(_title(scene, condition), runs)]:
+        title = _title(scene, condition)
+        for table in [*tables.scores(title, runs, again.get(condition)), *tables.tips(title, runs)]:
             terminal.print(table)
         for label, trace in runs.items():
             if trace.failure:
                 terminal.note(f"{label}: {trace.failure}", "red", wrap=True)
         terminal.print()
-    for table in tables.answers(scene.answers, traces) if scene.answers else ():
+    for table in tables.answers(scene.answers, traces, again) if scene.answers else ():
         terminal.print(table, "")
     with clock("traces"):  # first, so that runs are kept if the scene's own answer fails
         written = save(traces, out, export)
-    terminal.note(f"{scene.sentence(traces)}\n", "bold", wrap=True)
+    answer = scene.sentence(traces)
+    terminal.note(answer, "bold", wrap=True)
+    for words in other_answers(scene, traces, again, answer) if again else ():
+        terminal.note(words, "yellow", wrap=True)
+    terminal.print()
     with clock("figures"):
         written += figures(scene, traces, out)
     try:
@@ -74,6 +89,43 @@ def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullco
     for (condition, label, _), trace in zip(runs, made, strict=True):
         traces.setdefault(condition, {})[label] = trace
     return traces
+
+
+def repeat(scene: Scene, threads: int | None) -> dict[str, dict[str, list[Trace]]]:
+    """Return condition -> label -> the same run at half the physics step, and from a nudged start."""
+    changed: list[tuple[str, str, Scenario]] = []
+    for condition, label, scenario in scene.runs():
+        try:
+            changed += [(condition, label, halved(scenario)), (condition, label, nudged(scenario))]
+        except ScenarioError:  # its step cannot be halved
+            continue
+    made: dict[str, dict[str, list[Trace]]] = {}
+    for (condition, label, _), trace in zip(
+        changed, run([s for *_, s in changed], threads, progress=True), strict=True
+    ):
+        made.setdefault(condition, {}).setdefault(label, []).append(trace)
+    return made
+
+
+def other_answers(scene: Scene, traces: Traces, again: Mapping[str, tables.Again], answer: str) -> list[str]:
+    """Return the scene's answer at half the physics step and from nudged starts, where it says something else."""
+    said = []
+    for k, words in enumerate(("At half the physics step", f"From starts moved by {NUDGE:g} of themselves")):
+        runs = {
+            c: {label: again.get(c, {}).get(label, [t, t])[k] for label, t in its.items()} for c, its in traces.items()
+        }
+        other = scene.sentence(runs)
+        if not same_answer(answer, other):
+            said.append(f"{words}: {other}")
+    return said
+
+
+def same_answer(one: str, other: str) -> bool:
+    """Return whether two answers say the same: equal words, and numbers that are no more than 5 % apart."""
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    pairs = zip(map(float, NUMBER.findall(one)), map(float, NUMBER.findall(other)), strict=True)
+    return not any(apart(pair) for pair in pairs)
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:

@@ -10,7 +10,8 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
-from smc_mujoco.analysis.step_halving import MARK, NOTE
+from smc_mujoco.analysis.paired_runs import floor
+from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, apart
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.step_halving import StepChange
 
 T = TypeVar("T")
+Again = Mapping[str, Sequence[Trace]]  # label -> the same run at half the physics step, and from a nudged start
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
     "largest\nerror": ("max_error", "mm", 1e3),
     "error at\nthe end": ("last_error", "mm", 1e3),
@@ -68,24 +70,46 @@ def plain(*columns: Column | str, **options: Any) -> Table:
 # scores of runs
 
 
-def scores(title: str, traces: Mapping[str, Trace]) -> list[Table]:
-    """Return a table for each group of channels, with a line for each run and a column for each metric."""
+def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
+    """Return a table for each group of channels, with a line for each run and a column for each metric.
+
+    Scores that differ in the same runs `again` are marked, with the largest and the smallest value.
+    """
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
-    values = {label: metric_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
-    tables = []
+    values = {label: _several(trace, again, label) for label, trace in traces.items() if trace.diverged_at is None}
+    tables, marked = [], False
     for group, heading in headings(scenario).items():
         units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
         shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
         rows = {
-            label: [_score_text(name, its[group.name][name]) for name in shown.values()]
+            label: [
+                _marked(name, [one[group.name][name] for one in its], traces[label].scenario) for name in shown.values()
+            ]
             for label, its in values.items()
         }
+        marked |= any(MARK in text.plain for row in rows.values() for text in row)
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
-    tables[-1].caption, tables[-1].caption_justify = in_words(gains) or None, "left"
+    caption = "; ".join(filter(None, (in_words(gains), SCORE_NOTE * marked)))
+    tables[-1].caption, tables[-1].caption_justify = caption or None, "left"
     return tables
+
+
+def _several(trace: Trace, again: Again | None, label: str) -> list[dict[str, dict[str, float]]]:
+    """Return the scores of a run, then those of the same runs again that did not fail."""
+    others = [other for other in (again or {}).get(label, ()) if other.diverged_at is None]
+    return [metric_scores(one) for one in (trace, *others)]
+
+
+def _marked(metric: str, values: Sequence[float], scenario: Scenario) -> Text:
+    """Return a score as text; with its range, marked, if the values of the same run are apart."""
+    if not apart(values, floor(scenario, metric)):
+        return Text(_score_text(metric, values[0]))
+    known = [value for value in values if not math.isnan(value)]
+    low, high = (_score_text(metric, end(known)) for end in (min, max))
+    return Text(f"{low}{MARK}").append(f"\nto {high}", "dim")
 
 
 def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
@@ -117,7 +141,11 @@ def headings(scenario: Scenario) -> dict[Group, str]:
     return titles
 
 
-def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> list[Table]:
+def answers(
+    names: Sequence[str],
+    traces: Mapping[str, Mapping[str, Trace]],
+    again: Mapping[str, Again] | None = None,
+) -> list[Table]:
     """Return a table for each metric that applies, or one table of them all if there is only one condition."""
     scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())
     plants = dict.fromkeys((scenario.plant, scenario.efforts[0]) for scenario in scenarios)
@@ -127,25 +155,33 @@ def answers(names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]]) -> 
             units = dict.fromkeys(CATALOGUE[name].unit_for(plant.unit, effort) for plant, effort in plants)
             shown[f"{name} ({' or '.join(units)})"] = CATALOGUE[name]
     if len(traces) == 1:
-        (runs,) = traces.values()
-        return [_answer("", [(head, metric, runs) for head, metric in shown.items()])]
-    return [_answer(head, [(name, metric, runs) for name, runs in traces.items()]) for head, metric in shown.items()]
+        ((condition, runs),) = traces.items()
+        others = (again or {}).get(condition, {})
+        return [_answer("", [(head, metric, runs, others) for head, metric in shown.items()])]
+    every = [(name, runs, (again or {}).get(name, {})) for name, runs in traces.items()]
+    return [_answer(head, [(name, metric, *its) for name, *its in every]) for head, metric in shown.items()]
 
 
-def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace]]]) -> Table:
-    """Return a table with a line for every label; each column has a heading, a metric and labelled runs."""
-    traces = {label: trace for _, _, runs in columns for label, trace in runs.items()}
-    rows = {label: [_cell(metric, runs.get(label)) for _, metric, runs in columns] for label in traces}
-    table = _by_label(title, [Text(head) for head, _, _ in columns], traces, rows, 30)
+def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]) -> Table:
+    """Return a table with a line for every label; each column has a heading, a metric and labelled runs, also again."""
+    traces = {label: trace for _, _, runs, _ in columns for label, trace in runs.items()}
+    rows = {
+        label: [_cell(metric, runs.get(label), again.get(label, ())) for _, metric, runs, again in columns]
+        for label in traces
+    }
+    table = _by_label(title, [Text(head) for head, *_ in columns], traces, rows, 30)
     table.min_width = len(title)  # a narrower table would break the title
     return table
 
 
-def _cell(metric: Metric, trace: Trace | None) -> Text | str:
+def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> Text | str:
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    return FAILED if trace.diverged_at is not None else _score_text(metric.name, metric.of(trace))
+    if trace.diverged_at is not None:
+        return FAILED
+    others = [metric.of(other) for other in again if other.diverged_at is None]
+    return _marked(metric.name, [metric.of(trace), *others], trace.scenario)
 
 
 def _score_text(metric: str, value: float) -> str:

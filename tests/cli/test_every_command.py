@@ -25,7 +25,7 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "laws --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
     "laws --plant duffing": ["cli.law_pages.print_suitable"],
     "run duffing": ["cli.scene.perform"],
-    "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat": ["cli.scene.perform"],
+    "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat": ["cli.scene.perform"],
     "view duffing": ["draw.viewer.watch"],
     "view vdp_noise --condition noise --label super_twisting": ["draw.viewer.watch"],
     "compare": ["studies.compare.compare"],

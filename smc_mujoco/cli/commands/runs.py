@@ -25,9 +25,15 @@ def run(
         str | None,
         typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat, mcap or parquet, beside its .npz."),
     ] = None,
+    repeat: Annotated[
+        bool, typer.Option(help="Whether to repeat runs at half the physics step, to mark what depends on it.")
+    ] = True,
     timing: Annotated[bool, typer.Option("--timing", help="Print how long each part took.")] = False,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
+
+    Each run is repeated at half the physics step, and from a start moved by 1e-9 of itself. A score that changes by
+    more than 5 % is marked, and an answer that says something else is printed, too.
 
     Exported traces have every number to the last bit, and its unit.
 
@@ -45,7 +51,7 @@ def run(
     if seed is not None:
         scene = scene.seeded(seed)
     terminal, folder = Terminal(), out / path.stem
-    perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path))
+    perform(scene, folder, film, threads, clock, terminal, endings, scenes.question(path), repeat)
     if timing:
         terminal.note(str(clock), "dim")
 

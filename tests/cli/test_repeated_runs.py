@@ -1,0 +1,76 @@
+"""What a scene prints is the same at half the physics step and from a nudged start, or it is marked."""
+
+import dataclasses
+import math
+
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.step_halving import MARK, apart, halved, nudged
+from smc_mujoco.cli import scene as show
+from smc_mujoco.cli import tables
+
+pytestmark = pytest.mark.quick
+
+
+@pytest.mark.parametrize(
+    ("values", "least", "marked"),
+    [
+        ([1.0, 1.03, 0.99], 0.0, False),
+        ([1.0, 1.06], 0.0, True),
+        ([1.0, 0.9], 0.0, True),
+        ([1e-9, 1e-7], 1e-6, False),  # below what the problem can show
+        ([1.0, math.inf], 0.0, True),
+        ([math.inf, math.inf], 0.0, False),
+        ([math.nan, 1.0], 0.0, False),
+        ([0.0, 0.0], 0.0, False),
+    ],
+)
+def test_scores_are_apart_by_more_than_five_percent_of_what_matters(values, least, marked):
+    assert apart(values, least) is marked
+
+
+@pytest.mark.parametrize(
+    ("other", "same"),
+    [
+        ("a settles in 1.02 s, b never.", True),
+        ("a settles in 1.20 s, b never.", False),
+        ("b settles in 1.00 s, a never.", False),
+        ("a settles in 1.00 s, b in 2 s.", False),
+    ],
+)
+def test_an_answer_is_the_same_with_equal_words_and_numbers_within_five_percent(other, same):
+    assert show.same_answer("a settles in 1.00 s, b never.", other) is same
+
+
+def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():
+    scenario = smc.Scenario(plant="duffing", law="classical", noise=smc.Noise(position=0.01), x0=1.0)
+    half, moved = halved(scenario), nudged(scenario)
+    assert half == dataclasses.replace(scenario, physics_step=5e-4)
+    assert moved.x0 == (1.0 + 1e-9,)
+    assert dataclasses.replace(moved, x0=1.0) == scenario
+
+
+def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
+    stuck = smc.Scenario(plant="inverted_pendulum", law="adaptive", duration=1.0)
+    trace = smc.run(stuck)
+    larger = dataclasses.replace(trace, x=1.5 * trace.x)
+    (table,) = tables.scores("t", {"a": trace, "b": trace}, {"a": [trace, larger], "b": [trace, trace]})
+    lines = "\n".join(str(row) for row in zip(*(column._cells for column in table.columns), strict=True)).splitlines()
+    assert MARK in lines[0]
+    assert MARK not in lines[1]
+    bound = smc.score(trace)["ultimate_bound"]
+    assert f"to {tables.number(1.5 * bound)}" in lines[0]
+    assert "half the physics step" in str(table.caption)
+
+
+def test_an_answer_that_half_the_step_changes_is_printed_too():
+    runs = {law: smc.Scenario(plant="duffing", law=law, duration=0.5) for law in ("classical", "pid")}
+    scene = smc.Scene(
+        title="t",
+        conditions={"nominal": runs},
+        answer=lambda outcome: f"step {outcome.traces['nominal']['pid'].scenario.resolved.physics_step:g} s",
+    )
+    traces, again = show.simulate(scene, 1), show.repeat(scene, 1)
+    (said,) = show.other_answers(scene, traces, again, scene.sentence(traces))
+    assert said == "At half the physics step: Step 0.0005 s."
