@@ -193,7 +193,7 @@ def test_the_grid_is_kept_and_its_noise_is_drawn_for_a_user_s_law(tmp_path, monk
             (law, condition, seed, 3.0) for condition in plan.conditions for law in ("pid", "lqr") for seed in range(24)
         ]
         assert (folder, options) == (
-            tmp_path / "study", {"threads": 3, "progress": False, "noise_key": key, "replay": True, "half_steps": True},
+            tmp_path / "study", {"threads": 3, "progress": False, "noise_key": key, "half_steps": True},
         )  # fmt: skip
 
 
