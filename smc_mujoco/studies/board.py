@@ -73,6 +73,7 @@ class Block:
     by_step: Mapping[str, tuple[float, float]]  # law -> medians at the step and at half of it, where they differ much
     samples: int  # largest number of samples of any two laws, see `ranking`; for one law, of its runs
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
+    given: tuple[str, ...] = ()  # the laws with one set of gains, where another law has several
     untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is named the winner
     unchecked: tuple[str, ...] = ()  # the laws whose code is unchecked, none of which is named the winner over others
 
@@ -163,7 +164,7 @@ class Board(Tables):
     def result(self) -> str:
         """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
         blocks = f"in {every(len(self.blocks))} conditions"
-        these = ", for these gains" * all(block.sets == 1 for block in self.blocks)
+        these = self._these_gains
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
             closest = max(leads, key=lambda lead: lead.effect.high, default=None)
@@ -206,6 +207,14 @@ class Board(Tables):
     def step_change(self, law: str) -> tuple[float, float] | None:
         """Return the medians of a law at the physics step and at half of it, in the first block that is marked."""
         return next((block.by_step[law] for block in self.blocks if law in block.by_step), None)
+
+    @property
+    def _these_gains(self) -> str:
+        """That the result holds for the gains of laws that have one set of them, after a comma."""
+        if all(block.sets == 1 for block in self.blocks):
+            return ", for these gains"
+        given = dict.fromkeys(law for block in self.blocks for law in block.given)
+        return f", for these gains of {first_of(given)}" * bool(given)
 
     def _search(self, law: str) -> str:
         """Return how the gains of a law that wins were searched, after a comma, if not by the rule."""

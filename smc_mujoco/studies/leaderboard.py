@@ -239,6 +239,7 @@ def _block(
         runs=int(comparison.seeds[at]),
         samples=int(comparison.samples[at].max()) if len(comparison.laws) > 1 else int(comparison.seeds[at]),
         sets=int(sets[sets > 1].min()) if (sets > 1).any() else 1,
+        given=tuple(law for law, n in zip(comparison.laws, sets, strict=True) if n == 1 and (sets > 1).any()),
         untuned=untuned,
         unchecked=outside,
     )

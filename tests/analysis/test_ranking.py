@@ -1,6 +1,7 @@
 """Statistics: intervals cover what they say, ranks are paired, and no winner is declared inside the noise."""
 
 import contextlib
+import dataclasses
 import json
 import math
 import re
@@ -608,6 +609,10 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
     assert leaderboard(stand({"a": blocks(1, 2), "b": blocks(2, 4)}), ["itae"])[0].result == (
         "a wins in both conditions: at least 50 % less than b (50 to 50 %), ahead in 20 of 20 runs, for these gains"
     )
+    both = leaderboard(stand({"a": blocks(1), "b": blocks(2)}), ["itae"])[0]
+    one_set = dataclasses.replace(both.blocks[0], sets=12, given=("b",))
+    assert dataclasses.replace(both, blocks=(one_set,)).result.endswith("runs, for these gains of b")
+    assert dataclasses.replace(both, blocks=(dataclasses.replace(one_set, given=()),)).result.endswith("20 runs")
     text = " ".join(printed([board]).split())
     assert "too few" not in text
     assert "b wins under c2, loses under c0 and c1;" in text
