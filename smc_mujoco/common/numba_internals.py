@@ -2,6 +2,7 @@
 
 # ruff: noqa: F401
 from numba import typeof
+from numba.core import ir
 from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.ccallback import CFunc

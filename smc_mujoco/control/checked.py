@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.core import ir
 
 from smc_mujoco.common import numba_internals as internals
 from smc_mujoco.common.errors import one_line
@@ -33,6 +32,8 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
+
+ir = internals.ir
 
 BUILTINS = {
     abs,

@@ -16,6 +16,7 @@ from smc_mujoco.metrics.conventions import (
     CATALOGUE,
     ROUNDING,
     SETTLING_BAND,
+    UNIT_OF_S,
     Metric,
     approaches,
     error,
@@ -254,7 +255,7 @@ def hf_share(trace: Trace) -> float:
     return power[frequency > HIGH_FREQUENCY * (1 + ROUNDING_SHARE)].sum() / power[1:].sum()
 
 
-@metric("unit of s", command=True, absent=0.0)
+@metric(UNIT_OF_S, command=True, absent=0.0)
 def chattering_amplitude(trace: Trace) -> float:
     """Amplitude of the limit cycle of s in the last part, in the unit of s, worst channel; NaN without one.
 

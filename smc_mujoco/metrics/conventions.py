@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 SETTLING_BAND = 0.02  # of the scale
 LAST_PART = 0.2  # of the run's duration
 ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
+UNIT_OF_S = "unit of s"  # the law's; it follows from that of x, so that metres and radians do not mix
 REST_SHARE = 1e-3  # of the run's largest |v|
 REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
 
@@ -116,7 +117,7 @@ class Metric:
         driven = [group for group in groups(plant) if group.driven]
         if not any(map(self.fits, driven)):
             return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
-        if "{" in self.unit and len(driven) > 1:
+        if ("{" in self.unit or self.unit == UNIT_OF_S) and len(driven) > 1:
             units = " and ".join(group.unit for group in driven)
             return f"{self.name} has no one value where channels are in {units}, as in {plant.name}: use smc.scores"
         return ""
@@ -133,7 +134,8 @@ class Metric:
     def worst(self, traces: Mapping[Group, Trace]) -> float:
         """Return the value of the worst group, from the result of `by_group`."""
         counted = [trace for group, trace in traces.items() if self.fits(group) and (group.driven or self.shared)]
-        return max(float(self.formula(trace)) for trace in counted)
+        values = [value for value in (float(self.formula(trace)) for trace in counted) if not math.isnan(value)]
+        return max(values, default=math.nan)  # a group without the value, such as a limit cycle, hides no other
 
     def fits(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""

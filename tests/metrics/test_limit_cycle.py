@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+import smc_mujoco as smc
 from smc_mujoco.metrics.limit_cycle import largest_cycle, limit_cycle
 
 pytestmark = pytest.mark.quick
@@ -101,3 +102,24 @@ def test_what_does_not_oscillate_steadily_has_no_limit_cycle(s):
     amplitude, frequency = limit_cycle(T[: len(s)], s)
     assert math.isnan(amplitude)
     assert math.isnan(frequency)
+
+
+CARTS = """<mujoco><option gravity="0 0 0"/><default><geom size=".1" mass="1" contype="0" conaffinity="0"/></default>
+ <worldbody><body><joint name="A" type="hinge" axis="0 0 1"/><geom pos=".5 0 0"/></body>
+ <body pos="0 1 0"><joint name="B" type="slide" axis="0 0 1"/><geom/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("laws", [("pid", "classical"), ("classical", "pid")])
+def test_a_group_without_a_limit_cycle_hides_no_other_and_units_do_not_mix(laws, tmp_path):
+    (tmp_path / "two.xml").write_text(CARTS)
+    motors = {name: smc.Channel(motor=True) for name in "AB"}
+    plant = smc.plant_from(str(tmp_path / "two.xml"), motors)
+    scenario = smc.Scenario(
+        plant=plant, law=[smc.law(law) for law in laws], x0=0.3, u_max=6.0, duration=6.0, input_delay=0.005
+    )
+    trace = smc.run(scenario)
+    of_group, whole = smc.scores(trace), smc.score(trace)
+    frequencies = [its["chattering_frequency"] for its in of_group.values()]
+    assert sum(map(math.isnan, frequencies)) == 1  # pid has none
+    assert whole["chattering_frequency"] == max(f for f in frequencies if not math.isnan(f))
+    assert "chattering_amplitude" not in whole  # m/s and rad/s
