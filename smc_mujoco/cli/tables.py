@@ -159,7 +159,9 @@ def answers(
         others = (again or {}).get(condition, {})
         return [_answer("", [(head, metric, runs, others) for head, metric in shown.items()])]
     every = [(name, runs, (again or {}).get(name, {})) for name, runs in traces.items()]
-    return [_answer(head, [(name, metric, *its) for name, *its in every]) for head, metric in shown.items()]
+    return [
+        _answer(head, [(name, metric, runs, others) for name, runs, others in every]) for head, metric in shown.items()
+    ]
 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]) -> Table:

@@ -297,10 +297,10 @@ def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     answers = ANSWERS if statement.whose == OURS else None
     if statement.rivals in verdicts:
         rest = [f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items()]
-        beside = ", ".join(words for words in rest if not words.endswith(f"with {statement.rivals} gains"))
+        others = ", ".join(words for words in rest if not words.endswith(f"with {statement.rivals} gains"))
         overall, flips = verdicts[statement.rivals], False
         sentence = f"Decided by a search over the law's gains, with {statement.rivals} gains of the other laws"
-        sentence += f"; for one set of gains each: {beside}." if beside else "."
+        sentence += f"; for one set of gains each: {others}." if others else "."
     else:
         overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
     if answers:
