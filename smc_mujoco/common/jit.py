@@ -345,6 +345,14 @@ class Uncompiled:
 
     why: str
 
+    def __call__(self, y: Any, gains: Any, memory: Any) -> tuple[float, float]:
+        """Return u and s."""
+        raise NotImplementedError
+
+    def fresh(self) -> "Uncompiled":
+        """Return what one channel of one run calls: itself, if it keeps no state outside of the memory."""
+        return self
+
 
 def reason(error: Exception) -> str:
     """Return the line of a compiler's error that says what is wrong, printable even if it quotes a user's text."""

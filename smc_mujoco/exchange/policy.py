@@ -3,8 +3,8 @@
     trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(network)))
 
 A policy observes the same positions and velocities as in an environment. On a plant of several channels it is called
-once per channel, with that channel's observation. It must be a function only of the observation, because all channels
-and runs share it. A policy is Python, so its runs take the reference loop. A file is first read in another process.
+once per channel, with that channel's observation. State that a plain function keeps elsewhere is shared by all runs. A
+policy is Python, so its runs take the reference loop. A file is first read in another process.
 """
 
 import copy
@@ -16,6 +16,7 @@ import io
 import math
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -69,6 +70,18 @@ class Policy(Uncompiled):
         if len(u) != 1:
             raise ValueError(f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel")
         return float(u[0]) * y.limit, 0.0
+
+    def fresh(self) -> "Policy":
+        """Return the policy with a copy of its object, and warn if that cannot be copied."""
+        try:
+            return dataclasses.replace(self, act=copy.deepcopy(self.act))
+        except Exception as error:
+            warnings.warn(
+                f"policy {self.name!r} cannot be copied ({one_line(str(error))}), so that channels and runs share it: "
+                "give an object that copy.deepcopy copies, or a function only of the observation",
+                stacklevel=2,
+            )
+            return self
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,6 +152,11 @@ class Network:
             return _predict(self.module, observation)
         return _forward(sys.modules["torch"], self.module, observation)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Network":
+        """Return a network of its own, as a module may keep state from call to call."""
+        _reset_distribution(self.module)
+        return Network(copy.deepcopy(self.module, memo), self.predicts)
+
     def __reduce__(self) -> tuple:
         """Return what pickle and run keys contain: the module's bytes, its classes, and torch's version."""
         torch, file = sys.modules["torch"], io.BytesIO()
@@ -165,7 +183,8 @@ def policy(act: Any, *, reference: bool = False) -> Law:
       reference: whether r, r' and r'' are at the end of the observation, as in the task `track`.
 
     The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.
-    ONNX and torch get it as a batch of one in the network's own type. A policy that simulates ahead must make and step
+    ONNX and torch get it as a batch of one in the network's own type. An object that keeps state, such as an adaptive
+    gain, is copied for each channel of each run, which starts from it as it was given. A policy that simulates ahead must make and step
     its environments in the thread that calls it. In another thread they and the run would wait for each other forever.
 
     Raises:

@@ -373,7 +373,9 @@ class PythonComponent:
         parts = parts * n if len(parts) == 1 else parts
         functions = {id(part.function): part.function for part in parts}  # a callable object may have no hash
         uncompiled = {key: rebuild(function, lambda inner: inner) for key, function in functions.items()}
-        self.functions, self.sizes = [uncompiled[id(part.function)] for part in parts], [part.memory for part in parts]
+        own = [uncompiled[id(part.function)] for part in parts]
+        self.functions = [function.fresh() if isinstance(function, jit.Uncompiled) else function for function in own]
+        self.sizes = [part.memory for part in parts]
         gains = {id(part): gains_of(part, n) for part in {id(part): part for part in parts}.values()}
         self.gains = [gains[id(part)] for part in parts]  # the record that each reads
 

@@ -85,6 +85,49 @@ def test_policies_of_one_callable_are_one_law_that_can_be_sent_away():
     assert pickle.loads(pickle.dumps(smc.policy(proportional).function)) == smc.policy(proportional).function
 
 
+class Adaptive:
+    """An action in proportion to x, whose gain grows with every call."""
+
+    def __init__(self):
+        self.gain = 0.0
+
+    def __call__(self, observation):
+        self.gain += 0.1
+        return [-self.gain * observation[0]]
+
+
+class Predicting:
+    """The same, called by `predict`."""
+
+    def __init__(self):
+        self.adaptive = Adaptive()
+
+    def predict(self, observation, deterministic):
+        return self.adaptive(observation), None
+
+
+@pytest.mark.parametrize("given", [Adaptive(), Adaptive().__call__, Predicting()], ids=["called", "method", "predict"])
+def test_every_channel_of_every_run_starts_from_the_object_as_it_was_given(given):
+    scenario = smc.Scenario(
+        plant="pendulum_network", law=smc.policy(given), duration=0.002, x0=[0.1, 0.2, 0.1, 0.1, 0.1], u_max=6.0
+    )
+    first, second = (smc.run(scenario) for _ in range(2))
+    np.testing.assert_array_equal(first.u, second.u)
+    np.testing.assert_allclose(first.u[0], -0.6 * np.array(first.scenario.x0))  # the first call of each channel
+
+
+class Locked(Adaptive):
+    """An object that cannot be copied."""
+
+    def __deepcopy__(self, memo):
+        raise TypeError("it holds a lock")
+
+
+def test_an_object_that_cannot_be_copied_is_shared_and_says_so():
+    with pytest.warns(UserWarning, match=r"policy 'Locked' cannot be copied \(it holds a lock\), .*: give an object"):
+        briefly(smc.policy(Locked()))
+
+
 def test_an_action_beyond_its_bounds_saturates():
     trace = briefly(smc.policy(lambda o: [-3.0]))
     assert np.all(trace.u == -6.0)

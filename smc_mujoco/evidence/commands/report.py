@@ -12,7 +12,9 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 def report(
-    quick: Annotated[bool, typer.Option("--quick", help="A small report, in two minutes: less of everything.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A small report, in five minutes: less of everything.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for the report and its data.")] = Path("report"),
     seeds: Annotated[
         int | None, typer.Option(min=1, help="Runs of a law in every cell of the grid; default 24.")
