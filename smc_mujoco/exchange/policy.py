@@ -184,8 +184,10 @@ def policy(act: Any, *, reference: bool = False) -> Law:
 
     The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.
     ONNX and torch get it as a batch of one in the network's own type. An object that keeps state, such as an adaptive
-    gain, is copied for each channel of each run, which starts from it as it was given. A policy that simulates ahead must make and step
-    its environments in the thread that calls it. In another thread they and the run would wait for each other forever.
+    gain, is copied for each channel of each run, which starts from it as it was given.
+
+    A policy that simulates ahead must make and step its environments in the thread that calls it. In another thread
+    they and the run would wait for each other forever.
 
     Raises:
       ScenarioError: none of these, no such file, or a library that is not installed.

@@ -32,7 +32,7 @@ def report(
 
     Args:
       out: the folder; what it holds already is not computed again.
-      quick: a look in two minutes: less of everything, one set of gains for the claims.
+      quick: a look in five minutes: less of everything, one set of gains for the claims.
       seeds: number of seeds of each cell of the grid; by default 24.
       threads: simulations at once; None for one per available core.
       progress: whether to show a bar for each stage.
