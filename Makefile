@@ -67,7 +67,7 @@ report: setup ## the study: which law, where, how sure; which of the paper's cla
 
 live: ## the live page, live/index.html: laws and machines in a browser
 	@./setup.sh requirements-live.lock
-	$(BIN)/smc-mujoco live
+	$(BIN)/smc-mujoco export live/index.html
 
 gains: setup ## the laws' gains again, tuned by one rule (within 90 minutes on two cores)
 	$(BIN)/python benchmarks/gains.py --all

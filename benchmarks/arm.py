@@ -22,7 +22,7 @@ LAWS = ("observer_free_joint", "time_delay_sliding", "computed_torque_sliding", 
 def main() -> None:
     """Print the costs of laws, and the use of cores."""
     arm = smc.plant("panda", grav=0.0)
-    move = [smc.Waypoints((0.0, 3.0), pair) for pair in zip(arm.x0, arm.rest, strict=True)]
+    move = [smc.signals.Waypoints((0.0, 3.0), pair) for pair in zip(arm.x0, arm.rest, strict=True)]
     machine = {"plant": arm, "physics_step": 5e-4, "reference": move}
     for integrator in ("implicitfast", "RK4"):
         for law in LAWS:

@@ -23,7 +23,7 @@ def measured(trace: smc.Trace) -> tuple[float, ...]:
     """The numbers of a run, NaN for one that failed."""
     if trace.failure is not None:
         return (float("nan"),) * len(COLUMNS)
-    tip, joints = smc.tip_scores(trace), smc.joint_scores(trace).values()
+    tip, joints = smc.metrics.tip_scores(trace), smc.metrics.joint_scores(trace).values()
     bound, rate, work = (max(scores[name] for scores in joints) for name in ("ultimate_bound", "tv_rate", "work"))
     return 1e3 * tip["rms_error"], 1e3 * tip["last_error"], 1e3 * bound, rate, work
 
@@ -59,7 +59,7 @@ def main() -> None:
         found = np.array(
             [
                 [one["mean_force"], one["force_error"], one["touching"], 1e3 * one["depth"]]
-                for one in (smc.tip_scores(trace) for trace in runs)
+                for one in (smc.metrics.tip_scores(trace) for trace in runs)
             ]
         )
         print(row(name, found), flush=True)

@@ -35,7 +35,7 @@ DRIVES = {
     "lag 1 ms": smc.Lag(1e-3),
     "lag 10 ms": smc.Lag(0.01),
     "lags 5 and 10 ms": (smc.Lag(5e-3), smc.Lag(0.01)),
-    "rate limit": smc.RateLimit(200.0),
+    "rate limit": smc.hardware.RateLimit(200.0),
     "motor without inductance": smc.DCMotor(inductance=0.0),
     "motor RE 40": smc.DCMotor(),
     "motor of 5 ms": smc.DCMotor(inductance=5e-3 * smc.DCMotor().resistance),
@@ -50,7 +50,9 @@ def halving(plant: str) -> None:
         changes = {} if drive is None else {"actuator": drive}
         runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in gain_sets.general()])
         integrator = runs[0].scenario.resolved.integrator
-        found = {t.scenario.law.name: c for t, c in zip(runs, smc.step_halving(runs, 0), strict=True) if c.marked}
+        found = {
+            t.scenario.law.name: c for t, c in zip(runs, smc.fidelity.step_halving(runs, 0), strict=True) if c.marked
+        }
         marked[integrator] += len(found)
         cases[integrator] += len(runs)
         parts = [

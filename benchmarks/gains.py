@@ -58,7 +58,7 @@ def tune(task: Task) -> dict[str, Any]:
     """Search for the gains of a law on a plant, and return their record."""
     goal = gain_sets.OBJECTIVES[task.gains]
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "no set of gains tried", smc.ScenarioWarning)
+        warnings.filterwarnings("ignore", "no set of gains tried", smc.errors.ScenarioWarning)
         return smc.tune(task.plant, task.law, objective=goal, threads=1, searches=task.searches).record()
 
 

@@ -13,11 +13,11 @@ LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "passivity_
 
 
 def sag(trace):
-    return 1e3 * smc.tip_scores(trace)["max_error"]
+    return 1e3 * smc.metrics.tip_scores(trace)["max_error"]
 
 
 def left(trace):
-    return 1e3 * smc.tip_scores(trace)["last_error"]
+    return 1e3 * smc.metrics.tip_scores(trace)["last_error"]
 
 
 def answer(runs):

@@ -12,7 +12,7 @@ LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "time_delay
 
 
 def off(trace):
-    return 1e3 * smc.tip_scores(trace)["rms_error"]
+    return 1e3 * smc.metrics.tip_scores(trace)["rms_error"]
 
 
 def answer(runs):

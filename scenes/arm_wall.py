@@ -12,15 +12,15 @@ import smc_mujoco as smc
 
 
 def off(trace):
-    return abs(smc.tip_scores(trace, force=smc.arms.PRESS)["force_error"])
+    return abs(smc.metrics.tip_scores(trace, force=smc.arms.PRESS)["force_error"])
 
 
 def varies(trace):
-    return smc.tip_scores(trace)["force_ripple"]
+    return smc.metrics.tip_scores(trace)["force_ripple"]
 
 
 def stays(trace):
-    scores = smc.tip_scores(trace)
+    scores = smc.metrics.tip_scores(trace)
     return scores["touching"] == 100.0 and scores["depth"] <= 1e-3
 
 

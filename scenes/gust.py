@@ -28,7 +28,7 @@ scene = smc.Scene(
         f"{force} N": smc.paper.comparison(
             "inverted_pendulum",
             duration=4.0,
-            changes={"contact": "floor", "disturbance": smc.Gust(force, time=1.0, width=0.4)},
+            changes={"contact": "floor", "disturbance": smc.signals.Gust(force, time=1.0, width=0.4)},
         )
         for force in (4, 8, 16, 32)
     },

@@ -24,7 +24,7 @@ scene = smc.Scene(
             duration=4.0,
             changes={
                 "contact": smc.Contact("stops", restitution=e),
-                "disturbance": smc.Impulse(2.0, time=1.0, width=0.01),
+                "disturbance": smc.signals.Impulse(2.0, time=1.0, width=0.01),
             },
         )
         for e in (0.2, 0.8)

@@ -25,7 +25,7 @@ scene = smc.Scene(
             "none": smc.Coulomb(0.0),
             "0.1 N m": smc.Coulomb(0.1),
             "0.4 N m": smc.Coulomb(0.4),
-            "LuGre": smc.LuGre(coulomb=0.2, static=0.4, stribeck=0.05),
+            "LuGre": smc.hardware.LuGre(coulomb=0.2, static=0.4, stribeck=0.05),
         }.items()
     },
     film="0.4 N m",

@@ -10,7 +10,7 @@ whatever rubs or hangs there; the boundary layer lags by 12 mrad, and by more wi
 import smc_mujoco as smc
 
 PANDA = smc.plant("panda")
-THERE = [smc.Waypoints((0.0, 3.0), pair) for pair in zip(PANDA.x0, PANDA.rest, strict=True)]
+THERE = [smc.signals.Waypoints((0.0, 3.0), pair) for pair in zip(PANDA.x0, PANDA.rest, strict=True)]
 K = [30.0, 20.0, 30.0, 40.0, 60.0, 100.0, 200.0]  # rad/s^2
 L = [100.0, 100.0, 100.0, 400.0, 400.0, 2e3, 2e3]  # rad/s^3
 M = [0.02, 0.4, 0.02, 0.1, 0.015, 0.01, 0.003]  # kg m^2

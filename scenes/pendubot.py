@@ -13,7 +13,7 @@ UP = 3.14159265  # rad
 
 
 def run(blow):
-    disturbance = smc.Impulse(blow, time=4.0, width=0.05)
+    disturbance = smc.signals.Impulse(blow, time=4.0, width=0.05)
     up = smc.Constant(UP)  # for the metrics: the law has its own reference
     return smc.boards.entry("pendubot", disturbance=disturbance, reference=up, duration=5.0)
 

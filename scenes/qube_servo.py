@@ -6,7 +6,7 @@ arm's inertia, and the published ones with m r^2/3. The arm follows a sine of th
 Look for: the last one falls in a second, although the machine stands. The published arm of m r^2/12 stands too, but
 does not stick as the identified one does, whose fit on unused records is 94 / 93 / 87 %.
 
-The film of a recorded run beside its twin: smc-mujoco replay qube_servo FILE --quantities driver --film run.mp4
+The film of a recorded run beside its twin: smc-mujoco rig qube_servo FILE --sets driver --film run.mp4
 """
 
 import smc_mujoco as smc

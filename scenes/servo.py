@@ -11,12 +11,13 @@ that it still pushes upwards while it lets the load down.
 import smc_mujoco as smc
 
 PENDULUM = smc.plant("inverted_pendulum", m=1.0, l=0.15)
-MOVE = smc.Waypoints((0.1, 1.6, 2.0, 3.5), (2.6, 1.2, 1.2, 2.6))  # rad from upright; it is heaviest at 1.57
+MOVE = smc.signals.Waypoints((0.1, 1.6, 2.0, 3.5), (2.6, 1.2, 1.2, 2.6))  # rad from upright; it is heaviest at 1.57
 ACROSS = 1.5708  # rad, where the load is m g l
 
 
 def swinging(model):
-    servo, law = smc.servo("mx106", model), smc.law("computed_torque", kp=2500.0, kd=100.0)  # both poles at -50 rad/s
+    servo = smc.hardware.servo("mx106", model)
+    law = smc.law("computed_torque", kp=2500.0, kd=100.0)  # both poles at -50 rad/s
     machine = {"plant": PENDULUM, "actuator": servo.motor, "friction": servo.friction}
     return smc.Scenario(law=law, model="nominal", reference=MOVE, x0=2.6, duration=3.8, u_max=12.0, **machine)
 

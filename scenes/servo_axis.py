@@ -10,12 +10,12 @@ third of a millimetre. Super-twisting follows within 0.1 um, at the price of a b
 import smc_mujoco as smc
 
 AXIS = smc.plant("servo_axis", cf=0.0)
-STICKS = smc.LuGre(coulomb=20.3935, static=30.6, stribeck=0.005, stiffness=1e6)
+STICKS = smc.hardware.LuGre(coulomb=20.3935, static=30.6, stribeck=0.005, stiffness=1e6)
 
 
 def run(law, model="nominal"):
     return smc.Scenario(
-        plant=AXIS, law=law, model=model, friction=STICKS, x0=0.0, reference=smc.Ramp(1e-3), u_max=350.0
+        plant=AXIS, law=law, model=model, friction=STICKS, x0=0.0, reference=smc.signals.Ramp(1e-3), u_max=350.0
     )
 
 

@@ -9,7 +9,7 @@ Look for: how little the laws' scores change from the equation to the mechanism.
 import smc_mujoco as smc
 
 PLANTS = ("duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
-MISS = ", ".join(f"{plant} {100.0 * smc.deviation(plant, 'springs'):.0f} %" for plant in PLANTS)
+MISS = ", ".join(f"{plant} {100.0 * smc.fidelity.deviation(plant, 'springs'):.0f} %" for plant in PLANTS)
 
 
 def answer(runs):

@@ -80,7 +80,7 @@ def attempt(random: Random) -> smc.Scenario | None:
         if "unexpected keyword" not in str(error):
             raise
         return None
-    knots = [scenario.duration / d.dt for d in scenario.disturbance if isinstance(d, smc.OrnsteinUhlenbeck)]
+    knots = [scenario.duration / d.dt for d in scenario.disturbance if isinstance(d, smc.signals.OrnsteinUhlenbeck)]
     work = scenario.samples * scenario.steps * scenario.plant.n
     return scenario if work <= MOST and max(knots, default=0.0) < 1e5 and scenario.readings < 10_000 else None
 
@@ -173,7 +173,7 @@ SANE: dict[str, Any] = {  # what an argument of this name is, of a public call t
     **{"threads": 1, "low": 0.0, "high": 5.0, "name": "classical", "scene": "none such", "resolution": 0.1},
 }
 OWN: dict[str, dict[str, Any]] = {  # where the argument of a call is another than its name says
-    **{name: {"path": path} for name, path in {"film": "a.mp4", "clip": "a.webp", "still": "a.png"}.items()},
+    **{name: {"path": path} for name, path in {"film": "a.mp4"}.items()},
     **{"load": {"path": "trace.npz"}, "Table.read": {"path": "out"}, "plant_from": {"path": "arm.xml"}},
     **{"TimeSeries.from_csv": {"path": "a.csv"}, "Trace.export": {"path": "a.csv"}, "plant": {"name": "duffing"}},
     **{
@@ -199,7 +199,7 @@ class World:
             smc.grid(["duffing"], ["classical", "none"], ["nominal", "noise"], 2, duration=0.2), "out"
         )
         Path("arm.xml").write_text(wild.ARM)
-        Path("law.c").write_text(smc.law_to_c("classical"))
+        Path("law.c").write_text(smc.exchange.law_to_c("classical"))
         self.tuned = smc.tune("duffing", "classical", budget=1, objective=Objective(duration=0.2), searches=1)
         self.tuned.save("tuned.json")
         self.sane = SANE | {
@@ -214,13 +214,14 @@ class World:
     def _calls(self) -> Iterator[tuple[str, Callable]]:
         """Name -> what to call, of all that is public."""
         held = [self.scenario, self.trace, self.table, self.tuned, self.scenario.plant, smc.Coulomb(0.1), smc.Lag(0.1)]
-        held += [smc.Encoder(), smc.Sine(1.0, 1.0), smc.TimeSeries([0, 1], [0, 1]), smc.Contact("none")]
+        held += [smc.Encoder(), smc.Sine(1.0, 1.0), smc.signals.TimeSeries([0, 1], [0, 1]), smc.Contact("none")]
         held += [smc.Scene(title="a", conditions={"b": {"c": self.scenario}})]
         instances = {type(one): one for one in held}
-        for name in sorted(set(dir(smc)) - {"__doc__", "__version__", "__all__"}):
+        for name in sorted(one for one in dir(smc) if not one.startswith("_")):
             value = getattr(smc, name)
             if inspect.ismodule(value):
-                for inner, function in vars(value).items():
+                shelf = {inner: getattr(value, inner) for inner in getattr(value, "__all__", ())}
+                for inner, function in (vars(value) | shelf).items():
                     if inspect.isfunction(function) and not inner.startswith("_") and hasattr(function, "explains"):
                         yield f"{name}.{inner}", function
             elif callable(value) and not (isinstance(value, type) and issubclass(value, BaseException | list)):
@@ -384,7 +385,7 @@ def files(random: Random) -> str:
         "tuned": ("tuned.json", tuned.load),
         "json": ("tuned.json", tuned.load),
         "table": ("out/results.parquet", smc.Table.read),
-        "csv": ("a.csv", smc.TimeSeries.from_csv),
+        "csv": ("a.csv", smc.signals.TimeSeries.from_csv),
     }[kind]
     place = Path(f"damaged{Path(source).suffix}")
     data = Path(source).read_bytes()

@@ -5,6 +5,7 @@ import importlib
 import importlib.metadata
 import io
 import os
+import pydoc
 import re
 import runpy
 import subprocess
@@ -50,13 +51,17 @@ def test_the_contents_name_every_page_once():
 def test_help_lists_every_public_name_once_and_those_of_a_first_script_first(known):
     tasks = known.tasks()
     listed = [name for names in tasks.values() for name in names]
-    assert sorted(listed) == sorted([*smc._ORIGINS, *smc._MODULES])
+    assert sorted(listed) == sorted(smc.__all__)
     assert sum(len(names) for names in list(tasks.values())[:5]) in range(35, 45)
+    assert set(re.findall(r"`smc\.(\w+)`", smc.__doc__ or "")) == set(smc._SHELF.modules)
 
 
 def test_the_reference_has_every_public_name_and_each_entry_once(known):
     named = re.findall(r"^::: (\S+)$", "".join(known.reference().values()), re.MULTILINE)
-    assert {f"{module}.{name}" for name, module in smc._ORIGINS.items()} <= set(named)
+    assert {f"{module}.{name}" for name, module in smc._SHELF.origins.items()} <= set(named)
+    for shelf in known.SHELVES:
+        module = getattr(smc, shelf)
+        assert {getattr(module, name) for name in module.__all__} <= {*map(pydoc.locate, named)}
     assert len(named) == len(set(named))
     for module, _, name in (path.rpartition(".") for path in named):
         assert hasattr(importlib.import_module(module), name) or importlib.import_module(f"{module}.{name}")
@@ -77,7 +82,7 @@ def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
     assert re.findall(r"^\| `(\w+)`", "\n".join(known.audits()), re.MULTILINE) == papers
     shown = "\n".join(known.decisions()).split("???")[1:]
     assert [text.count("\n    | ") - 1 for text in shown] == [len(paper(name).claims) for name in papers]
-    laws = [*smc.laws(), *smc.joint_laws()]
+    laws = [*smc.laws(), *smc.laws(kind="joint")]
     assert sorted(re.findall(r"`(\w+)`", "".join(known.kinds()))) == sorted(laws)
 
 

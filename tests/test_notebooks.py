@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers.public import public_names, there
 
-import smc_mujoco as smc
 from smc_mujoco.common import gl
 
 ROOT = Path(__file__).parents[1]
@@ -81,7 +81,7 @@ def test_text_stands_before_each_cell_and_links_lead_somewhere(path):
     texts = "\n".join(text for kind, text in found if kind == "markdown")
     assert [link for link in re.findall(r"\]\(([^)]+)\)", texts) if not (path.parent / link).is_file()] == []
     assert [page for page in re.findall(r"`(docs/\S+\.md)`", texts) if not (ROOT / page).is_file()] == []
-    assert [name for name in re.findall(r"\bsmc\.(\w+)", texts) if not hasattr(smc, name)] == []
+    assert [name for name in public_names(texts) if not there(name)] == []
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -14,6 +14,7 @@ import pytest
 import typer
 from helpers.episodes import dm_control_suite
 from helpers.pages import PAGES, ROOT, beside, blocks, titled
+from helpers.public import public_names, there
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
@@ -59,7 +60,7 @@ LITTLE = {
     "tune": {"objective": SHORTLY, "searches": 2},
     "identify": {"most": 2},
     "worst_case": {"budget": 8},
-    "still": {"size": (640, 360)},
+    "film": {"size": (640, 360)},
 }
 
 
@@ -88,7 +89,7 @@ def test_there_is_something_to_test():
 
 @pytest.mark.parametrize(("page", "i", "block"), CODE, ids=named)
 def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, block, tmp_path, monkeypatch):
-    if "smc.still" in block and gl.missing():
+    if '.png", at=' in block and gl.missing():
         pytest.skip(gl.missing())
     if "dm_control_env" in block:
         dm_control_suite()
@@ -96,7 +97,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
     if "law_from_fmu" in block:
         pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'smc-mujoco[fmu]'")
-        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(fair_gains, "Objective", lambda: BRIEFLY)
@@ -201,7 +202,7 @@ def test_the_pages_list_what_a_law_measures():
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
 def test_names_that_a_page_takes_from_the_package_are_there(page):
-    assert [name for name in re.findall(r"\bsmc\.(\w+)", page.read_text()) if not hasattr(smc, name)] == []
+    assert [name for name in public_names(page.read_text()) if not there(name)] == []
 
 
 def test_modules_that_the_design_lists_are_there():

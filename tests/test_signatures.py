@@ -10,12 +10,17 @@ import smc_mujoco as smc
 
 pytestmark = pytest.mark.quick
 
-NAMES = [name for name in smc.__all__ if callable(getattr(smc, name)) and "Warning" not in name]
+HOMES = (
+    smc,
+    *(getattr(smc, name) for name in ("signals", "hardware", "design", "fidelity", "metrics", "exchange", "envs")),
+)
+PUBLIC = {name: getattr(home, name) for home in HOMES for name in home.__all__}
+NAMES = [name for name, one in PUBLIC.items() if callable(one)]
 
 
 def signature(name):
     """Return a call with its parameters and their defaults, without types."""
-    whole = inspect.signature(getattr(smc, name))
+    whole = inspect.signature(PUBLIC[name])
     plain = [one.replace(annotation=one.empty) for one in whole.parameters.values()]
     return name + re.sub(" at 0x[0-9a-f]+", "", str(inspect.Signature(plain)))
 

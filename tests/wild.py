@@ -136,11 +136,11 @@ def smooth(random: Random) -> smc.Signal:
             lambda: smc.Constant(wide(random)),
             lambda: smc.Sine(wide(random), wide(random), wide(random)),
             lambda: smc.Step(wide(random), times()),
-            lambda: smc.Pulse(wide(random), times(), positive(random)),
-            lambda: smc.Impulse(wide(random), times(), positive(random)),
-            lambda: smc.Ramp(wide(random), times()),
-            lambda: smc.MinimumJerk(wide(random), times(), positive(random)),
-            lambda: smc.TimeSeries(at, [wide(random) for _ in at]),
+            lambda: smc.signals.Pulse(wide(random), times(), positive(random)),
+            lambda: smc.signals.Impulse(wide(random), times(), positive(random)),
+            lambda: smc.signals.Ramp(wide(random), times()),
+            lambda: smc.signals.MinimumJerk(wide(random), times(), positive(random)),
+            lambda: smc.signals.TimeSeries(at, [wide(random) for _ in at]),
         ]
     )()
 
@@ -149,11 +149,13 @@ def signal(random: Random) -> smc.Signal:
     """Any signal of the package."""
     match random.randrange(6):
         case 0:
-            return smc.Gust(wide(random), random.uniform(0.0, 0.03), positive(random))
+            return smc.signals.Gust(wide(random), random.uniform(0.0, 0.03), positive(random))
         case 1:
-            return smc.BandLimited(positive(random), random.uniform(0.0, 1.0), 1.0 + 100.0 * positive(random))
+            return smc.signals.BandLimited(positive(random), random.uniform(0.0, 1.0), 1.0 + 100.0 * positive(random))
         case 2:
-            return smc.OrnsteinUhlenbeck(positive(random), positive(random), random.choice([1e-3, positive(random)]))
+            return smc.signals.OrnsteinUhlenbeck(
+                positive(random), positive(random), random.choice([1e-3, positive(random)])
+            )
         case _:
             return smooth(random)
 
@@ -217,9 +219,9 @@ def friction(random: Random) -> list:
     kinds = [
         lambda: smc.Viscous(positive(random)),
         lambda: smc.Coulomb(positive(random)),
-        lambda: changed(random, smc.LuGre, ["coulomb", "static", "stribeck"], ["stiffness", "damping"]),
-        lambda: changed(random, smc.Sigmoid, ["p1", "p2"], ["hold", "stiffness"]),
-        lambda: random.choice([smc.servo("mx106", "m6").friction, smc.servo("mx64", "m1").friction]),
+        lambda: changed(random, smc.hardware.LuGre, ["coulomb", "static", "stribeck"], ["stiffness", "damping"]),
+        lambda: changed(random, smc.hardware.Sigmoid, ["p1", "p2"], ["hold", "stiffness"]),
+        lambda: random.choice([smc.hardware.servo("mx106", "m6").friction, smc.hardware.servo("mx64", "m1").friction]),
     ]
     return [random.choice(kinds)() for _ in range(random.randint(0, 2))]
 
@@ -229,7 +231,7 @@ def actuator(random: Random) -> list:
     motor = ["resistance", "inductance", "torque_constant", "gear", "rotor_inertia", "cogging", "poles", "voltage"]
     kinds = [
         lambda: smc.Lag(positive(random)),
-        lambda: smc.RateLimit(positive(random)),
+        lambda: smc.hardware.RateLimit(positive(random)),
         lambda: changed(random, smc.DCMotor, [], motor),
         lambda: changed(random, smc.Backlash, ["gap"], ["rotor_inertia", "rotor_damping"]),
     ]
@@ -257,8 +259,8 @@ def fields(random: Random) -> dict[str, Any]:
         "disturbance": lambda: random.choice([None, signal(random), [signal(random) for _ in range(2)]]),
         "noise": lambda: random.choice([None, smc.Noise(positive(random), positive(random))]),
         "input_delay": lambda: random.randint(0, 6) * step,
-        "velocity": lambda: component(random, smc.estimator, smc.estimators()),
-        "surface": lambda: random.choice([None, component(random, smc.surface, smc.surfaces())]),
+        "velocity": lambda: component(random, smc.estimator, smc.laws(kind="estimator")),
+        "surface": lambda: random.choice([None, component(random, smc.surface, smc.laws(kind="surface"))]),
         "model": lambda: random.choice([None, "none", "nominal"]),
         "mismatch": lambda: factors(random, where),
         "jump": lambda: smc.Jump(random.uniform(0.0, 0.03), factors(random, where)),

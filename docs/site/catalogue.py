@@ -290,7 +290,7 @@ def _prose(text: str, names) -> str:
 def _c_form(name: str) -> str:
     """Return the law in C99, without the header that all exported laws share."""
     code = law_to_c(law(name)).rpartition(HEADER_END)[2].strip()
-    made = f"`smc-mujoco export-c {name}` writes this law as one file, with [the header](../c.md) at its top."
+    made = f"`smc-mujoco export {name}.c` writes this law as one file, with [the header](../c.md) at its top."
     return f'## In C {{ data-search-exclude }}\n\n{made}\n\n??? note "The law in C99"\n\n' + _indented(
         f"```c\n{code}\n```"
     )

@@ -63,7 +63,7 @@ def still(plant: str) -> bytes:
         return b""
     traces = smc.run([_case(plant, law, "nominal") for law in plant_laws(plant)])
     with tempfile.TemporaryDirectory() as folder:
-        picture = smc.still(traces, 0.25, Path(folder) / "still.png")
+        picture = smc.film(traces, Path(folder) / "still.png", at=0.25)
         kept = io.BytesIO()
         Image.open(picture).save(kept, "WEBP", quality=85)
     return kept.getvalue()

@@ -5,6 +5,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import catalogue
 
@@ -21,10 +22,21 @@ from smc_mujoco.studies import scene
 AUDITS = json.loads((Path(__file__).parent / "verdicts.json").read_text(encoding="utf-8"))  # see test_full_verdicts.py
 TASKS = re.compile(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE)  # of the package's docstring
 
+SHELVES = {  # module of public names -> title of its page
+    "signals": "References and disturbances", "hardware": "Real mechanisms", "design": "Gains from theory",
+    "fidelity": "Fidelity", "metrics": "Scores of joints and tips", "exchange": "Laws from and to C and FMUs",
+    "envs": "Environments for agents", "errors": "Warnings",
+}  # fmt: skip
 OTHERS = {  # title -> names of modules that are no public names
     "Types that are returned": """
     studies.compare.Compared
-    draw.notebook.Frames
+    studies.outcome.Outcome
+    draw.film.film.Frames
+    evidence.certificates.certificate.Certificate
+    evidence.rigs.rig.Rig
+    envs.gymnasium_env.PlantEnv
+    envs.vector_env.BatchEnv
+    envs.dm_control_env.load
     studies.advice.Advice
     analysis.tuning.result.Tuned
     analysis.gains_for.Design
@@ -35,11 +47,6 @@ OTHERS = {  # title -> names of modules that are no public names
     studies.worst_case.WorstCase
     evidence.audit.audit.Audit
     evidence.audit.verdict.Claim
-    """,
-    "Environments for agents": """
-    envs.gymnasium_env.PlantEnv
-    envs.vector_env.BatchEnv
-    envs.dm_control_env.load
     """,
     "Arms, boards, the paper, tests": """
     evidence.papers.gaber.scenarios
@@ -70,9 +77,18 @@ def tasks() -> dict[str, list[str]]:
 
 def entries() -> dict[str, list[str]]:
     """Return title -> the names on a page of the reference, with their modules."""
-    origins = smc._ORIGINS  # pyright: ignore[reportAttributeAccessIssue] private
+    origins = smc._SHELF.origins  # pyright: ignore[reportAttributeAccessIssue] private
     found = {task: [f"{origins[name]}.{name}" for name in its if name in origins] for task, its in tasks().items()}
-    return found | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
+    shelves = {
+        title: [_path(getattr(getattr(smc, shelf), name)) for name in getattr(smc, shelf).__all__]
+        for shelf, title in SHELVES.items()
+    }
+    return found | shelves | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
+
+
+def _path(thing: Any) -> str:
+    """Return the full name of a function, class or module."""
+    return thing.__name__ if inspect.ismodule(thing) else f"{thing.__module__}.{thing.__qualname__}"
 
 
 def reference() -> dict[str, str]:

@@ -40,7 +40,7 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
       ScenarioError: no command holds the plant at rest there.
       MissingPackageError: python-control is not installed.
     """
-    with package("control", "smc.state_space"):
+    with package("control", "smc.design.state_space"):
         from control import StateSpace
 
     plant = as_plant(plant)

@@ -1,6 +1,7 @@
 """Whether half the physics step changes the chattering of a run: the same runs with half the step.
 
-`smc.step_halving([trace])[0].marked` is True if half the step changes amplitude or frequency by more than 10 %.
+`smc.fidelity.step_halving([trace])[0].marked` is True if half the step changes amplitude or frequency by more than
+10 %.
 It costs one more run of twice the steps for each trace. Nothing is run unless this is called. A number without the
 mark may still depend on the step: of 69 cycles (5 plants, 8 laws, 8 mechanisms, seed 3, 4 s) that half the step changed
 by at most 10 %, an eighth of the step changed 6 by more than 10 %, mostly with backlash.

@@ -51,14 +51,6 @@ def lists() -> dict[str, list[tuple[str, str]]]:
     return {heading: listed(templates(), lambda template: template.doc) for heading, templates in CATALOGUES.items()}
 
 
-def print_lists(console: Console) -> None:
-    """Print a line about each law, surface and estimator."""
-    for heading, rows in lists().items():
-        console.print(catalogue(f"{heading} ({len(rows)})", rows), "")
-    page, some = ("smc-mujoco laws NAME", "cyan"), ("smc-mujoco laws --needs continuous,two-gains", "cyan")
-    console.print(Text.assemble("One law in full: ", page, ". Only some laws: ", some))
-
-
 def print_suitable(needs: Sequence[str], plant: str | None, console: Console) -> None:
     """Print a line about each law that has all these PROPERTIES and suits a plant."""
     names = [law.name for law in suitable(needs, plant)]

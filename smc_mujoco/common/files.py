@@ -44,11 +44,11 @@ def slug(name: str, max_bytes: int = MAX_NAME) -> str:
     return part
 
 
-def with_ending(path: str | os.PathLike[str], ending: str) -> Path:
-    """Return the path if its name ends in `ending`, such as ".json"; raise ScenarioError otherwise."""
+def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
+    """Return the path if its name ends in one of `endings`, such as ".json"; raise ScenarioError otherwise."""
     path = Path(path)
-    if path.suffix != ending or "\0" in path.name:
-        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {ending}")
+    if path.suffix not in endings or "\0" in path.name:
+        raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {' or '.join(endings)}")
     return path
 
 

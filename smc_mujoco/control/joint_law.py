@@ -219,8 +219,3 @@ def catalogue() -> Catalogue[Template]:
     return catalogue_of(
         "smc_mujoco.control.joint_laws", Template, "smc_mujoco.joint_laws", lambda law: law.kind == "law" and law.joint
     )
-
-
-def joint_laws() -> list[str]:
-    """List the laws of many joints that `smc.law` knows. `smc.laws` lists those of one channel."""
-    return list(catalogue())

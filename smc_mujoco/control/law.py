@@ -22,7 +22,7 @@ from numba import njit
 
 from smc_mujoco.common.catalogue import Catalogue, catalogue_of
 from smc_mujoco.common.errors import ScenarioError, find
-from smc_mujoco.control import joint_law
+from smc_mujoco.control import estimator, joint_law, surface
 from smc_mujoco.control.component import Component, Options, Template, decorated
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -185,14 +185,29 @@ def fits(law: Law | Template, plant: Plant) -> bool:
     return plant.own and plant.underactuated and any(known.underactuated for known in plants)
 
 
-def laws(plant: Plant | str | None = None) -> list[str]:
-    """List the names that `law` knows; with a plant, only those of laws for this plant.
+KINDS = {  # of laws and of their parts -> the catalogue
+    "law": catalogue, "joint": joint_law.catalogue, "surface": surface.catalogue, "estimator": estimator.catalogue,
+}  # fmt: skip
+
+
+def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
+    """List the names of laws; with a plant, only those of laws of one channel for this plant.
 
     A law that names no plants is for every plant whose channels all have an actuator. `none` is for every plant. A law
     for joints without an actuator is also for your own models with such joints.
+
+    Args:
+      plant: of the library by its name, or your own; None lists all.
+      kind: "law", of one channel; "joint", a law of many joints; "surface"; or "estimator", of velocities.
+
+    Raises:
+      ScenarioError: another kind, a plant with another kind than "law", or an unknown plant.
     """
+    names = find("kind of law", kind, KINDS)()
     if plant is None:
-        return list(catalogue())
+        return list(names)
+    if kind != "law":
+        raise ScenarioError(f"laws of kind {kind!r} are not for single plants: leave plant out")
     plant = as_plant(plant)
     return [
         name

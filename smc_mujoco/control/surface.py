@@ -40,8 +40,3 @@ def catalogue() -> Catalogue[Template]:
 def surface(name: str, **gains: float) -> Surface:
     """Return the surface `name` with these gains. An unknown name or a gain out of range is a ScenarioError."""
     return find("surface", name, catalogue()).bind(gains, warn=True)
-
-
-def surfaces() -> list[str]:
-    """List the names that `surface` knows."""
-    return list(catalogue())

@@ -1,7 +1,7 @@
-"""The commands of the exchange annex: laws in C and as FMUs, and the live page."""
+"""smc-mujoco export: a law as C or as an FMU, and plants with their laws as a page in a browser."""
 
 import math
-import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,155 +12,116 @@ from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-ARGUMENT_AT_END = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, at the end of its error sentences
+ENDINGS = ".c", ".fmu", ".html"
 
 
-def check_c(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A .c file with smc_law in it, or a .so.")],
-    gains: Annotated[
-        str, typer.Option(metavar="NAME=VALUE,...", help="The law's gains, in order, if the file does not define them.")
-    ] = "",
-    memory: Annotated[
-        int | None, typer.Option(min=1, help="How many numbers its memory has; default as the file says, or 8.")
-    ] = None,
-    symbol: Annotated[str, typer.Option(help="Name of the function.")] = "smc_law",
-    flag: Annotated[
-        list[str] | None, typer.Option(help="A compiler flag, as --flag=-Iinclude; may be repeated.")
-    ] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds that compiler, set-up and trial may take, each.")] = 10.0,
-) -> None:
-    """Compile a control law in C, try it in a separate process, and say in one sentence what is wrong with it.
-
-    The trial runs the law on a double integrator under noise, with and without model and surface, for 10 s. It also
-    calls the law at later times and with very large errors. It finds crashes, endless loops, NaN, writes beyond the
-    law's memory, state kept elsewhere (such as static data), and a changed rounding mode or flush-to-zero. It then runs
-    a .c file with the compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2. smc_law.h
-    describes the signature; it is at the top of every file that `smc-mujoco export-c` writes.
-
-    The process is not a sandbox: the law can open files and connections, like any program that you start.
-
-    Example: smc-mujoco check-c my_law.c --gains lam=6,k1=3
-    """
-    with delay_ctrl_c():
-        from smc_mujoco.control.from_text import parsed_gains
-        from smc_mujoco.exchange.c.load import check
-
-    values = parsed_gains(gains, "--gains") if gains else None
-    try:
-        for line in check(file, values, memory, symbol, flag or (), timeout):
-            print(line)
-    except ScenarioError as error:
-        raise ScenarioError(ARGUMENT_AT_END.sub(r"--\1", str(error))) from None
-
-
-def export_c(
-    law: options.LawText,
+def export(
+    ctx: typer.Context,
+    what: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="[LAW|PLANT...] OUT",
+            autocompletion=options.LAWS,
+            help="A law, and OUT.c or OUT.fmu; or plants with one motor, and the page, as live/index.html.",
+            show_default=False,
+        ),
+    ],
     gains: options.GainValues = "",
-    numbers: Annotated[
-        str, typer.Option("--type", metavar="double|float|q15", help="Type of numbers; q15 for observer_free only.")
-    ] = "double",
     joints: options.Joints = None,
-) -> None:
-    """Write a law as one file of C99 without dependencies, for firmware or for smc.law_from_c.
-
-    The C is translated from the law's Python, operation by operation. It keeps its state in the array memory[] that its
-    caller passes, and allocates nothing. The comment at its top says how many bytes of code and state it takes. In
-    double precision it gives the trace of the library's own law; compile it with -ffp-contract=off to get the same
-    bits.
-
-    LAW may also be a file: my_law.py with one law, made by @smc.law_function, or gains.json that `smc-mujoco tune
-    --out` wrote.
-
-    A law of many joints is written for a number of joints. Its gains may have one value for each joint, as in
-    --gains "k=8 20 15,c=5".
-
-    Example: smc-mujoco export-c observer_free --gains lam=6,k1=3 --type float > observer_free.c
-    """
-    with delay_ctrl_c():
-        from smc_mujoco.exchange.c.export import law_to_c
-
-    with options.joints_as_option():
-        text = law_to_c(options.law_with(law, gains), numbers, joints)
-    print(text, end="")
-
-
-def export_fmu(
-    law: options.LawText,
-    gains: options.GainValues = "",
+    numbers: Annotated[
+        str,
+        typer.Option("--type", metavar="double|float|q15", help="C: type of numbers; q15 for observer_free only."),
+    ] = "double",
     surface: Annotated[
-        str | None, typer.Option(metavar="NAME|TEXT", help="A surface, as linear(c=3); default the law's own.")
+        str | None, typer.Option(metavar="NAME|TEXT", help="FMU: a surface, as linear(c=3); default the law's own.")
     ] = None,
     velocity: Annotated[
         str | None,
-        typer.Option(metavar="NAME|TEXT", help="A velocity estimator, as levant(L=4800); default v is an input."),
+        typer.Option(metavar="NAME|TEXT", help="FMU: a velocity estimator, as levant(L=4800); default v is an input."),
     ] = None,
-    period: Annotated[float, typer.Option(help="Control period, s.")] = 1e-3,
-    u_max: Annotated[float, typer.Option("--u-max", help="Bound on |u|, N or N m.")] = math.inf,
+    period: Annotated[float, typer.Option(help="FMU: control period, s.")] = 1e-3,
+    u_max: Annotated[float, typer.Option("--u-max", help="FMU: bound on |u|, N or N m.")] = math.inf,
     model: Annotated[
         str | None,
-        typer.Option(metavar="none|nominal", help="nominal: f and g of x'' = f + g u are inputs; default as needed."),
-    ] = None,
-    joint: Annotated[str, typer.Option(metavar="hinge|slide", help="Units: rad and N m, or m and N.")] = "hinge",
-    joints: options.Joints = None,
-    binary: Annotated[bool, typer.Option(help="Whether to compile a binary for this machine.")] = True,
-    out: Annotated[Path | None, typer.Option(help="The file to write; default the law's name with .fmu.")] = None,
-) -> None:
-    """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0 for Co-Simulation.
-
-    The file contains C source code and a binary for this machine; it needs no Python. Its inputs are x, v (unless an
-    estimator replaces it), the reference r and dr, and ddr if the law reads it. Its outputs are u and s. All gains are
-    tunable parameters. The law runs every --period seconds on the inputs as they are at that time. In double precision
-    it gives the bits of `smc-mujoco run`. LAW may also be a file: my_law.py with one law, made by
-    @smc.law_function, or gains.json that `smc-mujoco tune --out` wrote.
-
-    A law of many joints has a variable for each element: x[1], x[2], M[1,1]. Its inputs are also those of M, h, g, the
-    matrix C of Coriolis forces and the tip's Jacobian J that it reads. Its gains may have one value for each joint, as
-    in --gains "k=8 20 15,c=5".
-
-    Example: smc-mujoco export-fmu super_twisting --gains k1=5,k2=8 --velocity levant --u-max 6 --out controller.fmu
-    """
-    with delay_ctrl_c():
-        from smc_mujoco.exchange.fmu.export import export_fmu as export
-
-    chosen = options.law_with(law, gains)
-    with options.joints_as_option():
-        path = export(
-            chosen, out, surface=surface, velocity=velocity, control_period=period, u_max=u_max, model=model,
-            joint=joint, joints=joints, binary=binary,
-        )  # fmt: skip
-    print(f"{path}, {path.stat().st_size / 1024:.0f} kB; FMI 3.0, Co-Simulation, every {period:g} s")
-
-
-def live(
-    plants: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[PLANT...]",
-            autocompletion=options.PLANTS,
-            help="Plants with one motor; by default inverted_pendulum, duffing and van_der_pol.",
+        typer.Option(
+            metavar="none|nominal", help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed."
         ),
     ] = None,
+    joint: Annotated[str, typer.Option(metavar="hinge|slide", help="FMU: units: rad and N m, or m and N.")] = "hinge",
+    binary: Annotated[bool, typer.Option(help="FMU: whether to compile a binary for this machine.")] = True,
     law: Annotated[
         list[str] | None,
-        typer.Option(metavar="LAW|FILE", help="Your own law, in addition to the library's; may be repeated."),
+        typer.Option(metavar="LAW|FILE", help="Page: your own law, in addition to the library's; may be repeated."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the page.")] = Path("live"),
 ) -> None:
-    """Build a web page in which MuJoCo runs: choose laws, move sliders, push the machine, compare two laws.
+    """Write a law as C or as an FMU, or a page on which MuJoCo runs in a browser, by OUT's ending.
 
-    The page is a folder of files. Any web server can serve it without this package and without network, for example
-    `python -m http.server --directory live`. The browser simulates the models of the package under its laws, translated
-    to JavaScript, with the same sampling, delay, noise and integrator. Its traces are those of `smc-mujoco run` within
-    rounding. The address of the page holds all that you set, so that a link shares it.
+    LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or gains.json that
+    `smc-mujoco tune --out` wrote; left out, it is the name of OUT, as observer_free.c. A law of many joints may have
+    one value of a gain for each joint, as in --gains "k=8 20 15,c=5".
 
-    `--law` takes a Python file with laws made by @smc.law_function, a law with gains such as "pid(kp=50, ki=1)", or
-    gains.json that `smc-mujoco tune --out` wrote.
+    - OUT.c: C99 without dependencies, for firmware or for smc.law_from. The C is translated from the law's Python,
+      operation by operation. It keeps its state in the array memory[] that its caller passes, and allocates nothing.
+      The comment at its top says how many bytes of code and state it takes. In double precision it gives the trace of
+      the library's own law; compile it with -ffp-contract=off to get the same bits.
+    - OUT.fmu: FMI 3.0 for Co-Simulation, for Simulink, Modelica and other tools, with C source code and a binary for
+      this machine; it needs no Python. Its inputs are x, v (unless an estimator replaces it), the reference r and dr,
+      and ddr if the law reads it. Its outputs are u and s. All gains are tunable parameters. The law runs every
+      --period seconds on the inputs as they are at that time. A law of many joints has a variable for each element:
+      x[1], x[2], M[1,1], and inputs for those of M, h, g, the matrix C of Coriolis forces and the tip's Jacobian J that
+      it reads.
+    - OUT.html: a page to choose laws, move sliders, push the machine and compare two laws, in a folder of files that
+      any web server can serve without this package and without network, for example `python -m http.server --directory
+      live`. The browser simulates the models of the package under its laws, translated to JavaScript, with the same
+      sampling, delay, noise and integrator. The address of the page holds all that you set, so that a link shares it.
+      The first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so has `pip
+      install 'smc-mujoco[live]'`.
 
-    The first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so has
-    `pip install 'smc-mujoco[live]'`.
+    Example: smc-mujoco export observer_free.c --gains lam=6,k1=3 --type float
 
-    Example: smc-mujoco live duffing cart_pole --law my_law.py
+    Example: smc-mujoco export super_twisting controller.fmu --gains k1=5,k2=8 --velocity levant --u-max 6
+
+    Example: smc-mujoco export duffing cart_pole live/index.html --law my_law.py
     """
+    outs = [text for text in what if Path(text).suffix in ENDINGS]
+    if len(outs) != 1:
+        raise ScenarioError(f"{len(outs)} files to write: give one that ends in {', '.join(ENDINGS)}")
+    out, others = Path(outs[0]), [text for text in what if text != outs[0]]
+    of_fmu = "surface", "velocity", "period", "u_max", "model", "joint", "binary"
+    options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
+    options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
+    options.only_for(ctx, ("law",), out.suffix == ".html", "OUT.html: give the law before OUT")
+    options.only_for(ctx, ("gains", "joints"), out.suffix != ".html", "OUT.c and OUT.fmu: give --law a law with gains")
+    if out.suffix == ".html":
+        _write_page(others, law or [], out)
+        return
+    if len(others) > 1:
+        raise ScenarioError(f"{len(others)} laws for {out}: give one")
+    chosen = options.law_with(others[0] if others else out.stem, gains)
+    with delay_ctrl_c(), options.joints_as_option():
+        if out.suffix == ".c":
+            from smc_mujoco.common.files import replacing
+            from smc_mujoco.exchange.c.export import law_to_c
+
+            text = law_to_c(chosen, numbers, joints)
+            with replacing(out) as part:
+                part.write_text(text, "utf-8")
+            what_it_is = "C99"
+        else:
+            from smc_mujoco.exchange.fmu.export import law_to_fmu
+
+            law_to_fmu(
+                chosen, out, surface=surface, velocity=velocity, control_period=period, u_max=u_max, model=model,
+                joint=joint, joints=joints, binary=binary,
+            )  # fmt: skip
+            what_it_is = f"FMI 3.0, Co-Simulation, every {period:g} s"
+    print(f"{out}, {out.stat().st_size / 1024:.0f} kB; {what_it_is}")
+
+
+def _write_page(plants: Sequence[str], laws: Sequence[str], out: Path) -> None:
+    """Build the live page of plants, with the library's laws and others."""
+    if out.name != "index.html":
+        raise ScenarioError(f"the page is {out.name!r}: it is index.html in a folder, such as live/index.html")
     with delay_ctrl_c():
         from smc_mujoco.common.progress import bar
         from smc_mujoco.exchange.live.build import DEFAULT_PLANTS
@@ -168,10 +129,10 @@ def live(
 
     terminal = Terminal()
     with bar("the live page", shown=terminal.is_terminal):
-        page = build(plants or DEFAULT_PLANTS, law or (), out)
+        page = build(plants or DEFAULT_PLANTS, laws, out.parent)
     terminal.wrote(page)
     terminal.note(f"serve it: python -m http.server --directory {page.parent}")
 
 
 # heading in the help -> commands
-GROUPS = {"Run and look": [live], "Exchange": [export_c, check_c, export_fmu]}
+GROUPS = {"Exchange": [export]}

@@ -2,7 +2,7 @@
 
     import control
     lead = control.tf([40, 100], [0.01, 1])                       # u = K(s) (r - x)
-    smc.run(smc.Scenario(plant="duffing", law=smc.law_from_control(lead)))
+    smc.run(smc.Scenario(plant="duffing", law=smc.exchange.law_from_control(lead)))
 
 A controller of continuous time is discretised by Tustin's rule (bilinear, without prewarping) with the control period
 of the run. In real Schur form A is triangular but for 2 x 2 blocks, so each sample solves (I - A h/2) x = b from below.

@@ -36,6 +36,7 @@ FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
     ".onnx": ("onnxruntime", "give what torch.onnx.export writes"),
     ".pt2": ("torch", "give what torch.export.save writes"),
 }
+UNITS = "u_max", "SI"  # of an action: a fraction of u_max, or N and N m
 LOAD_TIMEOUT = 120.0  # s in which a library must read a file; chosen
 ONNX_DTYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16}
 
@@ -49,6 +50,7 @@ class Policy(Uncompiled):
     act: Act
     name: str  # of the law
     reference: bool  # whether r, r' and r'' are at the end of the observation
+    units: str  # of the action, one of UNITS
 
     why = "is a policy, which is Python: several times slower than a law that compiles, and on one core"
 
@@ -59,8 +61,9 @@ class Policy(Uncompiled):
 
     def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
         """Return u, and 0 for s."""
-        if math.isinf(y.limit):
-            raise ValueError("its action is a fraction of u_max, and u_max is inf")
+        scale = y.limit if self.units == "u_max" else 1.0
+        if math.isinf(scale):
+            raise ValueError('its action is a fraction of u_max, and u_max is inf: give u_max, or units="SI"')
         state = [y.x, y.q, y.v, y.dq] if any((y.q, y.dq, y.fq, y.gq)) else [y.x, y.v]
         observation = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
         arithmetic = _arithmetic()
@@ -69,7 +72,7 @@ class Policy(Uncompiled):
             raise ArithmeticError(f"{self.name} {ALTERS}")
         if len(u) != 1:
             raise ValueError(f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel")
-        return float(u[0]) * y.limit, 0.0
+        return float(u[0]) * scale, 0.0
 
     def fresh(self) -> "Policy":
         """Return the policy with a copy of its object, and warn if that cannot be copied."""
@@ -171,16 +174,18 @@ def _unpickled(content: bytes, classes: tuple[type, ...], version: str, predicts
     return Network(_library("torch", "network").load(io.BytesIO(content), weights_only=False), predicts)
 
 
-def policy(act: Any, *, reference: bool = False) -> Law:
+def policy(act: Any, *, reference: bool = False, name: str | None = None, units: str = "u_max") -> Law:
     """Return a policy as a law.
 
     Args:
       act: one of
-        - a callable from an observation to an action, a fraction of u_max that is clipped to -1 .. 1;
+        - a callable from an observation to an action;
         - an object with a method `predict`, such as a model of stable-baselines3, called for its deterministic action;
         - a torch module, which is copied and put in evaluation mode, as is the policy of a model;
         - the path of a file of ONNX (.onnx) or of torch.export (.pt2).
       reference: whether r, r' and r'' are at the end of the observation, as in the task `track`.
+      name: of the law; default: the object's name.
+      units: of the action: "u_max", a fraction of u_max; or "SI", N or N m. Either is clipped to the bound.
 
     The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.
     ONNX and torch get it as a batch of one in the network's own type. An object that keeps state, such as an adaptive
@@ -190,15 +195,17 @@ def policy(act: Any, *, reference: bool = False) -> Law:
     they and the run would wait for each other forever.
 
     Raises:
-      ScenarioError: none of these, no such file, or a library that is not installed.
+      ScenarioError: none of these, no such file, a library that is not installed, or other units.
     """
+    if units not in UNITS:
+        raise ScenarioError(f"units is {shown(units)}: give {' or '.join(map(repr, UNITS))}")
     try:
-        function, name = _callable(act)
+        function, its_name = _callable(act)
     except ScenarioError:
         raise
     except Exception as error:  # of the object itself, when it is inspected
         raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}") from error
-    return law_function(Policy(function, name, reference))()
+    return law_function(Policy(function, name or its_name, reference, units))()
 
 
 def _callable(act: Any) -> tuple[Act, str]:
@@ -216,7 +223,7 @@ def _callable(act: Any) -> tuple[Act, str]:
         return file, path.stem
     torch, control, name = sys.modules.get("torch"), sys.modules.get("control"), type(act).__name__
     if control is not None and isinstance(act, control.InputOutputSystem):
-        raise ScenarioError(f"policy is a {name} of python-control: give smc.law_from_control(...) as the law")
+        raise ScenarioError(f"policy is a {name} of python-control: give smc.exchange.law_from_control(...) as the law")
     predicts = callable(getattr(act, "predict", None))
     if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy
         act = getattr(act, "policy", act)

@@ -130,7 +130,7 @@ class Scenario:
     v0: tuple[float, ...] | None = field(coerce.state, None)
     reference: Signal | None = field(coerce.reference, None)
     feedforward: Signal | None = field(
-        coerce.instance(Signal, "one signal, such as smc.TimeSeries(times, values)"), None
+        coerce.instance(Signal, "one signal, such as smc.signals.TimeSeries(times, values)"), None
     )
     disturbance: tuple[Signal, ...] = field(coerce.several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)"), None)
     noise: Noise = field(coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None)
@@ -514,7 +514,7 @@ def check_law(s: Resolved) -> None:
     for law in s.law.parts:
         if not fits(law, s.plant):
             paired = dataclasses.replace(s.plant, underactuated=True)
-            listed = f"smc-mujoco laws --plant {s.plant.argument} lists those for it"
+            listed = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
             cure = "give each channel a partner" if s.plant.own and fits(law, paired) else listed
             raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}")
     if s.model == "nominal" and s.plant.unmodelled:

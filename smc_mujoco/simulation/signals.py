@@ -390,7 +390,7 @@ class Noise:
         for error in self.errors:
             is_signal = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
             if not is_signal or (error and (error.random or error.cartesian or error.sees)):
-                cure = "give a known signal, such as smc.Held(times, values)"
+                cure = "give a known signal, such as smc.signals.Held(times, values)"
                 raise ScenarioError(f"Noise's error is {shown(error)}: {cure}")
 
     @property

@@ -23,7 +23,7 @@ QUESTIONS = {
 
 @pytest.mark.parametrize("ask", QUESTIONS.values(), ids=QUESTIONS)
 def test_a_law_that_raises_is_told_once(ask):
-    with pytest.warns(smc.ScenarioWarning, match=r"^late failed by itself in a run: .*too late") as told:
+    with pytest.warns(smc.errors.ScenarioWarning, match=r"^late failed by itself in a run: .*too late") as told:
         ask(late)
     assert len(told) == 1
 

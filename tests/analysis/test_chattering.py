@@ -12,11 +12,12 @@ import pytest
 from helpers.words import words
 
 import smc_mujoco as smc
-from smc_mujoco import chattering, describing_function
+from smc_mujoco import chattering
 from smc_mujoco.analysis.chattering import Chattering, _assumptions, _other_cycles, cycles, save, switches
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
+from smc_mujoco.design import describing_function
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -322,7 +323,7 @@ def test_coupled_channels_are_named_in_the_assumptions():
 
 
 def test_what_a_prediction_leaves_out_is_said(snapshot):
-    parts = {"actuator": (smc.RateLimit(50.0), smc.Backlash(0.02)), "friction": smc.Coulomb(0.1)}
+    parts = {"actuator": (smc.hardware.RateLimit(50.0), smc.Backlash(0.02)), "friction": smc.Coulomb(0.1)}
     more = {"sensor": smc.Encoder(counts=4096), "physics_step": 2.5e-4}
     rough = Loop(smc.Scenario(plant="inverted_pendulum", law="classical", **parts, **more))
     assert [words(one) for one in _assumptions(rough)] == snapshot

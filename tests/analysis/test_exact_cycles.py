@@ -102,7 +102,7 @@ def test_gains_for_an_amplitude_keep_the_machine_below_it(name):
     base = scenario(loop)
     wanted = 0.5 * amplitude
     fields = {"actuator": base.actuator, "control_period": loop.period, "u_max": math.inf}
-    design = smc.gains_for(base.law, base.plant, amplitude=wanted, **fields)
+    design = smc.design.gains_for(base.law, base.plant, amplitude=wanted, **fields)
     gains = tuple(design.law.gains[gain] for gain in GAINS[loop.kind])
     realised, _ = ExactLoop(loop.kind, gains, loop.period, loop.lags).cycle()
     assert 0.3 * wanted < realised <= wanted
@@ -114,6 +114,6 @@ def test_a_run_whose_cycle_depends_on_the_step_is_marked():
     free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
     common = {"plant": free, "law": "twisting", "actuator": smc.Lag(0.001), "x0": 0.02, "duration": 3.0}
     traces = smc.run([smc.Scenario(**common, **fields) for fields in (coarse, {})])
-    wrong, right = smc.step_halving(traces)
+    wrong, right = smc.fidelity.step_halving(traces)
     assert (wrong.marked, right.marked) == (True, False)
     assert right.amplitude < 0.02

@@ -17,7 +17,7 @@ LAG = {"actuator": smc.Lag(0.01)}
 @pytest.mark.slow
 @COARSELY
 def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem():
-    design = smc.gains_for("super_twisting", "duffing", amplitude=1e-3, **LAG)
+    design = smc.design.gains_for("super_twisting", "duffing", amplitude=1e-3, **LAG)
     assert 0.99e-3 < design.chattering.amplitude_range[1] <= 1e-3
     run = smc.run(smc.Scenario(plant="duffing", law=design.law, x0=0.02, duration=6.0, **LAG))
     assert channel_cycle(run)[0] == pytest.approx(1e-3, rel=0.1)
@@ -31,7 +31,7 @@ def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem(
 @pytest.mark.slow
 @COARSELY
 def test_forces_among_the_gains_stay_at_the_actuators_limit():
-    design = smc.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
+    design = smc.design.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
     assert design.law.gains["k"] == pytest.approx(2.0)
     assert design.chattering.amplitude < 1.0
 
@@ -47,7 +47,7 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
 @pytest.mark.slow
 @COARSELY
 def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
-    design = smc.gains_for("boundary_layer", "duffing", amplitude=1e-3, u_max=10.0, **LAG)
+    design = smc.design.gains_for("boundary_layer", "duffing", amplitude=1e-3, u_max=10.0, **LAG)
     assert not design.chattering
     assert design.law.gains["k"] == pytest.approx(10.0)
     assert design.law.gains["phi"] / smc.law("boundary_layer").gains["phi"] == pytest.approx(design.size)
@@ -59,8 +59,8 @@ FAST = smc.law("classical", k=1.0, c=20.0)
 @COARSELY
 def test_a_frequency_decides_the_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
-    with pytest.warns(smc.ScenarioWarning, match="does not hold duffing, even without a disturbance"):
-        design = smc.gains_for(FAST, "duffing", frequency=wanted, **fields)
+    with pytest.warns(smc.errors.ScenarioWarning, match="does not hold duffing, even without a disturbance"):
+        design = smc.design.gains_for(FAST, "duffing", frequency=wanted, **fields)
     assert design.chattering.frequency <= wanted
     assert (design.size, design.law.gains["k"]) == (1.0, pytest.approx(design.speed**2))
     assert design.law.gains["c"] == pytest.approx(20.0 * design.speed)
@@ -71,7 +71,7 @@ def test_a_frequency_decides_the_speed():
 @pytest.mark.filterwarnings("ignore:classical with these gains")
 def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
-    both = smc.gains_for(FAST, "duffing", amplitude=5e-3, frequency=wanted, **fields)
+    both = smc.design.gains_for(FAST, "duffing", amplitude=5e-3, frequency=wanted, **fields)
     assert both.chattering.amplitude_range[1] <= 5e-3
     assert both.chattering.frequency <= wanted
     gains = dict(both.law.gains) | {"k": 1.01 * both.law.gains["k"]}
@@ -83,13 +83,15 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
 @pytest.mark.slow
 @COARSELY
 def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is(refused):
-    refused(lambda: smc.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66", recorded=False)
+    refused(
+        lambda: smc.design.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66", recorded=False
+    )
 
 
 @pytest.mark.slow
 def test_speeds_at_which_a_law_has_no_cycle_do_not_count(refused):
     said = "Hz at least, at whatever speed: give a larger one"
-    refused(lambda: smc.gains_for("super_twisting", "duffing", frequency=10.0, **LAG), said, recorded=False)
+    refused(lambda: smc.design.gains_for("super_twisting", "duffing", frequency=10.0, **LAG), said, recorded=False)
 
 
 @smc.law_function(gains={"k": 1.0})
@@ -105,7 +107,7 @@ def test_bad_input_is_one_sentence(refused):
         (without_units(), {"amplitude": 1e-3}),
         (smc.law("classical", k=(1.0, 2.0)), {"amplitude": 1.0, "plant": "double_pendulum"}),
     ]:
-        refused(lambda law=law, wanted=wanted: smc.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
+        refused(lambda law=law, wanted=wanted: smc.design.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
 
 
 def predicted(frequency, amplitude):

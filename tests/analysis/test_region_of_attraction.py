@@ -151,7 +151,7 @@ def test_a_run_that_leaves_slowly_from_near_the_reference_does_not_converge_earl
 
 
 def test_a_run_that_fails_does_not_converge():
-    with pytest.warns(smc.ScenarioWarning, match="failed by itself"):
+    with pytest.warns(smc.errors.ScenarioWarning, match="failed by itself"):
         found = maps.basin_of(base("duffing", fails_far_out(far=1.0), 4.0), [0.5, 1.5], [0.0, 0.1])
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]] * 2
 

@@ -78,10 +78,10 @@ def test_the_ends_of_a_class_are_within_it():
 @pytest.mark.parametrize(
     ("name", "kind", "values", "kept"),
     [
-        ("force", smc.Held, [1, 1, 2, 2, 2, 3, 3, 3, 4], [0, 2, 5, 8]),
-        ("slope", smc.TimeSeries, [1, 1, 2, 2, 2, 3, 3, 3, 4], [0, 1, 2, 4, 5, 7, 8]),
-        ("force", smc.TimeSeries, [1, 2, 3, 4, 5, 5, 5, 5, 5], [0, 4, 8]),
-        ("force", smc.TimeSeries, [0, 1, 2, 3, 2, 1, 1, 1, 1], [0, 3, 5, 8]),
+        ("force", smc.signals.Held, [1, 1, 2, 2, 2, 3, 3, 3, 4], [0, 2, 5, 8]),
+        ("slope", smc.signals.TimeSeries, [1, 1, 2, 2, 2, 3, 3, 3, 4], [0, 1, 2, 4, 5, 7, 8]),
+        ("force", smc.signals.TimeSeries, [1, 2, 3, 4, 5, 5, 5, 5, 5], [0, 4, 8]),
+        ("force", smc.signals.TimeSeries, [0, 1, 2, 3, 2, 1, 1, 1, 1], [0, 3, 5, 8]),
     ],
 )
 def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_its_corners(name, kind, values, kept):
@@ -90,7 +90,7 @@ def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_it
 
 
 def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
-    error, steps = smc.Held([0.0, 0.05], [0.02, -0.02]), smc.TimeSeries([0.0, 0.2], [0.1, -0.1])
+    error, steps = smc.signals.Held([0.0, 0.05], [0.02, -0.02]), smc.signals.TimeSeries([0.0, 0.2], [0.1, -0.1])
     made = scenario(duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps))
     fast, slow = smc.run(made), reference.run(made)
     plain = smc.run(dataclasses.replace(made, noise=smc.Noise(position=1e-3)))
@@ -129,14 +129,14 @@ def test_a_relay_replays_from_its_record_to_the_last_bit():
     run = smc.run(dataclasses.replace(base, disturbance=relay))
     force = 2.0 * recorded_force(run, relay, np.zeros(0))
     np.testing.assert_array_equal(run.d, np.column_stack([force, force]))
-    replay = smc.run(dataclasses.replace(base, disturbance=smc.Held(run.t, force)))
+    replay = smc.run(dataclasses.replace(base, disturbance=smc.signals.Held(run.t, force)))
     for name in ("x", "v", "u", "s", "d"):
         np.testing.assert_array_equal(getattr(replay, name), getattr(run, name))
 
 
 def test_a_relay_that_starts_late_goes_on_from_another_force():
     relay = Relay(2.0, rate=1.0, start=0.5)
-    run = smc.run(scenario(duration=1.0, disturbance=(smc.Held([0.0, 0.5, 1.0], [1.0, 0.0, 0.0]), relay)))
+    run = smc.run(scenario(duration=1.0, disturbance=(smc.signals.Held([0.0, 0.5, 1.0], [1.0, 0.0, 0.0]), relay)))
     np.testing.assert_array_equal(run.d[:, 0], 2.0 * recorded_force(run, relay, np.full(1001, 0.5)))
     assert set(run.d[:500, 0]) == {1.0}
     assert set(run.d[500:, 0]) == {-2.0}
@@ -251,7 +251,7 @@ def test_a_failed_run_is_the_worst():
     def fragile(y, gains, memory):
         return (-10.0 * y.x - 5.0 * y.v) / (0.0 if y.v > 3.0 else 1.0), 0.0
 
-    with pytest.warns(smc.ScenarioWarning, match="fragile failed by itself in a run: .*division by zero"):
+    with pytest.warns(smc.errors.ScenarioWarning, match="fragile failed by itself in a run: .*division by zero"):
         worst = smc.worst_case(scenario(law=fragile, u_max=50.0), within=smc.Uncertainty(disturbance=20.0), budget=32)
     assert worst.value == np.inf
     assert smc.run(worst.scenario).failure

@@ -1,4 +1,4 @@
-"""What `smc-mujoco laws` promises: every law in a table that fits, one in full, and a new file found everywhere."""
+"""What `smc-mujoco list` promises: every law in a table that fits, one in full, and a new file found everywhere."""
 
 import os
 import re
@@ -11,9 +11,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.cli import law_pages, main
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.estimator import estimators
 from smc_mujoco.control.law import catalogue, law_function, laws
-from smc_mujoco.control.surface import surfaces
 
 pytestmark = pytest.mark.quick
 
@@ -45,19 +43,18 @@ def flat(text):
 
 
 def test_the_table_has_every_law_surface_and_estimator_and_fits(call):
-    code, out, err = call("laws")
+    code, out, err = call("list")
     assert (code, err) == (0, "")
     firsts = [line.split()[0] for line in out.splitlines() if re.match(r" {2}\S", line)]
-    for names in (laws(), surfaces(), estimators()):
+    for names in (laws(), laws(kind="surface"), laws(kind="estimator")):
         assert [name for name in names if name not in firsts] == []
     assert "…" not in out
     assert max(map(len, out.splitlines())) <= 80
-    assert f"Laws ({len(laws())})" in out
-    assert "smc-mujoco laws NAME" in out
+    assert "smc-mujoco list NAME" in out
 
 
 def test_the_table_has_the_formula(call):
-    out = call("laws")[1]
+    out = call("list")[1]
     (line,) = (line for line in out.splitlines() if line.split()[:1] == ["super_twisting"])
     assert "u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s)" in flat(out[out.index(line) :])
 
@@ -70,7 +67,7 @@ def test_there_are_at_least_thirty_laws():
 
 
 def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
-    code, out, err = call("laws", "--needs", "continuous,finite-time", "--plant", "duffing")
+    code, out, err = call("list", "--needs", "continuous,finite-time", "--plant", "duffing")
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
     rows = filter(None, map(str.split, out.splitlines()))
@@ -82,13 +79,13 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
 
 
 def test_laws_of_a_plant(call):
-    assert "hierarchical" in call("laws", "--plant", "overhead_crane")[1]
+    assert "hierarchical" in call("list", "--plant", "overhead_crane")[1]
 
 
 def test_where_no_law_suits_it_says_so(call):
-    out = flat(call("laws", "--needs", "one-gain")[1])
+    out = flat(call("list", "--needs", "one-gain")[1])
     assert out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, or --plant"
-    assert 'velocity="levant"' in flat(call("laws", "--needs", "no-velocity")[1])
+    assert 'velocity="levant"' in flat(call("list", "--needs", "no-velocity")[1])
 
 
 @pytest.mark.parametrize(
@@ -96,22 +93,22 @@ def test_where_no_law_suits_it_says_so(call):
     [
         (("--needs", "smooth"), "unknown property of a law 'smooth': choose from continuous, "),
         (("--plant", "dufing"), "did you mean 'duffing'?"),
-        (("pid", "--needs", "continuous"), "laws pid shows one law: leave it out, or leave out --needs"),
+        (("pid", "--needs", "continuous"), "--needs is for lists: leave out NAME"),
     ],
 )
 def test_a_filter_that_cannot_be_is_one_sentence(words, sentence, call):
-    code, out, err = call("laws", *words)
+    code, out, err = call("list", *words)
     assert (code, out, len(err.splitlines())) == (2, "", 1)
     assert sentence in err
 
 
 def test_a_page_has_what_theory_promises_and_what_the_law_reads(call):
-    out = flat(call("laws", "twisting")[1])
+    out = flat(call("list", "twisting")[1])
     assert "family higher-order" in out
     assert "promises e = 0 after a finite time" in out
     assert "reads e, de, ddr, f, g, model" in out
-    assert "promises a continuous u" in flat(call("laws", "pid")[1])
-    assert "promises" not in call("laws", "filtered_difference")[1]
+    assert "promises a continuous u" in flat(call("list", "pid")[1])
+    assert "promises" not in call("list", "filtered_difference")[1]
 
 
 # one of them
@@ -119,7 +116,7 @@ def test_a_page_has_what_theory_promises_and_what_the_law_reads(call):
 
 @ONE_BY_ONE
 def test_a_page_has_all_that_is_known(name, template: Template, call):
-    code, out, err = call("laws", name)
+    code, out, err = call("list", name)
     assert (code, err) == (0, "")
     assert max(map(len, out.splitlines())) <= 80
     text = flat(out)
@@ -148,21 +145,21 @@ def test_a_formula_is_an_equation():
 
 
 def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
-    out = flat(call("laws", "pid")[1])
+    out = flat(call("list", "pid")[1])
     assert "kp kd > ki" in out
     assert "tt = 0.5 > 0" in out
     assert "kp = 10 >= 0" in out
     assert "degree 2: acts on e, with u in e''" in out
     assert 'smc.law("pid", kp=10, ki=5)' in out
-    assert "plants inverted_pendulum" in flat(call("laws", "swing_up")[1])
-    assert "none on the gains alone" in flat(call("laws", "classical")[1])
-    assert 'velocity=smc.estimator("filtered_difference", tau=0.005)' in flat(call("laws", "filtered_difference")[1])
+    assert "plants inverted_pendulum" in flat(call("list", "swing_up")[1])
+    assert "none on the gains alone" in flat(call("list", "classical")[1])
+    assert 'velocity=smc.estimator("filtered_difference", tau=0.005)' in flat(call("list", "filtered_difference")[1])
 
 
 def test_a_name_of_a_law_and_a_surface_shows_both(call):
-    shared = sorted(set(laws()) & set(surfaces()))
+    shared = sorted(set(laws()) & set(laws(kind="surface")))
     assert shared
-    out = call("laws", shared[0])[1]
+    out = call("list", shared[0])[1]
     for kind in ("law", "surface"):
         assert re.search(rf"^{shared[0]} .*{kind}$", out, re.MULTILINE)
 
@@ -171,7 +168,7 @@ def test_a_name_of_a_law_and_a_surface_shows_both(call):
     ("typed", "meant"), [("supertwist", "super_twisting"), ("Classical", "classical"), ("kalmann", "kalman")]
 )
 def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
-    code, out, err = call("laws", typed)
+    code, out, err = call("list", typed)
     assert (code, out) == (2, "")
     assert err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
 
@@ -201,7 +198,7 @@ def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
 def test_a_law_of_a_file_has_a_page_that_says_how_to_make_it(call, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_law.py").write_text(LAW)
-    code, page, _ = call("laws", "my_law.py")
+    code, page, _ = call("list", "my_law.py")
     assert code == 0
     assert 'smc.law("my_law.py", k=4, c=2.5)' in page
 
@@ -255,7 +252,7 @@ import added_law, contextlib
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 assert "brand_new" in smc.laws()
-for words in (["list"], ["laws"], ["laws", "brand_new"]):
+for words in (["list"], ["list", "brand_new"]):
     with contextlib.suppress(SystemExit):
         cli.main(words)
 """

@@ -168,7 +168,7 @@ def test_whatever_reading_raises_is_one_sentence(error, tmp_path):
 LOADERS = {
     ".json": (load_margins, load_map, result.load),
     ".npz": (records.load, smc.load),
-    ".csv": (records.load, smc.TimeSeries.from_csv),
+    ".csv": (records.load, smc.signals.TimeSeries.from_csv),
     ".onnx": (smc.policy,),
 }
 
@@ -190,7 +190,7 @@ def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
 @pytest.mark.parametrize("name", ["é" * 300, "a\0b", "x/" * 3000], ids=["long", "nul", "deep"])
 def test_a_name_that_no_file_can_have_is_one_sentence(name):
     calls: list[Callable[[str], object]] = [smc.audit, writable, scene.find, lambda name: rigs.read(Path(name))]
-    calls += [lambda name: smc.law_from_c(f"{name}.c"), lambda name: smc.live("duffing", out=name)]
+    calls += [lambda name: smc.exchange.law_from_c(f"{name}.c"), lambda name: smc.live("duffing", out=name)]
     for call in (*calls, lambda name: new(Path(name))):
         with pytest.raises(smc.ScenarioError):
             call(name)
@@ -216,7 +216,8 @@ def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "make", [lambda: smc.export_fmu("pid", "a.fmu"), lambda: smc.plant_from(f"<!-- -->{wild.ARM}", ["shoulder"])]
+    "make",
+    [lambda: smc.exchange.law_to_fmu("pid", "a.fmu"), lambda: smc.plant_from(f"<!-- -->{wild.ARM}", ["shoulder"])],
 )
 def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -227,7 +228,12 @@ def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, 
 
 @pytest.mark.skipif(os.name != "posix", reason="a compiler that is a shell script")
 @pytest.mark.parametrize(
-    "compile_", [lambda: smc.export_fmu("pid", "a.fmu"), lambda: smc.law_to_c("pid"), lambda: smc.law_from_c("law.c")]
+    "compile_",
+    [
+        lambda: smc.exchange.law_to_fmu("pid", "a.fmu"),
+        lambda: smc.exchange.law_to_c("pid"),
+        lambda: smc.exchange.law_from_c("law.c"),
+    ],
 )
 def test_a_compiler_without_room_for_its_files_is_not_blamed(compile_, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -52,7 +52,7 @@ def run_of(law, plant="duffing", **fields):
 
 
 def still_of(trace, folder):
-    return smc.still([trace], 0.0, folder / "still.png")
+    return smc.film([trace], folder / "still.png", at=0.0)
 
 
 # (own plant, a trace of it, folder) -> whether what is to come out did

@@ -76,7 +76,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 def quiet() -> Iterator[None]:
     """Warnings of packages are not errors."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.PackageWarning)
+        warnings.simplefilter("ignore", smc.errors.PackageWarning)
         yield
 
 
@@ -155,7 +155,7 @@ def test_an_entry_made_after_its_package_listed_the_catalogue_is_found(install):
         {"laws": {"forward_law": "forward_laws:forward_law"}},
         forward_laws="import smc_mujoco as smc\nbefore = smc.laws()\n" + LAW.replace("NAME", "forward_law"),
     )
-    with pytest.warns(smc.PackageWarning, match="'forward_law'"):
+    with pytest.warns(smc.errors.PackageWarning, match="'forward_law'"):
         import forward_laws  # pyright: ignore[reportMissingImports]
     assert "forward_law" not in forward_laws.before
     assert smc.law("forward_law").name == "forward_law"
@@ -185,9 +185,9 @@ def many_estimator(y, gains, memory):
 """,
         many_scene='"""Is it listed?"""\nraise RuntimeError("a scene is not run to be listed")',
     )
-    assert "many_joint" in smc.joint_laws()
-    assert "many_surface" in smc.surfaces()
-    assert "many_estimator" in smc.estimators()
+    assert "many_joint" in smc.laws(kind="joint")
+    assert "many_surface" in smc.laws(kind="surface")
+    assert "many_estimator" in smc.laws(kind="estimator")
     assert scene.question(scene.find("many_scene")) == "Is it listed?"
     assert "many_scene" not in sys.modules
 
@@ -311,13 +311,13 @@ def test_a_broken_entry_is_one_sentence_where_it_is_asked_for(broken, name):
     assert "\n" not in sentence
 
 
-@pytest.mark.filterwarnings("ignore::smc_mujoco.PackageWarning")
+@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PackageWarning")
 def test_the_page_of_a_broken_law_says_what_is_wrong_with_it(broken, capsys):
     with pytest.raises(SystemExit, match="2"):
-        main(["laws", "raises"])
+        main(["list", "raises"])
     assert "its law 'raises' (bad_raises:raises) cannot be loaded (ZeroDivisionError" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
-        main(["laws", "riases"])
+        main(["list", "riases"])
     assert "unknown law, surface or velocity estimator 'riases'" in capsys.readouterr().err
 
 

@@ -84,7 +84,7 @@ def test_the_filter_takes_the_noise_from_the_derivative():
 
 def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceeded():
     """Held at e = 1 the integrator rests where (sat(u) - u) / tt = ki e: u exceeds the bound by ki tt."""
-    with pytest.warns(smc.GainWarning, match="kp kd > ki"):
+    with pytest.warns(smc.errors.GainWarning, match="kp kd > ki"):
         law = smc.law("pid", kp=10.0, ki=5.0, kd=0.0, tt=0.5)
     assert called(law, 20_000, e=1.0, limit=6.0) == pytest.approx(-(6.0 + 5.0 * 0.5), rel=1e-6)
     assert called(law, 1001, e=1.0) == pytest.approx(-(10.0 + 5.0), rel=1e-9)  # no bound: it winds up as ki t

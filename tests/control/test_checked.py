@@ -324,7 +324,7 @@ def test_what_numba_did_not_compile_is_unchecked(tmp_path):
         "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out) "
         "{ out[0] = -5.0 * y->e; out[1] = y->e; return 0; }\n"
     )
-    assert smc.law_from_c(source)().why_unchecked == (
+    assert smc.exchange.law_from_c(source)().why_unchecked == (
         "law honest is unchecked: it is machine code that numba did not compile"
     )
 

@@ -19,7 +19,7 @@ from smc_mujoco.simulation import reference
 pytestmark = pytest.mark.quick
 
 H = 1e-3  # s
-FROM_POSITION = [name for name in smc.estimators() if name != "measured"]
+FROM_POSITION = [name for name in smc.laws(kind="estimator") if name != "measured"]
 ESTIMATORS = pytest.mark.parametrize("name", FROM_POSITION)
 LINEAR = ("filtered_difference", "high_gain", "extended_state_observer", "kalman", "integral_chain", "savitzky_golay")
 SECOND = ("extended_state_observer", "kalman", "integral_chain", "savitzky_golay", "levant")

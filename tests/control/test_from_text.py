@@ -71,10 +71,10 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
 @pytest.mark.filterwarnings("ignore:no set of gains tried")
 def test_a_tuning_goes_through_every_door(files, tuned, capsys):
     tuned.save("st.json")
-    assert smc.law_to_c("st.json") == smc.law_to_c(tuned.law)
+    assert smc.exchange.law_to_c("st.json") == smc.exchange.law_to_c(tuned.law)
     for words in (
-        ("export-c", "st.json"),
-        ("export-fmu", "st.json", "--no-binary"),
+        ("export", "st.json", "st.c"),
+        ("export", "st.json", "st.fmu", "--no-binary"),
         ("compare", "duffing", "--law", "st.json,two.py", "--seeds", "1", "--duration", "0.1", "--condition", "nominal",
          "--no-tune"),
         ("margins", "duffing", "--law", "st.json", "--kinds", "delay", "--quick"),
@@ -108,6 +108,6 @@ def test_other_texts_are_one_sentence(files, refused):
         refused(lambda text=text: smc.law(text))
     for text in GAINS:
         refused(lambda text=text: parsed_gains(text, "--set"))
-    with pytest.warns(smc.GainWarning, match="1/2 < p < 1"):
+    with pytest.warns(smc.errors.GainWarning, match="1/2 < p < 1"):
         component("surface", "terminal(p=2)", surface.catalogue(), "terminal(b=2)")
     assert parsed_gains(" lam=6, k1=3 5,", "--set") == {"lam": 6.0, "k1": (3.0, 5.0)}

@@ -26,7 +26,7 @@ def inertia(x):
     return plant.nominal.dynamics(np.array(x), np.zeros(3), Values(**plant.parameters)).M
 
 
-@pytest.mark.parametrize("name", smc.joint_laws())
+@pytest.mark.parametrize("name", smc.laws(kind="joint"))
 def test_every_joint_law_names_gains_units_and_source(name):
     template = joint_law.catalogue()[name]
     assert template.joint

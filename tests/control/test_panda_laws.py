@@ -15,7 +15,7 @@ def moving(period, **fields):
     goal = np.array(panda.rest) + MOVE
     law = smc.law("computed_torque_sliding", k=200.0, c=100.0, width=0.5)
     common = {"control_period": period, "physics_step": period, "integrator": "RK4", "duration": 1.2}
-    reference = [smc.Waypoints((0.0, 1.0), pair) for pair in zip(panda.x0, goal, strict=True)]
+    reference = [smc.signals.Waypoints((0.0, 1.0), pair) for pair in zip(panda.x0, goal, strict=True)]
     trace = smc.run(smc.Scenario(plant=panda, law=law, reference=reference, **common, **fields))
     assert trace.failure is None
     assert np.abs(trace.u).max(axis=0).tolist() < list(trace.scenario.limits)

@@ -13,13 +13,16 @@ from scipy.integrate import quad
 
 import smc_mujoco as smc
 from smc_mujoco.control.component import GainWarning
-from smc_mujoco.control.surface import catalogue, surface, surfaces
+from smc_mujoco.control.law import laws
+from smc_mujoco.control.surface import catalogue, surface
 from smc_mujoco.simulation import reference
 
 pytestmark = pytest.mark.quick
 
-SURFACES = pytest.mark.parametrize("name", surfaces())
-SECOND = [name for name in surfaces() if name != "higher_order"]  # those that an acceleration of the error keeps
+SURFACES = pytest.mark.parametrize("name", laws(kind="surface"))
+SECOND = [
+    name for name in laws(kind="surface") if name != "higher_order"
+]  # those that an acceleration of the error keeps
 MASS = smc.plant("duffing", M=1.0, alpha=0.0, beta=0.0, delta=0.0)
 HUM = smc.Sine(amplitude=0.4, omega=3.0)
 SHAKEN = 1.2e-3 * 3.0  # bound on s from sampling: (k + D) dt for k = 2, and half as much again
@@ -193,7 +196,7 @@ def shares(name, law):
 
 
 @pytest.mark.parametrize(
-    ("name", "law"), list(zip(surfaces(), itertools.cycle(["observer_free", "boundary_layer", "classical"])))
+    ("name", "law"), list(zip(laws(kind="surface"), itertools.cycle(["observer_free", "boundary_layer", "classical"])))
 )
 def test_first_order_laws_settle_every_plant_on_every_surface(name, law):
     if name.startswith("nonsingular"):

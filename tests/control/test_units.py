@@ -12,6 +12,7 @@ from helpers.plants_ab import measured
 
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.law import laws
 
 pytestmark = pytest.mark.quick
 
@@ -33,7 +34,7 @@ def called(component, ys):
     return np.array([component.function(y, gains, memory) for y in ys])
 
 
-@pytest.mark.parametrize("name", surface.surfaces())
+@pytest.mark.parametrize("name", laws(kind="surface"))
 def test_surface_does_the_same_in_every_system_of_units(name):
     def seen(X, T):
         return [
@@ -50,7 +51,7 @@ def test_surface_does_the_same_in_every_system_of_units(name):
         np.testing.assert_allclose(eq, plain[:, 1] * X / T**2, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", estimator.estimators())
+@pytest.mark.parametrize("name", laws(kind="estimator"))
 def test_estimator_does_the_same_in_every_system_of_units(name):
     def seen(X, T):
         return [Reading(dt=0.01 * T, x=X * (math.sin(0.3 * i) + x), v=v * X / T) for i, (x, v, *_) in enumerate(WAY)]

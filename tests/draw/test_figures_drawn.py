@@ -157,12 +157,13 @@ REFUSED = {  # call -> arguments, and what replaces them
     pareto: ({"tunings": []}, [{}]),
     smc.plot: ({"table": ONE}, [{}]),
     smc.show: ({"what": ONE}, [{}]),
-    smc.still: ({"traces": ONE, "time": 0.0, "path": "a.png", "size": (320, 180)}, [
-        {"time": -0.1}, {"time": 0.02}, {"path": "a.jpg"}, {"size": (318, 180)}, {"size": (1922, 1080)},
-        {"size": (481, 270)},
+    smc.film: ({"traces": ONE, "at": 0.0, "path": "a.png", "size": (320, 180)}, [
+        {"at": -0.1}, {"at": 0.02}, {"at": None}, {"path": "a.jpg"}, {"path": "a.mp4"}, {"size": (318, 180)},
+        {"size": (1922, 1080)}, {"size": (481, 270)}, {"span": (0.0, 1.0)}, {"at": None, "path": "a"},
+        {"at": None, "path": "a.mp4", "fps": 0.5}, {"at": None, "path": "a.mp4", "speed": 0.005},
+        {"at": None, "path": "a.mp4", "speed": 101.0}, {"at": None, "path": "a.mp4", "span": (5.0, 6.0)},
         {"camera": (0.0, 91.0)}, {"traces": [ONE] * 9}, {"traces": []},
     ]),
-    smc.film: ({"traces": ONE, "path": "a.mp4"}, [{"path": "a"}, {"fps": 0.5}, {"speed": 0.005}, {"speed": 101.0}]),
 }  # fmt: skip
 
 

@@ -74,11 +74,11 @@ def test_show_takes_any_figure(cell, trace):
 @renders
 @without_charts
 def test_frames_are_those_of_the_film_again_and_again(trace):
-    frames = smc.frames(trace, title="twice", **FILM)
+    frames = smc.film(trace, title="twice", **FILM)
     assert len(frames) == 5
     assert np.allclose(frames.clock.times, [0.0, 0.05, 0.1, 0.15, 0.2])
     first, second = list(frames), list(frames)
-    wanted = list(film.frames(trace, pace.clock(trace, 20.0, 1.0), None, "twice", SIZE))
+    wanted = list(film.pictures(trace, pace.clock(trace, 20.0, 1.0), None, "twice", SIZE))
     assert np.array_equal(first, second)
     assert np.array_equal(first, wanted)
     assert first[0].shape == (180, 320, 3)
@@ -90,7 +90,7 @@ def test_frames_are_those_of_the_film_again_and_again(trace):
 @without_charts
 def test_mediapy_takes_the_frames_with_their_speed(trace):
     mediapy = pytest.importorskip("mediapy")
-    shown = mediapy.show_video(smc.frames(trace, **FILM), return_html=True)
+    shown = mediapy.show_video(smc.film(trace, **FILM), return_html=True)
     assert probe(content(shown)) == (320, 180, 20.0, 5)
 
 
@@ -98,7 +98,7 @@ def test_mediapy_takes_the_frames_with_their_speed(trace):
 @without_charts
 def test_show_films_traces_and_frames(cell, trace):
     smc.show([trace, trace], labels=["a", "b"], **FILM)
-    smc.show(smc.frames(trace, **FILM))
+    smc.show(smc.film(trace, **FILM))
     assert [probe(content(shown)) for shown in cell if shown] == [(320, 180, 20.0, 5)] * 2
     assert all('width="320"' in shown and "max-width:100%" in shown for shown in cell if shown)
     assert content(cell[0]) != content(cell[-1])
@@ -149,4 +149,4 @@ def test_outside_of_a_notebook_show_names_what_to_call(trace):
 
 def test_a_speed_that_no_film_has_is_refused_at_once(trace):
     with pytest.raises(smc.ScenarioError, match="fps is 0"):
-        smc.frames(trace, fps=0.0)
+        smc.film(trace, fps=0.0)

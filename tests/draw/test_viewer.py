@@ -1,4 +1,4 @@
-"""What `smc-mujoco view` promises: the run of smc.run, at the user's pace and with their gains; or one sentence."""
+"""What `smc-mujoco run --view` promises: the run of smc.run, at the user's pace and with their gains; or a sentence."""
 
 import dataclasses
 import sys
@@ -26,9 +26,9 @@ HARD = smc.Scenario(
     model="nominal",
     duration=0.3,
     noise=smc.Noise(0.001, 0.01),
-    disturbance=(smc.Sine(0.2, 5.0), smc.Gust(1.0, time=0.1, width=0.05)),
+    disturbance=(smc.Sine(0.2, 5.0), smc.signals.Gust(1.0, time=0.1, width=0.05)),
     input_delay=0.005,
-    friction=smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.05),
+    friction=smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.05),
     actuator=(smc.DCMotor(), smc.Backlash(0.01)),
     sensor=smc.Encoder(counts=4096, delay=0.001),
     contact="stops",
@@ -330,7 +330,7 @@ def test_without_a_display_one_sentence_says_so(call, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    code, out, err = call("view", "duffing")
+    code, out, err = call("run", "duffing", "--view")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith("smc-mujoco: no view: there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set): ")
 
@@ -339,7 +339,7 @@ def test_a_display_that_does_not_answer_is_named(call, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setenv("DISPLAY", ":9876")
-    code, out, err = call("view", "duffing")
+    code, out, err = call("run", "duffing", "--view")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "no window opens on DISPLAY=:9876" in err
 
@@ -354,8 +354,8 @@ def test_on_macos_it_needs_mjpython(monkeypatch):
 
 
 def test_condition_and_label_name_the_run(call, screen):
-    assert call("view", "duffing")[0] == 0
-    assert call("view", "vdp_noise", "--label", "classical")[0] == 0
+    assert call("run", "duffing", "--view")[0] == 0
+    assert call("run", "vdp_noise", "--view", "--label", "classical")[0] == 0
     assert [(s.plant.name, s.law.name) for s in screen] == [("duffing", "observer_free"), ("van_der_pol", "classical")]
 
 
@@ -365,7 +365,7 @@ def test_what_the_scene_does_not_have_is_named_before_a_display_is_missed(
     words, display_there, call, screen, monkeypatch
 ):
     monkeypatch.setattr(display, "missing", lambda: None if display_there else "no view: there is no display")
-    code, out, err = call("view", *words)
+    code, out, err = call("run", *words, "--view")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert repr(words[-1]) in err
     assert screen == []

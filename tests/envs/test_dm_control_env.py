@@ -45,7 +45,7 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
     changes = {"duration": 0.3, "x0": start(plant, task)}
     environment = suite.load(plant, task, changes=changes)
     trace = smc.run(run_of(environment.task.setting, law))
-    states = driven_by_dm(environment, smc.agent(law, environment))
+    states = driven_by_dm(environment, smc.envs.agent(law, environment))
     assert np.abs(states - columns(trace)).max() < 1e-9
     assert np.abs(states[:, : trace.x.shape[1]] - start(plant, task)).max() > 1e-4  # it moved
 
@@ -64,7 +64,7 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
 def test_what_makes_a_mechanism_real_is_in_the_environment_too(changes):
     changes = {"duration": 0.3, "x0": 0.5} | changes
     environment = suite.load("inverted_pendulum", changes=changes)
-    trace, act = smc.run(run_of(environment.task.setting, LAW)), smc.agent(LAW, environment)
+    trace, act = smc.run(run_of(environment.task.setting, LAW)), smc.envs.agent(LAW, environment)
     for _ in range(2):  # nothing is left of the episode before
         assert np.abs(driven_by_dm(environment, act) - columns(trace)).max() < 1e-9
 
@@ -81,7 +81,7 @@ def test_what_makes_a_mechanism_real_is_in_the_environment_too(changes):
 def test_an_agent_has_the_memories_model_surface_and_estimator_of_its_law(law, fields):
     environment = suite.load("duffing", "track", changes={"duration": 0.2, "x0": 0.7})
     trace = smc.run(run_of(environment.task.setting, smc.law(law), fields))
-    act = smc.agent(law, environment, **fields)
+    act = smc.envs.agent(law, environment, **fields)
     first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
     assert np.abs(first - columns(trace)).max() < 1e-9
     assert np.array_equal(first, second)  # nothing is left of the episode before
@@ -92,7 +92,7 @@ def test_an_agent_with_a_model_of_coupled_channels_starts_afresh_too():
     links = {joint: smc.Channel(motor=True) for joint in ("shoulder", "elbow")}
     arm = smc.plant_from(Path(dm_control.suite.__file__).parent / "acrobot.xml", links)
     environment = suite.load(arm, changes={"x0": [1.0, 0.5], "duration": 0.05, "u_max": 500.0})
-    act = smc.agent(smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal")
+    act = smc.envs.agent(smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal")
     first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
     assert np.array_equal(first, second)
 
@@ -179,7 +179,7 @@ def test_a_swing_up_cannot_push_the_pendulum_up_and_energy_can():
     environment = suite.load("inverted_pendulum", "swing_up", random=0)
     last = driven_by_dm(environment, lambda timestep: np.array([1.5]))[:, 0]
     assert np.abs(last - np.pi).max() < 2.0
-    act = smc.agent(smc.law("swing_up"), environment)
+    act = smc.envs.agent(smc.law("swing_up"), environment)
     assert np.cos(driven_by_dm(environment, act)[-1, 0]) > 0.999
 
 
@@ -256,7 +256,7 @@ def test_it_runs_in_the_runtime_of_dm_control_s_viewer():
     from dm_control.viewer import runtime
 
     environment = suite.load("duffing", random=0)
-    shown, faults = runtime.Runtime(environment, smc.agent(LAW, environment)), []
+    shown, faults = runtime.Runtime(environment, smc.envs.agent(LAW, environment)), []
     shown.on_error += faults.append
     for _ in range(3):
         shown.tick(0.02, paused=False)
@@ -278,7 +278,7 @@ def test_environments_are_dm_control_s_own():
     assert type(environment) is control.Environment
     timestep = environment.reset()
     assert timestep.observation["observations"].shape == (2,)
-    assert smc.agent("classical", environment)(timestep).shape == (1,)
+    assert smc.envs.agent("classical", environment)(timestep).shape == (1,)
 
 
 def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
@@ -357,8 +357,8 @@ def test_bad_input_is_one_sentence(refused):
         lambda: suite.load("duffing").task.setting.command([np.inf]),
         lambda: suite.load("duffing").task.setting.command(["left"]),
         lambda: suite.load("duffing").task.setting.command([[0.0], [0.0, 1.0]]),
-        lambda: smc.agent("classical", 3),
-        lambda: smc.agent("clasical", suite.load("duffing")),
+        lambda: smc.envs.agent("classical", 3),
+        lambda: smc.envs.agent("clasical", suite.load("duffing")),
     ):
         refused(make)
 
@@ -370,6 +370,6 @@ def test_an_agent_whose_law_fails_says_so(refused):
 
     environment = suite.load("duffing")
     timestep = environment.reset()
-    act = smc.agent(broken, environment)
+    act = smc.envs.agent(broken, environment)
     timestep = environment.step(act(timestep))
     refused(lambda: act(timestep))

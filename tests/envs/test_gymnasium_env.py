@@ -29,7 +29,7 @@ def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
     law = smc.law("hierarchical") if "hierarchical" in smc.laws(plant) else LAW
     single = PlantEnv(plant, task, {"duration": 0.2, "x0": start(plant, task)})
     trace = smc.run(run_of(single.setting, law))
-    assert np.abs(driven_by_gym(single, smc.agent(law, single)) - columns(trace)).max() < 1e-9
+    assert np.abs(driven_by_gym(single, smc.envs.agent(law, single)) - columns(trace)).max() < 1e-9
 
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(1))
@@ -87,7 +87,7 @@ def test_a_copy_that_mujoco_gives_up_leaves_its_neighbours_drives_alone(monkeypa
 
 def test_an_agent_that_joins_an_episode_late_has_no_old_memory():
     one = PlantEnv("duffing", changes={"x0": 0.5, "duration": 0.1})
-    act, episodes = smc.agent("adaptive", one), []
+    act, episodes = smc.envs.agent("adaptive", one), []
     for _ in range(2):
         one.reset(seed=0)
         observation = one.step([0.0])[0]
@@ -436,8 +436,8 @@ def test_bad_input_is_one_sentence(refused):
         lambda: BatchEnv("duffing", 2).step([[0.0], [0.0]]),
         lambda: BatchEnv("duffing", 2).reset(seed=[1]),
         lambda: BatchEnv("duffing", 2).reset(seed="a"),
-        lambda: smc.agent("classical", BatchEnv("duffing", 2)),
-        lambda: smc.agent("clasical", PlantEnv("duffing")),
-        lambda: smc.agent("classical", PlantEnv("double_pendulum"))(np.zeros(3)),
+        lambda: smc.envs.agent("classical", BatchEnv("duffing", 2)),
+        lambda: smc.envs.agent("clasical", PlantEnv("duffing")),
+        lambda: smc.envs.agent("classical", PlantEnv("double_pendulum"))(np.zeros(3)),
     ):
         refused(make)

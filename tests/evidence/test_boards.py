@@ -13,9 +13,9 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 import smc_mujoco as smc
-from smc_mujoco.cli import main as cli
 from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.boards import entries, simulator, standings
+from smc_mujoco.evidence.boards.__main__ import app as command
 from smc_mujoco.evidence.boards.scoring import VERSIONS
 from smc_mujoco.evidence.boards.simulator import Case, Machine
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
@@ -489,7 +489,7 @@ def test_an_entry_survives_a_file(tmp_path, traces):
 
 
 def test_an_entry_is_exported_to_c():
-    code = smc.law_to_c(entries.acrobot_swing_up)
+    code = smc.exchange.law_to_c(entries.acrobot_swing_up)
     assert "smc_law" in code
     assert "tanh" in code
 
@@ -589,7 +589,7 @@ def test_a_law_that_does_not_compile_is_refused():
 @pytest.mark.slow
 def test_the_command_shows_this_packages_rows_among_the_published(capsys, tmp_path):
     with pytest.raises(SystemExit) as ended:
-        cli.main(["board", "acrobot", "--no-robustness", "--figure", str(tmp_path / "a")])
+        command(["acrobot", "--no-robustness", "--figure", str(tmp_path / "a")])
     assert ended.value.code in (0, None)
     out = capsys.readouterr().out
     order = ["trajectory + linear", "History SAC", "mcpilco", "trajectory + sliding"]
@@ -603,7 +603,7 @@ UNWRITABLE = ["acrobot", "--no-robustness", "--figure", f"{__file__}/a"]  # in n
 @pytest.mark.parametrize("arguments", [["acrobat"], ["acrobot", "--film", "a.avi"], UNWRITABLE])
 def test_the_command_refuses_in_one_sentence(arguments, capsys):
     with pytest.raises(SystemExit) as ended:
-        cli.main(["board", *arguments])
+        command(arguments)
     assert ended.value.code == 2
     printed = capsys.readouterr()
     assert printed.out == ""

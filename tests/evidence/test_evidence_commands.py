@@ -122,15 +122,6 @@ def repeated(name):
 
 FOUND = SimpleNamespace(tried=40, value=0.3125, scenario=smc.Scenario(plant="duffing", law="pid"))
 STUBS = {  # of each command: the functions replaced, and what they give
-    "board": {
-        "evidence.boards.experiments": {boards.NAME: "first", "SAC": "second"},
-        "simulation.run.run": lambda runs: [f"trace of {one}" for one in runs],
-        "evidence.boards.board": ROWS,
-        "evidence.boards.robustness": half_done,
-        "evidence.boards.robustness_board": TESTS,
-        "draw.figure.figure": None,
-        "cli.scene.filmed": [Path("film.mp4")],
-    },
     "certify": {
         "evidence.certificates.maker.certify": lambda scenario, within: certificate(),
         "evidence.certificates.certificate.Certificate.figure": None,
@@ -140,8 +131,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
     "claims": {
         "evidence.audit.audit.audit": audited,
         "evidence.audit.mutants.survivors": lambda *_, **__: {"3": "kept"},
-    },
-    "papers": {
         "evidence.audit.paper.new": [Path("mine/paper.toml"), Path("mine/claims.py")],
         "evidence.audit.paper.papers": {"small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")},
         "evidence.audit.evidence.check": {
@@ -154,11 +143,8 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.report.report": lambda *_, **__: Path("report.html"),
         "evidence.report.paper.report": lambda *_, **__: Path("report.html"),
     },
-    "identify": {
+    "rig": {
         "evidence.rigs.identify.identify": lambda of, many, *_, **__: identified(len(many)),
-        "evidence.rigs.records.load": lambda file, names: f"columns of {file}",
-    },
-    "replay": {
         "evidence.rigs.rig.rig": repeated,
         "evidence.rigs.records.load": lambda file, names: {"t": np.array([3.0, 4.0])},
         "evidence.rigs.figure.residual_figure": [Path("run.svg")],
@@ -167,8 +153,6 @@ STUBS = {  # of each command: the functions replaced, and what they give
     },
 }
 LINES = (
-    "board acrobot --figure a --film b.mp4",
-    "board pendubot --no-robustness",
     "certify duffing --disturbance 2 --worst --out d.json --figure f",
     "certify duffing --law pid --condition noise --gains default --slope 3",
     "certify",
@@ -179,18 +163,21 @@ LINES = (
     "claims 5 --quick",
     "claims 4 --json --quick",
     "claims --json --mutants",
-    "papers",
-    "papers --new mine --check e.json",
+    "claims --papers",
+    "claims --new mine --check e.json",
+    "claims --papers --quick",
     "report --paper gaber --quick --threads 2",
     "report --quick --out there --seeds 2 --law pid,lqr --records r --relevant 0.1",
     "report --paper gaber --law pid",
-    "identify emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3",
-    "identify duffing a.csv b.csv --json found.json --figure fit",
-    "identify emps a.csv --set mass=much",
-    "identify nowhere a.csv",
-    "replay emps run.csv --columns x=position",
-    "replay emps run.csv --quantities driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4",
-    "replay emps run.csv --film film.mp4",
+    "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3",
+    "rig --fit duffing a.csv b.csv --json found.json --figure fit",
+    "rig --fit emps a.csv --set mass=much",
+    "rig --fit nowhere a.csv",
+    "rig emps run.csv --columns x=position",
+    "rig emps run.csv --sets driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4",
+    "rig emps run.csv --film film.mp4",
+    "rig emps a.csv b.csv",
+    "rig emps a.csv --starts 3",
 )
 
 

@@ -43,12 +43,12 @@ def sampled(K: control.StateSpace) -> control.StateSpace:
 def test_a_loop_is_that_of_python_control(name, discrete):
     K = CONTROLLERS[name]
     one = K.ninputs == 1
-    law = smc.law_from_control(sampled(K) if discrete else K)
+    law = smc.exchange.law_from_control(sampled(K) if discrete else K)
     scenario = smc.Scenario(
         plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=3.0, control_period=H, u_max=np.inf, disturbance=()
     )
     trace = smc.run(scenario)
-    G = control.sample_system(smc.state_space(LINEAR), H, "zoh")
+    G = control.sample_system(smc.design.state_space(LINEAR), H, "zoh")
     Kd = sampled(K)
     x, w, found = np.array([0.3, -0.4]), np.zeros(Kd.nstates), []
     for _ in trace.t:
@@ -63,8 +63,8 @@ def test_a_loop_is_that_of_python_control(name, discrete):
 def test_a_step_of_the_reference_is_the_closed_loop_of_forced_response():
     K = CONTROLLERS["integrator"]
     fields = {"x0": 0.0, "duration": 4.0, "control_period": H, "u_max": np.inf, "reference": smc.Constant(0.2)}
-    trace = smc.run(smc.Scenario(plant=LINEAR, law=smc.law_from_control(K), **fields))
-    G = control.sample_system(smc.state_space(LINEAR), H, "zoh")
+    trace = smc.run(smc.Scenario(plant=LINEAR, law=smc.exchange.law_from_control(K), **fields))
+    G = control.sample_system(smc.design.state_space(LINEAR), H, "zoh")
     loop = control.feedback(G * sampled(K))
     answer = control.forced_response(loop, trace.t, np.full(len(trace.t), 0.2))
     assert np.abs(trace.x[:, 0] - np.squeeze(answer.outputs)).max() < 1e-8
@@ -73,7 +73,7 @@ def test_a_step_of_the_reference_is_the_closed_loop_of_forced_response():
 
 def test_many_inputs_are_read_by_name():
     K = control.ss([], [], [], [[5.0, -30.0, -6.0, 2.0]])
-    law = smc.law_from_control(K, ["r", "x", "v", "ddr"])
+    law = smc.exchange.law_from_control(K, ["r", "x", "v", "ddr"])
     assert "w3 = y.ddr" in text(law)
     trace = smc.run(smc.Scenario(plant=LINEAR, law=law, duration=0.1, reference=smc.Constant(0.5), u_max=np.inf))
     assert np.allclose(trace.u[:, 0], 2.5 - 30.0 * trace.x[:, 0] - 6.0 * trace.v[:, 0], rtol=1e-12)
@@ -81,9 +81,9 @@ def test_many_inputs_are_read_by_name():
 
 @needs_compiler
 def test_its_c_gives_the_same_bits(tmp_path):
-    law: Any = smc.law_from_control(CONTROLLERS["two resonances"])
-    (tmp_path / "law.c").write_text(smc.law_to_c(law))
-    in_c = smc.law_from_c(tmp_path / "law.c")
+    law: Any = smc.exchange.law_from_control(CONTROLLERS["two resonances"])
+    (tmp_path / "law.c").write_text(smc.exchange.law_to_c(law))
+    in_c = smc.exchange.law_from_c(tmp_path / "law.c")
     runs = [
         smc.Scenario(plant="duffing", law=one, duration=1.0, u_max=np.inf)
         for one in (law, in_c(), law.template(scale=0.5))
@@ -94,15 +94,15 @@ def test_its_c_gives_the_same_bits(tmp_path):
 
 
 def test_it_is_tuned_pickled_and_told_apart():
-    law: Any = smc.law_from_control(LEAD)
-    assert pickle.loads(pickle.dumps(law)) == law != smc.law_from_control(2 * LEAD)
+    law: Any = smc.exchange.law_from_control(LEAD)
+    assert pickle.loads(pickle.dumps(law)) == law != smc.exchange.law_from_control(2 * LEAD)
     assert text(pickle.loads(pickle.dumps(law))) == text(law)
     assert 0.01 <= smc.tune("duffing", law.template(scale=0.02), budget=4, searches=1).gains["scale"] <= 100.0
 
 
 def test_systems_of_scipy_and_matrices_are_taken():
     texts = {
-        text(smc.law_from_control(K))
+        text(smc.exchange.law_from_control(K))
         for K in (
             tf([1.0, 2.0], [1.0, 3.0]), scipy.signal.TransferFunction([1.0, 2.0], [1.0, 3.0]),
             (-3.0, 1.0, -1.0, 1.0), ([[-3.0]], [1.0], [-1.0], 1.0, None),
@@ -125,22 +125,22 @@ def test_what_cannot_be_a_law_is_one_sentence(refused):
         "three matrices": (1, 1, 1),
     }
     for K in wrong.values():
-        refused(lambda K=K: smc.law_from_control(K))
-    refused(lambda: smc.law_from_control(LEAD, ["y"]))
-    refused(lambda: smc.law_from_control(LEAD, name=""))
+        refused(lambda K=K: smc.exchange.law_from_control(K))
+    refused(lambda: smc.exchange.law_from_control(LEAD, ["y"]))
+    refused(lambda: smc.exchange.law_from_control(LEAD, name=""))
 
 
 def test_a_discrete_one_runs_at_its_own_period_only():
-    law = smc.law_from_control(sampled(LEAD))
+    law = smc.exchange.law_from_control(sampled(LEAD))
     with pytest.raises(smc.ScenarioError, match=r"is discretised for 0.01 s, and control_period is 0.001 s: give"):
         smc.Scenario(plant="duffing", law=law)
     every = sampled(LEAD)
     every.dt = True
-    smc.Scenario(plant="duffing", law=smc.law_from_control(every))
+    smc.Scenario(plant="duffing", law=smc.exchange.law_from_control(every))
 
 
 def test_python_control_is_not_imported_for_matrices():
-    code = "import sys, smc_mujoco as smc; smc.law_from_control((0, 1, 1, 0)); print('control' in sys.modules)"
+    code = "import sys, smc_mujoco as smc; smc.exchange.law_from_control((0, 1, 1, 0)); print('control' in sys.modules)"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"
 
 
@@ -151,7 +151,7 @@ def test_python_control_is_not_imported_for_matrices():
 def test_a_and_b_are_the_derivatives_of_the_nominal_model(name):
     """Where it has one for its channels alone, and so holds with the others at rest."""
     plant = smc.plant(name)
-    G = smc.state_space(plant)
+    G = smc.design.state_space(plant)
     n = plant.n
     assert (G.nstates, G.ninputs, G.noutputs) == (2 * n, plant.driven, n)
     assert np.array_equal(G.A[:n], np.eye(n, 2 * n, n))
@@ -164,7 +164,7 @@ def test_a_and_b_are_the_derivatives_of_the_nominal_model(name):
 
 
 def test_it_is_linearised_where_a_command_holds_it():
-    G = smc.state_space("inverted_pendulum", 0.5)
-    assert G.A[1, 0] == pytest.approx(smc.state_space("inverted_pendulum").A[1, 0] * np.cos(0.5), rel=1e-6)
+    G = smc.design.state_space("inverted_pendulum", 0.5)
+    assert G.A[1, 0] == pytest.approx(smc.design.state_space("inverted_pendulum").A[1, 0] * np.cos(0.5), rel=1e-6)
     with pytest.raises(smc.ScenarioError, match=r"no command holds cart_pole at rest at x = 0\.5, 0\.5: give another"):
-        smc.state_space("cart_pole", 0.5)
+        smc.design.state_space("cart_pole", 0.5)

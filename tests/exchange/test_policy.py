@@ -72,7 +72,7 @@ def test_a_joint_that_nothing_couples_where_it_is_stays_in_the_observation():
 
 
 def test_the_warning_of_a_policy_names_its_cost_and_no_compiler():
-    with pytest.warns(smc.PlainLoopWarning) as caught:
+    with pytest.warns(smc.errors.PlainLoopWarning) as caught:
         briefly(smc.policy(proportional))
     sentence = str(caught[0].message)
     assert sentence.startswith("law 'proportional' is a policy, which is Python: several times slower")
@@ -393,7 +393,9 @@ class Broken:
 
 def test_a_controller_of_python_control_is_told_its_own_door():
     control = pytest.importorskip("control", reason="python-control is not installed")
-    with pytest.raises(smc.ScenarioError, match=r"policy is a StateSpace of python-control: give smc.law_from_control"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"policy is a StateSpace of python-control: give smc.exchange.law_from_control"
+    ):
         smc.policy(control.ss([[0.0]], [[1.0]], [[1.0]], [[0.0]]))
 
 

@@ -9,7 +9,7 @@ import smc_mujoco as smc
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c import export as c_export
 
-FMUS = {  # name of a snapshot -> law, options of export_fmu
+FMUS = {  # name of a snapshot -> law, options of law_to_fmu
     "one joint": ("super_twisting", {"surface": "integral", "velocity": "levant", "u_max": 3.0, "joint": "slide"}),
     "with its model": ("pid", {"model": "nominal", "control_period": 2e-3}),
     "two joints": ("hybrid_sliding", {"joints": 2, "u_max": (3.0, 5.0)}),
@@ -33,7 +33,7 @@ def recorded(text: str) -> str:
 def test_what_the_files_of_an_fmu_say_is_as_recorded(name, tmp_path, snapshot):
     """The comments of their code; of one FMU, also its XML files and the names of all."""
     law, given = FMUS[name]
-    with zipfile.ZipFile(smc.export_fmu(law, tmp_path / "a.fmu", binary=False, **given)) as archive:
+    with zipfile.ZipFile(smc.exchange.law_to_fmu(law, tmp_path / "a.fmu", binary=False, **given)) as archive:
         texts = {one: recorded(archive.read(one).decode()) for one in archive.namelist()}
     written = [text for one, text in texts.items() if one.endswith(("controller.c", "controller.h", "or.c", "ce.c"))]
     said = [each for text in written for each in COMMENT.findall(text)]
@@ -49,6 +49,6 @@ def test_what_the_files_of_an_fmu_say_is_as_recorded(name, tmp_path, snapshot):
 )
 def test_a_law_in_c_is_as_recorded(law, numbers, joints, snapshot):
     """The whole of one law; of others what is said before their code, without what their docstrings say."""
-    text = recorded(smc.law_to_c(law, numbers, joints))
+    text = recorded(smc.exchange.law_to_c(law, numbers, joints))
     text = re.sub(r"( \*\n \* [^\n]*\n).*?(?= \* gains )", r"\1", text, count=1, flags=re.DOTALL)
     assert (text if numbers == "float" else text.partition(";\n\n")[0]) == snapshot

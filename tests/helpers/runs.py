@@ -23,7 +23,7 @@ def made(function, gains=None, memory=8):
 def plainly(*args, **kwargs):
     """`smc.run` of something that takes the reference loop, without the warning about it."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
         return smc.run(*args, **kwargs)
 
 

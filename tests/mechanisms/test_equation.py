@@ -190,8 +190,8 @@ CONDITIONS = {
     "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
     "sines": {"disturbance": (SINE, smc.Sine(amplitude=1.0, omega=30.0))},
     "step": {"disturbance": smc.Step(0.2, time=HALF)},
-    "pulse": {"disturbance": smc.Pulse(2.0, time=HALF, width=0.1)},
-    "process_noise": {"disturbance": smc.OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
+    "pulse": {"disturbance": smc.signals.Pulse(2.0, time=HALF, width=0.1)},
+    "process_noise": {"disturbance": smc.signals.OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
     "delay": {"input_delay": 0.02},
     "light": {"mismatch": {"mass": 0.7}},
     "differenced": {"velocity": "filtered_difference"},
@@ -207,7 +207,7 @@ def disturbance(trace, since):
     for signal in trace.scenario.disturbance:
         if isinstance(signal, smc.Sine):
             d += sine(signal, trace.t[:-1, None] + since)
-        elif isinstance(signal, smc.OrnsteinUhlenbeck):
+        elif isinstance(signal, smc.signals.OrnsteinUhlenbeck):
             d += trace.d[:-1] + rise
         else:
             d += trace.d[:-1]

@@ -320,7 +320,7 @@ BEHIND = {"table": ((0.5545, 0.0, 0.195), 2, 0.2, -1.0), "wall": ((0.66, 0.0, 0.
 def test_the_probe_presses_on_a_surface_and_does_not_pass_through(kind):
     point, axis, place, way = BEHIND[kind]
     home = (0.5545, 0.0, 0.5245)
-    path = smc.cartesian_path("panda", [0.0, 1.0], [home, point], site="tip")
+    path = smc.signals.cartesian_path("panda", [0.0, 1.0], [home, point], site="tip")
     common = {"plant": "panda", "law": "computed_torque_sliding", "reference": path, "duration": 1.2}
     depths = {}
     for trace in smc.run([smc.Scenario(**common, contact=each) for each in (kind, "none")]):

@@ -245,10 +245,10 @@ def test_the_motor_limits_the_command(name):
 
 def test_a_gust_on_the_pole_of_a_turned_arm_is_logged_as_its_torque_about_the_hinge():
     """Against the force times dp/dq of the pole's centre p, by the formula of its place: F l cos(q) cos(x)."""
-    gust = smc.Gust(0.02, time=-1.0, width=3.0)
+    gust = smc.signals.Gust(0.02, time=-1.0, width=3.0)
     fields = {"law": "none", "x0": (0.8, 0.5), "v0": (3.0, 0.0), "disturbance": gust}
     trace = smc.run(smc.Scenario(plant="furuta", duration=0.3, **fields))
-    (x, q), force = trace.x.T, np.array([smc.Gust.value(t, gust)[0] for t in trace.t])
+    (x, q), force = trace.x.T, np.array([smc.signals.Gust.value(t, gust)[0] for t in trace.t])
     assert np.ptp(np.cos(x)) > 0.5
     lever = trace.scenario.plant.parameters["l"] * np.cos(q) * np.cos(x)
     np.testing.assert_allclose(trace.d[:, 1], force * lever, rtol=1e-9, atol=1e-15)

@@ -41,7 +41,7 @@ def test_tip_scores_are_of_the_distance_in_space(trace):
         return np.array(found)
 
     away = np.linalg.norm(places(trace.x) - places(trace.r), axis=1)
-    found = smc.tip_scores(trace)
+    found = smc.metrics.tip_scores(trace)
     expected = {"max_error": away.max(), "rms_error": np.sqrt(np.mean(away**2)), "last_error": away[-1]}
     assert found == pytest.approx(expected, rel=1e-12)
     assert away.max() > 0.05
@@ -66,7 +66,7 @@ def test_the_actual_tip_is_that_of_the_true_plant(trace):
 
 
 def test_joint_scores_are_each_joints_own(trace):
-    found = smc.joint_scores(trace)
+    found = smc.metrics.joint_scores(trace)
     assert list(found) == ["reach", "turn", "lift"]
     for i, scores in enumerate(found.values()):
         power = np.abs(trace.force[:, i] * trace.v[:, i])
@@ -138,7 +138,7 @@ def test_contact_forces_end_with_a_failure(pressed, tmp_path, monkeypatch):
 def test_contact_forces_are_unknown_behind_parts_with_a_state(pressed, refused):
     for part in (smc.Lag(0.01), smc.Backlash(0.01)):
         refused(lambda part=part: tip.contacts(changed(pressed, actuator=part)))
-        assert set(smc.tip_scores(changed(pressed, actuator=part))) == {"max_error", "rms_error", "last_error"}
+        assert set(smc.metrics.tip_scores(changed(pressed, actuator=part))) == {"max_error", "rms_error", "last_error"}
 
 
 LIFTED = """
@@ -156,12 +156,12 @@ def test_joints_without_a_channel_are_where_they_start():
     """A lift holds the arm 0.7 m higher than the model's qpos0, also for inverse kinematics."""
     plant = smc.plant_from(LIFTED, channels=["turn"], keyframe="up", name="lifted", tip="tip")
     np.testing.assert_allclose(tip.tip_path(plant, np.zeros((1, 1))), [[0.5, 0.0, 1.0]])
-    (turn,) = smc.cartesian_path(plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5])
+    (turn,) = smc.signals.cartesian_path(plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5])
     np.testing.assert_allclose(tip.tip_path(plant, np.array([[turn.values[-1]]])), [[0.4, 0.0, 1.3]], atol=1e-6)
 
 
 def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
-    scores = smc.tip_scores(pressed)
+    scores = smc.metrics.tip_scores(pressed)
     assert abs(scores["force_error"]) < 1.0
     assert scores["mean_force"] == pytest.approx(20.0 * (1.0 + scores["force_error"] / 100.0))
     late = tip.contacts(pressed).force[180:]  # t[180] is 0.18 s, a rounding below 0.2 * 0.9
@@ -170,7 +170,7 @@ def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
     assert 0.0 < scores["depth"] < 1e-3
     assert scores["max_error"] < 2e-3
     assert np.ptp(tip.tip_path(pressed.scenario.plant, pressed.x)[:, 1]) > 0.02
-    assert smc.tip_scores(pressed, force=10.0)["force_error"] == pytest.approx(100.0, abs=2.0)
+    assert smc.metrics.tip_scores(pressed, force=10.0)["force_error"] == pytest.approx(100.0, abs=2.0)
 
 
 def test_rubbing_on_the_wall_does_not_change_the_force():
@@ -184,8 +184,8 @@ def test_rubbing_on_the_wall_does_not_change_the_force():
 
 def test_bad_input_is_one_sentence(trace, pressed, refused):
     plain = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
-    refused(lambda: smc.tip_scores(plain))
-    refused(lambda: smc.tip_scores(pressed, force=0.0))
+    refused(lambda: smc.metrics.tip_scores(plain))
+    refused(lambda: smc.metrics.tip_scores(pressed, force=0.0))
     refused(lambda: tip.contacts(trace))
     refused(lambda: smc.score([trace]))
     refused(lambda: smc.plant_from(arms.ARM, channels=["reach"], tip="tp"))

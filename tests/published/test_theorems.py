@@ -54,7 +54,7 @@ def test_conditioned_super_twisting_does_not_wind_up_as_the_plain_law_does():
 @pytest.mark.parametrize(("slope", "kept"), [(0.95, True), (1.05, False)])
 def test_conditioned_super_twisting_follows_slopes_up_to_k2_and_no_steeper_ones(slope, kept):
     """d = -U/2 + slope t: the theorem asks for L < k2 = 1. Beyond it w falls behind, and s goes as the difference."""
-    ramp = [smc.Constant(-BOUND), smc.Ramp(slope)]
+    ramp = [smc.Constant(-BOUND), smc.signals.Ramp(slope)]
     (trace,) = run([conditioned(1.0, k1=3.0)], u_max=2.0 * BOUND, disturbance=ramp, duration=5.0)
     late = np.abs(trace.v[-500:]).max()
     assert (late < 30.0 * 1e-3**2) == kept

@@ -13,7 +13,7 @@ from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.studies import run_key
 
-SINE, MOVE = smc.Sine(0.3, 4.0), smc.MinimumJerk(0.4, 0.01, 0.03)
+SINE, MOVE = smc.Sine(0.3, 4.0), smc.signals.MinimumJerk(0.4, 0.01, 0.03)
 REST = smc.Constant(0.0)
 PENDULUM = """
 <mujoco><worldbody><body><joint name="shoulder" axis="0 1 0"/><geom type="sphere" size="0.1" pos="0 0 -1" mass="1"/>
@@ -137,12 +137,12 @@ REFUSED = {
     "joint law in one channel": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
     "gains by channel in one channel": lambda: smc.Scenario(law=["classical", smc.law("twisting", r1=[4, 3])], **BOTH),
     "noise as reference": lambda: smc.Scenario(
-        law="classical", reference=[SINE, smc.OrnsteinUhlenbeck(0.1, 1.0)], **BOTH
+        law="classical", reference=[SINE, smc.signals.OrnsteinUhlenbeck(0.1, 1.0)], **BOTH
     ),
     "gain of a surface": lambda: smc.surface("linear", c=[1, 2]),
     "wrong degree": lambda: smc.Scenario(law=["classical", "twisting"], surface="pid", **BOTH),
     "tuning": lambda: smc.tune("double_pendulum", smc.law("classical", k=[1, 2]), budget=1),
-    "in C": lambda: smc.law_to_c(smc.law("classical", k=[1, 2])),
+    "in C": lambda: smc.exchange.law_to_c(smc.law("classical", k=[1, 2])),
 }
 
 

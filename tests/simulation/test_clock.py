@@ -103,7 +103,7 @@ def test_callback_equals_plain_loop(plant, name):
 
 
 def test_a_law_of_many_joints_may_be_late_too():
-    made = smc.Scenario(plant="double_pendulum", law=smc.joint_laws()[0], duration=0.2, **FIELDS["jitter"])
+    made = smc.Scenario(plant="double_pendulum", law=smc.laws(kind="joint")[0], duration=0.2, **FIELDS["jitter"])
     assert_same(smc.run(made), reference.run(made))
 
 

@@ -265,7 +265,8 @@ def test_named_law_is_another_in_tables(tmp_path):
 
 def test_grid_warns_of_gains_for_other_parameters():
     with pytest.warns(
-        smc.ScenarioWarning, match=r"tuned for duffing with its default parameters, .* has M = 20, beta = 50: tune"
+        smc.errors.ScenarioWarning,
+        match=r"tuned for duffing with its default parameters, .* has M = 20, beta = 50: tune",
     ):
         smc.grid(smc.plant("duffing", beta=50.0, M=20.0), "pid")
     with warnings.catch_warnings():

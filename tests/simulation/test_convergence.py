@@ -32,9 +32,9 @@ PARTS = {
     "viscous": {"friction": smc.Viscous(0.1)},
     "coulomb": {"friction": smc.Coulomb(0.05)},
     "coulomb, strong": {"friction": smc.Coulomb(0.5)},
-    "lugre": {"friction": smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)},
+    "lugre": {"friction": smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)},
     "lag": {"actuator": smc.Lag(0.005)},
-    "rate limit": {"actuator": smc.RateLimit(200.0)},
+    "rate limit": {"actuator": smc.hardware.RateLimit(200.0)},
     "dc motor": {"actuator": smc.DCMotor()},
     "backlash": {"actuator": smc.Backlash(0.02, rotor_damping=0.02)},
     "encoder": {"sensor": smc.Encoder(counts=4096)},  # on the ideal plant: RK4, 1 ms and 0.5 ms

@@ -51,7 +51,7 @@ def cases(arm):
     """Scenarios that differ in all that the law's road touches, most in one Batch."""
     common = {"duration": 0.05, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2)}
     loaded = {"velocity": "levant", "input_delay": 2e-3, "mismatch": {"m": 1.4}, "feedforward": smc.Constant(0.3)}
-    for name in smc.joint_laws():
+    for name in smc.laws(kind="joint"):
         yield smc.Scenario(plant=arm, law=name, x0=(0.1, -0.3, 0.2), **common)
         if name != "hybrid_sliding":  # which needs a tip
             yield smc.Scenario(plant="double_pendulum", law=name, **common)
@@ -265,7 +265,7 @@ REFUSED = {
     "welded": lambda: smc.Scenario(
         plant=smc.plant_from(WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"), law=TORQUE
     ),
-    "in C": lambda: smc.law_to_c(TORQUE),
+    "in C": lambda: smc.exchange.law_to_c(TORQUE),
     "chattering": lambda: smc.chattering(TORQUE, plant="double_pendulum"),
 }
 

@@ -101,7 +101,7 @@ def assert_close(scenarios):
             np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.parametrize("surface", smc.surfaces())
+@pytest.mark.parametrize("surface", smc.laws(kind="surface"))
 def test_callback_equals_plain_loop_on_every_surface(surface):
     scenario = smc.Scenario(
         plant="inverted_pendulum", law="boundary_layer", surface=surface, model="nominal", duration=0.2
@@ -111,7 +111,7 @@ def test_callback_equals_plain_loop_on_every_surface(surface):
         np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-12, atol=1e-12, err_msg=name)
 
 
-@pytest.mark.parametrize("velocity", smc.estimators())
+@pytest.mark.parametrize("velocity", smc.laws(kind="estimator"))
 def test_callback_equals_plain_loop_with_every_estimator(velocity):
     scenario = smc.Scenario(
         plant="duffing", law="classical", velocity=velocity, noise=smc.Noise(0.01), duration=0.3, seed=4
@@ -146,8 +146,8 @@ def scattered(number):
         smc.Constant(rng.normal()),
         smc.Sine(rng.normal(), omega=rng.uniform(1, 50), phase=rng.uniform(0, 6)),
         smc.Step(rng.normal(), time=rng.uniform(0, 0.2)),
-        smc.Pulse(rng.normal(), time=rng.uniform(0, 0.2), width=rng.uniform(0.001, 0.1)),
-        smc.OrnsteinUhlenbeck(rng.uniform(0.1, 1), tau=rng.uniform(0.01, 1), dt=rng.uniform(1e-4, 1e-2)),
+        smc.signals.Pulse(rng.normal(), time=rng.uniform(0, 0.2), width=rng.uniform(0.001, 0.1)),
+        smc.signals.OrnsteinUhlenbeck(rng.uniform(0.1, 1), tau=rng.uniform(0.01, 1), dt=rng.uniform(1e-4, 1e-2)),
     ]
     return smc.Scenario(
         plant=plant,
@@ -203,7 +203,7 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
 
 def test_a_jump_at_the_last_step_is_in_the_last_sample():
     """The jump makes the lever of the gust longer."""
-    gust, jump = smc.Gust(2.0, 0.0, 0.02), smc.Jump(0.00999, {"l": 1.5})
+    gust, jump = smc.signals.Gust(2.0, 0.0, 0.02), smc.Jump(0.00999, {"l": 1.5})
     longer = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, disturbance=gust, jump=jump)
     assert longer.jump_step == longer.samples * longer.steps
     trace = smc.run(longer)
@@ -308,7 +308,7 @@ def batch():
     found = []
     for i, law in enumerate(STUDIED):
         common = smc.paper.scenario(("duffing", "pendulum_network")[i % 2], law, "jump_mild", seed=i)
-        noisy = {"noise": smc.Noise(0.01, 0.05), "disturbance": smc.OrnsteinUhlenbeck(0.2 + 0.1 * i, tau=0.1)}
+        noisy = {"noise": smc.Noise(0.01, 0.05), "disturbance": smc.signals.OrnsteinUhlenbeck(0.2 + 0.1 * i, tau=0.1)}
         found.append(shortened(common, 0.1))
         found.append(shortened(dataclasses.replace(common, **noisy, input_delay=i * 1e-3), 0.1))
         found.append(shortened(dataclasses.replace(common, **noisy, velocity="filtered_difference"), 0.1))
@@ -483,7 +483,7 @@ def test_a_law_that_does_not_compile_takes_the_plain_loop_and_says_so():
     def compiled(y, gains, memory):
         return -3.0 * y.e - y.de, y.e
 
-    with pytest.warns(smc.PlainLoopWarning, match="Policy"):
+    with pytest.warns(smc.errors.PlainLoopWarning, match="Policy"):
         trace = smc.run(uncompiled())
     other = smc.run(dataclasses.replace(uncompiled(), law=compiled()))
     np.testing.assert_array_equal(trace.x, other.x)
@@ -493,7 +493,7 @@ def predict():
     """A run whose law steps another model gives what it gives without."""
     model = smc.plant("duffing").load()
     data = mujoco.MjData(model)
-    warnings.simplefilter("ignore", smc.PlainLoopWarning)
+    warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
     thinking = smc.run(uncompiled(lambda: mujoco.mj_step(model, data)))
     assert data.ctrl[0] == 0.0
     np.testing.assert_array_equal(thinking.x, smc.run(uncompiled()).x)

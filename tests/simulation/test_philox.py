@@ -133,7 +133,7 @@ def path(signal, times, seed=0, channel=0):
 
 def test_process_noise_has_its_standard_deviation_and_correlation_time():
     knots, dt = 400_000, 5e-3
-    d = path(smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt), np.arange(knots) * dt, seed=3)
+    d = path(smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=dt), np.arange(knots) * dt, seed=3)
     independent = knots * dt / (2 * TAU)
     assert abs(d.mean()) < 4 * SIGMA / math.sqrt(independent)
     assert abs(d.std() / SIGMA - 1) < 4 / math.sqrt(independent)
@@ -144,14 +144,14 @@ def test_process_noise_has_its_standard_deviation_and_correlation_time():
 
 def test_process_noise_is_stationary_from_the_start():
     """Over many seeds the spread is sigma at time 0 and one correlation time later."""
-    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU)
+    signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU)
     ends = np.array([path(signal, (0.0, TAU), seed=seed) for seed in range(4000)])
     assert np.all(np.abs(ends.std(axis=0) / SIGMA - 1) < 4 / math.sqrt(2 * 4000))
     assert abs(np.corrcoef(ends.T)[0, 1] - math.exp(-1)) < 4 / math.sqrt(4000)
 
 
 def test_process_noise_is_a_path_that_does_not_depend_on_where_it_is_read():
-    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
+    signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
     fine = np.arange(4001) * 2.5e-4
     values = path(signal, fine)
     np.testing.assert_allclose(path(signal, fine[::3]), values[::3], rtol=0, atol=1e-12)
@@ -159,7 +159,7 @@ def test_process_noise_is_a_path_that_does_not_depend_on_where_it_is_read():
 
 
 def test_process_noise_is_continuous_and_linear_between_knots():
-    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
+    signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU, dt=1e-3)
     values = path(signal, np.arange(4001) * 2.5e-4)
     bends = np.abs(np.diff(values, 2))
     assert bends[3::4].min() > 0.0  # at the knots
@@ -169,7 +169,7 @@ def test_process_noise_is_continuous_and_linear_between_knots():
 
 def process(plant="duffing", **fields):
     """d of a run under process noise."""
-    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU)
+    signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU)
     common = {"plant": plant, "law": "none", "duration": 0.4, "disturbance": signal, "seed": 4}
     return smc.run(smc.Scenario(**(common | fields)))
 
@@ -193,7 +193,7 @@ def test_process_noise_differs_between_channels_and_seeds():
 
 def test_two_process_noises_of_one_run_are_independent():
     """The sum of two equal ones has sqrt(2) times the spread of one, not 2 times."""
-    signal = smc.OrnsteinUhlenbeck(SIGMA, tau=TAU)
+    signal = smc.signals.OrnsteinUhlenbeck(SIGMA, tau=TAU)
     one = process(duration=20.0).d
     two = process(duration=20.0, disturbance=(signal, dataclasses.replace(signal))).d - one
     assert abs(np.corrcoef(one[:, 0], two[:, 0])[0, 1]) < 4 / math.sqrt(20.0 / (2 * TAU))

@@ -27,8 +27,8 @@ from smc_mujoco.simulation.trace import ARRAYS
 PLANTS = pytest.mark.parametrize("name", smc.paper.GAINS)
 TWO = pytest.mark.parametrize("name", ["duffing", "pendulum_network"])
 ONE_JOINT = ["duffing", "inverted_pendulum", "van_der_pol"]
-LUGRE = smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
-pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.ScenarioWarning")  # motors of any strength
+LUGRE = smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
+pytestmark = pytest.mark.filterwarnings("ignore::smc_mujoco.errors.ScenarioWarning")  # motors of any strength
 MOTOR = smc.DCMotor()
 
 
@@ -62,17 +62,22 @@ PARTS = {
     "lugre": {"friction": LUGRE},
     "all frictions": {"friction": (smc.Viscous(0.1), LUGRE, smc.Coulomb(0.02))},
     "lag": {"actuator": smc.Lag(0.01)},
-    "rate limit": {"actuator": smc.RateLimit(100.0)},
+    "rate limit": {"actuator": smc.hardware.RateLimit(100.0)},
     "motor": {"actuator": MOTOR},
     "motor, no inductance, cogging, ripple": {"actuator": smc.DCMotor(inductance=0.0, cogging=0.02, ripple=0.3)},
     "backlash": {"actuator": smc.Backlash(0.02)},
     "motor and backlash": {"actuator": (MOTOR, smc.Backlash(0.02))},
     "backlash and lugre": {"actuator": (smc.Lag(0.01), smc.Backlash(0.02)), "friction": LUGRE},
     "encoder": {"sensor": smc.Encoder(500, bias=0.01, dropout=0.2, period=2.5e-3, delay=1e-3), "friction": LUGRE},
-    "gust": {"disturbance": (smc.Gust(5.0, time=0.02, width=0.05), smc.Impulse(0.2, time=0.01, width=2e-3))},
-    "noise": {"disturbance": smc.BandLimited(1.0, low=1.0, high=40.0), "noise": smc.Noise(0.01, 0.05)},
+    "gust": {
+        "disturbance": (smc.signals.Gust(5.0, time=0.02, width=0.05), smc.signals.Impulse(0.2, time=0.01, width=2e-3))
+    },
+    "noise": {"disturbance": smc.signals.BandLimited(1.0, low=1.0, high=40.0), "noise": smc.Noise(0.01, 0.05)},
     "delay": {"input_delay": 7.5e-4, "actuator": MOTOR},
-    "series": {"disturbance": smc.TimeSeries((0.0, 0.02, 0.05), (0.0, 1.0, -1.0)), "friction": smc.Coulomb(0.1)},
+    "series": {
+        "disturbance": smc.signals.TimeSeries((0.0, 0.02, 0.05), (0.0, 1.0, -1.0)),
+        "friction": smc.Coulomb(0.1),
+    },
     "heavier": {"jump": smc.Jump(0.05, {"mass": 3.0}), "friction": (LUGRE, smc.Viscous(0.1)), "actuator": MOTOR},
 }
 
@@ -117,10 +122,11 @@ def scattered(number):
     frictions = {
         "viscous": smc.Viscous(u(0, 1)),
         "coulomb": smc.Coulomb(pick(rng, 0.0, u(0, 2))),
-        "lugre": smc.LuGre(u(0.01, 0.5), u(0.5, 1.0), u(0.001, 0.1)),
+        "lugre": smc.hardware.LuGre(u(0.01, 0.5), u(0.5, 1.0), u(0.001, 0.1)),
     }
     drive = pick(
-        rng, None, smc.Lag(pick(rng, 0.0, u(1e-4, 0.1))), smc.RateLimit(u(10, 1000)), smc.RateLimit(math.inf),
+        rng, None, smc.Lag(pick(rng, 0.0, u(1e-4, 0.1))), smc.hardware.RateLimit(u(10, 1000)),
+        smc.hardware.RateLimit(math.inf),
         smc.DCMotor(inductance=pick(rng, 0.0, 1e-4), voltage=u(5, 50), current=u(5, 50), cogging=u(0, 0.05)),
     )  # fmt: skip
     play = pick(rng, None, None, smc.Backlash(pick(rng, 0.0, u(0, 0.1)), rotor_inertia=u(1e-3, 0.1)))
@@ -130,10 +136,11 @@ def scattered(number):
     )  # fmt: skip
     key = str(rng.choice([k for k in plant.parameters if k not in ("alpha", "beta", "l")]))
     signals = [
-        smc.Gust(u(-5, 5), time=u(0, 0.1), width=u(0.01, 0.1)), smc.Impulse(u(-0.5, 0.5), time=u(0, 0.1), width=5e-3),
-        smc.BandLimited(u(0, 2), low=u(0, 5), high=u(6, 100)), smc.Sine(u(0, 2), omega=u(1, 50)),
-        smc.TimeSeries((0.0, u(0.01, 0.1)), tuple(rng.normal(size=2))),
-        smc.OrnsteinUhlenbeck(u(0.1, 1), tau=u(0.01, 1)),
+        smc.signals.Gust(u(-5, 5), time=u(0, 0.1), width=u(0.01, 0.1)),
+        smc.signals.Impulse(u(-0.5, 0.5), time=u(0, 0.1), width=5e-3),
+        smc.signals.BandLimited(u(0, 2), low=u(0, 5), high=u(6, 100)), smc.Sine(u(0, 2), omega=u(1, 50)),
+        smc.signals.TimeSeries((0.0, u(0.01, 0.1)), tuple(rng.normal(size=2))),
+        smc.signals.OrnsteinUhlenbeck(u(0.1, 1), tau=u(0.01, 1)),
     ]  # fmt: skip
     contact = pick(rng, "none", "none", *plant.contacts)
     if contact != "none":
@@ -181,10 +188,10 @@ NUMBERS = {
     "coulomb": [{"friction": smc.Coulomb(level)} for level in (0.0, 0.05, 2.0)],
     "lugre": [
         {"friction": f}
-        for f in (LUGRE, smc.LuGre(0.01, 0.01, 0.1), dataclasses.replace(LUGRE, stiffness=200.0, damping=1.0))
+        for f in (LUGRE, smc.hardware.LuGre(0.01, 0.01, 0.1), dataclasses.replace(LUGRE, stiffness=200.0, damping=1.0))
     ],
     "lag": [{"actuator": smc.Lag(tau)} for tau in (1e-4, 0.01, 1.0)],
-    "rate limit": [{"actuator": smc.RateLimit(rate)} for rate in (1.0, 500.0, math.inf)],
+    "rate limit": [{"actuator": smc.hardware.RateLimit(rate)} for rate in (1.0, 500.0, math.inf)],
     "motor": [
         {"actuator": m}
         for m in (
@@ -214,7 +221,8 @@ NUMBERS = {
     "plant": [
         {"friction": LUGRE, "actuator": MOTOR, "mismatch": {"mass": 1.3}},
         {"friction": LUGRE, "actuator": MOTOR, "jump": smc.Jump(0.05, {"mass": 0.5})},
-        {"friction": LUGRE, "actuator": MOTOR, "noise": smc.Noise(0.01), "disturbance": smc.Gust(3.0, 0.0, 0.1)},
+        {"friction": LUGRE, "actuator": MOTOR, "noise": smc.Noise(0.01),
+         "disturbance": smc.signals.Gust(3.0, 0.0, 0.1)},
     ],
 }  # fmt: skip
 CONTACT_NUMBERS = [(name, contact) for name in smc.paper.GAINS for contact in smc.plant(name).contacts]
@@ -285,14 +293,14 @@ ZEROS = {
     "viscous": {"friction": smc.Viscous(0.0)},
     "coulomb": {"friction": smc.Coulomb(0.0)},
     "lag": {"actuator": smc.Lag(0.0)},
-    "rate limit": {"actuator": smc.RateLimit(math.inf)},
+    "rate limit": {"actuator": smc.hardware.RateLimit(math.inf)},
     "backlash": {"actuator": smc.Backlash(0.0, rotor_inertia=1e-9)},
     "motor": {
         "actuator": smc.DCMotor(
             inductance=0.0, torque_constant=1e-6, gear=1.0, rotor_inertia=0.0, voltage=math.inf, current=math.inf
         )
     },
-    "lugre": {"friction": smc.LuGre(1e-9, 1e-9, 1.0, stiffness=1e-6, damping=0.0)},
+    "lugre": {"friction": smc.hardware.LuGre(1e-9, 1e-9, 1.0, stiffness=1e-6, damping=0.0)},
 }
 
 
@@ -354,7 +362,7 @@ def resting(name):
         gains = smc.paper.GAINS[name][law]
         for these in (gains, gains | weak):
             for level in LEVELS:
-                for friction in (smc.Coulomb(level), smc.LuGre(0.8 * level, level, 0.01)):
+                for friction in (smc.Coulomb(level), smc.hardware.LuGre(0.8 * level, level, 0.01)):
                     for start in STARTS if isinstance(friction, smc.Coulomb) else STARTS[:1]:
                         found.append(
                             scenario(
@@ -513,9 +521,9 @@ def test_after_a_jump_the_run_is_that_of_the_other_mass_from_there(name):
 @pytest.mark.parametrize(
     ("name", "friction"),
     [
-        ("duffing", smc.LuGre(20.0, 20.0, 0.1)),
+        ("duffing", smc.hardware.LuGre(20.0, 20.0, 0.1)),
         ("inverted_pendulum", smc.Coulomb(20.0)),
-        ("pendulum_network", smc.LuGre(20.0, 20.0, 0.1)),
+        ("pendulum_network", smc.hardware.LuGre(20.0, 20.0, 0.1)),
     ],
 )
 def test_the_reaction_that_holds_a_stuck_joint_balances_all_other_forces(name, friction):
@@ -533,7 +541,7 @@ def test_the_reaction_of_a_sliding_joint_is_its_friction(name):
 
 
 def test_two_frictions_react_together():
-    friction = (smc.Coulomb(0.3), smc.LuGre(0.2, 0.2, 0.1))
+    friction = (smc.Coulomb(0.3), smc.hardware.LuGre(0.2, 0.2, 0.1))
     fast = smc.run(scenario(friction=friction, v0=2.0, x0=0.3, duration=0.05))
     np.testing.assert_allclose(fast.reaction[20:], -0.5, rtol=2e-3)
 
@@ -569,7 +577,7 @@ PUSHED = {
     "lugre": {"friction": LUGRE},
     "both": {"friction": (LUGRE, smc.Coulomb(0.1))},
     "lag": {"actuator": smc.Lag(0.02), "friction": smc.Coulomb(0.4)},
-    "rate limit": {"actuator": smc.RateLimit(50.0)},
+    "rate limit": {"actuator": smc.hardware.RateLimit(50.0)},
     "motor": {"actuator": dataclasses.replace(MOTOR, rotor_inertia=0.0), "friction": LUGRE},
     "backlash": {"actuator": smc.Backlash(0.05, rotor_inertia=0.01)},
     "stops": {"contact": "stops", "v0": 5.0},
@@ -629,7 +637,7 @@ def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, refused):
     ):
         path = tmp_path / "force.csv"
         path.write_text(text)
-        refused(lambda path=path: smc.TimeSeries.from_csv(path))
+        refused(lambda path=path: smc.signals.TimeSeries.from_csv(path))
 
 
 def test_what_does_not_fit_is_refused_in_one_sentence(refused):
@@ -655,11 +663,11 @@ def test_what_does_not_fit_is_refused_in_one_sentence(refused):
         {"mechanism": ["springs"]},
         {"integrator": "RK4", "friction": LUGRE},
         {"integrator": "rk4"},
-        {"reference": smc.Gust(1.0, 0.0, 1.0)},
-        {"reference": smc.BandLimited(1.0, 0.0, 1.0)},
+        {"reference": smc.signals.Gust(1.0, 0.0, 1.0)},
+        {"reference": smc.signals.BandLimited(1.0, 0.0, 1.0)},
         {"feedforward": PerChannel((smc.Constant(1.0),))},
         {"disturbance": PerChannel((smc.Constant(1.0),))},
-        {"disturbance": smc.Impulse(1.0, 0.0, 1e-4)},
+        {"disturbance": smc.signals.Impulse(1.0, 0.0, 1e-4)},
         {"input_delay": 1e-4, "friction": LUGRE},
         {"physics_step": 3e-4, "friction": LUGRE},
     ):
@@ -756,7 +764,11 @@ EVERYTHING = {
     "sensor": smc.Encoder(1000, bias=0.01, dropout=0.1, period=2e-3, delay=1e-3),
     "contact": smc.Contact("stops", restitution=0.3),
     "mechanism": "springs",
-    "disturbance": (smc.Gust(1.0, 0.0, 0.1), smc.BandLimited(0.1, 1.0, 5.0), smc.TimeSeries((0, 1), (0, 1))),
+    "disturbance": (
+        smc.signals.Gust(1.0, 0.0, 0.1),
+        smc.signals.BandLimited(0.1, 1.0, 5.0),
+        smc.signals.TimeSeries((0, 1), (0, 1)),
+    ),
     "input_delay": 7.5e-4,
 }
 
@@ -785,8 +797,8 @@ def test_every_realism_brings_its_defaults():
 def test_drives_keep_the_plain_integrator():
     for actuator, step in (
         (smc.Lag(0.01), 1e-3),
-        (smc.RateLimit(50.0), 2.5e-4),
-        (smc.RateLimit(math.inf), 1e-3),
+        (smc.hardware.RateLimit(50.0), 2.5e-4),
+        (smc.hardware.RateLimit(math.inf), 1e-3),
         (smc.Lag(1e-3), 1e-3),  # a lag's force has its first moment, too
         (smc.Lag(1e-4), 1e-3),
         ((smc.Lag(6e-4), smc.Lag(0.01)), 2.5e-4),

@@ -391,7 +391,7 @@ def test_a_signal_of_the_wrong_shape_fails_the_run(field):
 
 
 def test_a_signal_that_does_not_compile_takes_the_plain_loop():
-    with pytest.warns(smc.PlainLoopWarning, match="Written"):
+    with pytest.warns(smc.errors.PlainLoopWarning, match="Written"):
         trace = smc.run(scenario(disturbance=Written()))
     assert same(trace, smc.run(scenario(disturbance=smc.Constant(0.1))))
 
@@ -444,21 +444,21 @@ def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin():
         "plant": smc.plant("pendulum_network", n=3),
         "control_period": 2e-3,
         "noise": smc.Noise(0.01, 0.05),
-        "disturbance": [smc.Sine(0.2, 5.0), smc.OrnsteinUhlenbeck(0.2, 0.1)],
+        "disturbance": [smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.2, 0.1)],
         "input_delay": 3e-3,
         "jump": smc.Jump(0.05, {"mass": 2.0}),
         "seed": 3,
     }
     twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
     for function in (with_json, WithClass(), Unhashable(), with_array):
-        with pytest.warns(smc.PlainLoopWarning, match="reference loop"):
+        with pytest.warns(smc.errors.PlainLoopWarning, match="reference loop"):
             trace = smc.run(scenario(made(function, {"k": 2.0}), **rich))
         for name in ARRAYS:
             np.testing.assert_allclose(getattr(trace, name), getattr(twin, name), rtol=0, atol=1e-12)
 
 
 def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_caller():
-    with pytest.warns(smc.PlainLoopWarning, match="with_json.*json") as caught:
+    with pytest.warns(smc.errors.PlainLoopWarning, match="with_json.*json") as caught:
         smc.run(scenario(made(with_json, {"k": 2.0})))
     assert caught[0].filename == __file__
 
@@ -466,7 +466,7 @@ def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_calle
     def loaded(y, gains, memory):
         return float(json.loads(json.dumps(y.v)))
 
-    with pytest.warns(smc.PlainLoopWarning, match="loaded.*json"):
+    with pytest.warns(smc.errors.PlainLoopWarning, match="loaded.*json"):
         smc.run(scenario(velocity=loaded()))
 
 
@@ -506,8 +506,8 @@ def test_an_estimator_from_a_file_without_its_code_is_refused(tmp_path, refused)
 WILD = """
 import json, math, warnings
 import smc_mujoco as smc
-warnings.simplefilter("ignore", smc.PlainLoopWarning)
-warnings.simplefilter("ignore", smc.ScenarioWarning)
+warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
+warnings.simplefilter("ignore", smc.errors.ScenarioWarning)
 def law(function):
     return smc.law_function()(function)()
 def run(law, **fields):
@@ -575,7 +575,7 @@ def test_runs_of_two_python_threads_do_not_meet():
     jobs = [([slow], expected[:1], 5), (fast, expected[1:], 20), (fast, expected[1:], 20)]
     threads = [threading.Thread(target=work, args=job) for job in jobs]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.PlainLoopWarning)
+        warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
         for thread in threads:
             thread.start()
         for thread in threads:

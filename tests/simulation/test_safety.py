@@ -239,7 +239,7 @@ def late_none(y, gains, memory):
 
 @pytest.mark.parametrize(("function", "at"), [(late_number, 0.0), (late_none, 0.005)])
 def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(function, at):
-    with pytest.warns(smc.PlainLoopWarning, match=f"'{function.__name__}' does not compile.*instead of numbers"):
+    with pytest.warns(smc.errors.PlainLoopWarning, match=f"'{function.__name__}' does not compile.*instead of numbers"):
         trace = smc.run(scenario(made(function)))
     assert trace.diverged_at == pytest.approx(at)
     assert f"law '{function.__name__}' returned (None, 0.0) instead of the two numbers u, s" in trace.failure
@@ -388,7 +388,7 @@ def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
 
 LARGE = [
     scenario(made(lambda y, gains, memory: (0.0, 0.0), memory=10_000), plant=smc.plant("pendulum_network", n=50)),
-    scenario(disturbance=[smc.OrnsteinUhlenbeck(0.1, 0.1)] * 40, plant=smc.plant("pendulum_network", n=50)),
+    scenario(disturbance=[smc.signals.OrnsteinUhlenbeck(0.1, 0.1)] * 40, plant=smc.plant("pendulum_network", n=50)),
     scenario(input_delay=0.9, duration=2.0, plant=smc.plant("pendulum_network", n=20)),
     scenario(velocity=smc.estimator_function(memory=5000)(lambda y, gains, memory: y.v)()),
     scenario(duration=10.0),
@@ -554,7 +554,7 @@ class SourNoise(smc.Signal):
         ({"surface": smc.surface_function(sour_surface)()}, "surface 'sour_surface' raised ValueError (sour)"),
         ({"reference": Sour()}, "Sour raised ValueError (sour)"),
         ({"feedforward": Sour()}, "Sour raised ValueError (sour)"),
-        ({"disturbance": [smc.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]}, "SourNoise raised ValueError (sour)"),
+        ({"disturbance": [smc.signals.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]}, "SourNoise raised ValueError (sour)"),
     ],
     ids=["estimator", "surface", "reference", "feedforward", "disturbance"],
 )
@@ -588,9 +588,11 @@ def test_a_motor_of_next_to_no_resistance_is_refused(refused):
 
 def test_process_noise_of_more_knots_than_minutes_of_computing_is_refused(refused):
     plant = smc.plant("pendulum_network", n=1000)
-    refused(lambda: scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10)))
-    scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1, dt=2e-7))
-    scenario("none", plant=plant, disturbance=smc.OrnsteinUhlenbeck(0.1, 0.1), duration=1000.0, control_period=0.1)
+    refused(lambda: scenario("none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10)))
+    scenario("none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1, dt=2e-7))
+    scenario(
+        "none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1), duration=1000.0, control_period=0.1
+    )
 
 
 def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
@@ -659,7 +661,7 @@ def test_a_child_forked_by_a_law_in_the_plain_loop_can_run():
 def test_a_pulse_lasts_width_over_dt_samples_wherever_decimal_times_put_it(dt):
     wrong = []
     for start, width in itertools.product((*range(0, 60), 500, 4999), (1, 2, 3, 7, 10, 33, 100)):
-        pulse = smc.Pulse(1.0, time=float(f"{start * dt:.6g}"), width=float(f"{width * dt:.6g}"))
+        pulse = smc.signals.Pulse(1.0, time=float(f"{start * dt:.6g}"), width=float(f"{width * dt:.6g}"))
         on = [k for k in range(start - 2, start + width + 3) if pulse.value(k * dt, pulse)[0]]
         if on != list(range(start, start + width)):
             wrong.append((pulse, on))
@@ -667,17 +669,21 @@ def test_a_pulse_lasts_width_over_dt_samples_wherever_decimal_times_put_it(dt):
 
 
 def test_a_pulse_of_a_run_lasts_as_long():
-    pulses = [smc.Pulse(1.0, 0.008, 0.1), smc.Pulse(1.0, 0.1, 0.008), smc.Pulse(1.0, 0.07, 0.03)]
-    pulses += [smc.Pulse(1.0, round(0.001 * i, 3), 0.003) for i in range(1, 60)]
+    pulses = [
+        smc.signals.Pulse(1.0, 0.008, 0.1),
+        smc.signals.Pulse(1.0, 0.1, 0.008),
+        smc.signals.Pulse(1.0, 0.07, 0.03),
+    ]
+    pulses += [smc.signals.Pulse(1.0, round(0.001 * i, 3), 0.003) for i in range(1, 60)]
     traces = smc.run([scenario("none", duration=0.15, disturbance=pulse) for pulse in pulses])
     assert [int(trace.d.sum()) for trace in traces] == [100, 8, 30, *[3] * 59]
     assert [trace.t[np.flatnonzero(trace.d)[0]] for trace in traces] == pytest.approx([p.time for p in pulses])
 
 
-NOISE = smc.OrnsteinUhlenbeck(0.2, 0.1)
+NOISE = smc.signals.OrnsteinUhlenbeck(0.2, 0.1)
 
 
-@pytest.mark.parametrize("before", [[smc.Constant(0.0)], [smc.Step(0.0), smc.Pulse(0.0, 0.1, 0.1)]])
+@pytest.mark.parametrize("before", [[smc.Constant(0.0)], [smc.Step(0.0), smc.signals.Pulse(0.0, 0.1, 0.1)]])
 def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(before):
     alone = smc.run(scenario("none", plant=THREE, disturbance=NOISE, seed=3))
     assert np.ptp(alone.d) > 0.0
@@ -900,7 +906,7 @@ TOO_MUCH = {
     [("compiled", 0.0, "RK4"), ("compiled", 0.007, "Euler"), ("plain", 0.005, "RK4"), ("sum", 0.007, "RK4")],
 )
 def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integrator):
-    with contextlib.nullcontext() if kind != "plain" else pytest.warns(smc.PlainLoopWarning):
+    with contextlib.nullcontext() if kind != "plain" else pytest.warns(smc.errors.PlainLoopWarning):
         trace = smc.run(scenario("none", disturbance=TOO_MUCH[kind](start), integrator=integrator))
     assert trace.diverged_at == pytest.approx(start, abs=1e-9)
     assert "disturbance became NaN or inf" in trace.failure

@@ -165,7 +165,7 @@ def test_a_run_shorter_than_a_period_is_refused(refused):
 
 
 def test_process_noise_with_more_knots_than_a_run_may_have_steps_is_refused(refused):
-    refused(lambda: scenario(disturbance=smc.OrnsteinUhlenbeck(sigma=0.1, tau=0.1, dt=1e-300)), "dt", "1e-300")
+    refused(lambda: scenario(disturbance=smc.signals.OrnsteinUhlenbeck(sigma=0.1, tau=0.1, dt=1e-300)), "dt", "1e-300")
 
 
 def test_a_state_that_is_no_finite_number_is_refused(refused):
@@ -266,18 +266,18 @@ def test_what_is_left_out_or_none_is_quiet():
 
 
 def test_a_reference_that_is_noise_is_refused(refused):
-    refused(lambda: scenario(reference=smc.OrnsteinUhlenbeck(1.0, 1.0)), "reference", "OrnsteinUhlenbeck")
+    refused(lambda: scenario(reference=smc.signals.OrnsteinUhlenbeck(1.0, 1.0)), "reference", "OrnsteinUhlenbeck")
 
 
 SIGNALS = [
     smc.Constant(1.0),
     smc.Sine(1.0, 2.0, 3.0),
     smc.Step(1.0, 2.0),
-    smc.Pulse(1.0, 2.0, 3.0),
-    smc.OrnsteinUhlenbeck(1.0, 2.0, 3.0),
-    smc.Impulse(1.0, 2.0, 3.0),
-    smc.Gust(1.0, 2.0, 3.0),
-    smc.BandLimited(1.0, 2.0, 3.0),
+    smc.signals.Pulse(1.0, 2.0, 3.0),
+    smc.signals.OrnsteinUhlenbeck(1.0, 2.0, 3.0),
+    smc.signals.Impulse(1.0, 2.0, 3.0),
+    smc.signals.Gust(1.0, 2.0, 3.0),
+    smc.signals.BandLimited(1.0, 2.0, 3.0),
 ]
 
 
@@ -295,18 +295,18 @@ def test_every_parameter_of_every_signal_must_be_a_finite_number(refused):
 
 def test_widths_and_time_constants_are_positive(refused):
     for make, name in [
-        (lambda value: smc.Pulse(1.0, 0.0, width=value), "width"),
-        (lambda value: smc.Impulse(1.0, 0.0, width=value), "width"),
-        (lambda value: smc.Gust(1.0, 0.0, width=value), "width"),
-        (lambda value: smc.OrnsteinUhlenbeck(1.0, tau=value), "tau"),
-        (lambda value: smc.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
+        (lambda value: smc.signals.Pulse(1.0, 0.0, width=value), "width"),
+        (lambda value: smc.signals.Impulse(1.0, 0.0, width=value), "width"),
+        (lambda value: smc.signals.Gust(1.0, 0.0, width=value), "width"),
+        (lambda value: smc.signals.OrnsteinUhlenbeck(1.0, tau=value), "tau"),
+        (lambda value: smc.signals.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
     ]:
         for value in (0.0, -1.0):
             refused(lambda value=value, make=make, name=name: make(value), name, f"{value:g}")
 
 
 def test_the_spread_of_process_noise_is_not_negative(refused):
-    refused(lambda: smc.OrnsteinUhlenbeck(-0.1, 1.0), "sigma", "-0.1")
+    refused(lambda: smc.signals.OrnsteinUhlenbeck(-0.1, 1.0), "sigma", "-0.1")
 
 
 def test_measurement_noise_is_a_finite_number_not_negative(refused):
@@ -321,7 +321,13 @@ def test_a_noise_that_is_no_noise_is_refused(refused):
 
 
 def test_an_error_of_measurement_is_a_known_signal(refused):
-    for error in (0.1, smc.OrnsteinUhlenbeck(0.1, 1.0), smc.Gust(1.0, 0.0, 1.0), Relay(1.0), PerChannel((COME,))):
+    for error in (
+        0.1,
+        smc.signals.OrnsteinUhlenbeck(0.1, 1.0),
+        smc.signals.Gust(1.0, 0.0, 1.0),
+        Relay(1.0),
+        PerChannel((COME,)),
+    ):
         refused(lambda error=error: smc.Noise(velocity_error=error))
         refused(lambda error=error: smc.Noise(position_error=error))
 
@@ -462,7 +468,7 @@ def full():
         velocity=smc.estimator("filtered_difference", tau=1e-2),
         control_period=2e-3,
         reference=smc.Sine(0.1, 2.0),
-        disturbance=[smc.OrnsteinUhlenbeck(0.1, 0.1), smc.Pulse(1.0, 0.1, 0.2), smc.Step(1.0, 0.5)],
+        disturbance=[smc.signals.OrnsteinUhlenbeck(0.1, 0.1), smc.signals.Pulse(1.0, 0.1, 0.2), smc.Step(1.0, 0.5)],
         noise=smc.Noise(0.01, 0.05),
         input_delay=3e-3,
         mismatch={"mass": 1.3},
@@ -565,7 +571,7 @@ def test_a_law_for_other_plants_is_refused(refused):
 
 
 def test_a_missed_condition_warns_once_where_it_was_written():
-    with pytest.warns(smc.GainWarning, match="r1 > r2") as caught:
+    with pytest.warns(smc.errors.GainWarning, match="r1 > r2") as caught:
         law = smc.law("twisting", r1=1.0, r2=2.0)
     assert [w.filename for w in caught] == [__file__]
     again = pickle.loads(pickle.dumps(law))  # and not again

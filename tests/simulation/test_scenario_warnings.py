@@ -48,7 +48,7 @@ def test_warnings_are_whole_sentences(snapshot):
     motor, turned = {"actuator": smc.DCMotor(gear=1.0)}, {"x0": 30.0}
     said = []
     for fields in (motor, turned):
-        with pytest.warns(smc.ScenarioWarning) as caught:
+        with pytest.warns(smc.errors.ScenarioWarning) as caught:
             smc.Scenario(**plain | fields)
         said += [str(one.message) for one in caught]
     assert said == snapshot
@@ -57,25 +57,25 @@ def test_warnings_are_whole_sentences(snapshot):
 def test_angles_of_several_turns_may_be_degrees():
     for fields in DEGREES:
         with pytest.warns(
-            smc.ScenarioWarning, match=r"rad, \d+\.\d turns: if it is \S+ degrees, give math.radians\("
+            smc.errors.ScenarioWarning, match=r"rad, \d+\.\d turns: if it is \S+ degrees, give math.radians\("
         ) as caught:
             smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, **fields)
         assert [warning.filename for warning in caught] == [__file__]
 
 
 def test_turns_ramps_places_and_what_is_no_angle_are_no_degrees():
-    for fields in ({"x0": 1.5 * math.tau}, {"x0": 1e3}, {"reference": smc.Ramp(100.0)}):
+    for fields in ({"x0": 1.5 * math.tau}, {"x0": 1e3}, {"reference": smc.signals.Ramp(100.0)}):
         dataclasses.replace(PENDULUM, **fields)
     smc.Scenario(plant="duffing", law="none", x0=30.0)
     smc.Scenario(plant="cart_pole", law="none", x0=(30.0, 0.1), reference=smc.Constant(30.0))
-    with pytest.warns(smc.ScenarioWarning, match="x0 is 30 rad"):
+    with pytest.warns(smc.errors.ScenarioWarning, match="x0 is 30 rad"):
         smc.Scenario(plant="cart_pole", law="none", x0=(0.0, 30.0))
 
 
 def test_a_motor_too_weak_for_gravity_at_the_start_says_so():
     """m g l sin 0.5 = 1.176 N m; gear 1 gives 30 A times 0.0302 N m/A, 1 V at gear 12.25 gives 0.3699/0.299 N m."""
     words = "DCMotor gives at most 0.906 N m at rest, and channel 0 of inverted_pendulum needs 1.18 to hold its start"
-    with pytest.warns(smc.ScenarioWarning, match=words):
+    with pytest.warns(smc.errors.ScenarioWarning, match=words):
         dataclasses.replace(PENDULUM, actuator=smc.DCMotor(gear=1.0))
     for fields in (
         {"actuator": smc.DCMotor()},
@@ -84,12 +84,12 @@ def test_a_motor_too_weak_for_gravity_at_the_start_says_so():
         {"actuator": smc.DCMotor(gear=1.0), "u_max": 1.1},  # no motor could: it is to swing
     ):
         dataclasses.replace(PENDULUM, **fields)
-    with pytest.warns(smc.ScenarioWarning, match=r"0.378 N at rest, and channel 0 of duffing needs 1.88"):
+    with pytest.warns(smc.errors.ScenarioWarning, match=r"0.378 N at rest, and channel 0 of duffing needs 1.88"):
         smc.Scenario(plant="duffing", law="none", actuator=smc.DCMotor(resistance=23.5))
 
 
 def test_a_run_that_has_been_is_read_without_a_warning():
-    with pytest.warns(smc.ScenarioWarning):
+    with pytest.warns(smc.errors.ScenarioWarning):
         scenario = dataclasses.replace(PENDULUM, x0=30.0, actuator=smc.DCMotor(gear=1.0))
     assert serialise.restore(serialise.describe(scenario)) == scenario
 

@@ -539,4 +539,4 @@ def test_first_row_of_nan_is_no_header(tmp_path):
     path = tmp_path / "gap.csv"
     path.write_text("nan,nan\n0,1\n1,2\n")
     with pytest.raises(smc.ScenarioError, match=r"line 1: column 1 is 'nan': give a finite number"):
-        smc.TimeSeries.from_csv(path)
+        smc.signals.TimeSeries.from_csv(path)

@@ -70,8 +70,8 @@ def network(**fields):
         disturbance=[
             smc.Constant(0.1),
             smc.Step(0.1, 0.005),
-            smc.Pulse(0.1, 0.005, 0.01),
-            smc.OrnsteinUhlenbeck(0.1, 0.1, 2e-3),
+            smc.signals.Pulse(0.1, 0.005, 0.01),
+            smc.signals.OrnsteinUhlenbeck(0.1, 0.1, 2e-3),
             Ramp(0.5),
         ],
         noise=smc.Noise(0.01, 0.05),
@@ -175,7 +175,7 @@ def test_an_estimator_of_one_s_own_keeps_its_name(tmp_path):
 
 
 def test_fields_that_only_older_versions_had_may_be_none():
-    made = smc.Scenario(plant=arms.arm(), law="none", friction=smc.Sigmoid(1.0, 2.0))
+    made = smc.Scenario(plant=arms.arm(), law="none", friction=smc.hardware.Sigmoid(1.0, 2.0))
     data = json.loads(json.dumps(serialise.describe(made)))
     data["friction"][0]["values"]["stiffness"] = None
     for channel in data["plant"]["mjcf"]["channels"].values():
@@ -562,9 +562,10 @@ from smc_mujoco.simulation import serialise
 scenario = smc.Scenario(
     plant="duffing", law="classical", duration=0.01, contact="floor", mechanism="springs",
     sensor=smc.Encoder(delay=0.001),
-    friction=(smc.Viscous(0.1), smc.Coulomb(0.1), smc.LuGre(0.1, 0.2, 0.05)),
+    friction=(smc.Viscous(0.1), smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05)),
     actuator=(smc.DCMotor(), smc.Backlash(0.01)),
-    disturbance=(smc.Gust(1.0, 0.0, 0.1), smc.BandLimited(0.1, 1.0, 5.0), smc.TimeSeries((0.0, 1.0), (0.0, 1.0))),
+    disturbance=(smc.signals.Gust(1.0, 0.0, 0.1), smc.signals.BandLimited(0.1, 1.0, 5.0),
+                 smc.signals.TimeSeries((0.0, 1.0), (0.0, 1.0))),
 )
 """
 

@@ -35,7 +35,7 @@ def jerk_squared(times, states):
 
 
 def test_waypoints_passes_its_points_and_rests_at_both_ends():
-    signal = smc.Waypoints(TIMES, VALUES)
+    signal = smc.signals.Waypoints(TIMES, VALUES)
     r, dr, ddr = of(signal, TIMES)
     np.testing.assert_allclose(r, VALUES, atol=1e-15)
     assert dr[[0, -1]].tolist() == ddr[[0, -1]].tolist() == [0.0, 0.0]
@@ -44,7 +44,7 @@ def test_waypoints_passes_its_points_and_rests_at_both_ends():
 
 
 def test_waypoints_rates_are_derivatives_and_its_fourth_is_continuous():
-    signal, h = smc.Waypoints(TIMES, VALUES), 1e-4
+    signal, h = smc.signals.Waypoints(TIMES, VALUES), 1e-4
     t = np.linspace(0.25, 1.95, 200)
     (before, rate, _), (after, later, _) = of(signal, t - h), of(signal, t + h)
     _, dr, ddr = of(signal, t)
@@ -59,7 +59,7 @@ def test_waypoints_rates_are_derivatives_and_its_fourth_is_continuous():
 
 
 def test_waypoints_has_the_least_jerk_of_all_through_its_points():
-    data, rng = smc.Waypoints(TIMES, VALUES).data, np.random.default_rng(0)
+    data, rng = smc.signals.Waypoints(TIMES, VALUES).data, np.random.default_rng(0)
     states = data[1:].T
     least = jerk_squared(TIMES, states)
     for _ in range(20):
@@ -69,14 +69,14 @@ def test_waypoints_has_the_least_jerk_of_all_through_its_points():
 
 
 def test_waypoints_of_two_points_are_minimum_jerk():
-    signal, move = smc.Waypoints((0.5, 1.7), (0.0, 0.8)), smc.MinimumJerk(0.8, 0.5, 1.2)
+    signal, move = smc.signals.Waypoints((0.5, 1.7), (0.0, 0.8)), smc.signals.MinimumJerk(0.8, 0.5, 1.2)
     t = np.linspace(0.0, 2.0, 101)
     expected = np.array([move.value(one, move) for one in t]).T
     np.testing.assert_allclose(of(signal, t), expected, atol=1e-12)
 
 
 def test_a_run_follows_waypoints_in_both_loops(tmp_path):
-    signals = [smc.Waypoints(TIMES, VALUES), smc.Waypoints((0.0, 0.3, 2.0), (0.2, 0.4, 0.2))]
+    signals = [smc.signals.Waypoints(TIMES, VALUES), smc.signals.Waypoints((0.0, 0.3, 2.0), (0.2, 0.4, 0.2))]
     scenario = smc.Scenario(
         plant="double_pendulum",
         law=smc.law("computed_torque_sliding", k=20.0),
@@ -102,8 +102,8 @@ def tip(x):
 def test_cartesian_path_moves_the_tip_through_its_points():
     points = [tip((0.1, 0.2, 0.3)), tip((0.0, 1.0, 0.5)), tip((0.2, 0.6, -0.2))]
     times = (0.0, 1.0, 1.8)
-    path = smc.cartesian_path(arms.arm(), times, points, site="tip", x0=(0.1, 0.2, 0.3))
-    lines = [smc.Waypoints(times, [point[i] for point in points]) for i in range(3)]
+    path = smc.signals.cartesian_path(arms.arm(), times, points, site="tip", x0=(0.1, 0.2, 0.3))
+    lines = [smc.signals.Waypoints(times, [point[i] for point in points]) for i in range(3)]
     t = np.linspace(0.0, 1.8, 41) + 0.003  # between the knots
     found = np.array([tip(x) for x in np.array([of(one, t)[0] for one in path]).T])
     np.testing.assert_allclose(found, np.array([of(one, t)[0] for one in lines]).T, atol=2e-6)
@@ -112,7 +112,7 @@ def test_cartesian_path_moves_the_tip_through_its_points():
 def test_a_run_of_the_arm_follows_a_path_in_space():
     """Computed torque with the perfect model follows a minimum-jerk path to 1e-6 rad."""
     start = (0.1, 0.2, 0.3)
-    path = smc.cartesian_path(arms.arm(), (0.0, 1.0), [tip(start), tip((0.2, 1.0, 0.0))], site="tip", x0=start)
+    path = smc.signals.cartesian_path(arms.arm(), (0.0, 1.0), [tip(start), tip((0.2, 1.0, 0.0))], site="tip", x0=start)
     trace = smc.run(
         smc.Scenario(
             plant=arms.arm(),
@@ -129,14 +129,16 @@ def test_a_run_of_the_arm_follows_a_path_in_space():
 
 ARM = arms.arm
 REFUSED = {
-    "no tip": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2),
-    "unknown site": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tp"),
-    "one coordinate": lambda: smc.cartesian_path(ARM(), (0, 1), [0.0, 1.0], site="tip"),
-    "two and three coordinates": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
-    "sets": lambda: smc.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"),
-    "free joint": lambda: smc.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),
-    "start of another arm": lambda: smc.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", x0=(0.1,) * 9),
-    "times backwards": lambda: smc.Waypoints((0.0, 1.0, 0.5), (0, 1, 2)),
+    "no tip": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2),
+    "unknown site": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tp"),
+    "one coordinate": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [0.0, 1.0], site="tip"),
+    "two and three coordinates": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
+    "sets": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"),
+    "free joint": lambda: smc.signals.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),
+    "start of another arm": lambda: smc.signals.cartesian_path(
+        ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", x0=(0.1,) * 9
+    ),
+    "times backwards": lambda: smc.signals.Waypoints((0.0, 1.0, 0.5), (0, 1, 2)),
 }
 
 
@@ -151,8 +153,8 @@ def test_a_point_beyond_reach_is_named_with_its_distance(refused):
         "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
         "m away; give points within reach, or another x0",
     )
-    refused(lambda: smc.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said, recorded=False)
+    refused(lambda: smc.signals.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said, recorded=False)
 
 
 def test_a_path_of_countless_pieces_is_refused_at_once(refused):
-    refused(lambda: smc.cartesian_path("panda", [0.0, 1e6], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7"))
+    refused(lambda: smc.signals.cartesian_path("panda", [0.0, 1e6], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7"))

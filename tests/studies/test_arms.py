@@ -35,7 +35,7 @@ def test_the_walls_path_is_as_far_from_its_face_as_it_says(task, behind):
 def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     start = smc.plant("panda").rest
     trace = smc.run(smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05))
-    rms, rate = smc.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
+    rms, rate = smc.metrics.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
     assert arms.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
     assert np.isfinite(arms.cost(trace))
 
@@ -64,11 +64,11 @@ def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
     """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1 mm deep."""
     known, unknown = smc.run([arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)])
     for trace in (known, unknown):
-        scores = smc.tip_scores(trace)
+        scores = smc.metrics.tip_scores(trace)
         assert abs(scores["force_error"]) < 5.0
         assert scores["touching"] == 100.0
         assert scores["depth"] < 1e-3
-    assert smc.tip_scores(known)["force_ripple"] < smc.tip_scores(unknown)["force_ripple"]
+    assert smc.metrics.tip_scores(known)["force_ripple"] < smc.metrics.tip_scores(unknown)["force_ripple"]
 
 
 @pytest.mark.slow
@@ -87,7 +87,7 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
         if arms.unstable(runs, traces):
             assert told[name][column : column + 2] == ["unstable"] * 2, name
             continue
-        rms = np.median([1e3 * smc.tip_scores(trace)["rms_error"] for trace in traces])
-        rate = np.median([max(one["tv_rate"] for one in smc.joint_scores(trace).values()) for trace in traces])
+        rms = np.median([1e3 * smc.metrics.tip_scores(trace)["rms_error"] for trace in traces])
+        rate = np.median([max(one["tv_rate"] for one in smc.metrics.joint_scores(trace).values()) for trace in traces])
         assert f"{rms:.3g}" == told[name][column].split()[0], name
         assert float(told[name][column + 1]) == pytest.approx(rate, rel=0.005), name

@@ -137,7 +137,7 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
     assert "plain_law: lam and k1 have no unit, so their search is about the defaults and not by the rule" in repr(
         made.remarks
     )
-    with pytest.warns(smc.ScenarioWarning, match="plain_law's lam and k1 have no unit, and so a search about"):
+    with pytest.warns(smc.errors.ScenarioWarning, match="plain_law's lam and k1 have no unit, and so a search about"):
         tuned = smc.tune("duffing", plain_law, budget=4, objective=Objective(duration=0.5), searches=1)
     assert tuned.bounds["lam"] == pytest.approx((4.0 * 10**-1.5, 4.0 * 10**1.5))
 

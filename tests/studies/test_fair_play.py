@@ -98,7 +98,7 @@ def test_a_law_that_tries_the_public_seeds_knows_nothing_of_a_keyed_run():
 def test_the_key_changes_all_random_numbers_and_both_loops_agree():
     from smc_mujoco.simulation import reference
 
-    fields = NOISY | {"disturbance": smc.OrnsteinUhlenbeck(0.5, 0.1)}
+    fields = NOISY | {"disturbance": smc.signals.OrnsteinUhlenbeck(0.5, 0.1)}
     keyed = smc.Scenario(**fields, law=honest, seed=3, noise_key=5)
     other = smc.Scenario(**fields, law=honest, seed=3)
     assert keyed != other

@@ -41,7 +41,10 @@ def test_every_condition_is_known_by_its_name(plant):
 def test_a_condition_that_the_paper_has_not_is_told_by_what_differs():
     assert condition(scenario(smc.law("classical"), u_max=4.0, seed=3)) == "u_max=4.0"
     assert condition(scenario(smc.law("classical"), friction=smc.Coulomb(0.2))) == "friction=(Coulomb(level=0.2),)"
-    many = {"noise": smc.Noise(0.1, 0.2), "disturbance": (smc.Sine(0.1, 2.0), smc.Pulse(2.0, time=0.01, width=0.1))}
+    many = {
+        "noise": smc.Noise(0.1, 0.2),
+        "disturbance": (smc.Sine(0.1, 2.0), smc.signals.Pulse(2.0, time=0.01, width=0.1)),
+    }
     names = [condition(scenario(smc.law("classical"), input_delay=delay, **many)) for delay in (0.001, 0.002)]
     assert len(set(names)) == 2
     assert max(map(len, names)) < 80

@@ -1,4 +1,4 @@
-"""Laws: functions of one channel's measurement. Their docstrings are the pages of `smc-mujoco laws NAME`."""
+"""Laws: functions of one channel's measurement. Their docstrings are the pages of `smc-mujoco list NAME`."""
 
 import math
 

@@ -5,7 +5,7 @@ import importlib
 import itertools
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -96,7 +96,7 @@ Laws = Annotated[
         "--law",
         metavar="LAW|FILE",
         autocompletion=LAWS,
-        help=f"Laws of `smc-mujoco laws`, as a,b. {GAINS_HELP} May be repeated.",
+        help=f"Laws of `smc-mujoco list`, as a,b. {GAINS_HELP} May be repeated.",
         show_default=False,
     ),
 ]
@@ -271,3 +271,11 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
         except (TypeError, ValueError):
             raise ScenarioError(f"actuator {shown(part)} cannot be read: write it as lag:0.01") from None
     return tuple(parts)
+
+
+def only_for(ctx: typer.Context, names: Iterable[str], fits: bool, kind: str) -> None:
+    """Raise ScenarioError if one of these options was given although it does not fit: it is only for a kind of call."""
+    for name in () if fits else names:
+        if str(ctx.get_parameter_source(name)).endswith("COMMANDLINE"):
+            flags = next(parameter.opts for parameter in ctx.command.params if parameter.name == name)
+            raise ScenarioError(f"{flags[0]} is for {kind}")

@@ -1,4 +1,4 @@
-"""smc-mujoco run, show, view: the runs of a scene, a saved trace, and a run in a window."""
+"""smc-mujoco run, show: the runs of a scene, on record or in a window, and a saved trace."""
 
 import os
 import sys
@@ -14,6 +14,7 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 def run(
+    ctx: typer.Context,
     name: options.SceneName,
     out: Annotated[
         Path, typer.Option(metavar="FOLDER", help="For results; each scene has a folder of its name in it.")
@@ -29,6 +30,13 @@ def run(
         bool, typer.Option(help="Whether to repeat runs at half the physics step, to mark what depends on it.")
     ] = True,
     timing: Annotated[bool, typer.Option("--timing", help="Print how long each part took.")] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="Watch one run in MuJoCo's viewer instead, and change its law's gains.")
+    ] = False,
+    condition: Annotated[
+        str | None, typer.Option(help="Of the run in the viewer; default the condition of the film.")
+    ] = None,
+    label: Annotated[str | None, typer.Option(help="Of the run in the viewer; default the condition's first.")] = None,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
@@ -37,8 +45,25 @@ def run(
 
     Exported traces have every number to the last bit, and its unit.
 
+    With --view a window shows one run in real time, and nothing is written:
+
+    - Pause and continue: the space bar.
+    - Change a gain: its slider gain:NAME in the panel "Control" at the right, from a tenth of the scene's value to ten
+      times that value. At the end the law is printed, as code that makes it.
+    - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
+    - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
+
+    All other sliders and settings of the viewer change only the picture.
+
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
+
+    Example: smc-mujoco run inverted_pendulum --view --label super_twisting
     """
+    options.only_for(ctx, ("condition", "label"), view, "a run in the viewer, --view")
+    options.only_for(ctx, ("out", "film", "threads", "export", "repeat", "timing"), not view, "runs without --view")
+    if view:
+        _watch(name, seed, condition, label)
+        return
     clock = Clock()
     with clock("loading"), delay_ctrl_c():
         from smc_mujoco.cli.scene import perform
@@ -96,25 +121,8 @@ def show(
     terminal.wrote(*written)
 
 
-def view(
-    name: options.SceneName,
-    condition: Annotated[
-        str | None, typer.Option(help="Which of the scene's conditions; default the one of the film.")
-    ] = None,
-    label: Annotated[str | None, typer.Option(help="Label of the run in that condition; default the first.")] = None,
-) -> None:
-    """Watch one run of a scene in MuJoCo's viewer, in real time, and change the gains of its law.
-
-    - Pause and continue: the space bar.
-    - Change a gain: its slider gain:NAME in the panel "Control" at the right, from a tenth of the scene's value to ten
-      times that value. At the end the law is printed, as code that makes it.
-    - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
-    - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
-
-    All other sliders and settings of the viewer change only the picture.
-
-    Example: smc-mujoco view inverted_pendulum --label super_twisting
-    """
+def _watch(name: str, seed: int | None, condition: str | None, label: str | None) -> None:
+    """Show one run of a scene in MuJoCo's viewer."""
     from smc_mujoco.common.errors import ScenarioError, find
     from smc_mujoco.draw import display
 
@@ -126,6 +134,8 @@ def view(
         from smc_mujoco.studies import scene as scenes
 
     scene = scenes.read(scenes.find(name))
+    if seed is not None:
+        scene = scene.seeded(seed)
     runs = scene.conditions[scene.film]
     if condition is not None:
         runs = find(f"condition of {name}", condition, scene.conditions)

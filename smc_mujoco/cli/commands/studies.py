@@ -24,7 +24,7 @@ def which(
         typer.Option(
             help="What to compare, as a,b: fast, accurate, on-track, calm, gentle, frugal, no-overshoot, robust; "
             "default fast,accurate,calm. And what the law must have: no-velocity, continuous, finite-time, ..., "
-            "as for `smc-mujoco laws --needs`."
+            "as for `smc-mujoco list --needs`."
         ),
     ] = None,
     condition: options.Conditions = None,

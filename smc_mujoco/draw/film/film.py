@@ -6,11 +6,13 @@ and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
+import dataclasses
 import itertools
 import os
 import warnings
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from PIL import Image
@@ -18,20 +20,24 @@ from PIL import Image
 from smc_mujoco.common import errors, extras, gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, items_of, number, users_stacklevel
 from smc_mujoco.common.files import replacing, with_ending
-from smc_mujoco.common.progress import bar
+from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import finite, windows
 from smc_mujoco.draw.film import arm, arrows, pace, scene
 from smc_mujoco.draw.film.camera import Camera, Room, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
-from smc_mujoco.draw.film.encoder import encoder
+from smc_mujoco.draw.film.encoder import encoder, mediapy
 from smc_mujoco.draw.film.pace import Clock
 from smc_mujoco.draw.film.puppet import Motion, motion
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
-FPS = 30.0
+if TYPE_CHECKING:
+    from mediapy import VideoMetadata
+
+FPS, FPS_OF = 30.0, {".webp": 20.0}  # by the ending
+MAX_WEBP_FRAMES = 600
 MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
@@ -39,97 +45,186 @@ CHARTS_SHARE = 0.36  # of the film's height
 LAST_FRAME_TIME = 1200  # ms for which a clip's last picture stays before the clip repeats
 
 
+@dataclasses.dataclass(repr=False, eq=False)
+class Frames:
+    """Pictures of a film, each (height, width, 3) uint8. They are made while you iterate, as often as you do.
+
+    `mediapy.show_video` and `mediapy.write_video` take them as they are; `numpy.stack(list(frames))` is an array.
+    `clock` has the times of the run at each picture, s. Arguments: as `film`.
+
+    Raises:
+      ScenarioError: as `film`; those of size and OpenGL are raised at the first picture.
+    """
+
+    traces: Trace | Sequence[Trace]
+    labels: Sequence[str] | None = None
+    title: str | None = None
+    size: tuple[int, int] = (800, 450)
+    fps: float = 30.0
+    speed: float | None = None
+    camera: Camera | None = None
+    at: float | None = None
+    span: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        checked(self.camera)
+        if self.at is not None:
+            end = max(float(trace.t[-1]) for trace in style.same_plant(self.traces))
+            self.clock = Clock(np.array([number("at", self.at, low=0.0, high=end + 1e-9)]), np.ones(1))
+        else:
+            self.clock = pace.clock(self.traces, self.fps, self.speed)
+        if self.span is not None:
+            if len(ends := items_of("span", self.span)) != 2:
+                raise ScenarioError(f"span is {errors.shown(self.span)}: give two times, in s")
+            start, stop = (number("span", end) for end in ends)
+            self.clock = self.clock.part(start, stop)
+            if not len(self):
+                raise ScenarioError(f"a film of {start:g} .. {stop:g} s has no frames: give a span within the runs")
+
+    def __len__(self) -> int:
+        return len(self.clock.times)
+
+    def __iter__(self) -> Generator[np.ndarray]:
+        return pictures(self.traces, self.clock, self.labels, self.title, self.size, self.camera)
+
+    def __repr__(self) -> str:
+        return f"Frames({len(self)} of {self.size[0]} x {self.size[1]} px, {self.fps:g} a second)"
+
+    @property
+    def metadata(self) -> "VideoMetadata":
+        """The playback speed, which mediapy reads here. It also gets the ffmpeg of imageio_ffmpeg."""
+        width, height = self.size
+        return mediapy().VideoMetadata(len(self), (height, width), self.fps, None)
+
+
+@overload
 def film(
     traces: Trace | Sequence[Trace],
     path: str | os.PathLike[str],
     labels: Sequence[str] | None = None,
     title: str | None = None,
-    size: tuple[int, int] = (1280, 720),
-    fps: float = FPS,
+    size: tuple[int, int] | None = None,
+    fps: float | None = None,
     speed: float | None = None,
     camera: Camera | None = None,
-) -> Path:
-    """Write an .mp4 of traces of one plant, from t = 0 to the end of the longest.
+    *,
+    at: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> Path: ...
+
+
+@overload
+def film(
+    traces: Trace | Sequence[Trace],
+    path: None = None,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: tuple[int, int] | None = None,
+    fps: float | None = None,
+    speed: float | None = None,
+    camera: Camera | None = None,
+    *,
+    at: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> Frames: ...
+
+
+def film(
+    traces: Trace | Sequence[Trace],
+    path: str | os.PathLike[str] | None = None,
+    labels: Sequence[str] | None = None,
+    title: str | None = None,
+    size: tuple[int, int] | None = None,
+    fps: float | None = None,
+    speed: float | None = None,
+    camera: Camera | None = None,
+    *,
+    at: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> Path | Frames:
+    """Film traces of one plant, from t = 0 to the end of the longest, and return the path of the file.
 
     Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the speed.
 
     Args:
       traces: several, or a single one.
+      path: its ending tells what is written: .mp4, a film; .webp, an animated picture that web pages show as an image;
+        .png, the picture at the time `at`. None writes nothing, and returns the pictures for other packages, `Frames`.
       labels: one a trace; default: the laws' labels.
       title: default: the plant's name.
-      size: width and height in px, even.
+      size: width and height in px, even. Default: 1280 x 720, and 800 x 450 for .webp and `Frames`.
+      fps: frames a second; default: 30, and 20 for .webp.
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
       camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera. It gives
         the direction of the view, and the camera is as near as it can see all machines. Default: the plant's own
         `look`; for your own model the first camera that does not move.
+      at: the time of a single picture, s.
+      span: the part of the runs that is shown, (start, stop) in s; default: all, and the first 4 s for .webp.
 
     Raises:
-      ScenarioError: nothing to show, a size that is odd or too small or large, or no OpenGL to render with.
+      ScenarioError: nothing to show, a size that is odd or too small or large, another ending, or no OpenGL to render
+        with.
     """
-    path = with_ending(path, ".mp4")
-    shown = pace.clock(traces, fps, speed)
-    pictures = frames(traces, shown, labels, title, size, camera)
-    with replacing(path) as part, contextlib.closing(pictures), bar("film", len(shown.times)) as progress:
-        first = next(pictures)
-        with encoder(part, first.shape[:2], fps) as write:
-            for picture in itertools.chain([first], pictures):
-                write(picture)
-                progress.advance(1)
+    ending = None if path is None else with_ending(path, *WRITERS).suffix
+    if (at is None) if ending == ".png" else (ending is not None and at is not None):
+        raise ScenarioError("the picture at a time is a .png: give at, in s, with a path that ends in .png")
+    if at is not None and span is not None:
+        raise ScenarioError("at and span exclude each other: give at for a picture, or span for a film")
+    small = ending in (None, ".webp")
+    frames = Frames(
+        traces,
+        labels,
+        title,
+        (size or ((800, 450) if small else (FULL_WIDTH, 720))),
+        FPS_OF.get(ending or "", FPS) if fps is None else fps,
+        speed,
+        camera,
+        at,
+        (0.0, 4.0) if ending == ".webp" and span is None else span,
+    )
+    return frames if path is None else write(frames, Path(path))
+
+
+def write(frames: Frames, path: Path) -> Path:
+    """Write frames to a file, as its ending tells, and return its path."""
+    made = iter(frames)
+    with replacing(path) as part, contextlib.closing(made), bar("film", len(frames)) as progress:
+        WRITERS[path.suffix](frames, _counted(made, progress), part)
     return path
+
+
+def _counted(made: Iterator[np.ndarray], progress: Bar) -> Iterator[np.ndarray]:
+    for picture in made:
+        yield picture
+        progress.advance(1)
+
+
+def _write_mp4(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
+    first = next(made)
+    with encoder(part, first.shape[:2], frames.fps) as write_frame:
+        for picture in itertools.chain([first], made):
+            write_frame(picture)
+
+
+def _write_webp(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
+    count = len(frames)
+    if count > MAX_WEBP_FRAMES:
+        raise ScenarioError(f"a .webp of {count} frames: give a span with at most {MAX_WEBP_FRAMES}, or an .mp4")
+    images = [Image.fromarray(picture) for picture in made]
+    ends = [round(1000 / frames.fps)] * (count - 1) + [LAST_FRAME_TIME]
+    images[0].save(part, save_all=True, append_images=images[1:], duration=ends, loop=0, quality=60, method=4)
+
+
+def _write_png(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
+    Image.fromarray(next(made)).save(part, optimize=True)
+
+
+WRITERS = {".mp4": _write_mp4, ".webp": _write_webp, ".png": _write_png}
 
 
 def missing() -> str | None:
     """Return None if a film can be written, else one sentence that says why not and what to do."""
     return gl.missing() or extras.missing("film", "no film: it", "mediapy", "imageio_ffmpeg")
-
-
-def clip(
-    traces: Trace | Sequence[Trace],
-    path: str | os.PathLike[str],
-    labels: Sequence[str] | None = None,
-    title: str | None = None,
-    span: tuple[float, float] = (0.0, 4.0),
-    size: tuple[int, int] = (800, 450),
-    fps: float = 20.0,
-    speed: float | None = None,
-    camera: Camera | None = None,
-) -> Path:
-    """Write an animated .webp of the time `span`, s, which web pages show as an image. Other arguments: as `film`."""
-    path = with_ending(path, ".webp")
-    if len(ends := items_of("span", span)) != 2:
-        raise ScenarioError(f"span is {errors.shown(span)}: give two times, in s")
-    start, stop = (number("span", end) for end in ends)
-    shown = pace.clock(traces, fps, speed).part(start, stop)
-    count = len(shown.times)
-    if not 0 < count <= 600:
-        raise ScenarioError(f"a clip of {start:g} .. {stop:g} s has {count} frames: give a span with 1 to 600")
-    pictures = []
-    with bar("clip", count) as progress:
-        for picture in frames(traces, shown, labels, title, size, camera):
-            pictures.append(Image.fromarray(picture))
-            progress.advance(1)
-    ends = [round(1000 / fps)] * (count - 1) + [LAST_FRAME_TIME]
-    with replacing(path) as part:
-        pictures[0].save(part, save_all=True, append_images=pictures[1:], duration=ends, loop=0, quality=60, method=4)
-    return path
-
-
-def still(
-    traces: Trace | Sequence[Trace],
-    time: float,
-    path: str | os.PathLike[str],
-    labels: Sequence[str] | None = None,
-    title: str | None = None,
-    size: tuple[int, int] = (1280, 720),
-    camera: Camera | None = None,
-) -> Path:
-    """Write the frame at `time` in s, within the runs, as a .png. Other arguments: as `film`."""
-    path = with_ending(path, ".png")
-    end = max(float(trace.t[-1]) for trace in style.same_plant(traces))
-    now = Clock(np.array([number("time", time, low=0.0, high=end + 1e-9)]), np.ones(1))
-    with contextlib.closing(frames(traces, now, labels, title, size, camera)) as pictures, replacing(path) as part:
-        Image.fromarray(next(pictures)).save(part, optimize=True)
-    return path
 
 
 def _checked_size(size: Iterable[int]) -> tuple[int, int]:
@@ -142,7 +237,7 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     return int(sides[0]), int(sides[1])
 
 
-def frames(
+def pictures(
     traces: Trace | Sequence[Trace],
     shown: Clock,
     labels: Sequence[str] | None,

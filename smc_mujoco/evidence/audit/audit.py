@@ -91,7 +91,7 @@ def audit(
         smc.audit("./my_paper").save("evidence.json")
 
     Args:
-      paper: a name of `smc-mujoco papers`, or a folder.
+      paper: a name of `smc-mujoco claims --papers`, or a folder.
       only: ids of the claims wanted; None for all.
       gains: names of the paper's sets of gains; None for all of them, or for its quick sets if `quick`.
       quick: whether to measure less, as each claim says: coarser grids, shorter runs.

@@ -197,7 +197,7 @@ def _of_package(point: EntryPoint) -> Home:
 
 
 def paper(which: str | Path) -> Paper:
-    """Return a paper by its name in `smc-mujoco papers`, or from its folder."""
+    """Return a paper by its name in `smc-mujoco claims --papers`, or from its folder."""
     known = catalogue()
     if isinstance(which, str) and which in known:
         return _read_once(*known[which])
@@ -255,7 +255,7 @@ def _about(what: object) -> Iterator[None]:
 
 def _read(folder: Path, package: str) -> Paper:
     """Return the paper in a folder, whose code is imported under a package's name."""
-    with reading(folder / PAPER_FILE, "paper", "make one with `smc-mujoco papers --new FOLDER`") as file:
+    with reading(folder / PAPER_FILE, "paper", "make one with `smc-mujoco claims --new FOLDER`") as file:
         text = file.read_text(encoding="utf-8")
     try:
         data = tomllib.loads(text)

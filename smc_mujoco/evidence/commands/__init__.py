@@ -1,10 +1,9 @@
 """The commands of the evidence annex."""
 
-from smc_mujoco.evidence.commands import accuracy, boards, certificates, papers, report, rigs
+from smc_mujoco.evidence.commands import accuracy, certificates, papers, report, rigs
 
 GROUPS = {  # heading in the help -> commands
-    "Compare": [boards.board],
     "Tune and analyse": [accuracy.accuracy],
-    "Audit": [papers.claims, papers.papers, certificates.certify, report.report],
-    "Machines": [rigs.identify, rigs.replay],
+    "Audit": [papers.claims, certificates.certify, report.report],
+    "Machines": [rigs.rig],
 }

@@ -1,4 +1,4 @@
-"""smc-mujoco claims, papers: audits of the claims of papers."""
+"""smc-mujoco claims: audits of the claims of papers."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 
 
 def claims(
+    ctx: typer.Context,
     ids: Annotated[
         list[str] | None, typer.Argument(metavar="ID", help="Of claims, as 3 18; by default all.", show_default=False)
     ] = None,
     gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")] = False,
     paper: Annotated[
-        str | None, typer.Option(metavar="NAME|FOLDER", help="A paper of `smc-mujoco papers`; default Gaber's.")
+        str | None, typer.Option(metavar="NAME|FOLDER", help="A paper of --papers; default Gaber's.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
     evidence: Annotated[
@@ -30,8 +31,17 @@ def claims(
     badge: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge of the verdicts.")] = None,
     mutants: Annotated[bool, typer.Option("--mutants", help="List claims that no broken law loses.")] = False,
     threads: options.Threads = None,
+    papers: Annotated[bool, typer.Option("--papers", help="List the papers instead.")] = False,
+    new: Annotated[
+        Path | None, typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper instead.")
+    ] = None,
+    check: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead.")
+    ] = None,
 ) -> None:
     """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
+
+    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
 
     Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
     otherwise. One counter-example refutes a universal claim. A claim about some gains is "not shown" if a search finds
@@ -42,8 +52,15 @@ def claims(
 
     Example: smc-mujoco claims 3 18 --gains tuned
 
+    Example: smc-mujoco claims --new my_paper
+
     Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
     """
+    if papers or new or check:
+        audited = "ids", "gains", "quick", "paper", "json", "evidence", "badge", "mutants", "threads"
+        options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
+        _papers(papers, new, check)
+        return
     with delay_ctrl_c():
         from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import with_ending, writable
@@ -93,21 +110,8 @@ def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
     return bool(kept)
 
 
-def papers(
-    new: Annotated[
-        Path | None, typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper into a folder.")
-    ] = None,
-    check: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.json", help="Check the seal of a file that `smc-mujoco claims --evidence` wrote."),
-    ] = None,
-) -> None:
-    """List the papers whose claims `smc-mujoco claims --paper NAME` audits, begin your own, or check evidence.
-
-    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
-
-    Example: smc-mujoco papers --new my_paper && smc-mujoco claims --paper ./my_paper
-    """
+def _papers(listed: bool, new: Path | None, check: Path | None) -> None:
+    """Begin a paper of one's own, check evidence, or list the papers."""
     with delay_ctrl_c():
         from smc_mujoco.cli import tables
         from smc_mujoco.evidence.audit import evidence, paper
@@ -121,7 +125,7 @@ def papers(
         about = f"{data['paper']['authors']}, {data['paper']['title']}"
         quick = ", in a quick audit" if data["quick"] else ""
         terminal.note(f"the seal is whole: {about}: {counts}{quick}", wrap=True)
-    if new or check:
+    if not listed:
         return
     lines = {name: f"{known.authors}: {known.title} ({known.contents})" for name, known in paper.papers().items()}
     rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]

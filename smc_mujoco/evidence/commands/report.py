@@ -32,7 +32,9 @@ def report(
     ] = None,
     paper: Annotated[
         str | None,
-        typer.Option(metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco papers`."),
+        typer.Option(
+            metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco claims --papers`."
+        ),
     ] = None,
     relevant: options.Relevant = RELEVANT,
     threads: options.Threads = None,

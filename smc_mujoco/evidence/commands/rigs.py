@@ -1,5 +1,6 @@
-"""smc-mujoco identify, replay: a rig's quantities from its records, and records beside their twins."""
+"""smc-mujoco rig: records of a real machine beside its twin, and a machine's quantities from its records."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -7,39 +8,89 @@ import typer
 
 from smc_mujoco.cli.commands import options
 from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
-def identify(
-    rig: Annotated[
-        str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo, a plant, or FILE.xml:joint+joint.")
+def rig(
+    ctx: typer.Context,
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="RIG", help="A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint."
+        ),
     ],
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns, or saved traces.")
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns; with --fit also traces."),
     ],
     columns: options.Columns = None,
-    quantities: Annotated[
-        str | None, typer.Option(help="Quantities to find, as a,b; default those that the rig's records determine.")
+    figure: Annotated[Path | None, options.picture("the (first) record and its residuals")] = None,
+    sets: Annotated[
+        str | None, typer.Option(help="Published parameter sets whose twins are shown too, as a,b; default none.")
     ] = None,
     start: Annotated[
-        str | None,
-        typer.Option("--set", metavar="NAME=VALUE,...", help="Values from which the search starts, SI units: M=5,b=8."),
+        float | None, typer.Option(min=0.0, help="Where the film starts, s of the record; default the rig's own start.")
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, help="How many parameter sets the search may start from.")] = 4,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of these starts.")] = 0,
-    figure: Annotated[Path | None, options.picture("the first record and its residuals")] = None,
-    json: options.Json = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
+    ] = None,
+    film: Annotated[Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")] = None,
+    fit: Annotated[bool, typer.Option("--fit", help="Fit quantities (mass, friction, motor) to the records.")] = False,
+    quantities: Annotated[
+        str | None,
+        typer.Option(help="Fit: quantities to find, as a,b; default those that the rig's records determine."),
+    ] = None,
+    given: Annotated[
+        str | None,
+        typer.Option("--set", metavar="NAME=VALUE,...", help="Fit: where the search starts, SI units: M=5,b=8."),
+    ] = None,
+    starts: Annotated[int, typer.Option(min=1, help="Fit: how many sets the search may start from.")] = 4,
+    seed: Annotated[int, typer.Option(min=0, help="Fit: seed of these starts.")] = 0,
+    json: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Fit: also write the result to a file.")
+    ] = None,
 ) -> None:
-    """Fit a machine's parameters (mass, friction, motor) to measured data.
+    """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to records.
 
-    The rig's references, controller, encoder and delay are replayed, and the quantities are chosen that give the least
-    sum of squared residuals. The command prints them with their standard errors, says what the records cannot tell, and
-    gives the fit of each record before and after: 100 (1 - |y - yhat| / |y - mean y|) percent. A record has a column
-    for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The first line of a CSV
-    file has the names of the columns.
+    The twin starts from the measured state. If the machine's controller is known, the loop is closed and only the
+    references are those of the record; else the twin repeats the recorded command. The table has the fit of the whole
+    record, 100 (1 - |y - yhat| / |y - mean y|) percent, and that of a machine that does nothing.
 
-    Example: smc-mujoco identify servo_axis run.csv --set M=5,b=8 --columns x=position,u=force
+    With --fit the quantities are chosen that give the least sum of squared residuals. They are printed with their
+    standard errors, with what the records cannot tell, and with the fit of each record before and after.
+
+    A record has a column for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The
+    first line of a CSV file has the names of the columns.
+
+    Example: smc-mujoco rig qube_servo run.csv --sets driver --duration 6 --film run.mp4
+
+    Example: smc-mujoco rig servo_axis run.csv --fit --set M=5,b=8 --columns x=position,u=force
     """
+    options.only_for(ctx, ("sets", "start", "duration", "film"), not fit, "a record beside its twin: leave out --fit")
+    options.only_for(ctx, ("quantities", "given", "starts", "seed", "json"), fit, "--fit")
+    named = options.columns(columns)
+    if fit:
+        values = options.numbers(given, "--set", "M=5,b=8")
+        _fit(name, files, named, options.names(quantities), values, starts, seed, figure, json)
+        return
+    if len(files) != 1:
+        raise ScenarioError(f"{len(files)} records: give one, or --fit")
+    _repeat(name, files[0], named, options.names(sets), start, duration, figure, film)
+
+
+def _fit(
+    rig: str,
+    files: Sequence[Path],
+    columns: Mapping[str, str],
+    quantities: Sequence[str],
+    start: Mapping[str, float],
+    starts: int,
+    seed: int,
+    figure: Path | None,
+    json: Path | None,
+) -> None:
+    """Find quantities of a rig, and print them."""
     with delay_ctrl_c():
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.identify import identify as find
@@ -48,13 +99,13 @@ def identify(
         from smc_mujoco.mechanisms.named import as_plant
         from smc_mujoco.mechanisms.plant import catalogue as plants
 
-    terminal, named = Terminal(), options.columns(columns)
+    terminal, named = Terminal(), columns
     options.check_files(json, figure)
     identified = find(
         as_plant(rig) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
         [load(file, named) for file in files],
-        options.names(quantities) or None,
-        start=options.numbers(start, "--set", "M=5,b=8"),
+        quantities or None,
+        start=start,
         starts=starts,
         seed=seed,
         progress=True,
@@ -70,33 +121,19 @@ def identify(
         terminal.wrote(*identified.figure(figure))
 
 
-def replay(
-    rig: Annotated[str, typer.Argument(metavar="RIG", help="A rig, such as qube_servo or simple_pendulum_ak80.")],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A record: CSV or npz file of columns.")],
-    columns: options.Columns = None,
-    quantities: Annotated[
-        str | None, typer.Option(help="Published parameter sets whose twins are shown too, as a,b; default none.")
-    ] = None,
-    start: Annotated[
-        float | None, typer.Option(min=0.0, help="Where the film starts, s of the record; default the rig's own start.")
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
-    ] = None,
-    figure: Annotated[Path | None, options.picture("the columns and their residuals")] = None,
-    film: Annotated[Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")] = None,
+def _repeat(
+    rig: str,
+    file: Path,
+    columns: Mapping[str, str],
+    sets: Sequence[str],
+    start: float | None,
+    duration: float | None,
+    figure: Path | None,
+    film: Path | None,
 ) -> None:
-    """Repeat a record of a real machine by its twin, and show both side by side.
-
-    The twin starts from the measured state. If the machine's controller is known, the loop is closed and only the
-    references are those of the record; else the twin repeats the recorded command. The table has the fit of the whole
-    record, 100 (1 - |y - yhat| / |y - mean y|) percent, and that of a machine that does nothing.
-
-    Example: smc-mujoco replay qube_servo run.csv --quantities driver --duration 6 --film run.mp4
-    """
+    """Show a record beside the runs of the rig's twins."""
     with delay_ctrl_c():
         from smc_mujoco.cli.scene import filmed
-        from smc_mujoco.common.errors import ScenarioError
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.evidence.commands import tables
         from smc_mujoco.evidence.rigs.records import load
@@ -106,10 +143,10 @@ def replay(
 
     terminal, twin = Terminal(), find_rig(rig)
     writable(figure, film and with_ending(film, ".mp4"))
-    record = load(file, options.columns(columns))
+    record = load(file, columns)
     if isinstance(record, Trace):
         raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")
-    twins = {"twin": twin} | {name: twin.set(name) for name in options.names(quantities)}
+    twins = {"twin": twin} | {name: twin.set(name) for name in sets}
     fits = {"twin": twin.fit(record)}
     fits |= {name: shown.fits([record])[0] for name, shown in twins.items() if name != "twin"}
     terminal.print(tables.fits(twin.label, fits | {"do nothing": twin.idle(record)}))

@@ -33,7 +33,7 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
     with scratch() as folder:
         path = folder / "film.webm"
         with encoder(path, (SIZE[1], SIZE[0]), FPS) as write:
-            for k, picture in enumerate(video.frames(traces, shown, None, title, SIZE), 1):
+            for k, picture in enumerate(video.pictures(traces, shown, None, title, SIZE), 1):
                 write(picture)
                 report(k, len(shown.times))
         return path.read_bytes()

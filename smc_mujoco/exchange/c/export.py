@@ -30,7 +30,7 @@ SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of 
 
 
 def law_to_c(law: Component | Template | str, numbers: str = "double", joints: int | None = None) -> str:
-    """Return a law as one C99 file, with its gains as defaults. `smc.law_from_c` can load it.
+    """Return a law as one C99 file, with its gains as defaults. `smc.exchange.law_from_c` can load it.
 
     Args:
       law: a Law, its Template, or its text, see `law`.

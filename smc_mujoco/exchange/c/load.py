@@ -187,7 +187,7 @@ def law_from_c(
 
     Nothing checks C while it runs. A law that accesses other memory crashes the process or changes the numbers of
     other runs; one that does not return hangs it. Try a new law with isolate=True, or with
-    `smc-mujoco check-c my_law.c`.
+    `smc-mujoco list my_law.c`.
     """
     if name is not None:
         errors.name("name", name)

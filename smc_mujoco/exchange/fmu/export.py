@@ -42,7 +42,7 @@ SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": (
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
 
 
-def export_fmu(
+def law_to_fmu(
     law: Law | Template | str | Scenario,
     path: str | os.PathLike[str] | None = None,
     *,
@@ -122,7 +122,7 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
 def _controller(
     law: Any, surface: Any, velocity: Any, control_period: Any, u_max: Any, model: Any, joints: int | None
 ) -> Controller:
-    """Return the controller, checked. Arguments and errors as in `export_fmu`."""
+    """Return the controller, checked. Arguments and errors as in `law_to_fmu`."""
     sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
     count = number_of_joints(chosen, joints)

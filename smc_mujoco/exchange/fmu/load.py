@@ -1,6 +1,6 @@
 """Controllers in FMUs as laws: `law_from_fmu` reads FMI 2.0 and 3.0 for Co-Simulation, through FMPy.
 
-An FMU from Simulink, Modelica or `export_fmu` keeps its own state. So each channel of each run has its own instance,
+An FMU from Simulink, Modelica or `law_to_fmu` keeps its own state. So each channel of each run has its own instance,
 which is made at the first sample and freed with the run. The instance is called from Python, in the reference loop. The
 FMU is first tried in a separate process, which may crash or hang.
 """
@@ -145,7 +145,7 @@ def extracted(path: str, digest: str) -> Path:
     except OSError:
         now = ""
     if now != digest:
-        raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.law_from_fmu again")
+        raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.exchange.law_from_fmu again")
     folder = build.fresh("-fmu")
     with zipfile.ZipFile(path) as archive, no_room(errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         archive.extractall(folder)
@@ -188,7 +188,7 @@ def law_from_fmu(
     u is what the FMU returns after a step from the sample's time, on the measurement of that sample. In a run the FMU
     is part of your process: if it crashes, Python ends.
     """
-    with extra("fmu", "smc.law_from_fmu"):
+    with extra("fmu", "smc.exchange.law_from_fmu"):
         import fmpy  # noqa: F401
     with reading(path, "functional mock-up unit", "give the path of an .fmu file") as file:
         file.open("rb").close()

@@ -122,7 +122,8 @@ def plant_from(
       keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
         unless the scenario has a v0.
       assets: name -> content of the files that a text names.
-      tip: name of the site that films trace and `smc.tip_scores` scores; laws of many joints may read its Jacobian.
+      tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many joints may read its
+        Jacobian.
       timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:

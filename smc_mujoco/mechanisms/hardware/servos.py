@@ -1,6 +1,6 @@
 """Servos whose friction grows with the load on their gearbox: models M1 to M6; Dynamixel MX-64 and MX-106 as presets.
 
-    servo = smc.servo("mx106", "m4")
+    servo = smc.hardware.servo("mx106", "m4")
     scenario = smc.Scenario(plant="pendulum", law=..., actuator=servo.motor, friction=servo.friction)
 
 The load of a gearbox is the two torques on its sides, that of its motor and that from outside, and not their sum: if a

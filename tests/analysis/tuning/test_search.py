@@ -301,7 +301,7 @@ def test_the_search_knows_nothing_of_the_gains_it_is_given():
 
 
 def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
-    with pytest.warns(smc.ScenarioWarning, match=r"failing's when and k have no unit.*Gain\("):
+    with pytest.warns(smc.errors.ScenarioWarning, match=r"failing's when and k have no unit.*Gain\("):
         tuned = tune("duffing", failing(), budget=2, objective=LEAN, searches=1)
     for name, (low, high) in tuned.bounds.items():
         assert low * high == pytest.approx(failing().gains[name] ** 2)
@@ -510,7 +510,7 @@ WORSE = (
 def test_warns_if_and_only_if_the_laws_own_gains_are_better():
     first = tune("duffing", smc.law("classical", k=0.5), objective=SHORT, searches=1)
     assert first.objective < first.before
-    with pytest.warns(smc.ScenarioWarning, match=WORSE) as caught:
+    with pytest.warns(smc.errors.ScenarioWarning, match=WORSE) as caught:
         again = tune("duffing", first.law, budget=1, objective=SHORT, searches=1)
     assert again.objective > again.before
     assert [Path(one.filename).name for one in caught] == ["test_search.py"]
@@ -568,6 +568,6 @@ def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
 @pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_it_warns_if_all_gains_tried_chatter_too_much():
-    with pytest.warns(smc.ScenarioWarning, match="are predicted to chatter with more than 1e-12"):
+    with pytest.warns(smc.errors.ScenarioWarning, match="are predicted to chatter with more than 1e-12"):
         tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12, searches=1)
     assert tuned.objective > 2.0 * FAILURE_COST

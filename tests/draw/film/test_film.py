@@ -53,7 +53,7 @@ def broken(trace: smc.Trace, at: int) -> smc.Trace:
 def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
     clock = Clock(np.array(times), np.ones(len(times)))
     with contextlib.nullcontext() if charts else without_charts:
-        return list(film.frames(traces, clock, options.get("labels"), None, options.get("size", SIZE)))
+        return list(film.pictures(traces, clock, options.get("labels"), None, options.get("size", SIZE)))
 
 
 def seconds(trace: smc.Trace, fps: float = 30.0) -> np.ndarray:
@@ -285,10 +285,10 @@ smc.film([trace], sys.argv[1], size=(320, 180))
 def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
     many = smc.plant("inverted_pendulum_network", n=30)
     traces = smc.run([smc.Scenario(plant=many, law="none", duration=0.2)])
-    still = film.still(traces, 0.1, tmp_path / "a.png", size=SIZE)
+    still = film.film(traces, tmp_path / "a.png", at=0.1, size=SIZE)
     with Image.open(still) as image:
         assert image.size == SIZE
-    with Image.open(film.clip(traces, tmp_path / "a.webp", span=(0.0, 0.2), size=SIZE, speed=1.0)) as clip:
+    with Image.open(film.film(traces, tmp_path / "a.webp", span=(0.0, 0.2), size=SIZE, speed=1.0)) as clip:
         assert (clip.n_frames, clip.size) == (5, SIZE)
 
 
@@ -297,10 +297,10 @@ def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
 def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
     (trace,) = runs(laws=LAWS[:1], duration=0.1)
     for name, given in (("a.png", trace), ("b.png", [trace])):
-        film.still(given, 0.05, tmp_path / name, size=SIZE)
+        film.film(given, tmp_path / name, at=0.05, size=SIZE)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert film.film(trace, tmp_path / "a.mp4", size=SIZE, speed=1.0).stat().st_size
-    assert film.clip(trace, tmp_path / "a.webp", size=SIZE, speed=1.0).stat().st_size
+    assert film.film(trace, tmp_path / "a.webp", size=SIZE, speed=1.0).stat().st_size
 
 
 def test_camera_sees_all_points_as_near_as_it_can():

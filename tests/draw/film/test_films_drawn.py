@@ -248,17 +248,17 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path, sna
         wrote.append(f"{part.suffix} {shape} {fps}")
         yield lambda picture: None
 
-    monkeypatch.setattr(film, "frames", blank)
+    monkeypatch.setattr(film, "pictures", blank)
     monkeypatch.setattr(film, "encoder", encoder)
     trace, size, told = machine("duffing", duration=5.0), (320, 180), []
     monkeypatch.setattr(progress.Bar, "advance", lambda bar, work: told.append((bar.what, work)))
     looks = {"labels": ["a"], "title": "b", "size": size, "camera": (10.0, -20.0)}
     film.film(trace, tmp_path / "first.mp4")
     film.film(trace, tmp_path / "a.mp4", fps=10.0, speed=2.0, **looks)
-    film.still(trace, 0.5, tmp_path / "a.png")
-    film.still(trace, 5.0, tmp_path / "b.png", **looks)
-    film.clip(trace, tmp_path / "a.webp", size=size)
-    film.clip(trace, tmp_path / "b.webp", span=(1.0, 1.5), fps=10.0, speed=1.0, **looks)
+    film.film(trace, tmp_path / "a.png", at=0.5)
+    film.film(trace, tmp_path / "b.png", at=5.0, **looks)
+    film.film(trace, tmp_path / "a.webp", size=size)
+    film.film(trace, tmp_path / "b.webp", span=(1.0, 1.5), fps=10.0, speed=1.0, **looks)
     durations = []
     with Image.open(tmp_path / "b.webp") as clip:
         for frame in range(clip.n_frames):
@@ -268,7 +268,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path, sna
     sentences = []
     for options in refused:
         with pytest.raises(smc.ScenarioError) as error:
-            film.clip(trace, tmp_path / "c.webp", **options)
+            film.film(trace, tmp_path / "c.webp", **options)
         sentences.append(str(error.value))
     names = sorted(path.name for path in tmp_path.iterdir())
     assert "\n".join([*asked, *wrote, *sentences, f"{collections.Counter(told)} {names} {durations}"]) == snapshot

@@ -30,7 +30,7 @@ def test_a_foreign_model_has_its_picture(tmp_path):
     plant = smc.plant_from(FOREIGN / "reacher.xml", {"shoulder": None, "wrist": None})
     runs = [smc.Scenario(plant=plant, law=law, duration=0.2) for law in ("none", "super_twisting")]
     traces = smc.run(runs)
-    still = smc.still(traces, 0.1, tmp_path / "a.png", size=(640, 360))
+    still = smc.film(traces, tmp_path / "a.png", at=0.1, size=(640, 360))
     assert np.asarray(Image.open(still))[60:200].std() > 5.0
     smc.figure(traces, tmp_path / "a.svg")
     assert all((tmp_path / name).stat().st_size for name in ("a.svg", "a.png"))
@@ -47,12 +47,12 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
       <actuator><motor joint="j"/></actuator></mujoco>""")
     trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
     if words:
-        with pytest.warns(smc.ScenarioWarning, match=words):
-            smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
+        with pytest.warns(smc.errors.ScenarioWarning, match=words):
+            smc.film([trace], tmp_path / "a.png", at=0.1, size=(320, 180))
     else:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            smc.still([trace], 0.1, tmp_path / "a.png", size=(320, 180))
+            smc.film([trace], tmp_path / "a.png", at=0.1, size=(320, 180))
 
 
 @pytest.mark.slow
@@ -68,7 +68,7 @@ def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
     for chosen in (None, "eye"):
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
-            path = smc.still([trace], 0.1, tmp_path / "a.png", size=(640, 360), camera=chosen)
+            path = smc.film([trace], tmp_path / "a.png", at=0.1, size=(640, 360), camera=chosen)
         picture = np.asarray(Image.open(path)).astype(int)[:230]
         assert (picture[..., 0] - picture[..., 1] > 60).sum() > 50
         assert [str(one.message).partition(":")[0] for one in told] == ["camera 'eye' shows nothing of one"] * bool(
@@ -148,4 +148,4 @@ def test_a_body_without_a_shape_has_no_arrow_and_no_error(tmp_path):
       <actuator><motor joint="j"/><motor joint="i"/></actuator></mujoco>""")
     plant = smc.plant_from(tmp_path / "bare.xml", ["j", "i"])
     trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.2, x0=0.3))
-    assert smc.still([trace], 0.1, tmp_path / "a.png", size=(640, 360)).stat().st_size
+    assert smc.film([trace], tmp_path / "a.png", at=0.1, size=(640, 360)).stat().st_size

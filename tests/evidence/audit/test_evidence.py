@@ -225,11 +225,11 @@ def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_p
     assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), asked.output
     without = CliRunner().invoke(main.app, ["claims", "2", "--paper", str(folder), "--mutants"])
     assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
-    checked = CliRunner().invoke(main.app, ["papers", "--check", str(files[0])])
+    checked = CliRunner().invoke(main.app, ["claims", "--check", str(files[0])])
     assert "the seal is whole: A. Nobody, Small: 1 refuted" in " ".join(checked.stdout.split())
-    listed = CliRunner().invoke(main.app, ["papers"])
+    listed = CliRunner().invoke(main.app, ["claims", "--papers"])
     assert "gaber" in listed.stdout
-    begun = CliRunner().invoke(main.app, ["papers", "--new", str(tmp_path / "mine")])
+    begun = CliRunner().invoke(main.app, ["claims", "--new", str(tmp_path / "mine")])
     assert begun.exit_code == 0
     assert (tmp_path / "mine" / "claims.py").is_file()
     broken = CliRunner().invoke(main.app, ["claims", "--paper", str(tmp_path)])

@@ -10,6 +10,7 @@ from helpers.sketch import sketch
 from scipy.interpolate import RegularGridInterpolator
 
 import smc_mujoco as smc
+from smc_mujoco.evidence.certificates.certificate import Certificate
 
 REACHED = part("reaching", {"reaching": 0.3, "actuator": 1.0}, X=1.25, S=0.5)
 GLOBAL = part("saturated PD", {"damping": 0.5, "restoring": 0.2, "actuator": 0.0, "local": 1.0})
@@ -92,7 +93,7 @@ def test_what_has_no_plane_is_refused(name, sentence):
 
 def test_a_file_that_is_no_certificate_is_refused(tmp_path):
     SAID["without d"].save(tmp_path / "a.json")
-    assert smc.Certificate.load(tmp_path / "a.json").data == SAID["without d"].data
+    assert Certificate.load(tmp_path / "a.json").data == SAID["without d"].data
     (tmp_path / "b.json").write_text('{"parts": 3}')
     with pytest.raises(smc.ScenarioError, match="is not a certificate"):
-        smc.Certificate.load(tmp_path / "b.json")
+        Certificate.load(tmp_path / "b.json")

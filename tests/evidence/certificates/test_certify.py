@@ -22,6 +22,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets
+from smc_mujoco.evidence.certificates.certificate import Certificate
 
 pytest.importorskip("flint", reason="python-flint is not installed: the extra proof does")
 from smc_mujoco.evidence.certificates import checker, loops
@@ -198,7 +199,7 @@ def test_what_is_left_out_is_said_with_what_the_scenario_has():
     [
         ({"law": smc.law("twisting")}, "twisting on duffing"),
         ({"plant": "cart_pole", "law": smc.law("observer_free")}, "cart_pole"),
-        ({"disturbance": smc.OrnsteinUhlenbeck(1.0, 1.0)}, "no bound"),
+        ({"disturbance": smc.signals.OrnsteinUhlenbeck(1.0, 1.0)}, "no bound"),
     ],
 )
 def test_what_has_no_theorem_is_one_sentence(changes, word):
@@ -453,7 +454,7 @@ def test_the_checker_stands_alone(tmp_path):
     shutil.copy(checker.__file__, tmp_path / "apart.py")
     made = certificate("duffing", disturbance=2.0)
     file = made.save(tmp_path / "duffing.json")
-    assert smc.Certificate.load(file).data == made.data
+    assert Certificate.load(file).data == made.data
     run = functools.partial(subprocess.run, capture_output=True, text=True, check=False, cwd=tmp_path)
     done = run([sys.executable, "-I", "apart.py", "duffing.json"])
     assert (done.returncode, done.stdout) == (0, "duffing.json is accepted: every statement is proven\n")

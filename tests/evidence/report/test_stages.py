@@ -251,7 +251,7 @@ def test_a_film_has_every_frame(tmp_path, monkeypatch):
     )
     monkeypatch.setattr(films, "encoder", encoder)
     monkeypatch.setattr(films.pace, "clock", lambda traces, fps: SimpleNamespace(times=np.arange(count) / fps))
-    monkeypatch.setattr(films.video, "frames", pictures)
+    monkeypatch.setattr(films.video, "pictures", pictures)
     film = films.film([trace], "title", lambda done, whole: reached.append((done, whole)))
     assert written == [("film.webm", (540, 960), 20), *range(0, 4 * count, 4)]
     assert reached == [(k + 1, count) for k in range(count)]

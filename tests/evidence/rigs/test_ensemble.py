@@ -100,7 +100,7 @@ def test_the_command_compares_laws_on_every_set(tmp_path):
 def test_the_command_identifies_from_files(tmp_path):
     rig = smc.rig("emps")
     smc.run(rig.scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(tmp_path / "run.npz")
-    words = ["identify", "emps", str(tmp_path / "run.npz"), "--quantities", "mass", "--starts", "1"]
+    words = ["rig", "--fit", "emps", str(tmp_path / "run.npz"), "--quantities", "mass", "--starts", "1"]
     done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "found.json")])
     assert done.exit_code == 0, done.output
     assert "mass" in done.output

@@ -330,7 +330,7 @@ def test_drawn_sets_have_the_errors_and_correlations_found(found):
 def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path):
     run = smc.run(smc.Scenario(plant="duffing", law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
     run.export(tmp_path / "run.csv")
-    words = ["identify", "duffing", str(tmp_path / "run.csv"), "--quantities", "delta", "--starts", "1"]
+    words = ["rig", "--fit", "duffing", str(tmp_path / "run.csv"), "--quantities", "delta", "--starts", "1"]
     refused = CliRunner().invoke(app, [*words, "--set", "delta=much"])
     assert refused.exit_code == 2
     assert "--set delta=much is no number: write it as M=5,b=8" in refused.output

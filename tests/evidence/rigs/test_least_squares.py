@@ -218,7 +218,7 @@ def test_corrected_replays_have_steps_that_divide_the_period():
     assert replays._steps(plain, 2)["physics_step"] == pytest.approx(5.5e-5)
     even = smc.Scenario(plant="duffing", law="pid", control_period=0.001)
     assert replays._steps(even, 1)["physics_step"] == pytest.approx(1.25e-4)
-    late = smc.Scenario(plant="duffing", law="pid", input_delay=0.003, friction=smc.LuGre(0.3, 0.4, 0.01))
+    late = smc.Scenario(plant="duffing", law="pid", input_delay=0.003, friction=smc.hardware.LuGre(0.3, 0.4, 0.01))
     assert replays._steps(late, 1)["integrator"] == "implicitfast"
     assert replays._steps(late, 1)["physics_step"] == late.resolved.physics_step / 2
 

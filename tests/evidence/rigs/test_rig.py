@@ -251,7 +251,7 @@ def test_records_of_torques_are_not_repeated():
 @pytest.mark.slow
 def test_the_command_repeats_a_record(record, tmp_path):
     np.savez(tmp_path / "run.npz", **record)
-    words = ["replay", "qube_servo", str(tmp_path / "run.npz"), "--quantities", "driver"]
+    words = ["rig", "qube_servo", str(tmp_path / "run.npz"), "--sets", "driver"]
     done = CliRunner().invoke(app, [*words, "--figure", str(tmp_path / "run")])
     assert done.exit_code == 0, done.output
     assert re.search(r"twin +(99|100)\.\d +(99|100)\.\d +(99|100)\.\d", done.output)

@@ -57,8 +57,8 @@ def compiled(folder):
 
     def make(name: str):
         path = folder / f"{name}.c"
-        path.write_text(smc.law_to_c(name))
-        return smc.law_from_c(path, flags=STRICT, plants=LAWS[name].plants, timeout=60.0)
+        path.write_text(smc.exchange.law_to_c(name))
+        return smc.exchange.law_from_c(path, flags=STRICT, plants=LAWS[name].plants, timeout=60.0)
 
     with unmeasured(), ThreadPoolExecutor(2) as pool:
         made = dict(zip(LAWS, pool.map(make, LAWS), strict=True))
@@ -98,8 +98,8 @@ def scenario(law, plant="duffing", **more) -> smc.Scenario:
 def back(folder: Path, law, numbers="double", **more) -> CLaw:
     """A law's C, compiled without a warning, as a function (y, gains, memory) -> (u, s)."""
     path = folder / f"{law.name}-{numbers}.c"
-    path.write_text(smc.law_to_c(law, numbers))
-    made = smc.law_from_c(path, flags=(*STRICT, *more.get("flags", ())), timeout=60.0).function
+    path.write_text(smc.exchange.law_to_c(law, numbers))
+    made = smc.exchange.law_from_c(path, flags=(*STRICT, *more.get("flags", ())), timeout=60.0).function
     assert isinstance(made, CLaw)
     return made
 
@@ -145,7 +145,7 @@ def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, na
 def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
     paths = [folder / f"{name}-single.c" for name in LAWS]
     with unmeasured(), ThreadPoolExecutor(2) as pool:
-        for path, text in zip(paths, pool.map(lambda name: smc.law_to_c(name, "float"), LAWS), strict=True):
+        for path, text in zip(paths, pool.map(lambda name: smc.exchange.law_to_c(name, "float"), LAWS), strict=True):
             path.write_text(text)
             assert re.search(r"(?<![\w.])\d+\.\d+(?![\df])", text[text.index("smc_law_modelled =") :]) is None
     flags = [*STRICT, "-Wdouble-promotion", "-fsyntax-only"]
@@ -156,8 +156,11 @@ def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_fixed_point_is_the_library_s_to_the_last_bit(folder, plant):
-    (folder / "q15.c").write_text(smc.law_to_c(smc.law("observer_free", lam=5.0, k1=1.7), "q15"))
-    mine, theirs = smc.law_from_c(folder / "q15.c", flags=STRICT), smc.law("observer_free_q15", lam=5.0, k1=1.7)
+    (folder / "q15.c").write_text(smc.exchange.law_to_c(smc.law("observer_free", lam=5.0, k1=1.7), "q15"))
+    mine, theirs = (
+        smc.exchange.law_from_c(folder / "q15.c", flags=STRICT),
+        smc.law("observer_free_q15", lam=5.0, k1=1.7),
+    )
     for more in WAYS:
         first, second = smc.run([scenario(law, plant, **more) for law in (mine, theirs)])
         assert first.failure is None
@@ -166,7 +169,7 @@ def test_fixed_point_is_the_library_s_to_the_last_bit(folder, plant):
 
 
 def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
-    text = smc.law_to_c("observer_free", "q15")
+    text = smc.exchange.law_to_c("observer_free", "q15")
     core = text[text.index("static const int16_t TABLE") : text.index("/* From here on")]
     assert re.search(r"double|float|smc_real|math", core) is None
     words = {name: int(value) for name, value in re.findall(r"Q15_(\w+) = (-?\d+)", text)}
@@ -261,8 +264,8 @@ def test_names_that_c_has_for_something_else_are_other_names_in_it(folder, diale
 
 
 def test_a_law_of_one_s_own_runs_alike_in_both(folder):
-    (folder / "turns.c").write_text(smc.law_to_c(turns))
-    first, second = smc.run([scenario(law) for law in (turns, smc.law_from_c(folder / "turns.c"))])
+    (folder / "turns.c").write_text(smc.exchange.law_to_c(turns))
+    first, second = smc.run([scenario(law) for law in (turns, smc.exchange.law_from_c(folder / "turns.c"))])
     np.testing.assert_array_equal(first.u, second.u)
 
 
@@ -322,17 +325,17 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
     )
     law = strange(text, tmp_path, monkeypatch)
     with pytest.raises(smc.ScenarioError, match=f"law 'strange' cannot be written in C: .*({words})") as error:
-        smc.law_to_c(law)
+        smc.exchange.law_to_c(law)
     assert "\n" not in str(error.value)
 
 
 # what a file says, and the command
 
 
-def test_the_file_says_formula_source_gains_and_sizes(capsys):
+def test_the_file_says_formula_source_gains_and_sizes(tmp_path):
     with pytest.raises(SystemExit) as end:
-        cli.main(["export-c", "super_twisting", "--gains", "k1=5,c=1.5", "--type", "float"])
-    text = capsys.readouterr().out
+        cli.main(["export", str(tmp_path / "super_twisting.c"), "--gains", "k1=5,c=1.5", "--type", "float"])
+    text = (tmp_path / "super_twisting.c").read_text()
     assert not end.value.code
     head, _, rest = text.partition("*/")
     assert head.startswith("/* super_twisting: a control law in C99, written out by smc_mujoco ")
@@ -357,7 +360,7 @@ def test_the_file_says_formula_source_gains_and_sizes(capsys):
     ids=("double", "float", "joints"),
 )
 def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
-    (tmp_path / "law.c").write_text(smc.law_to_c(law, **options))
+    (tmp_path / "law.c").write_text(smc.exchange.law_to_c(law, **options))
     strict = (*STRICT, "-Wfloat-conversion", "-shared", "-fPIC")
     subprocess.run([*build.compiler(), *strict, "law.c", "-o", "law.so", "-lm"], cwd=tmp_path, check=True)
     library = ctypes.CDLL(str(tmp_path / "law.so"))
@@ -367,9 +370,9 @@ def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
 
 
 def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
-    with_one = smc.law_to_c("twisting")
+    with_one = smc.exchange.law_to_c("twisting")
     monkeypatch.setenv("CC", "nocc")
-    without = smc.law_to_c("twisting")
+    without = smc.exchange.law_to_c("twisting")
     assert "not measured: there is no compiler here" in without
     assert without.partition("*/")[2] == with_one.partition("*/")[2]
 
@@ -387,30 +390,30 @@ def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
     ],
 )
 def test_a_mistake_in_the_command_is_one_sentence(capsys, words, said):
-    assert_refused(capsys, ["export-c", *words], said)
+    assert_refused(capsys, ["export", *words, "nowhere/a.c"], said)
 
 
 def test_the_command_writes_the_one_law_of_a_file(tmp_path, capsys):
     one = "@smc.law_function(gains={'k': 2.0})\ndef mine(y, gains, memory):\n    return -gains.k * y.e, y.e\n"
     (file := tmp_path / "mine.py").write_text(f"import smc_mujoco as smc\n{one}")
     with pytest.raises(SystemExit) as end:
-        cli.main(["export-c", str(file), "--gains", "k=4"])
+        cli.main(["export", str(file), str(tmp_path / "a.c"), "--gains", "k=4"])
     assert not end.value.code
-    assert 'smc_law_gains[] = "k=4.0";' in capsys.readouterr().out
+    assert 'smc_law_gains[] = "k=4.0";' in (tmp_path / "a.c").read_text()
     file.write_text(f"{file.read_text()}{one.replace('mine', 'other')}")
     with pytest.raises(SystemExit):
-        cli.main(["export-c", str(file)])
+        cli.main(["export", str(file), str(tmp_path / "a.c")])
     assert f"{file} has several laws, mine, other: give a file with one" in capsys.readouterr().err
 
 
 def test_what_is_no_law_or_is_in_c_already_is_refused(folder):
-    (folder / "none.c").write_text(smc.law_to_c("none"))
+    (folder / "none.c").write_text(smc.exchange.law_to_c("none"))
     with pytest.raises(smc.ScenarioError, match=r"law 'none' is in C already: take none\.c"):
-        smc.law_to_c(smc.law_from_c(folder / "none.c"))
+        smc.exchange.law_to_c(smc.exchange.law_from_c(folder / "none.c"))
     with pytest.raises(smc.ScenarioError, match="law is 3: give"):
-        smc.law_to_c(3)
+        smc.exchange.law_to_c(3)
 
 
 def test_gains_that_fixed_point_does_not_hold_are_warned_of():
     with pytest.warns(GainWarning, match="lam < u_range"):
-        smc.law_to_c(smc.law("observer_free", lam=9.0), "q15")
+        smc.exchange.law_to_c(smc.law("observer_free", lam=9.0), "q15")

@@ -109,8 +109,8 @@ def compiled(folder):
     }
 
     def make(name: str):
-        (path := folder / f"{name}.c").write_text(smc.law_to_c(laws[name], joints=3))
-        return smc.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
+        (path := folder / f"{name}.c").write_text(smc.exchange.law_to_c(laws[name], joints=3))
+        return smc.exchange.law_from_c(path, flags=STRICT, timeout=60.0, name=f"c {name}")
 
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
         patch.setattr(export, "_measured", lambda code: "not measured")
@@ -185,9 +185,9 @@ def test_the_reference_loop_calls_it_alike(compiled, name):
 
 @pytest.mark.parametrize("name", ["passivity_based", "super_twisting_computed_torque", "time_delay_sliding"])
 def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(folder, name):
-    (path := folder / f"{name}-single.c").write_text(smc.law_to_c(name, "float", joints=3))
+    (path := folder / f"{name}-single.c").write_text(smc.exchange.law_to_c(name, "float", joints=3))
     flags = (*STRICT, "-Wdouble-promotion")
-    single, law = smc.law_from_c(path, flags=flags, timeout=60.0).function, LAWS[name]()
+    single, law = smc.exchange.law_from_c(path, flags=flags, timeout=60.0).function, LAWS[name]()
     rng, memory = np.random.default_rng(3), np.zeros((3, law.memory))
     theirs = reference.PythonComponent(law, 3)
     for k in range(20):
@@ -213,8 +213,8 @@ def edges(y, gains, memory):
     "x", [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)]
 )
 def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
-    (path := folder / "edges.c").write_text(smc.law_to_c(edges, joints=3))
-    c, zero = smc.law_from_c(path, flags=STRICT).function, np.zeros(3)
+    (path := folder / "edges.c").write_text(smc.exchange.law_to_c(edges, joints=3))
+    c, zero = smc.exchange.law_from_c(path, flags=STRICT).function, np.zeros(3)
     for v in ((0.0, 0.0, 0.0), (-0.0, -0.0, 1.0), (2.0, math.nan, math.nan)):
         x_, v_ = np.array(x), np.array(v)
         y = JointMeasurement(0.0, 1e-3, 0.0, Nothing(), x_, v_, *[zero] * 7, np.eye(3), zero, zero)
@@ -237,9 +237,9 @@ class Nothing:
 
 
 def test_a_trial_in_a_process_of_its_own_finds_nothing_wrong(folder, capsys):
-    (path := folder / "tried.c").write_text(smc.law_to_c("passivity_based", joints=2))
+    (path := folder / "tried.c").write_text(smc.exchange.law_to_c("passivity_based", joints=2))
     with pytest.raises(SystemExit) as end:
-        cli.main(["check-c", str(path)])
+        cli.main(["list", str(path)])
     assert not end.value.code
     said = "tried.c: smc_law passes; 2 joints; gains K = 1, k = 1, c = 5, width = 0.1; memory 1"
     assert capsys.readouterr().out.splitlines()[-1] == said
@@ -278,7 +278,7 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path, case):
     (path := tmp_path / "mine.c").write_text(text)
     gains = {"k": 1.0} if case == "nan" else None
     with pytest.raises(smc.ScenarioError, match=re.escape(said)) as error:
-        smc.law_from_c(path, isolate=case in ("memory", "out", "measurement", "nan"), gains=gains)
+        smc.exchange.law_from_c(path, isolate=case in ("memory", "out", "measurement", "nan"), gains=gains)
     assert "\n" not in str(error.value)
 
 
@@ -289,11 +289,11 @@ def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
     three = smc.plant("inverted_pendulum_network", n=3)
     trace = smc.run(scenario(compiled["hybrid_sliding"][1], plant=three, duration=0.01))
     assert "asks for the Jacobian of a tip, and there is none" in str(trace.failure)
-    (path := tmp_path / "mine.c").write_text(smc.law_to_c("unit_vector", joints=2))
+    (path := tmp_path / "mine.c").write_text(smc.exchange.law_to_c("unit_vector", joints=2))
     library = tmp_path / "mine.so"
     subprocess.run([*build.compiler(), *build.LIBRARY_FLAGS, str(path), "-o", str(library), "-lm"], check=True)
     with pytest.raises(smc.ScenarioError, match=r"mine\.so is a library with a law of many joints: give its \.c file"):
-        smc.law_from_c(library)
+        smc.exchange.law_from_c(library)
 
 
 def test_a_mistake_in_the_command_is_one_sentence(capsys):
@@ -305,7 +305,7 @@ def test_a_mistake_in_the_command_is_one_sentence(capsys):
         (["pid", "--joints", "3"], "law 'pid' is of one channel: leave --joints 3 out"),
         (["unit_vector", "--gains", "c=1 a"], "--gains is 'c=1 a': give names and numbers"),
     ):
-        assert_refused(capsys, ["export-c", *words], said)
+        assert_refused(capsys, ["export", *words, "nowhere/a.c"], said)
 
 
 REFUSED = {
@@ -359,13 +359,13 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
     )
     law = strange(text, tmp_path, monkeypatch)
     with pytest.raises(smc.ScenarioError, match="law 'strange' cannot be written in C: ") as error:
-        smc.law_to_c(law, joints=3)
+        smc.exchange.law_to_c(law, joints=3)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
 
 
 def test_the_file_says_how_many_joints_it_is_for_and_what_it_reads():
-    text = smc.law_to_c(smc.law("hybrid_sliding", c=[1.0, 2.0, 3.0]))
+    text = smc.exchange.law_to_c(smc.law("hybrid_sliding", c=[1.0, 2.0, 3.0]))
     head, _, rest = text.partition("*/")
     assert head.startswith("/* hybrid_sliding: a control law of 3 joints in C99, written out by smc_mujoco ")
     for words in ("c = (1, 2, 3)", "3 numbers each", "reads    jacobian, M, de, e, ddr, v, h\n", "0 bytes a joint"):

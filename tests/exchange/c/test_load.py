@@ -98,7 +98,7 @@ def same(one: smc.Trace, other: smc.Trace) -> bool:
 
 
 def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file):
-    mine = smc.law_from_c(file(MINE))
+    mine = smc.exchange.law_from_c(file(MINE))
     pairs = [(mine(lam=5.0), smc.law("observer_free", lam=5.0))] * 3
     plants = ("inverted_pendulum", "duffing", "pendulum_network")
     traces = iter(smc.run([scenario(law, plant) for pair, plant in zip(pairs, plants, strict=True) for law in pair]))
@@ -109,7 +109,7 @@ def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file):
 
 
 def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
-    mine = smc.law_from_c(file(MINE))
+    mine = smc.exchange.law_from_c(file(MINE))
     sweep = [scenario(mine(lam=lam), seed=seed, duration=0.1) for lam in (2.0, 6.0) for seed in range(4)]
     one, two = smc.run(sweep, threads=1), smc.run(sweep, threads=2)  # a PlainLoopWarning would be an error
     assert all(same(a, b) for a, b in zip(one, two, strict=True))
@@ -117,7 +117,7 @@ def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
 
 def test_memory_is_the_channel_s_own_and_zero_at_the_start(file):
     counts = law("memory[1] += 1.0; out[0] = 0.0; out[1] = memory[1] + 1000.0 * gains[0];")
-    mine = smc.law_from_c(file(counts), gains={"k": 2.0}, memory=2, isolate=True)
+    mine = smc.exchange.law_from_c(file(counts), gains={"k": 2.0}, memory=2, isolate=True)
     trace = smc.run(scenario(mine(), "pendulum_network", duration=0.01))
     assert trace.s.tolist() == [[2001.0 + k] * trace.s.shape[1] for k in range(11)]
 
@@ -134,14 +134,14 @@ def test_every_number_of_the_measurement_is_where_the_header_says(file):
         ), y.limit  # fmt: skip
 
     more = {"model": "nominal", "surface": "linear", "reference": smc.Sine(0.1, 3.0), "u_max": 1e9}
-    mine = smc.law_from_c(file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",))
+    mine = smc.exchange.law_from_c(file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",))
     theirs = smc.law_function(plants=("cart_pole",))(summed.function)
     assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
 
 
 @pytest.mark.slow
 def test_single_precision_is_single_within_and_double_without(file):
-    single = smc.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
+    single = smc.exchange.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
     fast, exact = smc.run([scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))])
     assert np.array_equal(fast.s, fast.s.astype(np.float32))
     assert 0.0 < np.abs(fast.x - exact.x).max() < 1e-6
@@ -149,7 +149,7 @@ def test_single_precision_is_single_within_and_double_without(file):
 
 
 def test_state_in_single_precision_is_kept(file):
-    mine = smc.law_from_c(
+    mine = smc.exchange.law_from_c(
         file("#define SMC_REAL float\n" + law("memory[0] += 0.1f; out[0] = 0.0f; out[1] = memory[0];"))
     )
     expected = np.cumsum(np.full(31, 0.1, np.float32), dtype=np.float32)
@@ -166,7 +166,7 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
         source = file(law(f"out[0] = -{gain} * gains[0] * y->e;").replace("smc_law(", "firmware_step("), "built.c")
         line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
         subprocess.run(line, check=True)
-        mine = smc.law_from_c(target, symbol="firmware_step", gains={"k": 0.5}, isolate=True)
+        mine = smc.exchange.law_from_c(target, symbol="firmware_step", gains={"k": 0.5}, isolate=True)
         traces.append(smc.run(scenario(mine, noise=None)))
         assert same(traces[-1], reference.run(traces[-1].scenario))
     assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
@@ -178,7 +178,9 @@ def test_two_laws_of_one_library_are_two(file, tmp_path):
     source = file(text + "int " + second)
     line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
     subprocess.run(line, check=True)
-    one, other = (scenario(smc.law_from_c(target, symbol=name, name="mine")()) for name in ("smc_law", "other"))
+    one, other = (
+        scenario(smc.exchange.law_from_c(target, symbol=name, name="mine")()) for name in ("smc_law", "other")
+    )
     assert one != other
     assert run_key.key(one) != run_key.key(other)
     assert repr(other.law.function) == "<C function other of laws.so>"
@@ -186,11 +188,11 @@ def test_two_laws_of_one_library_are_two(file, tmp_path):
 
 def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
     path = file(MINE)
-    first = scenario(smc.law_from_c(path)(lam=4.0))
-    copies = [pickle.loads(pickle.dumps(first)), copy.deepcopy(first), scenario(smc.law_from_c(path)(lam=4.0))]
+    first = scenario(smc.exchange.law_from_c(path)(lam=4.0))
+    copies = [pickle.loads(pickle.dumps(first)), copy.deepcopy(first), scenario(smc.exchange.law_from_c(path)(lam=4.0))]
     assert all(each == first and hash(each.law.function) == hash(first.law.function) for each in copies)
-    wider, renamed = smc.law_from_c(path, memory=20), smc.law_from_c(path, name="other")
-    edited = smc.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
+    wider, renamed = smc.exchange.law_from_c(path, memory=20), smc.exchange.law_from_c(path, name="other")
+    edited = smc.exchange.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
     functions = {each.function for each in (first.law, wider(), renamed(), edited())}
     assert len(functions) == 4
 
@@ -203,23 +205,23 @@ def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
     source = file(text)
     line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
     subprocess.run(line, check=True)
-    assert smc.run(scenario(smc.law_from_c(target, gains={"k": 3.0}))).failure is None
+    assert smc.run(scenario(smc.exchange.law_from_c(target, gains={"k": 3.0}))).failure is None
 
 
 def test_other_files_and_flags_come_along(file, tmp_path):
     other = file("double twice(double a) { return 2.0 * a; }", "filter.c")
     mine = file(law("out[0] = -K * twice(y->e);", "double twice(double a);"))
-    trace = smc.run(scenario(smc.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None))
+    trace = smc.run(scenario(smc.exchange.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None))
     assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
 
 
 def test_set_up_is_called_before_the_first_run(file):
     text = law("out[0] = table[3];", "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }")
-    assert (smc.run(scenario(smc.law_from_c(file(text)))).u == 0.25).all()
+    assert (smc.run(scenario(smc.exchange.law_from_c(file(text)))).u == 0.25).all()
 
 
 def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
-    mine = smc.law_from_c(file(MINE), name="squash")
+    mine = smc.exchange.law_from_c(file(MINE), name="squash")
     trace = smc.load(smc.run(scenario(mine(lam=4.0))).save(tmp_path / "a.npz"))
     assert str(trace.scenario.law) == "squash(lam=4, k1=2.5)"
     with pytest.raises(smc.ScenarioError, match="law 'squash' came from a file without its code"):
@@ -228,7 +230,8 @@ def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
 
 def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_then(file, tmp_path):
     text = 'const char smc_law_gains[] = "k=2";'
-    first = scenario(smc.law_from_c(file(law("out[0] = table * gains[0] * y->e;", f"static double table;\n{text}\n"
+    first = scenario(smc.exchange.law_from_c(file(law(
+        "out[0] = table * gains[0] * y->e;", f"static double table;\n{text}\n"
         "int smc_setup(void) { table = -1.0; return 0; }")), name="mine")(k=4.0), noise=None)  # fmt: skip
     kept, trace = pickle.dumps([first, first]), smc.run(first)
     file(law("out[0] = y->e;"))
@@ -244,13 +247,13 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
 
 def test_a_law_of_floats_is_as_large_in_another_process(file):
     text = "#define SMC_REAL float\n" + law("memory[99] += gains[0]; out[0] = 0.0f; out[1] = memory[99];")
-    first = scenario(smc.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01)
+    first = scenario(smc.exchange.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01)
     trace = smc.run(pickle.loads(pickle.dumps(first)))
     assert trace.s[:, 0].tolist() == [2.0 * k for k in range(1, 12)]
 
 
 def test_code_of_another_machine_is_one_sentence(file):
-    mine = smc.law_from_c(file(MINE)).function
+    mine = smc.exchange.law_from_c(file(MINE)).function
     remade, arguments = mine.__reduce__()
     with pytest.raises(smc.ScenarioError, match=r"my_law\.c cannot be loaded \(my_law\.c: file too short\): run it on"):
         remade(*arguments[:2], b"\x7fELF", *arguments[3:])
@@ -258,7 +261,7 @@ def test_code_of_another_machine_is_one_sentence(file):
 
 def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
     def key(gain: float, name: str = "my_law.c", **more: object) -> str:
-        return run_key.key(scenario(smc.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()))
+        return run_key.key(scenario(smc.exchange.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()))
 
     first = key(1.0)
     assert key(2.0) != first
@@ -267,13 +270,13 @@ def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
     assert key(1.0, flags=["-O0"]) != first
     (tmp_path / "elsewhere").mkdir()
     assert key(1.0, "elsewhere/my_law.c") == first
-    again = pickle.loads(pickle.dumps(scenario(smc.law_from_c(file(law("out[0] = -1.0 * y->e;")))())))
+    again = pickle.loads(pickle.dumps(scenario(smc.exchange.law_from_c(file(law("out[0] = -1.0 * y->e;")))())))
     assert run_key.key(again) == first
 
 
 def test_a_study_runs_it_and_after_an_edit_runs_it_again(file, tmp_path):
     def table(gain: float):
-        mine = smc.law_from_c(file(law(f"out[0] = -{gain} * y->e;")))
+        mine = smc.exchange.law_from_c(file(law(f"out[0] = -{gain} * y->e;")))
         return smc.study(smc.grid(["duffing"], [mine()], ["nominal"], seeds=1, duration=0.05), tmp_path / "study")
 
     first, second, third = (table(gain).column("max_u").tolist() for gain in (1.0, 2.0, 1.0))
@@ -284,7 +287,7 @@ def test_a_study_runs_it_and_after_an_edit_runs_it_again(file, tmp_path):
 def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
     """y0 and remove are functions of C's, timezone a number: a linker may take those without a word."""
     more = "double y0(double a) { return -a; }\ndouble remove(double a) { return y0(2.0 * a); }\ndouble timezone = 0.5;"
-    trace = smc.run(scenario(smc.law_from_c(file(law("out[0] = timezone * remove(y->e);", more))), noise=None))
+    trace = smc.run(scenario(smc.exchange.law_from_c(file(law("out[0] = timezone * remove(y->e);", more))), noise=None))
     assert trace.u[0, 0] == -trace.x[0, 0]
 
 
@@ -318,7 +321,7 @@ def test_what_cannot_be_loaded_is_one_sentence(file):
     ):
         flags = re.findall(r"/\* (-Wl\S+) \*/", text)
         with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
-            smc.law_from_c(file(text), flags=flags)
+            smc.exchange.law_from_c(file(text), flags=flags)
         assert "\n" not in str(error.value)
 
 
@@ -330,7 +333,7 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     starts = law("", f"{headers}__attribute__((constructor)) static void start(void) {{ for (;;) pause(); }}")
     with ThreadPoolExecutor(2) as pool:  # each waits for its time limit
         files = file(waits, "waits.c"), file(starts, "starts.c")
-        tries = [pool.submit(smc.law_from_c, path, timeout=3.0) for path in files]
+        tries = [pool.submit(smc.exchange.law_from_c, path, timeout=3.0) for path in files]
         for tried, words in zip(tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True):
             with pytest.raises(smc.ScenarioError, match=words):
                 tried.result()
@@ -365,7 +368,7 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
 def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
     timeout = 3.0 if "did not end" in words else 30.0
     with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
-        smc.law_from_c(
+        smc.exchange.law_from_c(
             file("#define SMC_REAL float\n" * ("of floats" in body) + law(body, KEPT)),
             gains={"k": 3.0},
             isolate=True,
@@ -408,7 +411,7 @@ def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
     text = law(body, "#include <stdlib.h>\n#include <string.h>")
     line = text[: text.index(body)].count("\n") + 1
     with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c makes an error in line {line}: {words}")) as error:
-        smc.law_from_c(file(text), gains={"k": 3.0}, isolate=True, timeout=60.0)
+        smc.exchange.law_from_c(file(text), gains={"k": 3.0}, isolate=True, timeout=60.0)
     assert "\n" not in str(error.value)
 
 
@@ -417,21 +420,21 @@ def test_isolated_harm_is_told_of_the_file_that_does_it(file):
     other = file("int over(const double *a) { return a[3] > 0.0; }", "filter.c")
     text = law("static const double T[3] = {1, 2, 3}; out[0] = over(T);", "int over(const double *);")
     with pytest.raises(smc.ScenarioError, match=r"^filter\.c makes an error in line 1: global-buffer-overflow, READ"):
-        smc.law_from_c(file(text), flags=[str(other)], isolate=True, timeout=60.0)
+        smc.exchange.law_from_c(file(text), flags=[str(other)], isolate=True, timeout=60.0)
 
 
 def test_check_c_says_what_it_could_not_see(call, file, tmp_path, monkeypatch):
-    out = call("check-c", file(MINE))[1]
+    out = call("list", file(MINE))[1]
     wrapper = tmp_path / "cc"
     wrapper.write_text(f'#!/bin/sh\ncase "$*" in *-fsanitize*) exit 1;; esac\nexec {" ".join(build.compiler())} "$@"\n')
     wrapper.chmod(0o755)
     monkeypatch.setenv("CC", str(wrapper))
-    told = call("check-c", file(MINE))[1].splitlines()
+    told = call("list", file(MINE))[1].splitlines()
     without = f"my_law.c is tried without address and undefined-behaviour sanitizers: {wrapper} has none that work here"
     assert told == [without, out.splitlines()[-1]]
     library = build.library(tmp_path / "my_law.c", "smc_law", [], 60.0)[0].rename(tmp_path / "my_law.so")
     without = "my_law.so is tried without address and undefined-behaviour sanitizers: give its .c file"
-    assert call("check-c", library)[1].splitlines()[0] == without
+    assert call("list", library)[1].splitlines()[0] == without
 
 
 FLUSHES = """#include <fenv.h>
@@ -459,7 +462,7 @@ ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps),
 )
 def test_what_would_harm_other_runs_is_not_loaded(file, more, words):
     with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c: {words}")):
-        smc.law_from_c(file(law("out[0] = -y->e;", more)))
+        smc.exchange.law_from_c(file(law("out[0] = -y->e;", more)))
     assert 5e-324 * np.float64(1.0) > 0.0
 
 
@@ -468,8 +471,8 @@ def test_a_library_that_changes_the_rounding_is_found_too(file, tmp_path):
     line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-lm", "-o", tmp_path / "a.so"]
     subprocess.run(line, check=True)
     with pytest.raises(smc.ScenarioError, match=re.escape(f"a.so: smc_law {ALTERS}")):
-        smc.law_from_c(tmp_path / "a.so", isolate=True)
-    ours, theirs = scenario("super_twisting"), scenario(smc.law_from_c(tmp_path / "a.so"))
+        smc.exchange.law_from_c(tmp_path / "a.so", isolate=True)
+    ours, theirs = scenario("super_twisting"), scenario(smc.exchange.law_from_c(tmp_path / "a.so"))
     alone = smc.run(ours)
     for trace, beside in (smc.run([theirs, ours], threads=1), [reference.run(theirs), smc.run(ours)]):
         assert f"smc_law {ALTERS}" in str(trace.failure)
@@ -480,7 +483,7 @@ def test_a_library_that_changes_the_rounding_is_found_too(file, tmp_path):
 def test_untried_a_law_that_changes_the_rounding_fails_and_harms_no_other(file):
     ours, own = scenario("super_twisting"), law("out[0] = y->e; fesetround(FE_DOWNWARD);", "#include <fenv.h>")
     alone = smc.run(ours)
-    theirs, beside = smc.run([scenario(smc.law_from_c(file(own))), ours], threads=1)
+    theirs, beside = smc.run([scenario(smc.exchange.law_from_c(file(own))), ours], threads=1)
     assert (theirs.failure or "").startswith(f"law 'my_law' raised ArithmeticError (smc_law {ALTERS}) in channel 0")
     assert same(alone, beside)
     assert same(alone, smc.run(ours))
@@ -489,7 +492,9 @@ def test_untried_a_law_that_changes_the_rounding_fails_and_harms_no_other(file):
 @pytest.mark.slow
 def test_twenty_thousand_gains_are_tried(file):
     text = law("out[0] = -gains[19999] * y->e;")
-    mine = smc.law_from_c(file(text), gains={f"k{i}": 1.0 + i for i in range(20_000)}, isolate=True, timeout=60.0)
+    mine = smc.exchange.law_from_c(
+        file(text), gains={f"k{i}": 1.0 + i for i in range(20_000)}, isolate=True, timeout=60.0
+    )
     assert mine.defaults["k19999"] == 20_000.0
 
 
@@ -507,16 +512,16 @@ def test_checked_or_refused_it_was_not_in_this_process(call, file, tmp_path):
         "int smc_setup(void) { note(); return 0; }",
     ]
     more = "\n".join(lines)
-    assert call("check-c", file(law("if (y->t == 0.0) note(); out[0] = -y->e;", more)))[0] == 0
+    assert call("list", file(law("if (y->t == 0.0) note(); out[0] = -y->e;", more)))[0] == 0
     with pytest.raises(smc.ScenarioError, match="smc_law returned 3"):
-        smc.law_from_c(file(law("out[0] = 0.0; return 3;", more)), isolate=True)
+        smc.exchange.law_from_c(file(law("out[0] = 0.0; return 3;", more)), isolate=True)
     assert len(told.read_text().split()) > 8
     assert str(os.getpid()) not in told.read_text().split()
 
 
 def test_isolated_a_law_may_give_up_far_away(file):
     text = law("if (y->e * y->e > 1e4) return 7; out[0] = -y->e; /* and say nothing of u */")
-    assert smc.law_from_c(file(text), isolate=True).memory == 8
+    assert smc.exchange.law_from_c(file(text), isolate=True).memory == 8
 
 
 def test_what_a_set_up_prints_is_not_kept(file):
@@ -527,7 +532,7 @@ def test_what_a_set_up_prints_is_not_kept(file):
     tracemalloc.start()
     try:
         with pytest.raises(smc.ScenarioError, match="smc_setup did not end"):
-            smc.law_from_c(file(law("", text)), timeout=3.0)
+            smc.exchange.law_from_c(file(law("", text)), timeout=3.0)
         assert tracemalloc.get_traced_memory()[1] < 1e7
     finally:
         tracemalloc.stop()
@@ -546,8 +551,8 @@ def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
 
 
 def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
-    late = smc.law_from_c(file(law("out[0] = y->t > 0.1 ? y->e / (y->t - y->t) : 0.0;")))
-    code = smc.law_from_c(file(law("out[0] = 0.0; return y->t > 0.1 ? -5 : 0;")), name="mine")
+    late = smc.exchange.law_from_c(file(law("out[0] = y->t > 0.1 ? y->e / (y->t - y->t) : 0.0;")))
+    code = smc.exchange.law_from_c(file(law("out[0] = 0.0; return y->t > 0.1 ? -5 : 0;")), name="mine")
     first, third = smc.run([scenario(law) for law in (late, "observer_free")])
     second = smc.run(scenario(code))
     assert first.failure is not None
@@ -561,7 +566,7 @@ def test_a_law_that_says_no_s_ends_its_run(file, tmp_path):
     line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(silent), "-o", str(tmp_path / "a.so")]
     subprocess.run(line, check=True)
     for source in (silent, tmp_path / "a.so"):
-        trace = smc.run(scenario(smc.law_from_c(source)))
+        trace = smc.run(scenario(smc.exchange.law_from_c(source)))
         assert (trace.failure or "").endswith("returned u = 0, s = nan in channel 0, at t = 0 s")
 
 
@@ -573,7 +578,7 @@ def test_names_of_the_law_may_be_those_of_headers_that_it_does_not_include(file)
         "#define g 9.81",
     ]
     taken = law("out[0] = y0 * gamma;", "\n".join(more))
-    assert (smc.run(scenario(smc.law_from_c(file(taken)))).u == 6.0).all()
+    assert (smc.run(scenario(smc.exchange.law_from_c(file(taken)))).u == 6.0).all()
 
 
 def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeypatch):
@@ -588,7 +593,7 @@ def test_no_compiler_and_one_that_hangs_are_one_sentence(file, tmp_path, monkeyp
     ):
         monkeypatch.setenv("CC", compiler)
         with pytest.raises(smc.ScenarioError, match=words):
-            smc.law_from_c(file(MINE), timeout=0.5)
+            smc.exchange.law_from_c(file(MINE), timeout=0.5)
 
 
 def test_wrong_arguments_are_one_sentence(file):
@@ -610,7 +615,7 @@ def test_wrong_arguments_are_one_sentence(file):
         (None, {"name": "a\nb"}, "name is 'a\\nb': give a name of printable"),
     ):
         with pytest.raises(smc.ScenarioError, match=re.escape(words)):
-            smc.law_from_c(file(MINE) if source is None else source, **more)
+            smc.exchange.law_from_c(file(MINE) if source is None else source, **more)
 
 
 def test_a_library_that_may_not_be_read_is_one_sentence(file, monkeypatch):
@@ -619,17 +624,17 @@ def test_a_library_that_may_not_be_read_is_one_sentence(file, monkeypatch):
 
     monkeypatch.setattr("shutil.copy", refuse)  # nothing is forbidden to root
     with pytest.raises(smc.ScenarioError, match=r"my_law\.so cannot be read \(Permission denied\): give one"):
-        smc.law_from_c(file("", "my_law.so"))
+        smc.exchange.law_from_c(file("", "my_law.so"))
 
 
 def test_what_is_no_library_or_of_single_precision_is_refused(file, tmp_path):
     with pytest.raises(smc.ScenarioError, match=r"junk.so cannot be loaded \(junk.so: file too short\)"):
-        smc.law_from_c(file("junk", "junk.so"))
+        smc.exchange.law_from_c(file("junk", "junk.so"))
     source = file("#define SMC_REAL float\n" + MINE + "const int smc_law_real = sizeof(smc_real);\n")
     line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(tmp_path / "a.so")]
     subprocess.run(line, check=True)
     with pytest.raises(smc.ScenarioError, match=r"a\.so is a library of single precision: give its \.c file"):
-        smc.law_from_c(tmp_path / "a.so")
+        smc.exchange.law_from_c(tmp_path / "a.so")
 
 
 # the header, the documentation, the command
@@ -637,7 +642,7 @@ def test_what_is_no_library_or_of_single_precision_is_refused(file, tmp_path):
 
 def test_the_docs_show_a_law_that_passes(file):
     strict = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic"]
-    smc.law_from_c(file(MINE), flags=strict, isolate=True)
+    smc.exchange.law_from_c(file(MINE), flags=strict, isolate=True)
 
 
 def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
@@ -653,7 +658,7 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
 def test_at_the_end_of_a_sentence_check_c_has_its_own_options(name, option, call, monkeypatch):
     refused = mock.Mock(side_effect=smc.ScenarioError(f"memory= is wrong: give {name}="))
     monkeypatch.setattr("smc_mujoco.exchange.c.load.check", refused)
-    assert call("check-c", "a.c") == (2, "", f"smc-mujoco: memory= is wrong: give --{option}\n")
+    assert call("list", "a.c") == (2, "", f"smc-mujoco: memory= is wrong: give --{option}\n")
 
 
 @pytest.mark.slow
@@ -664,35 +669,34 @@ def test_check_c_names_its_own_options(call, file):
         (("--memory", 21), "fix it, or name all gains that it reads in smc_law_gains, or give --gains"),
         (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "fix it, or give other --flag"),
     ):
-        code, out, err = call("check-c", wants, *words)
+        code, out, err = call("list", wants, *words)
         assert (code, out) == (2, "")
         assert err.endswith(f"{said}\n")
-    assert call("check-c", wants, "--memory", 21, "--gains", "k=2")[0] == 0
+    assert call("list", wants, "--memory", 21, "--gains", "k=2")[0] == 0
     assert (
         "did not end within 3 s: fix what it waits for, or give --timeout\n"
-        in call("check-c", file(WAITS), "--timeout", 3)[2]
+        in call("list", file(WAITS), "--timeout", 3)[2]
     )
-    assert "cannot take a law from '.'" in call("check-c", ".")[2]
 
 
 def test_gains_may_have_any_name_that_python_takes(file):
-    mine = smc.law_from_c(file(law("out[0] = -gains[0] * y->e;", 'const char smc_law_gains[] = "λ=3";')))
+    mine = smc.exchange.law_from_c(file(law("out[0] = -gains[0] * y->e;", 'const char smc_law_gains[] = "λ=3";')))
     assert mine.defaults == {"λ": 3.0}
 
 
 def test_check_c_says_what_it_found(call, file):
-    code, out, err = call("check-c", file(MINE.replace("(void)memory;", "int unused;")), "--gains", "lam=5")
+    code, out, err = call("list", file(MINE.replace("(void)memory;", "int unused;")), "--gains", "lam=5")
     assert (code, err) == (0, "")
     assert "warning: unused variable 'unused'" in out
     assert out.splitlines()[-1] == "my_law.c: smc_law passes; gains lam = 5, k1 = 2.5; memory 8"
-    code, out, err = call("check-c", file(FALLS))
+    code, out, err = call("list", file(FALLS))
     assert (code, out) == (2, "")
     assert err.startswith("smc-mujoco: my_law.c: smc_setup died of SIGSEGV")
     assert len(err.splitlines()) == 1
 
 
 def test_nothing_is_left_behind(file):
-    code = f"import smc_mujoco as smc; smc.law_from_c({str(file(MINE))!r})\n"
+    code = f"import smc_mujoco as smc; smc.exchange.law_from_c({str(file(MINE))!r})\n"
     folder = python(code + "from smc_mujoco.exchange.c import build; print(build.folder())").strip()
     assert folder
     assert not Path(folder).exists()

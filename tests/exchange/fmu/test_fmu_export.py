@@ -65,14 +65,14 @@ def combined(folder):
     scenarios = [scenario(*one) for one in COMBINED]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
-        paths = pool.map(lambda i: smc.export_fmu(scenarios[i], folder / f"{i}.fmu"), range(len(scenarios)))
+        paths = pool.map(lambda i: smc.exchange.law_to_fmu(scenarios[i], folder / f"{i}.fmu"), range(len(scenarios)))
         return dict(zip(COMBINED, zip(list(paths), smc.run(scenarios), strict=True), strict=True))
 
 
 @pytest.fixture(scope="module")
 def twisting(folder):
     """The FMU of a law with memory, with a surface and an estimator with memory, and the folder of its files."""
-    return smc.export_fmu(
+    return smc.exchange.law_to_fmu(
         "super_twisting", folder / "twisting.fmu", surface="integral", velocity="levant", u_max=3.0
     ), folder / "twisting"
 
@@ -115,7 +115,7 @@ def test_all_surfaces_and_estimators_are_among_the_combinations():
 def test_the_sources_compiled_by_another_tool_give_the_same(combined, folder):
     one = ("observer_free_third", None, "extended_state_observer")
     trace = combined[one][1]
-    source = smc.export_fmu(scenario(*one), folder / "source.fmu", binary=False)
+    source = smc.exchange.law_to_fmu(scenario(*one), folder / "source.fmu", binary=False)
     assert fmpy.supported_platforms(str(source)) == ["c-code"]
     files = Path(fmpy.extract(str(source), str(folder / "source")))
     from fmpy.build import build_platform_binary
@@ -142,7 +142,9 @@ def test_the_sources_compile_without_a_warning(twisting, folder):
 
 
 def test_an_fmu_holds_no_python_and_no_path_of_this_machine(twisting, folder):
-    again = smc.export_fmu("super_twisting", folder / "again.fmu", surface="integral", velocity="levant", u_max=3.0)
+    again = smc.exchange.law_to_fmu(
+        "super_twisting", folder / "again.fmu", surface="integral", velocity="levant", u_max=3.0
+    )
     assert again.read_bytes() == twisting[0].read_bytes()
     with zipfile.ZipFile(again) as archive:
         (library,) = (name for name in archive.namelist() if name.startswith("binaries/"))
@@ -154,7 +156,7 @@ def test_an_fmu_holds_no_python_and_no_path_of_this_machine(twisting, folder):
 @pytest.mark.slow
 def test_every_law_is_a_valid_fmu(folder):
     for name, template in catalogue().items():
-        path = smc.export_fmu(template, folder / f"valid-{name}.fmu", binary=False)
+        path = smc.exchange.law_to_fmu(template, folder / f"valid-{name}.fmu", binary=False)
         assert validate_fmu(str(path)) == []
         known = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
         for gain, about in template.gains.items():
@@ -228,7 +230,7 @@ def test_the_memory_is_seen_and_can_be_set_before_the_start(combined, folder):
 
 def test_gains_are_in_their_order_and_change_while_it_runs(folder):
     law = smc.law("observer_free", lam=4.0, k1=2.0)
-    path = smc.export_fmu(law, folder / "gains.fmu")
+    path = smc.exchange.law_to_fmu(law, folder / "gains.fmu")
     fmu = Importer(path, folder / "gains")
     u, s = fmu.step(0.0, x=0.5, v=0.1, r=0.2, dr=0.05)
     assert (u, s) == (pytest.approx(-4.0 * np.tanh(0.05 + 2.0 * 0.3), rel=1e-15), 0.1 - 0.05 + 2.0 * (0.5 - 0.2))
@@ -243,7 +245,7 @@ def test_gains_are_in_their_order_and_change_while_it_runs(folder):
 
 def test_each_component_has_gains_of_its_own(folder):
     """Law and surface of the same name of a gain, c, which only the surface's value of decides."""
-    path = smc.export_fmu("super_twisting", folder / "two.fmu", surface=smc.surface("linear", c=3.0))
+    path = smc.exchange.law_to_fmu("super_twisting", folder / "two.fmu", surface=smc.surface("linear", c=3.0))
     fmu = Importer(path, folder / "two")
     assert fmu.get("law.c", "surface.c") == [2.5, 3.0]
     assert fmu.step(0.0, x=0.5)[1] == 1.5
@@ -356,7 +358,7 @@ def test_calls_in_a_wrong_mode_are_refused(twisting):
 
 
 def test_an_input_that_is_not_finite_ends_it_with_the_time(folder):
-    path = smc.export_fmu("classical", folder / "far.fmu")
+    path = smc.exchange.law_to_fmu("classical", folder / "far.fmu")
     fmu = Importer(path, folder / "far")
     fmu.step(0.0, x=0.1)
     fmu.set(x=float("inf"))
@@ -386,7 +388,7 @@ def test_a_token_of_another_fmu_is_refused(twisting):
 
 def test_the_page_s_file_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
     law = smc.law("super_twisting", k1=5.0, k2=8.0)
-    (folder / "super_twisting.c").write_text(smc.law_to_c(law))
+    (folder / "super_twisting.c").write_text(smc.exchange.law_to_c(law))
     (folder / "controller.c").write_text(titled(ROOT / "docs" / "simulink.md")["controller.c"])
     library = folder / "controller.so"
     flags = [*build.LIBRARY_FLAGS, "-Wall", "-Wextra", "-Werror"]
@@ -420,7 +422,9 @@ def test_units_have_names_and_base_units():
 def test_the_units_are_those_of_the_scenario_s_joint(folder):
     units = {}
     for plant in ("duffing", "inverted_pendulum"):
-        path = smc.export_fmu(scenario("pid").__class__(plant=plant, law="pid"), folder / f"{plant}.fmu", binary=False)
+        path = smc.exchange.law_to_fmu(
+            scenario("pid").__class__(plant=plant, law="pid"), folder / f"{plant}.fmu", binary=False
+        )
         units[plant] = {v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables}
     assert [units["duffing"][n] for n in ("x", "v", "u", "law.kp")] == ["m", "m/s", "N", "N/m"]
     assert [units["inverted_pendulum"][n] for n in ("x", "v", "u", "law.kp")] == ["rad", "rad/s", "N.m", "N.m/rad"]
@@ -428,21 +432,24 @@ def test_the_units_are_those_of_the_scenario_s_joint(folder):
 
 def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
     for call, said in (
-        (lambda: smc.export_fmu("twistin"), "unknown law 'twistin'"),
-        (lambda: smc.export_fmu("passivity_based"), "is of many joints: give their number, such as joints=7"),
-        (lambda: smc.export_fmu(smc.law("classical", k=[1.0, 2.0])), "has gains by channel"),
-        (lambda: smc.export_fmu("pid", "law.zip"), "cannot save to 'law.zip': end the name in .fmu"),
-        (lambda: smc.export_fmu("pid", joint="ball"), "unknown joint 'ball'"),
-        (lambda: smc.export_fmu("pid", control_period=0.0), "control_period is 0: give a number greater than 0"),
-        (lambda: smc.export_fmu("pid", u_max=-1.0), "u_max is -1"),
-        (lambda: smc.export_fmu("pid", model="full"), "model is 'full': give 'none' or 'nominal'"),
-        (lambda: smc.export_fmu("hierarchical", model="none"), "needs the nominal model"),
+        (lambda: smc.exchange.law_to_fmu("twistin"), "unknown law 'twistin'"),
+        (lambda: smc.exchange.law_to_fmu("passivity_based"), "is of many joints: give their number, such as joints=7"),
+        (lambda: smc.exchange.law_to_fmu(smc.law("classical", k=[1.0, 2.0])), "has gains by channel"),
+        (lambda: smc.exchange.law_to_fmu("pid", "law.zip"), "cannot save to 'law.zip': end the name in .fmu"),
+        (lambda: smc.exchange.law_to_fmu("pid", joint="ball"), "unknown joint 'ball'"),
         (
-            lambda: smc.export_fmu("twisting", surface="linear"),
+            lambda: smc.exchange.law_to_fmu("pid", control_period=0.0),
+            "control_period is 0: give a number greater than 0",
+        ),
+        (lambda: smc.exchange.law_to_fmu("pid", u_max=-1.0), "u_max is -1"),
+        (lambda: smc.exchange.law_to_fmu("pid", model="full"), "model is 'full': give 'none' or 'nominal'"),
+        (lambda: smc.exchange.law_to_fmu("hierarchical", model="none"), "needs the nominal model"),
+        (
+            lambda: smc.exchange.law_to_fmu("twisting", surface="linear"),
             "surface 'linear' has relative degree 1, and law 'twisting' 2",
         ),
-        (lambda: smc.export_fmu(scenario("pid"), surface="linear"), "a scenario has its own surface"),
-        (lambda: smc.export_fmu(smc.policy(lambda x: 0.0)), "cannot be written in C"),
+        (lambda: smc.exchange.law_to_fmu(scenario("pid"), surface="linear"), "a scenario has its own surface"),
+        (lambda: smc.exchange.law_to_fmu(smc.policy(lambda x: 0.0)), "cannot be written in C"),
     ):
         monkeypatch.chdir(tmp_path)
         with pytest.raises(smc.ScenarioError, match=said.replace("(", r"\(")) as error:
@@ -454,8 +461,8 @@ def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
 def test_without_a_compiler_the_cure_is_said(tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "nocc")
     with pytest.raises(smc.ScenarioError, match=r"no C compiler 'nocc': install one, set CC, or leave the binary out"):
-        smc.export_fmu("pid", tmp_path / "pid.fmu")
-    assert smc.export_fmu("pid", tmp_path / "pid.fmu", binary=False).exists()
+        smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu")
+    assert smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu", binary=False).exists()
 
 
 def test_a_compiler_that_does_not_end_is_not_a_missing_one(tmp_path, monkeypatch):
@@ -465,7 +472,7 @@ def test_a_compiler_that_does_not_end_is_not_a_missing_one(tmp_path, monkeypatch
     monkeypatch.setenv("CC", str(slow))
     monkeypatch.setattr(export, "COMPILE_TIMEOUT", 0.1)
     with pytest.raises(smc.ScenarioError, match=r"slow takes more than 0\.1 s to compile the FMU"):
-        smc.export_fmu("pid", tmp_path / "pid.fmu")
+        smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu")
 
 
 def test_a_mistake_in_the_command_is_one_sentence(capsys):
@@ -476,4 +483,4 @@ def test_a_mistake_in_the_command_is_one_sentence(capsys):
         (["super_twisting", "--gains", "k1"], "--gains is 'k1': give names and numbers"),
         (["none.py"], "no file 'none.py': give a file with a law in it"),
     ):
-        assert_refused(capsys, ["export-fmu", *words], said)
+        assert_refused(capsys, ["export", *words, "nowhere/a.fmu"], said)

@@ -31,7 +31,7 @@ from smc_mujoco.simulation.reference import gains_of  # noqa: E402
 
 pytestmark = [
     needs_compiler,
-    pytest.mark.filterwarnings("ignore::smc_mujoco.PlainLoopWarning"),
+    pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning"),
 ]
 FMI1 = 'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
 VARIABLES = {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
@@ -66,8 +66,8 @@ def scenario(law, plant="duffing", **more) -> smc.Scenario:
 )
 def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more):
     ours = scenario(law, plant, **more)
-    path = smc.export_fmu(ours, folder / f"{plant}-{law}.fmu")
-    theirs = smc.law_from_fmu(path, name="theirs", isolate=False)()
+    path = smc.exchange.law_to_fmu(ours, folder / f"{plant}-{law}.fmu")
+    theirs = smc.exchange.law_from_fmu(path, name="theirs", isolate=False)()
     first = reference.run(ours) if "model" in more else smc.run(ours)  # the model's last bit differs between the two
     second = smc.run(scenario(theirs, plant, **{k: v for k, v in more.items() if k == "model"}))
     assert second.failure is None
@@ -76,8 +76,8 @@ def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more)
 
 
 def test_gains_are_the_fmu_s_parameters(folder):
-    path = smc.export_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
-    template = smc.law_from_fmu(path, isolate=False)
+    path = smc.exchange.law_to_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
+    template = smc.exchange.law_from_fmu(path, isolate=False)
     assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
     with pytest.raises(smc.ScenarioError, match="law_lam"):
         template(law_lam=-1.0)
@@ -91,7 +91,7 @@ def test_gains_are_the_fmu_s_parameters(folder):
 
 def test_an_input_that_only_the_model_needs_is_listed_with_the_model(folder):
     for model, more in (("none", set()), ("nominal", {"ddr", "f", "g"})):
-        path = smc.export_fmu("classical", folder / f"{model}.fmu", model=model, binary=False)
+        path = smc.exchange.law_to_fmu("classical", folder / f"{model}.fmu", model=model, binary=False)
         with zipfile.ZipFile(path) as archive:
             text = archive.read("modelDescription.xml").decode()
         assert set(re.findall(r'name="(\w+)"[^>]*causality="input"', text)) == {"x", "v", "r", "dr"} | more
@@ -99,8 +99,8 @@ def test_an_input_that_only_the_model_needs_is_listed_with_the_model(folder):
 
 @pytest.mark.slow
 def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
-    path = smc.export_fmu("super_twisting", folder / "free.fmu")
-    template = smc.law_from_fmu(path, isolate=False)
+    path = smc.exchange.law_to_fmu("super_twisting", folder / "free.fmu")
+    template = smc.exchange.law_from_fmu(path, isolate=False)
     assert (template.defaults["u_max"], template.defaults["law_w_max"]) == (np.inf, np.inf)
     first, second = smc.run([scenario("super_twisting"), scenario(template())])
     np.testing.assert_array_equal(first.u, second.u)
@@ -108,8 +108,8 @@ def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
 
 @pytest.mark.slow
 def test_runs_have_instances_of_their_own_which_end_with_them(folder):
-    path = smc.export_fmu("super_twisting", folder / "own.fmu")
-    law = smc.law_from_fmu(path, isolate=False)()
+    path = smc.exchange.law_to_fmu("super_twisting", folder / "own.fmu")
+    law = smc.exchange.law_from_fmu(path, isolate=False)()
     one, other, again = smc.run([scenario(law), scenario(law, v0=-0.3), scenario(law)])
     np.testing.assert_array_equal(one.u, again.u)
     assert (one.u != other.u).any()
@@ -118,7 +118,9 @@ def test_runs_have_instances_of_their_own_which_end_with_them(folder):
 
 
 def test_a_memory_set_to_0_starts_a_new_instance_and_ends_the_old(folder):
-    law = smc.law_from_fmu(smc.export_fmu("super_twisting", folder / "written_again.fmu"), isolate=False)()
+    law = smc.exchange.law_from_fmu(
+        smc.exchange.law_to_fmu("super_twisting", folder / "written_again.fmu"), isolate=False
+    )()
     assert law.function is not None
     y, gains, memory = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0), gains_of(law), np.zeros(1)
     first, second = [law.function(y._replace(t=t), gains, memory) for t in (0.0, 1e-3)]
@@ -132,7 +134,7 @@ def test_a_memory_set_to_0_starts_a_new_instance_and_ends_the_old(folder):
 
 def test_an_fmu_that_has_one_instance_in_a_process_runs_one_channel(foreign, tmp_path):
     path = changed(foreign, tmp_path, ("<CoSimulation", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true"'))
-    law = smc.law_from_fmu(path, **RENAMED, isolate=False)()
+    law = smc.exchange.law_from_fmu(path, **RENAMED, isolate=False)()
     fine = smc.run([scenario(law), scenario(law)])
     assert [trace.failure for trace in fine] == [None, None]
     network = smc.run(scenario(law, "pendulum_network"))
@@ -140,16 +142,16 @@ def test_an_fmu_that_has_one_instance_in_a_process_runs_one_channel(foreign, tmp
 
 
 def test_another_process_takes_the_law_from_the_file(folder):
-    path = smc.export_fmu("pid", folder / "sent.fmu")
-    law = smc.law_from_fmu(path, isolate=False)()
+    path = smc.exchange.law_to_fmu("pid", folder / "sent.fmu")
+    law = smc.exchange.law_from_fmu(path, isolate=False)()
     copy = pickle.loads(pickle.dumps(law))
     assert copy == law
     first, second = smc.run([scenario(law), scenario(copy)])
     np.testing.assert_array_equal(first.u, second.u)
-    smc.export_fmu("classical", path)
+    smc.exchange.law_to_fmu("classical", path)
     load.extracted.cache_clear()
     changed = smc.run(scenario(law))
-    assert "FMU 'sent.fmu' is gone or has changed: call smc.law_from_fmu again" in str(changed.failure)
+    assert "FMU 'sent.fmu' is gone or has changed: call smc.exchange.law_from_fmu again" in str(changed.failure)
 
 
 # another tool's
@@ -168,7 +170,7 @@ def expected(trace: smc.Trace, k: float = 8.0) -> np.ndarray:
 
 
 def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
-    law = smc.law_from_fmu(foreign, **RENAMED)
+    law = smc.exchange.law_from_fmu(foreign, **RENAMED)
     function = law.function
     assert isinstance(function, load.FmuLaw)
     assert dict(function.inputs) == {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
@@ -183,7 +185,7 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
 
 
 def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
-    law = smc.law_from_fmu(foreign, **RENAMED, isolate=False)()
+    law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
     trace = smc.run(scenario(law, noise=None, u_max=100.0, control_period=0.02, physics_step=1e-3, duration=0.2))
     u, total = [], 0.0
     for i in range(len(trace.t)):
@@ -199,12 +201,12 @@ def test_inputs_that_are_not_real_may_be_held(folder):
     path, names = helper.fmi3(folder), {"x": "sensor.phi", "v": "sensor.omega", "u": "motor.torque"}
     for held, said, first in (({}, "enable, mode", "enable"), ({"enable": 1}, "mode", "mode")):
         with pytest.raises(smc.ScenarioError) as error:
-            smc.law_from_fmu(path, variables=names, constants=held)
+            smc.exchange.law_from_fmu(path, variables=names, constants=held)
         assert str(error.value) == (
             f"servo.fmu has inputs that mean nothing that a law measures, {said}: hold each, "
             f"constants={{{first!r}: 0.0}}"
         )
-    laws = [smc.law_from_fmu(path, variables=names, constants={"enable": on, "mode": 2}) for on in (1, 0)]
+    laws = [smc.exchange.law_from_fmu(path, variables=names, constants={"enable": on, "mode": 2}) for on in (1, 0)]
     trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
     seen = slice(None, None, 5)
     total = 0.005 * np.cumsum(trace.x[seen, 0])
@@ -214,7 +216,7 @@ def test_inputs_that_are_not_real_may_be_held(folder):
 
 
 def test_periods_that_do_not_fit_are_said(foreign):
-    law = smc.law_from_fmu(foreign, **RENAMED, isolate=False)()
+    law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
     trace = smc.run(scenario(law, control_period=3e-3, physics_step=1e-3))
     assert "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01" in str(trace.failure)
 
@@ -235,7 +237,9 @@ def test_periods_that_do_not_fit_are_said(foreign):
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
     with pytest.raises(smc.ScenarioError, match=rf"^controller\.fmu: {said}") as error:
-        smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0)
+        smc.exchange.law_from_fmu(
+            foreign, variables=VARIABLES, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0
+        )
     assert "\n" not in str(error.value)
 
 
@@ -252,7 +256,7 @@ def test_processes_that_an_fmu_starts_end_with_its_trial(foreign):
 
     before = children()
     with pytest.raises(smc.ScenarioError, match=r"the step from t = 0 s died of SIGABRT"):
-        smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 6.0})
+        smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 6.0})
     for _ in range(500):
         if children() <= before:
             return
@@ -264,11 +268,11 @@ def test_a_trial_has_the_parameters_of_the_run(foreign, tmp_path):
     """The value that stands in the description, which the FMU itself does not have."""
     path = changed(foreign, tmp_path, ('<Real start="8" min="0"/>', '<Real start="200"/>'))
     with pytest.raises(smc.ScenarioError, match=r"changed\.fmu: the step from t = 0 s fails"):
-        smc.law_from_fmu(path, **RENAMED)
+        smc.exchange.law_from_fmu(path, **RENAMED)
 
 
 def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
-    law = smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 4.0}, isolate=False)()
+    law = smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 4.0}, isolate=False)()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
     assert fine.failure is None
@@ -276,7 +280,7 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
 
 def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(foreign):
     one, alone = 1.0, smc.run(scenario("pid"))
-    law = smc.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False)()
+    law = smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False)()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "changes the arithmetic of its thread" in str(trace.failure)
     assert one / 3.0 == float.fromhex("0x1.5555555555555p-2")
@@ -303,7 +307,7 @@ def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(f
 )
 def test_a_mistake_in_the_call_is_one_sentence(foreign, settings, said):
     with pytest.raises(smc.ScenarioError) as error:
-        smc.law_from_fmu(foreign, **{"variables": VARIABLES} | settings)
+        smc.exchange.law_from_fmu(foreign, **{"variables": VARIABLES} | settings)
     assert str(error.value).startswith(said.replace("\\.", ".").replace("\\n", "\\n"))
     assert "\n" not in str(error.value)
 
@@ -341,14 +345,14 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
 )  # fmt: skip
 def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, said):
     with pytest.raises(smc.ScenarioError) as error:
-        smc.law_from_fmu(changed(foreign, tmp_path, pair), **RENAMED)
+        smc.exchange.law_from_fmu(changed(foreign, tmp_path, pair), **RENAMED)
     assert str(error.value).startswith(said)
     assert "\n" not in str(error.value)
 
 
 def test_a_parameter_that_is_a_word_of_python_is_a_gain(foreign, tmp_path):
     file = changed(foreign, tmp_path, ('name="gain.k"', 'name="lambda"'))
-    assert smc.law_from_fmu(file, **RENAMED, isolate=False).defaults == {"lambda_": 8.0}
+    assert smc.exchange.law_from_fmu(file, **RENAMED, isolate=False).defaults == {"lambda_": 8.0}
 
 
 @pytest.mark.slow  # test_files.py refuses such archives of all kinds
@@ -358,7 +362,7 @@ def test_an_fmu_that_unpacks_to_too_much_is_refused_before(foreign, tmp_path):
         for i in range(6):
             archive.writestr(f"zeros{i}", bytes(100_000_000))
     with pytest.raises(smc.ScenarioError, match=r"bomb.FMU is .*\(it unpacks from \d MB to .* files of 600 MB in all"):
-        smc.law_from_fmu(bomb, constants={"mode": 0.0})
+        smc.exchange.law_from_fmu(bomb, constants={"mode": 0.0})
 
 
 @pytest.mark.parametrize("name", ["/lib/x", "a**", "../a"])
@@ -366,7 +370,7 @@ def test_an_identifier_that_is_no_name_is_refused(tmp_path, name):
     text = (helper.HERE / "fmi2.xml").read_text().replace('modelIdentifier="controller"', f'modelIdentifier="{name}"')
     assert name in text
     with pytest.raises(smc.ScenarioError, match=r"has the modelIdentifier .*, which is no name in C"):
-        smc.law_from_fmu(helper.fmi2(tmp_path, text), constants={"mode": 0.0})
+        smc.exchange.law_from_fmu(helper.fmi2(tmp_path, text), constants={"mode": 0.0})
 
 
 def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
@@ -383,7 +387,7 @@ def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
         (3, "cannot read 3: give the path of an .fmu file"),
     ):
         with pytest.raises(smc.ScenarioError) as error:
-            smc.law_from_fmu(path)
+            smc.exchange.law_from_fmu(path)
         assert str(error.value).startswith(said)
 
 
@@ -395,16 +399,16 @@ def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path
     with pytest.raises(
         smc.ScenarioError, match=r"windows\.fmu has a binary for win16, and this one is .*: export it for"
     ):
-        smc.law_from_fmu(path)
-    source = smc.export_fmu("pid", tmp_path / "source.fmu", binary=False)
+        smc.exchange.law_from_fmu(path)
+    source = smc.exchange.law_to_fmu("pid", tmp_path / "source.fmu", binary=False)
     with pytest.raises(smc.ScenarioError, match=r"source\.fmu has a binary for no machine, .*, or compile its sources"):
-        smc.law_from_fmu(source)
+        smc.exchange.law_from_fmu(source)
 
 
 def test_without_fmpy_the_cure_is_said(foreign, monkeypatch):
     monkeypatch.setitem(sys.modules, "fmpy", None)
-    with pytest.raises(smc.ScenarioError, match=r"smc\.law_from_fmu needs an optional package .*smc-mujoco\[fmu\]"):
-        smc.law_from_fmu(foreign, **RENAMED)
+    with pytest.raises(smc.ScenarioError, match=r"law_from_fmu needs an optional package .*smc-mujoco\[fmu\]"):
+        smc.exchange.law_from_fmu(foreign, **RENAMED)
 
 
 @pytest.mark.parametrize(("step", "h"), [(None, 1e-3), (0.02, 0.02)])

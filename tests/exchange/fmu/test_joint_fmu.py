@@ -49,7 +49,7 @@ def made(folder):
     scenarios = [scenario(name) for name in CASES]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
-        paths = list(pool.map(lambda s: smc.export_fmu(s, folder / f"{s.law.name}.fmu"), scenarios))
+        paths = list(pool.map(lambda s: smc.exchange.law_to_fmu(s, folder / f"{s.law.name}.fmu"), scenarios))
         return dict(zip(CASES, zip(paths, smc.run(scenarios), strict=True), strict=True))
 
 
@@ -128,7 +128,7 @@ def other_words(y, gains, memory):
 
 
 def test_what_a_function_reads_is_an_input_whatever_it_calls_the_measurement(folder):
-    path = smc.export_fmu(other_words, folder / "words.fmu", joints=2, model="nominal", binary=False)
+    path = smc.exchange.law_to_fmu(other_words, folder / "words.fmu", joints=2, model="nominal", binary=False)
     assert "M[1,2]" in {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
 
 
@@ -191,7 +191,7 @@ def test_units_are_left_out_where_joints_differ(made, folder):
     known = {v.name: v.unit for v in fmpy.read_model_description(str(made["unit_vector"][0])).modelVariables}
     # the arm slides and turns
     assert [known[name] for name in ("x[1]", "u[1]", "dt", "law.c[1]")] == [None, None, "s", "1/s"]
-    path = smc.export_fmu("unit_vector", folder / "turning.fmu", joints=2, binary=False)
+    path = smc.exchange.law_to_fmu("unit_vector", folder / "turning.fmu", joints=2, binary=False)
     known = {v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables}
     assert (known["x[1]"], known["u[2]"], known["M[1,2]"]) == ("rad", "N.m", "N.m.s^2/rad")
 
@@ -199,12 +199,12 @@ def test_units_are_left_out_where_joints_differ(made, folder):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: smc.export_fmu("unit_vector", joints=2, surface="linear"), "has its own surface"),
-        (lambda: smc.export_fmu("unit_vector", joints=2, model="none"), "needs the nominal model"),
-        (lambda: smc.export_fmu("unit_vector", joints=3, u_max=[1.0, 2.0]), "u_max has 2 values for 3 joints"),
-        (lambda: smc.export_fmu("unit_vector", joints=2, u_max=[1.0, -2.0]), r"u_max\[1\] is -2"),
-        (lambda: smc.export_fmu("pid", joints=2), "law 'pid' is of one channel: leave joints=2 out"),
-        (lambda: smc.export_fmu(scenario("unit_vector"), joints=3), "a scenario has its own joints"),
+        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, surface="linear"), "has its own surface"),
+        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, model="none"), "needs the nominal model"),
+        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=3, u_max=[1.0, 2.0]), "u_max has 2 values for 3 joints"),
+        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, u_max=[1.0, -2.0]), r"u_max\[1\] is -2"),
+        (lambda: smc.exchange.law_to_fmu("pid", joints=2), "law 'pid' is of one channel: leave joints=2 out"),
+        (lambda: smc.exchange.law_to_fmu(scenario("unit_vector"), joints=3), "a scenario has its own joints"),
     ],
 )
 def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch):
@@ -218,19 +218,19 @@ def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch
 def test_it_is_no_law_of_one_channel(made):
     said = r"unit_vector\.fmu has inputs that mean nothing that a law measures, x\[1\], x\[2\], x\[3\]"
     with pytest.raises(smc.ScenarioError, match=said) as error:
-        smc.law_from_fmu(made["unit_vector"][0])
+        smc.exchange.law_from_fmu(made["unit_vector"][0])
     assert "\n" not in str(error.value)
 
 
 def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
     out = tmp_path / "c.fmu"
     with pytest.raises(SystemExit) as end:
-        cli.main(["export-fmu", "unit_vector", "--gains", "c=4 6", "--no-binary", "--out", str(out)])
+        cli.main(["export", "unit_vector", str(out), "--gains", "c=4 6", "--no-binary"])
     assert not end.value.code
     known = {v.name: v for v in fmpy.read_model_description(str(out)).modelVariables}
     assert [float(known[name].start) for name in ("law.c[1]", "law.c[2]", "M[2,2]", "M[1,2]")] == [4.0, 6.0, 1.0, 0.0]
     with pytest.raises(SystemExit) as end:
-        cli.main(["export-fmu", "unit_vector"])
+        cli.main(["export", "unit_vector.fmu"])
     assert end.value.code == 2
     said = "smc-mujoco: law 'unit_vector' is of many joints: give their number, such as --joints 7\n"
     assert capsys.readouterr().err == said

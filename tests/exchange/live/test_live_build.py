@@ -123,7 +123,7 @@ def test_the_command_takes_a_file_of_laws_gains_and_a_name(vendor, tmp_path, cap
     (tmp_path / "mine.py").write_text(MY_LAW)
     laws = ["--law", str(tmp_path / "mine.py"), "--law", "slow: classical(k=2)", "--law", "pid(kp=50)"]
     with pytest.raises(SystemExit) as ended:
-        main.main(["live", "duffing", *laws, "--out", str(tmp_path / "page")])
+        main.main(["export", "duffing", *laws, str(tmp_path / "page" / "index.html")])
     assert ended.value.code == 0
     assert "python -m http.server --directory" in capsys.readouterr().out
     found = facts(tmp_path / "page" / "index.html")
@@ -137,21 +137,31 @@ def test_the_command_takes_a_file_of_laws_gains_and_a_name(vendor, tmp_path, cap
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["nosuchplant"], "unknown plant 'nosuchplant': choose from cart_pole, duffing, furuta, inverted_pendulum, "),
-        (["double_pendulum"], "cannot show double_pendulum, which has 2 motors: choose from cart_pole, "),
-        (["servo_axis"], "which has dry friction in its equation"),
-        (["acrobot"], "which is not one MJCF file of the package"),
-        (["dufing"], "unknown plant 'dufing'"),
-        (["--law", "none.py"], "no file 'none.py'"),
-        (["--law", __file__], "has no law: write @smc.law_function"),
-        (["--law", "computed_torque_sliding"], "is of several joints"),
-        (["--out", "."], "something else is there, choose another folder"),
+        (
+            ["nosuchplant", "live/index.html"],
+            "unknown plant 'nosuchplant': choose from cart_pole, duffing, furuta, inverted_pendulum, ",
+        ),
+        (
+            ["double_pendulum", "live/index.html"],
+            "cannot show double_pendulum, which has 2 motors: choose from cart_pole, ",
+        ),
+        (["servo_axis", "live/index.html"], "which has dry friction in its equation"),
+        (["acrobot", "live/index.html"], "which is not one MJCF file of the package"),
+        (["dufing", "live/index.html"], "unknown plant 'dufing'"),
+        (["--law", "none.py", "live/index.html"], "no file 'none.py'"),
+        (["--law", __file__, "live/index.html"], "has no law: write @smc.law_function"),
+        (["--law", "computed_torque_sliding", "live/index.html"], "is of several joints"),
+        (["page.html"], "it is index.html in a folder, such as live/index.html"),
+        (["duffing"], "0 files to write: give one that ends in .c, .fmu, .html"),
+        (["live/index.html", "--type", "float"], "--type is for OUT.c"),
+        (["live/index.html", "--gains", "k=2"], "give --law a law with gains"),
+        (["index.html"], "something else is there, choose another folder"),
     ],
 )
 def test_what_the_page_cannot_have_is_one_sentence(vendor, tmp_path, monkeypatch, capsys, words, sentence):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
-        main.main(["live", *words])
+        main.main(["export", *words])
     said = capsys.readouterr().err
     assert ended.value.code == 2
     assert sentence in " ".join(said.split())

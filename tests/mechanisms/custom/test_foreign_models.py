@@ -89,7 +89,7 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
         assert any(label.startswith(f"{joint} u (") for label in labels), labels
     assert not any("mean" in label for label in labels)
     if gl.missing() is None:
-        picture = np.asarray(Image.open(smc.still(traces, 0.2, tmp_path / "b.png", size=(640, 360)))).astype(int)
+        picture = np.asarray(Image.open(smc.film(traces, tmp_path / "b.png", at=0.2, size=(640, 360)))).astype(int)
         assert picture[60:200].std() > 5.0
         assert (picture[60:230].min(axis=2) > 250).mean() < 0.5  # the floor is not burnt white
     law = smc.law("pid")
@@ -100,7 +100,7 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     else:
         with pytest.raises(smc.ScenarioError, match="nominal model"):
             smc.tune(plant, "pid", budget=4, starts=smc.starts(x0=start))
-    assert "GAIN_kp" in smc.law_to_c(law)
+    assert "GAIN_kp" in smc.exchange.law_to_c(law)
 
 
 def test_margins_of_a_foreign_model():

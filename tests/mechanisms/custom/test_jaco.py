@@ -24,7 +24,7 @@ def jaco():
 
 def moving(jaco, law, **fields):
     """A scenario in which every joint goes 0.3 rad forth and 0.5 back."""
-    moves = [smc.Waypoints((0.0, 1.5, 3.0), (x, x + 0.3, x - 0.2)) for x in START]
+    moves = [smc.signals.Waypoints((0.0, 1.5, 3.0), (x, x + 0.3, x - 0.2)) for x in START]
     common = {"model": "nominal", "u_max": LIMITS, "duration": 3.0, "physics_step": 1e-3}
     return smc.Scenario(plant=jaco, law=law, reference=moves, **common | fields)
 
@@ -55,7 +55,7 @@ def test_laws_of_many_joints_track_on_every_joint(jaco):
         assert trace.failure is None
         assert error.max() < FOLLOW[trace.scenario.law.name], error
         assert np.ptp(trace.x, axis=0).min() > 0.4
-    assert set(FOLLOW) <= set(smc.joint_laws())
+    assert set(FOLLOW) <= set(smc.laws(kind="joint"))
 
 
 def test_its_run_is_that_of_the_reference_loop(jaco):

@@ -397,7 +397,7 @@ def test_a_law_with_anti_wind_up_knows_its_motor_s_limit(arm):
     rest = '<option gravity="0 0 0"/><actuator><motor joint="elbow" ctrlrange="-1 1"/></actuator>'
     plant = arm(["elbow"], rest)
     law = smc.law("pid", kp=4.0, ki=4.0, kd=2.0, tt=0.1)
-    load = smc.Pulse(amplitude=-2.0, time=0.0, width=2.0)
+    load = smc.signals.Pulse(amplitude=-2.0, time=0.0, width=2.0)
     base = smc.Scenario(plant=plant, law=law, duration=8.0, disturbance=load)
     told, large = smc.run([base, dataclasses.replace(base, u_max=100.0)])
     np.testing.assert_array_equal(told.x, large.x)
@@ -443,7 +443,7 @@ def test_a_keyframe_is_where_runs_start(arm):
         arm(rest=rest, keyframe="hme")
 
 
-@pytest.mark.parametrize("part", [smc.Lag(0.01), smc.Backlash(0.02), smc.DCMotor(), smc.RateLimit(100.0)])
+@pytest.mark.parametrize("part", [smc.Lag(0.01), smc.Backlash(0.02), smc.DCMotor(), smc.hardware.RateLimit(100.0)])
 def test_parts_fit_an_own_model(arm, part):
     trace = smc.run(smc.Scenario(plant=arm(), law="super_twisting", actuator=part, duration=0.2, x0=(0.3, 0.2)))
     assert trace.failure is None
@@ -544,7 +544,7 @@ def test_a_law_as_an_agent_moves_the_model_as_its_run(arm):
     environment = dm_control_suite().load(arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)})
     law = smc.law("observer_free", lam=60.0, k1=3.0)
     trace = smc.run(run_of(environment.task.setting, law))
-    states = driven_by_dm(environment, smc.agent(law, environment))
+    states = driven_by_dm(environment, smc.envs.agent(law, environment))
     assert np.abs(states[:, :4] - np.hstack((trace.x, trace.v))).max() < 1e-9
     assert np.abs(trace.u).max(axis=0).tolist() == [4.0, 30.0]
 
@@ -843,7 +843,7 @@ def test_a_force_on_a_body_is_refused(arm):
         smc.ScenarioError,
         match=r"is a force on a body, and disturbances of arm act on its joints",
     ):
-        smc.Scenario(plant=arm(), law="none", disturbance=smc.Gust(amplitude=1.0, time=0.1, width=0.1))
+        smc.Scenario(plant=arm(), law="none", disturbance=smc.signals.Gust(amplitude=1.0, time=0.1, width=0.1))
 
 
 # names
@@ -966,7 +966,7 @@ def test_names_that_refer_to_motors_and_sensors_do_no_harm(arm):
       <sensor><jointpos name="x:elbow" joint="shoulder"/></sensor>
       <custom><tuple name="t"><element objtype="actuator" objname="b"/><element objtype="sensor" objname="x:elbow"/>
       </tuple></custom>"""
-    parts = {"friction": smc.LuGre(coulomb=0.05, static=0.08, stribeck=0.05), "actuator": smc.Backlash(0.01)}
+    parts = {"friction": smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.05), "actuator": smc.Backlash(0.01)}
     trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest), law="none", duration=0.05, **parts))
     assert trace.failure is None
 

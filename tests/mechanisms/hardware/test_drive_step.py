@@ -69,7 +69,7 @@ def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
 def test_no_lag_and_no_limit_are_the_plants_own_actuator_to_the_bit(name):
     common = {"plant": name, "law": "super_twisting", "duration": 0.2}
     own, lag, rate = smc.run(
-        [smc.Scenario(**common, actuator=a) for a in (None, smc.Lag(0.0), smc.RateLimit(math.inf))]
+        [smc.Scenario(**common, actuator=a) for a in (None, smc.Lag(0.0), smc.hardware.RateLimit(math.inf))]
     )
     for other in (lag, rate):
         for signal in ("x", "v", "u", "force"):
@@ -84,7 +84,7 @@ def stepping(y, gains, memory):
 
 def test_a_limited_rate_is_exactly_the_rate_starts_at_zero_and_stops_within_a_step():
     """The mean over steps of a ramp of 12/s, which meets u between two samples."""
-    trace = smc.run(scenario(smc.RateLimit(12.0), law=stepping(late=0.3), duration=0.6))
+    trace = smc.run(scenario(smc.hardware.RateLimit(12.0), law=stepping(late=0.3), duration=0.6))
     fine = np.linspace(0.0, 0.6, 600 * 200 + 1)
     force = np.where(fine < 0.3, np.minimum(12.0 * fine, 1.0), np.maximum(1.0 - 12.0 * (fine - 0.3), -1.0))
     total = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1])) * (fine[1] - fine[0])))
@@ -117,7 +117,7 @@ def test_a_motors_mean_torque_is_exact_for_a_held_voltage(inductance):
 
 
 def test_a_rate_limit_follows_the_lag():
-    trace = smc.run(scenario(smc.Lag(0.01), smc.RateLimit(20.0)))
+    trace = smc.run(scenario(smc.Lag(0.01), smc.hardware.RateLimit(20.0)))
     fine = np.linspace(0.0, 0.1, 100_001)
     lagged = 1.0 - np.exp(-fine / 0.01)
     meets = np.argmax((lagged <= 20.0 * fine) & (fine > 0.0))  # the lag is steeper at first, and flatter in the end
@@ -132,7 +132,7 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
     step, parts = 1e-3, 2000
     u, first, gap = np.random.default_rng(0).normal(size=(3, 500))
     second = first + gap * np.repeat([0.0, 0.01, 0.1, 1.0, 3.0], 100)
-    advance = drive_step((smc.Lag(tau), smc.RateLimit(rate)), step, True)
+    advance = drive_step((smc.Lag(tau), smc.hardware.RateLimit(rate)), step, True)
     assert advance is not None
     mean, last, _ = advance(u, first, second, np.zeros(500))
     lagged, force, total, above, below = first, second, 0.0, 0, 0
@@ -232,7 +232,7 @@ HARD = [
     {"actuator": (smc.Lag(0.01), smc.Lag(0.03)), "input_delay": 3.5e-3, "u_max": 0.5},
     {"actuator": (smc.Lag(0.01), smc.DCMotor()), "input_delay": 2e-3},
     {"actuator": (smc.Lag(0.01), smc.DCMotor(), smc.Backlash(0.02)), "friction": smc.Coulomb(0.05)},
-    {"actuator": (smc.Backlash(0.02), smc.Lag(0.01), smc.RateLimit(20.0))},
+    {"actuator": (smc.Backlash(0.02), smc.Lag(0.01), smc.hardware.RateLimit(20.0))},
     {"actuator": (smc.Lag(0.0), smc.Lag(0.0)), "integrator": "Euler"},
     {"actuator": smc.Lag(0.03)},
     {},
@@ -242,7 +242,7 @@ HARD = [
 def hard():
     """Drives in series under noise, delays and bounds, in company of others."""
     common = {"duration": 0.1, "control_period": 2e-3, "physics_step": 5e-4, "noise": smc.Noise(0.01, 0.05), "seed": 3}
-    common |= {"disturbance": smc.OrnsteinUhlenbeck(0.2, tau=0.1), "integrator": "implicitfast"}
+    common |= {"disturbance": smc.signals.OrnsteinUhlenbeck(0.2, tau=0.1), "integrator": "implicitfast"}
     plants = {"duffing": "classical", "pendulum_network": "super_twisting", "cart_pole": "cart_pole"}
     laws = {name: law if law in smc.laws(name) else smc.laws(name)[0] for name, law in plants.items()}
     return [smc.Scenario(plant=name, law=law, **common | fields) for name, law in laws.items() for fields in HARD]
@@ -300,7 +300,7 @@ def test_theory_of_delays_knows_no_drive():
             "actuator has the drives [Lag(tau=0.1), Lag(tau=0.2), Lag(tau=0.3)]: give one drive, or (smc.Lag(0.01), ",
         ),
         (
-            (smc.RateLimit(2.0), smc.Lag(0.2)),
+            (smc.hardware.RateLimit(2.0), smc.Lag(0.2)),
             "actuator has the drives [RateLimit(rate=2.0), Lag(tau=0.2)]: give one drive, or (smc.Lag(0.01), another)",
         ),
         ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice: give one"),

@@ -13,7 +13,7 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 pytestmark = pytest.mark.quick
 
-PUBLIC = [getattr(smc, name) for name in smc.__all__]
+PUBLIC = [getattr(home, name) for home in (smc, smc.hardware, smc.signals) for name in home.__all__]
 PARTS = [value for value in PUBLIC if isinstance(value, type) and issubclass(value, Part)]
 NAMES = re.compile(r"^  ((?:\w+)(?:, \w+)*): (.*?)(?=^  \w|\Z)", re.DOTALL | re.MULTILINE)
 LEAST, RANGE = re.compile(r"([\d.e-]+)(?: \([^)]*\))? or more"), re.compile(r"([\d.]+) \.\. ([\d.]+)")
@@ -29,7 +29,7 @@ def numbers(part):
 
 
 SAID = {(part, name): words for part in PARTS for name, words in numbers(part).items()}
-CASES = [case for case in SAID if case != (smc.LuGre, "static")]  # its bound is another field, coulomb
+CASES = [case for case in SAID if case != (smc.hardware.LuGre, "static")]  # its bound is another field, coulomb
 MOTOR = {"inductance": 0.0, "torque_constant": 1.0, "gear": 1.0}  # even, and strong for every resistance
 
 

@@ -45,7 +45,7 @@ def weightless(**fields):
 def test_friction_at_constant_speed_is_the_published_sigmoid(i):
     """At 2 mrad/s to 10 rad/s, both ways: a flywheel of 1e12 kg keeps its speed to 1e-13."""
     for v in (*np.geomspace(2e-3, 10.0, 4), *-np.geomspace(2e-3, 10.0, 4)):
-        trace = flywheel(1e12, v, friction=smc.Sigmoid(P1[i], P2[i], P3[i]))
+        trace = flywheel(1e12, v, friction=smc.hardware.Sigmoid(P1[i], P2[i], P3[i]))
         assert trace.v[-1, 0] == pytest.approx(v, rel=1e-11)
         np.testing.assert_allclose(trace.reaction[1:, 0], -sigmoid(v, P1[i], P2[i], P3[i]), rtol=0, atol=1e-9)
 
@@ -65,7 +65,7 @@ def test_a_coasting_joint_slows_down_by_the_formula():
     """v' = -F(v)/M for 1 s, against the formula's integral."""
     from scipy.integrate import solve_ivp
 
-    trace = flywheel(1.0, 1.5, friction=smc.Sigmoid(P1[3], P2[3], P3[3]), duration=1.0)
+    trace = flywheel(1.0, 1.5, friction=smc.hardware.Sigmoid(P1[3], P2[3], P3[3]), duration=1.0)
     exact = solve_ivp(lambda t, v: -sigmoid(v, P1[3], P2[3], P3[3]), (0, 1), [1.5], t_eval=trace.t, rtol=1e-10)
     np.testing.assert_allclose(trace.v[:, 0], exact.y[0], atol=3e-4)  # of a step of 0.25 ms, of first order
 
@@ -75,7 +75,7 @@ def test_a_coasting_joint_slows_down_by_the_formula():
 
 def grows(level):
     """A load that grows within 0.5 s, and stays."""
-    return smc.TimeSeries([0.0, 0.5, 10.0], [0.0, level, level])
+    return smc.signals.TimeSeries([0.0, 0.5, 10.0], [0.0, level, level])
 
 
 def limits(i):
@@ -133,10 +133,10 @@ def test_without_holding_a_joint_creeps_where_friction_equals_the_load():
     """Why joints stick here: with hold=0 half of the limit moves a joint at F^-1, about 0.2 rad/s."""
     p, load = (P1[0], P2[0], P3[0]), 0.5 * limits(0)[1]
     common = {"disturbance": smc.Constant(load), "duration": 5.0}
-    creep = flywheel(0.1, 0.0, friction=smc.Sigmoid(*p, hold=0.0), **common).v[-1, 0]
+    creep = flywheel(0.1, 0.0, friction=smc.hardware.Sigmoid(*p, hold=0.0), **common).v[-1, 0]
     assert sigmoid(creep, *p) == pytest.approx(load, rel=1e-6)
     assert 0.1 < creep < 0.3
-    assert abs(flywheel(0.1, 0.0, friction=smc.Sigmoid(*p), **common).v[-1, 0]) < 1e-12
+    assert abs(flywheel(0.1, 0.0, friction=smc.hardware.Sigmoid(*p), **common).v[-1, 0]) < 1e-12
 
 
 @pytest.mark.parametrize("hold", [None, 0.4])
@@ -144,7 +144,7 @@ def test_a_joint_breaks_away_at_the_holding_force(hold):
     """Under a load that grows by 0.2 N a second, in both directions."""
     low, high = limits(0) if hold is None else (-hold, hold)
     for most, slope in ((high, 0.2), (low, -0.2)):
-        part, load = smc.Sigmoid(P1[0], P2[0], P3[0], hold=hold), smc.Ramp(slope)
+        part, load = smc.hardware.Sigmoid(P1[0], P2[0], P3[0], hold=hold), smc.signals.Ramp(slope)
         trace = flywheel(0.1, 0.0, friction=part, disturbance=load, duration=2.5)
         start = np.argmax(np.abs(trace.v[:, 0]) > 0.01)
         assert abs(trace.d[start, 0]) == pytest.approx(abs(most), rel=0.02)
@@ -153,8 +153,12 @@ def test_a_joint_breaks_away_at_the_holding_force(hold):
 
 def test_a_joint_at_rest_stays_and_one_torn_loose_slides():
     """A push of 0.1 s, then rest under a load that the limits hold; then a push after which F balances the load."""
-    push = (smc.Pulse(2.0, time=0.0, width=0.1), smc.Constant(-0.15), smc.Pulse(-2.0, time=1.5, width=0.05))
-    trace = flywheel(0.5, 0.0, friction=smc.Sigmoid(P1[0], P2[0], P3[0]), disturbance=push, duration=7.0)
+    push = (
+        smc.signals.Pulse(2.0, time=0.0, width=0.1),
+        smc.Constant(-0.15),
+        smc.signals.Pulse(-2.0, time=1.5, width=0.05),
+    )
+    trace = flywheel(0.5, 0.0, friction=smc.hardware.Sigmoid(P1[0], P2[0], P3[0]), disturbance=push, duration=7.0)
     v = trace.v[:, 0]
     assert v[80] > 0.1
     assert np.abs(v[1200:1500]).max() < 1e-6
@@ -163,7 +167,7 @@ def test_a_joint_at_rest_stays_and_one_torn_loose_slides():
 
 
 def test_stuck_joints_are_critically_damped():
-    load, part = 0.1, smc.Sigmoid(P1[0], P2[0], P3[0])
+    load, part = 0.1, smc.hardware.Sigmoid(P1[0], P2[0], P3[0])
     fields = {"disturbance": smc.Constant(load), "duration": 0.4, "control_period": 5e-4}
     trace = flywheel(0.1, 0.0, friction=part, **fields)
     expected = load / (0.1 * 200.0**2)
@@ -172,7 +176,7 @@ def test_stuck_joints_are_critically_damped():
 
 
 def test_friction_only_takes_energy():
-    trace = flywheel(0.1, 1.0, friction=smc.Sigmoid(*(p[1] for p in (P1, P2, P3))), duration=3.0)
+    trace = flywheel(0.1, 1.0, friction=smc.hardware.Sigmoid(*(p[1] for p in (P1, P2, P3))), duration=3.0)
     energy = 0.05 * trace.v[:, 0] ** 2
     bend = 0.5 * max(map(abs, limits(1))) ** 2 / (0.1 * 200.0**2)  # J, what a stuck joint can hold
     assert np.all(energy[1:] <= np.minimum.accumulate(energy)[:-1] + bend)
@@ -199,14 +203,14 @@ def scenarios():
     common = {"duration": 0.1, "control_period": 2e-3, "disturbance": (smc.Sine(3.0, 40.0),)}
     frictions = [
         smc.plant("panda").friction,
-        smc.servo("mx106", "m6").friction,
+        smc.hardware.servo("mx106", "m6").friction,
         Curious(a=tuple(0.1 * i for i in range(1, 8))),
     ]
-    for friction in (*frictions, smc.Sigmoid(0.5, 9.0, hold=0.7)):
+    for friction in (*frictions, smc.hardware.Sigmoid(0.5, 9.0, hold=0.7)):
         yield smc.Scenario(plant="panda", law="computed_torque_sliding", friction=friction, **common)
     yield smc.Scenario(plant="cart_pole", law="observer_free", friction=Curious(a=(0.5, 0.01)), **common)
-    servo = smc.servo("mx64", "m5", command="voltage")
-    gust = {"disturbance": smc.Gust(2.0, time=0.05, width=0.1), "duration": 0.2}
+    servo = smc.hardware.servo("mx64", "m5", command="voltage")
+    gust = {"disturbance": smc.signals.Gust(2.0, time=0.05, width=0.1), "duration": 0.2}
     for start in (0.5, -1.5):
         yield smc.Scenario(
             plant="pendulum_network", law="classical", friction=servo.friction, actuator=servo.motor, x0=start, **gust
@@ -270,7 +274,7 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
         for model in ("m1", "m2", "m3", "m4", "m5", "m6"):
             fitted = SERVOS[name][model]
             assert (len(fitted) - 3) == {"m1": 2, "m2": 5, "m3": 3, "m4": 7, "m5": 9, "m6": 11}[model]
-            friction = smc.servo(name, model).friction
+            friction = smc.hardware.servo(name, model).friction
             numbers = functools.partial(reference.sliding_friction, friction, reference.friction_numbers(friction, 0))
             speeds, torques = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0], np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]
             for v in speeds:
@@ -286,7 +290,7 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
 @pytest.mark.parametrize("model", ["m1", "m4", "m6"])
 def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
     """One step of a heavy pendulum: weight and disturbance are outside, the motor's torque is that of a step before."""
-    servo = smc.servo("mx106", model)
+    servo = smc.hardware.servo("mx106", model)
     plant = smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
     common = {"plant": plant, "friction": servo.friction, "feedforward": smc.Constant(1.5), "law": "none"}
     start = {"x0": (0.9, -0.4), "v0": (0.8, 1.2), "disturbance": smc.Constant(-0.6)}
@@ -303,11 +307,11 @@ def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
 
 def ends(model, weight):
     """The torques at which a servo that holds a weight of so many N m lifts it, and lets it fall."""
-    servo, plant = smc.servo("mx106", model), smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
+    servo, plant = smc.hardware.servo("mx106", model), smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
     p, found = plant.values({}), []
     level = math.asin(weight / (p.m * p.grav * p.l))
     for slope in (0.2, -0.2):
-        u = smc.TimeSeries([0.0, 10.0], [weight, weight + 10.0 * slope])
+        u = smc.signals.TimeSeries([0.0, 10.0], [weight, weight + 10.0 * slope])
         common = {"plant": plant, "law": "none", "x0": level, "duration": 6.0, "control_period": 5e-3}
         trace = smc.run(smc.Scenario(**common, feedforward=u, friction=servo.friction))
         moved = np.argmax(np.abs(trace.v[:, 0]) > 1e-3)
@@ -348,22 +352,26 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: smc.Sigmoid((1.0, -1.0), 5.0), "Sigmoid's p1[1] is -1: give at least 0"),
-        (lambda: smc.Sigmoid(1.0, 5.0, "much"), "Sigmoid's p3 is 'much': give a number"),
-        (lambda: smc.servo("mx65"), "unknown servo 'mx65': did you mean 'mx64'?"),
-        (lambda: smc.servo("mx64", "m7"), "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6"),
+        (lambda: smc.hardware.Sigmoid((1.0, -1.0), 5.0), "Sigmoid's p1[1] is -1: give at least 0"),
+        (lambda: smc.hardware.Sigmoid(1.0, 5.0, "much"), "Sigmoid's p3 is 'much': give a number"),
+        (lambda: smc.hardware.servo("mx65"), "unknown servo 'mx65': did you mean 'mx64'?"),
+        (lambda: smc.hardware.servo("mx64", "m7"), "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6"),
         (
-            lambda: smc.Scenario(plant="panda", law="none", friction=smc.Sigmoid([1.0, 2.0, 3.0], 5.0)),
+            lambda: smc.Scenario(plant="panda", law="none", friction=smc.hardware.Sigmoid([1.0, 2.0, 3.0], 5.0)),
             "Sigmoid's p1 is (1.0, 2.0, 3.0), and panda has 7 channels: give one number, or 7",
         ),
         (
             lambda: smc.Scenario(
-                plant="duffing", law="none", friction=[smc.LuGre(0.1, 0.2, 0.1), smc.Sigmoid(1.0, 5.0)]
+                plant="duffing",
+                law="none",
+                friction=[smc.hardware.LuGre(0.1, 0.2, 0.1), smc.hardware.Sigmoid(1.0, 5.0)],
             ),
             "friction has LuGre and Sigmoid, which both model bristles: give one",
         ),
         (
-            lambda: smc.Scenario(plant="duffing", law="none", friction=smc.Sigmoid(1.0, 5.0), integrator="RK4"),
+            lambda: smc.Scenario(
+                plant="duffing", law="none", friction=smc.hardware.Sigmoid(1.0, 5.0), integrator="RK4"
+            ),
             "integrator RK4 does not integrate the state of Sigmoid(p1=1.0, p2=5.0, p3=0.0, hold=None)"
             ": leave the integrator out",
         ),

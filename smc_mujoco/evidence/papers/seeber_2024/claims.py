@@ -23,14 +23,14 @@ def slopes(period, duration, seed):
     values, steps = [0.0], np.random.default_rng(seed).choice((-1.0, 1.0), count) * L * period
     for step in steps:
         values.append(values[-1] + (step if abs(values[-1] + step) <= MAX_DISTURBANCE else -step))
-    return smc.TimeSeries((np.arange(count + 1) * period).tolist(), values)
+    return smc.signals.TimeSeries((np.arange(count + 1) * period).tolist(), values)
 
 
 def flip(period, sign):
     """Return a triangle of slopes L and -L with mean 0 over a period, that keeps one slope after TRIANGLE_PERIODS."""
     corners = sign * 0.5 * L * period * (-1.0) ** np.arange(TRIANGLE_PERIODS + 1)  # the last one is sign L T / 2
     last = corners[-1] + sign * L * period
-    return smc.TimeSeries((np.arange(TRIANGLE_PERIODS + 2) * period).tolist(), [*corners.tolist(), last])
+    return smc.signals.TimeSeries((np.arange(TRIANGLE_PERIODS + 2) * period).tolist(), [*corners.tolist(), last])
 
 
 def late(trace):

@@ -1,6 +1,6 @@
 """A law as an agent of an environment.
 
-    act = smc.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
+    act = smc.envs.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
 The reference loop calls the law, so the law measures the same as in `smc.run`, and the episode equals the trace of that
@@ -84,7 +84,7 @@ def _episode(environment: Any) -> Episode:
     for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
         if isinstance(owner, Episode):
             return owner
-    cure = "give one of smc_mujoco.suite, or a single one of smc_mujoco.gym"
+    cure = "give one of smc_mujoco.envs.suite, or a single one of smc_mujoco.envs.gym"
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")
 
 

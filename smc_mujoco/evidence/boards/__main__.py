@@ -1,4 +1,4 @@
-"""smc-mujoco board: swing-ups among the published rows of RealAIGym."""
+"""python -m smc_mujoco.evidence.boards: swing-ups among the published rows of RealAIGym."""
 
 from pathlib import Path
 from typing import Annotated
@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.commands import options
-from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
@@ -25,7 +25,7 @@ def board(
     optimised trajectory under a Riccati law, and control experiments on the same trajectory. For your own law use
     smc.boards, see docs/boards.md.
 
-    Example: smc-mujoco board acrobot --figure acrobot --film acrobot.mp4
+    Example: python -m smc_mujoco.evidence.boards acrobot --figure acrobot --film acrobot.mp4
     """
     with delay_ctrl_c():
         from smc_mujoco.cli.scene import filmed
@@ -58,3 +58,10 @@ def board(
         terminal.wrote(*files(figure))
     if film:
         terminal.wrote(*filmed([traces[boards.NAME]], film, None, title, terminal))
+
+
+app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="markdown")
+app.command()(errors_as_sentences()(board))
+
+if __name__ == "__main__":
+    app(prog_name="python -m smc_mujoco.evidence.boards")

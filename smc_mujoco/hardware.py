@@ -1,0 +1,8 @@
+"""Friction models and drives beyond those at the root."""
+
+from smc_mujoco.mechanisms.hardware.drives import RateLimit
+from smc_mujoco.mechanisms.hardware.friction import LuGre
+from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
+from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
+
+__all__ = ["LuGre", "RateLimit", "ServoFriction", "Sigmoid", "servo"]

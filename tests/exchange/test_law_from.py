@@ -1,0 +1,84 @@
+"""A law from elsewhere comes through one door, and is the law that its own reader makes."""
+
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+
+RUN = {"plant": "duffing", "duration": 0.2, "u_max": 6.0}
+LEAD = ([[-100.0]], [[1.0]], [[-3000.0]], [[40.0]])
+
+
+class Adaptive:
+    """A law with a gain that grows, which gives N, and which is no function."""
+
+    def __init__(self):
+        self.gain = 0.0
+
+    def __call__(self, observation):
+        x, v = observation
+        self.gain += 0.1 * abs(v + x)
+        return -self.gain * math.tanh(v + x)
+
+
+def same(one, other):
+    return np.array_equal(one.x, other.x) and np.array_equal(one.u, other.u)
+
+
+def run(law, **fields):
+    return smc.run(smc.Scenario(law=law, **(RUN | fields)))
+
+
+def test_a_file_of_c_and_matrices_are_what_their_readers_make(tmp_path):
+    (file := tmp_path / "mine.c").write_text(smc.exchange.law_to_c("pid"))
+    assert smc.law_from(file) == smc.exchange.law_from_c(file)
+    assert smc.law_from(str(file), name="other", gains={}).name == "other"
+    assert smc.law_from(LEAD, name="lead") == smc.exchange.law_from_control(LEAD, name="lead")
+    assert smc.law_from(LEAD, inputs="error") == smc.exchange.law_from_control(LEAD, inputs="error")
+
+
+def test_an_fmu_is_what_its_reader_makes(tmp_path):
+    pytest.importorskip("fmpy")
+    path = smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu")
+    assert smc.law_from(path, name="mine") == smc.exchange.law_from_fmu(path, name="mine")
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
+def test_an_action_in_si_units_is_the_fraction_times_u_max():
+    def fraction(observation):
+        return -0.5 * math.tanh(observation[0])
+
+    def force(observation):
+        return 6.0 * fraction(observation)
+
+    assert same(run(smc.law_from(fraction)), run(smc.law_from(fraction, units="u_max")))
+    assert same(run(smc.law_from(fraction)), run(smc.law_from(force, units="SI")))
+    assert run(smc.law_from(force, units="SI"), u_max=math.inf).failure is None
+    assert 'u_max is inf: give u_max, or units="SI"' in str(run(smc.law_from(fraction), u_max=math.inf).failure)
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
+def test_an_object_that_keeps_state_is_fresh_in_each_run():
+    law = smc.law_from(Adaptive(), name="mine", units="SI")
+    first, second = run(law), run(law)
+    assert (law.name, first.failure) == ("mine", None)
+    assert same(first, second)
+    assert np.abs(first.u).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "said"),
+    [
+        ("mine.m", {}, r"unknown ending of a law's file '\.m': did you mean '\.fmu'"),
+        ("none.c", {}, r"none\.c"),
+        (LEAD, {"units": "SI"}, "units are of a policy's action: .* leave units out"),
+        (print, {"units": "V"}, "units is 'V': give 'u_max' or 'SI'"),
+        (None, {}, "give a callable"),
+    ],
+)
+def test_what_makes_no_law_is_refused_in_a_sentence(source, options, said):
+    with pytest.raises(smc.ScenarioError, match=said) as refused:
+        smc.law_from(source, **options)
+    assert "\n" not in str(refused.value)
