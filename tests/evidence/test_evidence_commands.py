@@ -33,6 +33,7 @@ CHECKS = {
         "holds": False,
     },
 }
+EMPS = smc.rig("emps")
 CLAIMS = Claims(
     [
         Claim(
@@ -56,7 +57,7 @@ CLAIMS = Claims(
 
 def identified(count):
     """Quantities of the axis: one at the end of its range, one that may be 0, one just not; records that fit badly."""
-    rig = smc.rig("emps").with_values({"mass": 120.5, "viscous": 0.0, "coulomb": 2.0, "offset": 6.0}, "identified")
+    rig = EMPS.with_values({"mass": 120.5, "viscous": 0.0, "coulomb": 2.0, "offset": 6.0}, "identified")
     correlations = np.eye(4)
     correlations[0, 2] = correlations[2, 0] = -0.999
     t = np.arange(3.0)
@@ -64,7 +65,7 @@ def identified(count):
     fits = ({"x": 99.04, "u": 81.0}, {"x": 90.0, "u": 60.0}, {"x": Fall(8.44), "u": Fall(8.44)})
     return Identified(
         rig=rig,
-        before=smc.rig("emps"),
+        before=EMPS,
         values={name: rig.values[name] for name in rig.free},
         errors={"mass": 0.0213, "viscous": 1.0, "coulomb": 2.0, "offset": 7.0},
         correlations=correlations,
