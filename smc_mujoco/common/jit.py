@@ -233,9 +233,43 @@ def _compile(made: Any, body: Callable, cache: bool | tuple[str, str], *types: A
     if cache:
         with contextlib.suppress(RuntimeError):  # nowhere to write
             made._cache = Cache(body, *(() if cache is True else cache))
+    with _compiling():
+        made.compile(*types)
+
+
+@contextlib.contextmanager
+def _compiling() -> Iterator[None]:
+    """Let numba compile in the block, with this package's numbers, and arrays written in place within their bounds."""
     with delay_ctrl_c(), NUMBERS.given():
         _load_numba()
-        made.compile(*types)
+        from numba.np import npyimpl
+
+        theirs = npyimpl.numpy_ufunc_kernel
+        npyimpl.numpy_ufunc_kernel = functools.partial(_within_bounds, theirs, npyimpl._prepare_argument)
+        try:
+            yield
+        finally:
+            npyimpl.numpy_ufunc_kernel = theirs
+
+
+def _within_bounds(kernel, prepare, context, builder, sig, args, ufunc, kind):
+    """Write numba's code for a function of whole arrays. Where it writes into an array, compare all shapes before.
+
+    Numba's own code for a += b reads beyond the end of b if a is longer.
+    """
+    pairs = [*zip(args, sig.args, strict=True)]
+    targets, arrays = (
+        [prepare(context, builder, value, of) for value, of in some if isinstance(of, types.ArrayCompatible)]
+        for some in (pairs[ufunc.nin :], pairs)
+    )
+    for target, array in itertools.product(targets, arrays):
+        if array.ndim > target.ndim:
+            raise internals.TypingError("it writes into an array of fewer dimensions than it reads")
+        for its, size in zip(reversed(array.shape), reversed(target.shape), strict=False):
+            fits = builder.or_(builder.icmp_signed("==", its, size), builder.icmp_signed("==", its, its.type(1)))
+            with builder.if_then(builder.not_(fits), likely=False):
+                context.call_conv.return_user_exc(builder, ValueError, ("operands could not be broadcast",))
+    return kernel(context, builder, sig, args, ufunc, kind)
 
 
 def _load_numba() -> None:
@@ -387,8 +421,7 @@ def compiled_for(function: Callable, types: tuple[Any, ...]) -> Any:
     """Return numba's result for a function that `jit` compiles for arguments of these types; raises NotCompilable."""
     made: Any = jit(function)
     try:
-        with delay_ctrl_c(), NUMBERS.given():
-            _load_numba()
+        with _compiling():
             made.compile(types)
     except Exception as error:  # numba raises many types; each means that it cannot compile the function
         raise NotCompilable(reason(error)) from None

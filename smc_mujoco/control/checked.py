@@ -8,7 +8,8 @@ own results are examined twice. First its typed instructions: each must be one o
 mathematical function or of a helper for which the same holds, and each global must be a number, a tuple of numbers or
 a read-only array, of which compiled code has a copy. Arrays are read and written within their bounds. Then the machine-
 independent code that LLVM gets: it may declare functions of these lists only, and have neither addresses as constants,
-nor calls through an address, nor variables of its own.
+nor calls through an address, nor instructions of the processor, nor variables of its own. What compiled code does for
+an operation of numba's own types must be written in numba itself.
 
 A law that runs in Python, in C from elsewhere or in an FMU is unchecked. The file that defines a law runs as a program
 when it is imported; this check says nothing of that.
@@ -16,6 +17,7 @@ when it is imported; this check says nothing of that.
 
 import functools
 import math
+import operator
 import re
 from collections.abc import Callable
 from types import CodeType, ModuleType
@@ -72,7 +74,7 @@ REQUESTED = {joint_law.coriolis, joint_law.jacobian}  # they call MuJoCo with th
 
 ARRAY_NAMES = """
 T all any argmax argmin argsort astype conj copy cumsum diagonal dot dtype fill flatten imag item max mean min ndim prod
-ravel real reshape shape size sort std sum trace transpose var
+ravel real shape size sort std sum trace transpose var
 """
 ARRAY_ATTRIBUTES = {*ARRAY_NAMES.split()}
 LIST_ATTRIBUTES = {"append", "clear", "copy", "count", "extend", "index", "insert", "pop", "remove", "reverse"}
@@ -85,7 +87,9 @@ arrayexpr binop build_list build_tuple call cast exhaust_iter getattr getitem ge
 pair_first pair_second phi static_getitem typed_getitem unary undef
 """
 EXPRESSIONS = {*EXPRESSION_NAMES.split()}
+OPERATIONS = {"getitem": operator.getitem, "static_getitem": operator.getitem, "typed_getitem": operator.getitem}
 INDICES = types.Integer, types.SliceType, types.BaseTuple, types.EllipsisType, types.NoneType, types.Boolean
+OPERATORS = {"operator", "_operator"}
 NAMES_A_FUNCTION = (types.Callable, types.Module, types.DType)
 CALLED = (types.NumberClass, types.BoundFunction, types.ExceptionClass)
 CONSTANT_TYPES = (types.Number, types.Boolean, types.NoneType, types.UnicodeType, types.Literal, types.EllipsisType)
@@ -98,8 +102,8 @@ INTRINSICS = re.compile(
 # Numba's own functions: memory that it counts, arithmetic that no processor has, and linear algebra.
 RUNTIME = re.compile(
     r"NRT_(MemInfo_(alloc\w*|call_dtor|data\w*|varsize\w*|new_varsize\w*)|Allocate\w*|Reallocate|Free|incref|decref)"
-    r"|numba_(xx|ez_|raw_)\w+|__powidf2|__muloti4|__divti3|__modti3|numba_gil_(ensure|release)|Py_FatalError|(_?_?numba_)?_?py_?\w*mod|numba_(cpow|gamma|lgamma|erf"
-    r"|erfc|frexp|ldexp|modf|ndtr|attempt_nocopy_reshape)\w*"
+    r"|numba_(x|ez_|raw_)\w+|numba_fatal_error|__powidf2|__muloti4|__divti3|__modti3|numba_gil_(ensure|release)|Py_FatalError|(_?_?numba_)?_?py_?\w*mod|numba_(cpow|gamma|lgamma|erf"
+    r"|erfc|frexp|ldexp|modf|ndtr|nextafter|attempt_nocopy_reshape)\w*"
 )
 LIBM = re.compile(
     r"(a?(sin|cos|tan)h?|atan2|exp|exp2|expm1|log|log10|log1p|log2|sqrt|cbrt|hypot|pow|fmod|remainder|fabs|floor|ceil"
@@ -110,6 +114,7 @@ ALLOWED = re.compile("|".join((INTRINSICS.pattern, RUNTIME.pattern, LIBM.pattern
 MESSAGES = re.compile(r"^define [^\n]*@__excinfo_unwrap_args\w+\(.*?^}$", re.MULTILINE | re.DOTALL)
 MAX_HEAD = 80  # characters between the name of a variable and its value
 ADDRESS = re.compile(r"\binttoptr \(?i\d+ -?\d+ to\b")
+INSTRUCTIONS = re.compile(r"\b(?:call|invoke)\b[^\n\"]*\basm\b")
 INDIRECT = re.compile(r"\b(?:call|invoke)\b[^@\n\"]*?%[\w.$-]+\(")
 
 
@@ -138,6 +143,8 @@ def why_unchecked(c: Component) -> str:
 @functools.cache
 def _found(function: Callable, kind: str, gains: tuple[str, ...], shared: tuple[str, ...], joint: bool) -> str:
     """Return what compiled code does that a checked one does not, or why it does not compile; "" for nothing."""
+    if whose := _elsewhere():
+        return f"may run {whose}, which changes what numba compiles for its own types"
     try:
         compiled = compiled_for(function, _argument_types(kind, gains, shared, joint))
         requests = Examination().all(compiled)
@@ -175,18 +182,24 @@ class Examination:
     def all(self, compiled: Any) -> bool:
         """Examine a compiled function. Return whether it asks the nominal model for numbers. Raise Found."""
         self.known.add(id(compiled))
-        about = compiled.type_annotation
+        about, outer = compiled.type_annotation, self.written
         types_of, self.written = about.typemap, _words(about.func_id.code)
+        for kind in compiled.signature.args:
+            if isinstance(kind, types.Omitted):
+                self.constant("a default value", kind.value, internals.typeof(kind.value))
         for statement in [s for block in about.blocks.values() for s in block.body]:
             if not isinstance(statement, STATEMENTS):
                 raise Found(f"has a statement that is not on the list ({type(statement).__name__.lower()})")
             if isinstance(statement, ir.SetItem):
                 self.index(types_of[statement.index.name])
+            if isinstance(statement, ir.SetItem | ir.StaticSetItem):
+                self.operation(operator.setitem, about.calltypes[statement])
             if isinstance(statement, ir.Assign):
-                self.value(statement.value, types_of, types_of[statement.target.name])
+                self.value(statement.value, types_of, types_of[statement.target.name], about.calltypes)
+        self.written = outer
         return self.requests
 
-    def value(self, value: Any, types_of: Any, kind: types.Type) -> None:
+    def value(self, value: Any, types_of: Any, kind: types.Type, calltypes: Any) -> None:
         """Examine the right side of an assignment, whose type is `kind`."""
         if isinstance(value, ir.Global | ir.FreeVar):
             self.constant(value.name, value.value, kind)
@@ -195,8 +208,10 @@ class Examination:
         elif isinstance(value, ir.Expr):
             if value.op not in EXPRESSIONS:
                 raise Found(f"has an expression that is not on the list ({value.op})")
+            for function in {OPERATIONS.get(value.op), *map(value._kws.get, ("fn", "immutable_fn"))}:
+                self.operation(function, calltypes.get(value))
             if value.op == "call":
-                self.call(types_of[value.func.name])
+                self.call(types_of[value.func.name], calltypes[value])
             elif value.op == "getattr":
                 self.attribute(types_of[value.value.name], value.attr, kind)
             elif value.op in ("static_getitem", "typed_getitem", "getitem"):
@@ -260,20 +275,38 @@ class Examination:
             for operand in operands:
                 self.elementwise(operand)
 
-    def call(self, kind: types.Type) -> None:
-        """Examine a call of something of this type."""
+    def operation(self, function: Any, signature: Any) -> None:
+        """Examine what compiled code does for an operator, called with these types."""
+        if function is not None and signature is not None:
+            for template in internals.cpu_target.typing_context.resolve_value_type(function).templates:
+                if not _home(template) and _takes(template, signature.args):
+                    raise Found(f"calls {_name(function)}, for which numba's code is not used")
+
+    def call(self, kind: types.Type, signature: Any) -> None:
+        """Examine a call of something of this type with arguments of the types in its signature."""
         if isinstance(kind, types.Dispatcher):
             self.helper(kind.dispatcher)
         elif isinstance(kind, types.NamedTupleClass):
             if kind.instance_class is JointMeasurement:
                 raise Found("makes a measurement of its own")
         elif isinstance(kind, types.Function):
-            function = kind.typing_key
-            self.requests |= function in REQUESTED
-            if function not in MATHEMATICAL | REQUESTED | {np.empty} or not _numbas_own(kind, function):
-                raise Found(f"calls {_name(function)}, which is not on the list of mathematical functions")
+            self.function(kind, kind.typing_key, signature)
         elif not isinstance(kind, CALLED):
             raise Found(f"calls a function from elsewhere ({one_line(str(kind))})")
+
+    def function(self, kind: types.Function, function: Any, signature: Any) -> None:
+        """Examine a call of a function that numba, or this package for REQUESTED, knows."""
+        home = joint_law.__name__ if function in REQUESTED else "numba"
+        own = all(_home(template, home) for template in kind.templates)
+        if function not in MATHEMATICAL | REQUESTED | {np.empty} or not own:
+            raise Found(f"calls {_name(function)}, which is not on the list of mathematical functions")
+        if (
+            function is np.outer and isinstance(signature.args[-1], types.Array) and len(signature.args) > 2
+        ):  # numba may have compiled it elsewhere, without checks
+            raise Found("writes numpy.outer into an array of its own: call it with two arguments")
+        if function in REQUESTED and getattr(signature.args[0], "instance_class", None) is not JointMeasurement:
+            raise Found(f"calls {function.__name__} with another thing than its measurement")
+        self.requests |= function in REQUESTED
 
     def helper(self, dispatcher: Any) -> None:
         """Examine a function that the law calls: it must be compiled as the law is, with checks of bounds."""
@@ -290,10 +323,40 @@ def _words(code: CodeType) -> set[Any]:
     return words.union(*(_words(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
 
 
-def _numbas_own(kind: types.Function, function: Any) -> bool:
-    """Return whether numba itself, or this package for REQUESTED, says what compiled code does for a function."""
-    home = joint_law.__name__ if function in REQUESTED else "numba"
-    return all(f"{_module(getattr(t, '_overload_func', t))}.".startswith(f"{home}.") for t in kind.templates)
+def _home(source: Any, home: str = "numba") -> bool:
+    """Return whether an implementation, or numba's template of one, is written in this package."""
+    written = getattr(source, "_overload_func", None) or getattr(source, "_definition_func", source)
+    return f"{_module(written)}.".startswith(f"{home}.")
+
+
+def _takes(template: Any, arguments: tuple[types.Type, ...]) -> bool:
+    """Return whether a template of numba has an implementation for arguments of these types."""
+    try:
+        return template(internals.cpu_target.typing_context).apply(arguments, {}) is not None
+    except Exception:  # numba raises many types; each means that it has none
+        return False
+
+
+def _elsewhere() -> str:
+    """Return the function of another package that writes code for numba's own operations and types; "" for none."""
+    target, typing = internals.cpu_target.target_context, internals.cpu_target.typing_context
+    target.refresh()
+    selectors = [*target._defns.items(), *target._getattrs.items(), ("", target._casts), ("", target._get_constants)]
+    found = [(key, kinds, _written(how)) for key, selector in selectors for kinds, how in selector.versions]
+    named = ARRAY_ATTRIBUTES | LIST_ATTRIBUTES | NUMBER_ATTRIBUTES
+    for kind, templates in typing._attributes.items():
+        found += [("", (kind,), how) for how in templates if getattr(how, "_attr", "real") in named]
+    for key, kinds, how in found:
+        own = key in MATHEMATICAL or not callable(key) or _module(key) in OPERATORS
+        if own and not _home(how) and all(_home(kind if isinstance(kind, type) else type(kind)) for kind in kinds):
+            return _name(getattr(how, "_overload_func", how))
+    return ""
+
+
+def _written(how: Any) -> Any:
+    """Return the function that numba wraps for an attribute."""
+    names = getattr(getattr(how, "__code__", None), "co_freevars", ())
+    return how.__closure__[names.index("real_impl")].cell_contents if "real_impl" in names else how
 
 
 def _module(source: Any) -> str:
@@ -319,6 +382,8 @@ def _examine_llvm(library: Any, requests: bool) -> None:
         start = str(variable)[len(variable.name) : len(variable.name) + MAX_HEAD]
         if not (variable.is_declaration or variable.name.startswith("_ZN08NumbaEnv") or " constant " in start):
             raise Found("has a variable of its own, as a global array of a megabyte is: keep what changes in memory")
+    if INSTRUCTIONS.search(text):
+        raise Found("has instructions of the processor")
     if ADDRESS.search(text):
         raise Found("has an address as a constant")
     if INDIRECT.search(text) and not requests:

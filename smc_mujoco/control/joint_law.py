@@ -110,6 +110,8 @@ def _coriolis(y, w):
     def compiled(y, w):
         n = len(y.x)
         vector, forces = np.empty(n), np.zeros(n)
+        if len(w) != n:  # numba may have compiled this function elsewhere, without checks of bounds
+            raise ValueError
         for i in range(n):
             vector[i] = w[i]
         if y.dynamics != 0:

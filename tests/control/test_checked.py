@@ -6,6 +6,7 @@ import ctypes
 import ctypes.util
 import dataclasses
 import math
+import operator
 import time
 from typing import NamedTuple
 
@@ -15,9 +16,12 @@ import pytest
 from llvmlite import ir
 from numba import carray, objmode
 from numba.core import types
-from numba.extending import intrinsic, lower_builtin, overload
+from numba.extending import intrinsic, lower_builtin, lower_cast, lower_getattr, overload, overload_attribute
+from numba.np.arrayobj import make_array
+from numpy import empty
 
 import smc_mujoco as smc
+from smc_mujoco.common import numba_internals
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control import checked, estimator, joint_law, surface
 from smc_mujoco.control.law import known_laws
@@ -47,35 +51,16 @@ def ticks(typingctx):
     return types.int64(), codegen
 
 
-@lower_builtin(np.spacing, types.float64)
-def _address(context, builder, signature, args):  # a mathematical function's name for the contents of an address
-    return builder.load(builder.inttoptr(ir.Constant(ir.IntType(64), ADDRESS), ir.DoubleType().as_pointer()))
-
-
-@lower_builtin(math.erfc, types.Float)
-def _clock(context, builder, signature, args):
-    kind = ir.FunctionType(ir.IntType(64), [])
-    now = builder.call(builder.module.declare_intrinsic("llvm.readcyclecounter", fnty=kind), [])
-    return builder.sitofp(now, ir.DoubleType())
-
-
-@lower_builtin(math.gamma, types.Float)
-def _counts(context, builder, signature, args):
-    kept = ir.GlobalVariable(builder.module, ir.DoubleType(), "kept_between_calls")
-    kept.initializer = ir.Constant(ir.DoubleType(), 0.0)
-    builder.store(builder.fadd(builder.load(kept), args[0]), kept)
-    return builder.load(kept)
-
-
-@lower_builtin(math.lgamma, types.Float)
-def _by_address(context, builder, signature, args):
-    kind = ir.FunctionType(ir.DoubleType(), [ir.DoubleType()]).as_pointer()
-    return builder.call(builder.inttoptr(builder.fptosi(args[0], ir.IntType(64)), kind), args)
-
-
 @overload(np.heaviside)
 def _heaviside(a, b):
     return lambda a, b: np.lib.stride_tricks.as_strided(a, (10_000,), (8,))[5_000]
+
+
+@overload(operator.lshift)
+def _beyond(a, k):
+    if isinstance(a, types.Array):
+        return lambda a, k: np.lib.stride_tricks.as_strided(a, (10_000,), (8,))[k]
+    return None
 
 
 @numba.njit
@@ -239,28 +224,49 @@ def fancy_index(y, gains, memory):
 
 
 @cheat
-def lowered_to_an_address(y, gains, memory):
-    return np.spacing(y.e), y.e
-
-
-@cheat
-def lowered_to_a_clock(y, gains, memory):
-    return math.erfc(y.e), y.e
-
-
-@cheat
-def lowered_to_a_variable(y, gains, memory):
-    return math.gamma(y.e), y.e
-
-
-@cheat
-def lowered_to_a_call(y, gains, memory):
-    return math.lgamma(y.e), y.e
-
-
-@cheat
 def overloaded(y, gains, memory):
     return np.heaviside(memory, memory), y.e
+
+
+@cheat
+def operator_of_an_author(y, gains, memory):
+    return memory << 5_000, y.e
+
+
+@cheat
+def shape_of_too_many(y, gains, memory):  # 3 * 6148914691236517208 is 8, the size of the memory, modulo 2^64
+    return memory.reshape((3, 6148914691236517208))[0, 5_000], y.e
+
+
+@cheat
+def shape_of_nothing(y, gains, memory):
+    return np.zeros(0).reshape((2**32, 2**32))[0, 5_000], y.e
+
+
+@cheat
+def into_an_array(y, gains, memory):
+    return np.outer(memory, memory, np.zeros((50, 50)))[40, 40], y.e
+
+
+@numba.njit
+def doubles(a):
+    return 2.0 * a
+
+
+@cheat
+def what_is_left_after_a_helper(y, gains, memory):
+    k = doubles(y.e)
+    return k * empty(1000)[500], y.e
+
+
+@numba.njit
+def with_default(a, table=WRITEABLE):
+    return a * table[1]
+
+
+@cheat
+def default_of_a_helper(y, gains, memory):
+    return with_default(y.e), y.e
 
 
 def made():
@@ -297,11 +303,86 @@ def reads_the_handle_by_number(y, gains, memory):
     return y.e * float(y[3]), y.e
 
 
+class LooksAlike(NamedTuple):
+    x: np.ndarray
+    dynamics: int
+
+
+def makes_what_looks_alike(y, gains, memory):
+    return joint_law.coriolis(LooksAlike(y.x, ADDRESS), y.v), y.e
+
+
+def names_what_looks_alike(y, gains, memory):
+    return joint_law.coriolis(w=y.v, y=LooksAlike(y.x, ADDRESS)), y.e
+
+
 def makes_a_handle(y, gains, memory):
     other = joint_law.JointMeasurement(
         y.t, y.dt, y.model, ADDRESS, y.x, y.v, y.e, y.de, y.r, y.dr, y.ddr, y.a, y.limit, y.M, y.h, y.g
     )
     return joint_law.coriolis(other, y.v), y.e
+
+
+def uses_its_author_s(y, gains, memory):  # what it calls is honest
+    return -len(memory) * y.e + math.erfc(y.e) % 3.0, y.e
+
+
+def clock(context, builder, *rest):
+    kind = ir.FunctionType(ir.IntType(64), [])
+    now = builder.call(builder.module.declare_intrinsic("llvm.readcyclecounter", fnty=kind), [])
+    return builder.sitofp(now, ir.DoubleType())
+
+
+def instruction(context, builder, *rest):  # LLVM aborts where it cannot read such code: it must not be compiled
+    now = builder.asm(ir.FunctionType(ir.IntType(64), []), "rdtsc", "=A,~{rdx}", [], True)
+    return builder.sitofp(now, ir.DoubleType())
+
+
+def beyond(context, builder, kind, value):
+    data = make_array(kind)(context, builder, value).data
+    return builder.fptosi(builder.load(builder.gep(data, [ir.Constant(ir.IntType(64), 5_000)])), ir.IntType(64))
+
+
+VECTOR = types.Array(types.float64, 1, "C")
+REPLACED = {
+    "function": lambda: lower_builtin(math.erfc, types.float64)(clock),
+    "instruction": lambda: lower_builtin(math.erfc, types.float64)(instruction),
+    "operator": lambda: lower_builtin(operator.mod, types.float64, types.float64)(clock),
+    "method": lambda: lower_builtin("array.sum", VECTOR)(lambda c, b, s, v: beyond(c, b, s.args[0], v[0])),
+    "length": lambda: lower_builtin(len, VECTOR)(lambda c, b, s, v: beyond(c, b, s.args[0], v[0])),
+    "attribute": lambda: lower_getattr(VECTOR, "size")(beyond),
+    "overloaded attribute": lambda: overload_attribute(types.Array, "conj")(lambda a: lambda a: a[0]),
+    "cast": lambda: lower_cast(types.int64, types.float64)(clock),
+}
+
+
+@pytest.fixture
+def replaced(request):
+    """Let an author say what numba compiles for its own operations, and undo it."""
+    request.param()
+    context, typing = numba_internals.cpu_target.target_context, numba_internals.cpu_target.typing_context
+    context.refresh()
+    yield
+    selectors = [*context._defns.values(), *context._getattrs.values(), context._casts]
+    for selector in selectors:
+        own = [(kinds, how) for kinds, how in selector.versions if checked._home(checked._written(how))]
+        if len(own) < len(selector.versions):
+            selector.versions[:] = own
+            selector._cache.clear()
+    for templates in typing._attributes.values():
+        templates[:] = [template for template in templates if checked._home(template)]
+    checked._found.cache_clear()
+
+
+@pytest.mark.parametrize("replaced", REPLACED.values(), ids=REPLACED, indirect=True)
+def test_no_law_is_checked_where_an_author_says_what_numba_compiles(replaced):
+    why = smc.law_function(uses_its_author_s)().why_unchecked
+    assert why.startswith("law uses_its_author_s is unchecked: it may run ")
+    assert why.endswith(", which changes what numba compiles for its own types")
+
+
+def test_the_law_of_that_test_is_checked_otherwise():
+    assert smc.law_function(uses_its_author_s)().why_unchecked == ""
 
 
 @pytest.mark.parametrize("name", CHEATS)
@@ -312,7 +393,12 @@ def test_no_cheat_is_called_checked(name):
     assert "\n" not in law.why_unchecked
 
 
-@pytest.mark.parametrize("function", [reads_the_handle, reads_the_handle_by_number, makes_a_handle])
+HANDLES = [
+    reads_the_handle, reads_the_handle_by_number, makes_a_handle, makes_what_looks_alike, names_what_looks_alike
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("function", HANDLES)
 def test_no_law_of_many_joints_gets_at_the_address_of_the_model(function):
     assert not smc.law_function(joint=True)(function)().checked
 
@@ -388,7 +474,13 @@ def within(y, gains, memory):
     return -gains.k * doubled(y.e), y.e
 
 
-HONEST = [helpers, loops, numpy_scalars, lists, raises, within]
+def linear_algebra(y, gains, memory):
+    A = np.array([[2.0, 1.0], [1.0, 3.0]])
+    z = np.linalg.solve(A, np.array([y.e, y.de])) + np.outer(memory, memory)[:2, 0]
+    return -gains.k * np.linalg.norm(z) + np.nextafter(y.e, 1.0), y.e
+
+
+HONEST = [helpers, loops, numpy_scalars, lists, raises, within, linear_algebra]
 
 
 @pytest.mark.parametrize("function", HONEST, ids=lambda f: f.__name__)
@@ -421,6 +513,60 @@ def test_an_index_beyond_the_memory_ends_the_run():
     law = beyond()
     assert law.checked
     assert smc.run(smc.Scenario(plant="duffing", law=law, duration=0.05)).failure is not None
+
+
+def longer_in_place(y, gains, memory):
+    values = np.zeros(1000)
+    values += memory
+    return values[900], y.e
+
+
+def shorter_in_place(y, gains, memory):
+    memory += np.ones(1000)
+    return memory[0], y.e
+
+
+def longer_given(y, gains, memory):
+    values = np.zeros(1000)
+    np.add(memory, memory, values)
+    return values[900], y.e
+
+
+def two_given(y, gains, memory):
+    values = np.zeros(1)
+    np.divmod(np.ones(1000), 2.0, np.zeros(1000), values)
+    return values[0], y.e
+
+
+@pytest.mark.parametrize("function", [longer_in_place, shorter_in_place, longer_given, two_given])
+def test_no_array_is_read_or_written_in_place_beyond_its_end(function):
+    trace = smc.run(smc.Scenario(plant="duffing", law=smc.law_function(function)(), duration=0.01))
+    assert trace.failure is not None
+    assert "raised ValueError" in trace.failure
+    assert "broadcast" in trace.failure
+
+
+def test_arrays_that_fit_are_changed_in_place():
+    @smc.law_function
+    def fits(y, gains, memory):
+        memory[:3] += np.ones(1)
+        memory[3:] -= np.arange(5.0)
+        memory *= 2.0
+        np.multiply(memory, 3.0, memory)
+        return memory[0] + memory[7], y.e
+
+    law = fits()
+    assert law.checked
+    trace = smc.run(smc.Scenario(plant="duffing", law=law, duration=0.01, u_max=1e6, control_period=0.001))
+    assert trace.u[:3, 0].tolist() == [-18.0, -126.0, -774.0]
+
+
+def test_no_vector_shorter_than_the_measurement_goes_to_coriolis():
+    def short(y, gains, memory):
+        return joint_law.coriolis(y, y.v[:1]), y.e
+
+    trace = smc.run(smc.Scenario(plant="double_pendulum", law=smc.law_function(joint=True)(short)(), duration=0.01))
+    assert trace.failure is not None
 
 
 def test_the_types_are_those_with_which_the_callback_compiles():
