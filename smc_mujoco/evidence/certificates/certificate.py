@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -12,9 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.common import html
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.extras import extra
-from smc_mujoco.common.files import read_json, reading, with_ending, write_json
+from smc_mujoco.common.files import reading, with_ending, write_json
 from smc_mujoco.common.text import number
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.plant import EFFORT
@@ -70,7 +71,7 @@ class Certificate:
     data: Mapping[str, Any]
 
     def __repr__(self) -> str:
-        return f"<Certificate of {self.law} on {self.plant}: {self.sentences[0]}>"
+        return printable(f"<Certificate of {self.law} on {self.plant}: {'; '.join(self.sentences[:-1])}>")
 
     def _repr_html_(self) -> str:
         rows = [
@@ -255,7 +256,7 @@ class Certificate:
           ScenarioError: no such file, or no certificate.
         """
         with reading(path, "certificate", "give a .json file that Certificate.save wrote") as file:
-            made = cls(data=read_json(file))
+            made = cls(data=json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=_once))
             made.sentences  # noqa: B018  # raises if the file is no certificate
             return made
 
@@ -272,6 +273,13 @@ class Certificate:
         from smc_mujoco.evidence.certificates.figure import draw
 
         return draw(self, traces, path)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the dict of a JSON object. Raise ValueError if it names a field twice."""
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("a field is there twice")
+    return dict(pairs)
 
 
 def finite(value: float) -> float | None:

@@ -25,6 +25,29 @@ except ImportError:
 FORMAT = "smc-certificate/1"
 LEAVES_OUT = ["sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"]
 TEXTS = {"format", "name", "mechanism", "unit", "theorem", "seal"}  # what may have a text
+ABSENT = {"u_max", "slope", "w_max", "boxes"}  # what may be null: an infinite number
+FIELDS = {
+    "the certificate": "format plant law u_max unit disturbance slope leaves_out parts seal",
+    "plant": "name n parameters mechanism",
+    "law": "name gains",
+    "inverted_pendulum": "m l b grav",
+    "pendulum_network": "m l b grav kc",
+    "inverted_pendulum_network": "m l b grav kc",
+    "duffing": "M delta alpha beta",
+    "van_der_pol": "M mu k",
+    "observer_free": "lam k1",
+    "boundary_layer": "k c phi",
+    "classical": "k c",
+    "terminal": "k b p bound",
+    "super_twisting": "k1 k2 c w_max",
+    "lqr": "q1 q2 r a1 a2 b",
+    "pid": "kp ki kd tau tt",
+    "saturated PD": "theorem holds conditions V",
+    "level sets": "theorem holds conditions x s W start P inner outer bound",
+    "reaching": "theorem holds conditions X S",
+    "super-twisting": "theorem holds conditions P L q X",
+}
+MAY_LACK = {"P"}  # of level sets
 MARGIN_TOLERANCE, MAX_HALVINGS = 3e-4, 6  # share below the true margin; halvings of a box in both directions
 
 
@@ -50,8 +73,23 @@ def finite(value, where="the certificate"):
             finite(item, str(name) if isinstance(value, dict) else where)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         need(bool(math.isfinite(value) and abs(value) < 1e300), f"{where}, which is not a finite number")
-    elif value is not None:
+    elif value is None:
+        need(where in ABSENT, f"{where}, which is null")
+    else:
         need(where in TEXTS if isinstance(value, str) else where == "holds" and isinstance(value, bool), f"{where!a}")
+
+
+def fields(doc):
+    """Refuse fields that the format does not have, or that are missing, and a whole number that is none."""
+    plant, law, parts = doc["plant"], doc["law"], doc["parts"]
+    told = [("the certificate", doc), ("plant", plant), ("law", law), *((part["theorem"], part) for part in parts)]
+    for name, its in [*told, (plant["name"], plant["parameters"]), (law["name"], law["gains"])]:
+        known = set(FIELDS[name].split())
+        need(known - MAY_LACK <= its.keys() <= known, f"the fields of {name}")
+    for condition in (condition for part in parts for condition in part["conditions"]):
+        more = condition.keys() - {"name", "margin"}
+        need(more in (set(), {"boxes"}, {"at"}) and (not more or condition["name"] == "restoring"), "a condition")
+    need(type(plant["n"]) is int, "the number of channels")
 
 
 def equal(stated, derived, what, terms=0):
@@ -84,6 +122,8 @@ def words(told):
             need(word.isidentifier() and word.isascii() and len(word) <= 40, f"the word {word!a}")
             known = all(n.isidentifier() and n.isascii() and type(v) in (int, float) for n, v in numbers.items())
             need(known and len(numbers) <= 40, f"the numbers of {word}")
+    (sampling,), (step,) = told["sampling"].values(), (numbers["step"] for numbers in told["rounding"].values())
+    need(sampling["period"] > 0 and step > 0, "a period and a step above 0")
 
 
 def equation(plant):
@@ -303,6 +343,12 @@ def seal(doc):
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def once(pairs):
+    """Return the dict of a JSON object. Refuse one that names a field twice."""
+    need(len(dict(pairs)) == len(pairs), "which of two fields of one name counts")
+    return dict(pairs)
+
+
 THEOREMS = {"level sets": levels, "saturated PD": saturated, "reaching": reaching, "super-twisting": super_twisting}
 
 
@@ -311,6 +357,7 @@ def check(doc):
     try:
         finite(doc)
         need(doc["format"] == FORMAT and doc["seal"] == seal(doc), "the seal")
+        fields(doc)
         words(doc["leaves_out"])
         e, f = equation(doc["plant"]), feedback(doc["law"], doc["u_max"])
         strong = f.kind is None or ((f.K is None or f.K > 0) and (f.a is None or f.a > 0))
@@ -329,10 +376,12 @@ def main(paths):
     for path in paths:
         try:
             with open(path, encoding="utf-8") as file:
-                check(json.load(file))
+                check(json.load(file, object_pairs_hook=once))
             print(f"{path} is accepted: every statement is proven")
         except Refused as why:
             sys.exit(f"{path} is refused: not proven is {why}")
+        except (OSError, ValueError, RecursionError) as error:
+            sys.exit(f"{path} is refused: it is no JSON file, {error}")
 
 
 if __name__ == "__main__":

@@ -51,6 +51,15 @@ def test_a_certificate_says_what_its_theorems_say(snapshot):
     assert len(set(SAID.values())) == len(SAID)  # each is its own key
 
 
+def test_a_certificate_prints_what_is_said_under_a_disturbance_and_no_control_characters():
+    printed = repr(SAID["fails and falls"])
+    assert "proven by level sets" in printed
+    assert "\n" not in printed
+    assert "no theorem here is about" not in printed
+    named = dict(SAID["without d"].data) | {"law": {"name": "\x1b[31mred", "gains": {}}}
+    assert repr(Certificate(data=named)).startswith(r"<Certificate of \x1b[31mred on inverted_pendulum: proven by")
+
+
 def test_w_is_bilinear_odd_states_alike_and_1_outside():
     made = SAID["fails and falls"]
     grid = RegularGridInterpolator((LEVELS["x"], LEVELS["s"]), LEVELS["W"])
