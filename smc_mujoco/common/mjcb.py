@@ -24,6 +24,7 @@ import mujoco
 CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn", "act_gain", "act_bias")
 
 _lock = threading.RLock()  # held while callbacks are replaced
+_given: list[dict[str, Any]] = []  # the callbacks of the with blocks of `installed`, the innermost last
 _python_lock = threading.RLock()  # held while no Python callback may be installed; its holder never waits
 
 
@@ -44,12 +45,20 @@ if hasattr(os, "register_at_fork"):
 def installed(control: Any) -> Iterator[None]:
     """Install a control callback, or None, and `no_clock`, and no others, in a with block. Other threads wait."""
     with _lock:
-        before = _callbacks()
+        before, ours = _callbacks(), dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()}
         try:
-            _install(dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()})
+            _install(ours)
+            _given.append(ours)
             yield
         finally:
+            _given.pop()
             _install(before)
+
+
+def replaced() -> str:
+    """Return the name of a callback that other code has set since `installed`, in its with block; "" for none."""
+    now = _callbacks()
+    return next((name for name, callback in _given[-1].items() if now[name] is not callback), "")
 
 
 @functools.cache

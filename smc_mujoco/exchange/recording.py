@@ -61,15 +61,21 @@ def write(trace: Trace, file: Path) -> None:
 
 
 def message_of(joints: Sequence[str]) -> Any:
-    """Return the class of a protobuf message with a number for each joint. Characters that its names lack become _."""
-    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+    """Return the class of a protobuf message with a number for each joint. Characters that its names lack become _.
+
+    A name of two fields, or of a method of protobuf's messages, gets the joint's number.
+    """
+    from google.protobuf import descriptor_pb2, descriptor_pool, message, message_factory
 
     file = descriptor_pb2.FileDescriptorProto(name="smc_mujoco/joints.proto", package="smc_mujoco", syntax="proto3")
-    message = file.message_type.add(name="Joints")
+    kind, taken = file.message_type.add(name="Joints"), {*dir(message.Message)}
     plain = [re.sub(r"^(?=\d)|\W", "_", joint, flags=re.ASCII) for joint in joints]
-    for number, name in enumerate(plain, 1):
-        unique = name if plain.count(name) == 1 else f"{name}_{number}"
-        message.field.add(name=unique, number=number, type="TYPE_DOUBLE", label="LABEL_OPTIONAL")
+    for number, known in enumerate(plain, 1):
+        name = known + f"_{number}" * (plain.count(known) > 1)
+        while name in taken:
+            name = f"{name}_{number}"
+        taken.add(name)
+        kind.field.add(name=name, json_name=name, number=number, type="TYPE_DOUBLE", label="LABEL_OPTIONAL")
     pool = descriptor_pool.DescriptorPool()
     pool.Add(file)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName("smc_mujoco.Joints"))

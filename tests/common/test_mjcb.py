@@ -11,8 +11,10 @@ import warnings
 from pathlib import Path
 
 import mujoco
+import numba
 import numpy as np
 import pytest
+from numba import types
 
 import smc_mujoco as smc
 from smc_mujoco.common import mjcb
@@ -329,6 +331,64 @@ def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monke
         for array in (trace.x, trace.u, trace.d, trace.reaction):
             assert np.isnan(array[at:]).all()
     assert mujoco.get_mjcb_control() is None
+
+
+@numba.cfunc(types.void(types.intp, types.intp))
+def native(model, data):
+    return
+
+
+@numba.cfunc(types.int32(types.intp, types.intp, types.int32, types.int32))
+def lets_touch(model, data, one, other):
+    return 0
+
+
+@pytest.mark.parametrize(
+    "law", ["classical", smc.policy(lambda observation: [-0.5 * observation[0]])], ids=["C", "Python"]
+)
+@pytest.mark.parametrize("name", ["passive", "sensor", "act_dyn", "contactfilter"])
+def test_a_run_during_which_other_code_sets_any_callback_fails(name, law, monkeypatch):
+    """Such a callback would change the forces of a run in silence."""
+    scenario = smc.Scenario(plant="duffing", law=law, duration=0.2)
+    assert smc.run(scenario).failure is None
+    given = (lets_touch if name == "contactfilter" else native).ctypes
+    stop = threading.Event()
+
+    def set_it():
+        while not stop.is_set():
+            getattr(mujoco, f"set_mjcb_{name}")(given)
+            time.sleep(1e-4)
+
+    thread = threading.Thread(target=set_it)
+    thread.start()
+    try:
+        trace = smc.run(scenario)
+    finally:
+        stop.set()
+        thread.join()
+        getattr(mujoco, f"set_mjcb_{name}")(None)
+    assert (trace.failure or "").startswith(
+        f"other code replaced MuJoCo's {name} callback during the run: call mujoco."
+    )
+    assert smc.run(scenario).failure is None
+
+
+def test_a_callback_that_is_cleared_beside_the_reference_loop_is_one_sentence():
+    law, stop = smc.policy(lambda observation: [-0.5 * observation[0]]), threading.Event()
+
+    def clear():
+        while not stop.is_set():
+            mujoco.set_mjcb_control(None)
+            time.sleep(1e-4)
+
+    thread = threading.Thread(target=clear)
+    thread.start()
+    try:
+        traces = [smc.run(smc.Scenario(plant="duffing", law=law, duration=0.5)) for _ in range(3)]
+    finally:
+        stop.set()
+        thread.join()
+    assert all("replaced MuJoCo's control callback" in (trace.failure or "") for trace in traces)
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])

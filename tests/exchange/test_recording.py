@@ -113,6 +113,25 @@ def test_names_that_become_the_same_are_numbered():
     assert list(fields) == ["a_b_1", "a_b_2", "c", "_1"]
 
 
+@pytest.mark.parametrize(
+    ("joints", "named"),
+    [
+        (["a b", "a_b", "a_b_1"], ["a_b_1", "a_b_2", "a_b_1_3"]),
+        (["arm_1", "arm1"], ["arm_1", "arm1"]),  # one in JSON, if protobuf makes the names there
+        (["left_arm", "leftArm"], ["left_arm", "leftArm"]),
+        (["\u00e9", "\u202e", "1"], ["__1", "__2", "_1"]),
+        (["SerializeToString", "Clear"], ["SerializeToString_1", "Clear_2"]),
+    ],
+)
+def test_every_name_that_a_joint_can_have_becomes_a_field(joints, named):
+    message = recording.message_of(joints)
+    assert list(message.DESCRIPTOR.fields_by_name) == named
+    sent = message(**dict(zip(named, [1.5, -2.0, 3.0], strict=False)))
+    assert [getattr(message.FromString(sent.SerializeToString()), name) for name in named] == [1.5, -2.0, 3.0][
+        : len(named)
+    ]
+
+
 def test_without_the_package_a_sentence_says_how_to_install_it(run, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "mcap_protobuf.writer", None)
     with pytest.raises(MissingPackageError, match=r"pip install 'smc-mujoco\[mcap\]'"):

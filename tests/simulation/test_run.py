@@ -20,11 +20,52 @@ import pytest
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
+from smc_mujoco.simulation import callback
 from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation import run as runs
 
 UNSTABLE = smc.plant("duffing", alpha=-1e6, beta=0.0)  # grows by e in a millisecond
 LOGGED = ("x", "v", "u", "applied", "s", "d")
 ARRAYS = (*LOGGED, "r")
+
+
+NO_ROWS = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
+
+
+@pytest.mark.parametrize(
+    ("fields", "may"),
+    [
+        ({"plant": "duffing"}, False),
+        ({"plant": "pendulum_network"}, False),
+        ({"plant": "cart_pole"}, False),
+        ({"plant": "duffing", "contact": "stops"}, True),
+        ({"plant": "duffing", "actuator": smc.Backlash(gap=0.01)}, True),
+        ({"plant": "duffing", "friction": smc.Coulomb(0.3)}, True),
+        ({"plant": "servo_axis"}, True),  # it has its own dry friction
+        ({"plant": "panda", "law": "none"}, True),
+    ],
+)
+def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(fields, may, monkeypatch):
+    scenarios = [smc.Scenario(**{"law": "classical", "duration": 0.2} | fields, seed=seed) for seed in (0, 1)]
+    flags, its = [], runs.ScenarioBatch.may_have_constraints
+    monkeypatch.setattr(runs.ScenarioBatch, "may_have_constraints", lambda batch: flags.append(its(batch)) or flags[-1])
+    quick = smc.run(scenarios)
+    assert flags == [may]
+    monkeypatch.setattr(runs.ScenarioBatch, "may_have_constraints", lambda batch: True)
+    for one, other in zip(quick, smc.run(scenarios), strict=True):
+        for name in (*ARRAYS, "force", "reaction"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
+    none, some = (
+        runs.prepare(smc.Scenario(plant="duffing", law="classical", friction=smc.Coulomb(force), duration=0.01))
+        for force in (0.0, 0.3)
+    )
+    with callback.installed():
+        for prepared, may in (([none, none], False), ([none, some], True), ([some, none], True)):
+            batch = runs.ScenarioBatch(prepared, 1)
+            assert bool(batch.model.opt.disableflags & NO_ROWS) is not may
 
 
 def failed(trace, at: float, *words: str):
