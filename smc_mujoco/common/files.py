@@ -44,9 +44,16 @@ def slug(name: str, max_bytes: int = MAX_NAME) -> str:
     return part
 
 
+def as_path(path: object) -> Path:
+    """Return a path; raise ScenarioError for what is none."""
+    if not isinstance(path, str | os.PathLike):
+        raise ScenarioError(f"the path is {shown(path)}: give the name of a file as a text")
+    return Path(path)
+
+
 def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
     """Return the path if its name ends in one of `endings`, such as ".json"; raise ScenarioError otherwise."""
-    path = Path(path)
+    path = as_path(path)
     if path.suffix not in endings or "\0" in path.name:
         raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {' or '.join(endings)}")
     return path

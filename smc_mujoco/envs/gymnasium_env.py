@@ -33,8 +33,8 @@ registration.register()  # also if only this module is imported
 
 
 def action_space(setting: Setting) -> spaces.Box:
-    """Return the space of actions, of float64 like the commands of laws; it contains float32 actions too."""
-    return spaces.Box(-1.0, 1.0, setting.action_shape, np.float64)
+    """Return the space of actions, of float32, as learners want it; `step` takes float64 too, and rounds nothing."""
+    return spaces.Box(-1.0, 1.0, setting.action_shape, np.float32)
 
 
 def observation_space(setting: Setting) -> spaces.Box:

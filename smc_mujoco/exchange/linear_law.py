@@ -29,7 +29,7 @@ INPUTS = {  # what a controller may read -> expression of the law's measurement
 }  # fmt: skip
 DEFAULT_INPUTS = ("error", "error_rate")
 MAX_STATES = 50
-CURE = "give a TransferFunction or StateSpace of python-control, or (A, B, C, D, dt)"
+CURE = "give a TransferFunction or StateSpace of python-control, (A, B, C, D, dt), or an array of gains"
 Matrix = tuple[tuple[float, ...], ...]
 
 
@@ -133,7 +133,8 @@ def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: st
       K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m; or matrices
         (A, B, C, D) or (A, B, C, D, dt). Without dt, or with dt = 0, it is of continuous time, and discretised by
         Tustin's rule with the control period of the run. With dt = True it is the step of any control period; with dt
-        in s, of that control period.
+        in s, of that control period. Or an array of gains, (1, m), such as the K of control.lqr: u = K w for the m
+        inputs w, which is -K (x - r, v - r') for error and error_rate.
       inputs: what K reads, in its order: error (r - x), error_rate (r' - v), x, v, r, dr, ddr, and q, dq of the joint
         without actuator that this one moves. Default: error, and error_rate if K has two inputs.
       name: of the law.
@@ -185,6 +186,8 @@ def _system(K: Any) -> System:
         return _matrices(K[0], K[1], K[2], K[3], K[4] if len(K) == 5 else None)
     if all(hasattr(K, name) for name in "ABCD"):
         return _matrices(K.A, K.B, K.C, K.D, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
+    if isinstance(K, np.ndarray) and K.ndim in (1, 2):
+        return _matrices([], [], [], K, None)
     if all(hasattr(K, name) for name in ("num", "den")):
         return _realisation(K.num, K.den, getattr(K, "dt", None))  # pyright: ignore[reportAttributeAccessIssue] see the line above
     raise ScenarioError(f"K is {shown(K)}: {CURE}")

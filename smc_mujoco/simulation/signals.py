@@ -460,7 +460,10 @@ class Clock:
         """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a physics step."""
         late = self.jitter >= control_period
         if late or (self.jitter and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step)):
+            room = round(control_period / physics_step) > 1
+            finer = "" if room else f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter of "
             raise ScenarioError(
-                f"Clock's jitter is {self.jitter:g} s: give at least a physics step, {physics_step:g} s, and less than "
-                f"the control period, {control_period:g} s, and missed=... for samples that do not run"
+                f"Clock's jitter is {self.jitter:g} s: {finer or 'give '}at least a physics step"
+                f"{f', {physics_step:g} s' * room}, and less than the control period, {control_period:g} s, and "
+                "missed=... for samples that do not run"
             )

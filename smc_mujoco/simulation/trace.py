@@ -16,7 +16,7 @@ from numpy.lib import format as npy
 from smc_mujoco.common import annexes, html
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, one_line, users_stacklevel, words
 from smc_mujoco.common.extras import package
-from smc_mujoco.common.files import from_json, reading, replacing, to_json
+from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
@@ -98,7 +98,7 @@ class Trace:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .npz file that `smc.load` reads back. Make missing folders, and replace an old file atomically."""
-        path = Path(path)
+        path = as_path(path)
         if not path.name or "\0" in path.name:
             raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
         if path.suffix not in ("", ".npz"):
@@ -202,7 +202,7 @@ class Trace:
         Raises:
           ScenarioError: the name has another ending.
         """
-        path = Path(path)
+        path = as_path(path)
         if path.suffix not in _WRITERS:
             raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv, .mat, .mcap or .parquet")
         with replacing(path) as file:

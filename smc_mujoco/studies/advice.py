@@ -121,8 +121,8 @@ class Advice(Tables):
         a, b = (self.comparison.laws.index(name) for name in (law, rival))
         return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
 
-    def dominated(self, law: str) -> list[str]:
-        """Return the laws that a law dominates: it is better than them in some block, and worse in none."""
+    def dominates(self, law: str) -> list[str]:
+        """Return the laws that this one dominates: it is better than each in some block, and worse in none."""
         rivals = (name for name in self.compared if name != law)
         return [name for name in rivals if self.wins(law, name) and not self.wins(name, law)]
 
@@ -327,7 +327,7 @@ class Advice(Tables):
         first, *others = self.compared
         if self._too_few:
             return f"How sure: not at all, with {self.samples}."
-        beaten = [name for name in others if name in self.dominated(first)]
+        beaten = [name for name in others if name in self.dominates(first)]
         mixed = [name for name in others if self.wins(name, first)]
         unsure = [name for name in self.level if name not in self.tied]
         it = first if self.all_level else "it"  # no law is advised where all are level

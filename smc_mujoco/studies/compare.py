@@ -223,6 +223,8 @@ def compare(
     count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), checked_share(relevant)
     workers = executors.as_executor("local" if executor is None else executor)
     _check_names(metrics, gains, out)
+    if not isinstance(worst, bool | Uncertainty):
+        raise ScenarioError(f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)")
     trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
     number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
     number, budget = whole("searches", number, 1, search.MAX_SEARCHES), whole("budget", budget, 1, search.MAX_BUDGET)

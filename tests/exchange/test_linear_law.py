@@ -36,6 +36,18 @@ def sampled(K: control.StateSpace) -> control.StateSpace:
     return control.sample_system(control.ss(K), H, "tustin") if control.ss(K).nstates else K
 
 
+def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
+    A, B = np.array([[0.0, 1.0], [1.0, -0.2]]), np.array([[0.0], [1.0]])
+    K = control.lqr(A, B, np.eye(2), np.eye(1))[0]
+    law = smc.law_from(K)
+    assert law.checked
+    trace = smc.run(smc.Scenario(plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=1.0, u_max=np.inf))
+    np.testing.assert_allclose(trace.u[:, 0], -(K[0, 0] * trace.x[:, 0] + K[0, 1] * trace.v[:, 0]), rtol=1e-12)
+    assert smc.law_from(K[0]).function == law.function
+    with pytest.raises(smc.ScenarioError, match="K has 2 outputs"):
+        smc.law_from(np.eye(2))
+
+
 @pytest.mark.parametrize(
     ("name", "discrete"),
     [("first order", True), ("integrator", False), ("two resonances", False), ("gain and rate", False)],

@@ -59,7 +59,7 @@ def driven_by_gym(environment, act):
     states, over = [], False
     while True:
         u = act(observation)
-        assert environment.action_space.contains(u)
+        assert environment.action_space.contains(u.astype(np.float32))  # a float64 that `step` does not round
         assert environment.observation_space.contains(observation)
         states.append([*observation[: 2 * n], *(u * limit)])
         if over:

@@ -141,3 +141,12 @@ def test_jitter_takes_margin_from_a_law_that_lives_near_its_delay():
     )
     assert quick.value * 8 == round(quick.value * 8)
     assert not slow.value > quick.value
+
+
+def test_a_jitter_where_a_period_has_one_step_is_told_of_a_shorter_step():
+    with pytest.raises(smc.ScenarioError) as error:
+        smc.Scenario(plant="duffing", law="none", physics_step=0.001, clock=smc.Clock(jitter=0.0005))
+    assert str(error.value) == (
+        "Clock's jitter is 0.0005 s: give a physics_step of 0.00025 s, for example, and a jitter of at least a physics "
+        "step, and less than the control period, 0.001 s, and missed=... for samples that do not run"
+    )

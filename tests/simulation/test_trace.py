@@ -600,3 +600,11 @@ def test_a_free_joint_has_the_goal_of_its_plant_as_reference():
     trace = smc.run(smc.Scenario(plant="acrobot", law="none", x0=upright, duration=0.05))
     assert (trace.r == upright).all()
     assert smc.scores(trace)["free"]["ultimate_bound"] < 1e-9
+
+
+@pytest.mark.parametrize("path", [5, None, ["a.csv"]])
+def test_what_is_no_path_is_refused_in_a_sentence(path):
+    trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
+    for write in (trace.save, trace.export):
+        with pytest.raises(smc.ScenarioError, match=r"^the path is .*: give the name of a file as a text$"):
+            write(path)

@@ -182,11 +182,11 @@ def test_a_law_that_another_dominates_is_not_advised_for_its_mean_rank(advice):
     found = with_cells(advice, **cells)
     first, second = found.choices
     assert second.rank.mean < first.rank.mean
-    assert (first.law.name, found.dominated("observer_free")) == ("observer_free", ["slow"])
-    assert found.dominated("slow") == []
+    assert (first.law.name, found.dominates("observer_free")) == ("observer_free", ["slow"])
+    assert found.dominates("slow") == []
     cells["slow"] = [0.4 * even, even, even, 9 * even]  # now it is better in one block
     traded = with_cells(advice, **cells)
-    assert (traded.law.name, traded.dominated("observer_free")) == ("slow", [])
+    assert (traded.law.name, traded.dominates("observer_free")) == ("slow", [])
 
 
 def test_laws_that_tie_stand_in_the_order_of_overshoot_and_energy_and_the_answer_says_so(advice):

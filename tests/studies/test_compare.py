@@ -236,3 +236,10 @@ def test_conditions_are_names_with_commas_or_one_text(refused):
     texts = ["noise,sine", "worn: friction=Coulomb(0.05), x0=0.3", "encoder"]
     assert [one.name for one in options.conditions(texts)] == ["noise", "sine", "worn", "encoder"]
     refused(lambda: options.conditions(["noise,worn: friction=Coulomb(0.05)"]))
+
+
+@pytest.mark.parametrize("worst", [5, "x", None])
+def test_a_worst_case_that_is_no_class_is_refused_before_any_run(worst, tmp_path):
+    with pytest.raises(smc.ScenarioError, match=r"^worst is .*: give True or a class, such as smc.Uncertainty"):
+        smc.compare(["classical"], "duffing", worst=worst, out=tmp_path / "new")
+    assert not (tmp_path / "new").exists()
