@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smc_mujoco.simulation.trace import ARRAYS, Trace
+from smc_mujoco.simulation.trace import Trace
 
 MEAN_WINDOW = 0.01, 40  # of a mean: share of the run, and smallest number of samples; chosen, see `window`
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
@@ -35,7 +35,7 @@ def finite(trace: Trace) -> Trace:
     if not bad.any():
         return trace
     count = int(np.argmax(bad))
-    part = {name: getattr(trace, name)[: max(1, count)] for name in ARRAYS}
+    part = {name: array[: max(1, count)] for name, array in trace.arrays().items()}
     if count == 0:
         part |= {"x": np.array([trace.scenario.resolved.x0]), "v": np.array([trace.scenario.resolved.v0])}
     return dataclasses.replace(trace, **part)

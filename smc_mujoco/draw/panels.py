@@ -21,7 +21,7 @@ from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
-from smc_mujoco.simulation.trace import ARRAYS, Trace
+from smc_mujoco.simulation.trace import Trace
 
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 LAST_SAMPLES = 60  # control samples in the close-up of u
@@ -256,7 +256,7 @@ def horizon(traces: Sequence[Trace]) -> float:
 def until(trace: Trace, time: float) -> Trace:
     """Return the trace up to a time, s, with two samples at least."""
     count = max(2, int(np.searchsorted(trace.t, time + 1e-9)))
-    return dataclasses.replace(trace, **{name: getattr(trace, name)[:count] for name in ARRAYS})
+    return dataclasses.replace(trace, **{name: array[:count] for name, array in trace.arrays().items()})
 
 
 def over_time(

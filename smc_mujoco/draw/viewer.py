@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.reference import Loop, PythonComponent
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Scenario, stepped_by_mujoco
 
 GAIN = "gain:"  # prefix of the sliders' names
 SPACE_KEY = 32  # code of the key in GLFW
@@ -89,6 +89,7 @@ class Live:
     def begin(self, scenario: Scenario) -> None:
         """Start the run again."""
         with installed():
+            scenario = stepped_by_mujoco(scenario)  # whose friction feels the push, too
             self.loop = Pushed(scenario, models.mechanism(scenario))
         self.step, self.due, self.late = 0, 0.0, False
         self.build(0)

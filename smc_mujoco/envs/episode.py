@@ -22,7 +22,7 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.model import channels
 from smc_mujoco.simulation.reference import Failure, evaluate
-from smc_mujoco.simulation.scenario import Resolved, Scenario
+from smc_mujoco.simulation.scenario import Resolved, Scenario, stepped_by_mujoco
 from smc_mujoco.simulation.signals import PerChannel
 
 FIELDS = (  # of a Scenario, that an environment accepts
@@ -51,7 +51,8 @@ class Setting:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
         # the run that equals an episode
-        self.scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes)).resolved
+        scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
+        self.scenario = stepped_by_mujoco(scenario).resolved
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if self.scenario.formula_friction is not None:

@@ -276,7 +276,12 @@ def chattering_frequency(trace: Trace) -> float:
 
 @metric("s", realistic=True)
 def stick_time(trace: Trace) -> float:
-    """Time for which a channel is at rest, with a reaction of friction or contact; longest channel."""
+    """Time for which a channel is at rest, with a reaction of friction or contact; longest channel.
+
+    Where dry friction ran by its moments, it is the time for which it held the joint, also within a control period.
+    """
+    if trace.held is not None:
+        return trace.held.sum(axis=0).max()
     rest = conventions.at_rest(trace)  # a sample's reaction is the mean over the control period before it
     return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
 

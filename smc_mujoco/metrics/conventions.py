@@ -40,7 +40,6 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.text import number
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
-from smc_mujoco.simulation.state import LOGGED
 
 if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
@@ -91,7 +90,8 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     if len(group.channels) == trace.x.shape[1]:
         return trace
     columns = list(group.channels)
-    return dataclasses.replace(trace, **{name: getattr(trace, name)[:, columns] for name in LOGGED})
+    arrays = {name: array[:, columns] for name, array in trace.arrays().items() if name != "t"}
+    return dataclasses.replace(trace, **arrays)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -234,7 +234,7 @@ def last_part(trace: Trace) -> slice:
 def first_part(trace: Trace) -> Trace:
     """Return the trace without the last part, but for its first sample."""
     count = last_part(trace).start + 1
-    return dataclasses.replace(trace, **{name: getattr(trace, name)[:count] for name in ("t", *LOGGED)})
+    return dataclasses.replace(trace, **{name: array[:count] for name, array in trace.arrays().items()})
 
 
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:

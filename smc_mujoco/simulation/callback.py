@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 from mujoco.introspect import ast_nodes, structs
 from numba import types
 
@@ -45,7 +46,8 @@ C_TYPES = {
 PROBE_MODEL = """<mujoco><size nuserdata="12345"/><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
 
-# Bytes from the start of mjModel to nuserdata, and from the start of mjData to the other fields, all pointers.
+OF_MODEL = "nuserdata", "dof_frictionloss"  # fields of mjModel; all others are of mjData
+# Bytes from the start of mjModel or mjData to the fields. All but nuserdata are pointers.
 Offsets = namedtuple("Offsets", ("nuserdata", "userdata", *Arrays._fields))
 
 
@@ -78,16 +80,16 @@ def _ctype(node: object) -> Any:
 def checked_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     """Return the introspected offsets, each compared with a live model and its data."""
     offsets = {}
-    for struct, names, live in (("mjModel", Offsets._fields[:1], model), ("mjData", Offsets._fields[1:], data)):
-        kind = _ctype(structs.STRUCTS[struct])
-        for name in names:
-            if not (field := getattr(kind, name, None)):
-                raise LayoutError(f"lacks the field {struct}.{name}")
-            value = getattr(live, name)
-            in_memory = ctypes.c_int64.from_address(live._address + field.offset).value
-            if in_memory != (value if live is model else value.ctypes.data):
-                raise LayoutError(f"does not have {struct}.{name} at byte {field.offset}, where introspection puts it")
-            offsets[name] = field.offset
+    kinds = {struct: _ctype(structs.STRUCTS[struct]) for struct in ("mjModel", "mjData")}
+    for name in Offsets._fields:
+        struct, live = ("mjModel", model) if name in OF_MODEL else ("mjData", data)
+        if not (field := getattr(kinds[struct], name, None)):
+            raise LayoutError(f"lacks the field {struct}.{name}")
+        value = getattr(live, name)
+        in_memory = ctypes.c_int64.from_address(live._address + field.offset).value
+        if in_memory != (value.ctypes.data if isinstance(value, np.ndarray) else value):
+            raise LayoutError(f"does not have {struct}.{name} at byte {field.offset}, where introspection puts it")
+        offsets[name] = field.offset
     return Offsets(**offsets)
 
 
@@ -129,7 +131,8 @@ def callback():
             pointer(integers(data + at.xipos)[0]), pointer(integers(data + at.xanchor)[0]),
             pointer(integers(data + at.xaxis)[0]), pointer(integers(data + at.actuator_force)[0]),
             pointer(integers(data + at.qfrc_constraint)[0]), pointer(integers(data + at.qfrc_bias)[0]),
-            pointer(integers(data + at.qfrc_spring)[0]),
+            pointer(integers(data + at.qfrc_spring)[0]), pointer(integers(data + at.qfrc_passive)[0]),
+            pointer(integers(data + at.qLDiagInv)[0]), pointer(integers(model + at.dof_frictionloss)[0]),
         )  # fmt: skip
         run_simulation(address, simulation_at(address, 0), arrays)
 

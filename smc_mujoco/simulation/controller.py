@@ -7,6 +7,7 @@ At the first stage of a control sample, for each channel:
 A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of the sample before.
 At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
 every stage, disturbance(t) goes to xfrc_applied. Then a friction by a formula goes to ctrl; its steps have one stage.
+Coulomb friction on joints that move alone goes to qfrc_applied, at every stage of RK4.
 Each sample is logged with the mean forces since the last one.
 
 The controller counts its calls, because mjData.time does not tell the last stage of a step from the start of the next:
@@ -28,6 +29,7 @@ from numba import njit
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
 from smc_mujoco.mechanisms.hardware.drives import rippled
+from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
@@ -38,11 +40,11 @@ LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, 
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
-# Arrays of one mjData, as pointers to their numbers.
+# Arrays of one mjData, and of its mjModel the levels of dry friction, as pointers to their numbers.
 Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis actuator_force qfrc_constraint qfrc_bias
-    qfrc_spring""",
+    qfrc_spring qfrc_passive qLDiagInv dof_frictionloss""",
 )
 
 
@@ -57,6 +59,7 @@ def control(address, sim, data):
     step, stage = calls // stages, calls % stages
     k, within = step // steps, step % steps
     failure = record.FINE
+    _remove_exact_friction(sim, data)
     if stage == 0:
         _sum_forces(sim, data)
         if _diverged(sim, data):
@@ -77,8 +80,11 @@ def control(address, sim, data):
     if failure != record.FINE:
         sim.failure, sim.failed_step = failure, step
         _zero_inputs(sim, data)
-    elif stage == 0 and within == 0:
+        return
+    if stage == 0 and within == 0:
         _log(sim, data, k)
+    if sim.exact_friction != 0:
+        _apply_exact_friction(sim, data, stage)
 
 
 @njit(error_model="numpy", inline="always")
@@ -547,6 +553,43 @@ def _apply_friction(address, sim, data):
 
 
 @njit(error_model="numpy", inline="always")
+def _remove_exact_friction(sim, data):
+    """Take the friction of the last stage from the joints."""
+    for i in range(sim.n if sim.exact_friction != 0 else 0):
+        data.qfrc_applied[channel_at(sim.channels, i).qvel] = 0.0
+
+
+_coulomb_step = njit(error_model="numpy")(coulomb_step)
+
+
+@njit(error_model="numpy")
+def _apply_exact_friction(sim, data, stage):
+    """Give every joint its Coulomb friction at a stage of RK4: the moments of `coulomb_step`.
+
+    While it holds the joint, it takes up what the other forces change within the step, too.
+    """
+    for i in range(sim.n):
+        channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
+        joint, drive = channel.qvel, data.ctrl[channel.ctrl] if channel.ctrl >= 0 else 0.0
+        level = data.dof_frictionloss[joint]
+        others = data.qfrc_passive[joint] - data.qfrc_bias[joint] + _generalised_disturbance(data, channel)
+        if stage == 0:
+            state.smooth = others + (state.middle if sim.drive_step.rise_first != 0.0 else drive)
+            v, mobility = data.qvel[joint], data.qLDiagInv[joint]
+            state.friction, state.friction_rise, held = _coulomb_step(v, state.smooth, level, mobility, sim.step)
+            sliding = 1.0 - held / sim.step
+            state.holding = 1.0 - sliding * sliding if held > 0.0 else 0.0
+            state.held += held
+        force = min(max(state.friction - state.holding * (others + drive - state.smooth), -level), level)
+        weight = 3.0
+        if stage % 3 == 0:  # the first stage, or the last
+            force += -state.friction_rise if stage == 0 else state.friction_rise
+            weight = 6.0
+        data.qfrc_applied[joint] += force
+        state.reaction += force / weight
+
+
+@njit(error_model="numpy", inline="always")
 def _sum_forces(sim, data):
     """Add the forces of the last physics step on each joint: of the drive, and of friction and contacts."""
     for i in range(sim.n):
@@ -573,4 +616,5 @@ def _log(sim, data, k):
             sample.applied = min(max(applied, -limit), limit) if sim.has_drives == 0 else state.delayed
         sample.d = _generalised_disturbance(data, channel)
         sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
-        state.force, state.reaction = 0.0, 0.0
+        sample.held = state.held
+        state.force, state.reaction, state.held = 0.0, 0.0, 0.0

@@ -43,7 +43,7 @@ def structure(scenario: Scenario) -> Hashable:
     plant = scenario.plant
     of_parts = tuple(part.structure() for part in parts(scenario))
     edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
-    stepping = scenario.resolved.integrator, scenario.resolved.physics_step
+    stepping = scenario.resolved.integrator, scenario.resolved.physics_step, scenario.exact_friction
     return plant.build, plant.fields, plant.n, edits, of_parts, scenario.readings, *stepping
 
 
@@ -181,6 +181,8 @@ def compiled(spec: mujoco.MjSpec, scenario: Scenario, nuserdata: int = 0) -> muj
     model, resolved = compiled_for_runs(spec, nuserdata), scenario.resolved
     model.opt.timestep = resolved.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
+    if resolved.exact_friction:  # the callback reads the levels from the model
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS.value
     return model
 
 

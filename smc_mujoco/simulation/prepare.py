@@ -198,6 +198,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "scale": math.prod(part.scale for part in s.actuator),
         "has_drives": drives is not None,
         "drive_step": drives._asdict() if drives else {},
+        "exact_friction": s.exact_friction,
         "seed": s.noise_seed,
         "sigma_x": s.noise.position,
         "sigma_v": s.noise.velocity,

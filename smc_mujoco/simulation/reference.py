@@ -20,6 +20,7 @@ from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.drives import rippled
+from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
 from smc_mujoco.mechanisms.plant import Dynamics, Plant, Values
 from smc_mujoco.simulation import model as models
@@ -105,6 +106,7 @@ class Loop:
         self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
         self.numbers = [] if formula is None else [friction_numbers(formula, i) for i in range(n)]
         self.stuck_at, self.speed = [math.nan] * n, [0.0] * n  # positions of joints that stick, or NaN; last speeds
+        self.rubbing, self.held = np.zeros((n, 4)), np.zeros(n)  # of Coulomb friction, see `apply_exact_friction`
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -147,10 +149,22 @@ class Loop:
                 delayed = self.delayed if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.scale
                 applied = np.zeros(len(x))  # the quotient may round to just beyond the limit
                 applied[self.driven] = np.clip(delayed[self.driven], -self.limits, self.limits)
-                sample = (x, v, self.commands[-1], applied, self.s, d, self.r, *self.forces / self.scenario.steps)
+                sample = (
+                    x,
+                    v,
+                    self.commands[-1],
+                    applied,
+                    self.s,
+                    d,
+                    self.r,
+                    *self.forces / self.scenario.steps,
+                    self.held,
+                )
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
-                self.forces[:] = 0.0
+                self.forces[:] = self.held[:] = 0.0
+            if self.scenario.exact_friction:
+                self.apply_exact_friction(data, d, stage)
         except Failure as failure:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
 
@@ -354,6 +368,26 @@ class Loop:
                 else:
                     self.stuck_at[i] = math.nan
             self.speed[i], data.ctrl[at["friction_ctrl"][i]] = v, -friction
+
+    def apply_exact_friction(self, data: mujoco.MjData, d: np.ndarray, stage: int) -> None:
+        """Give the joints the moments of their Coulomb friction at a stage of RK4; d are the disturbances, (n,)."""
+        at, h = self.channels, self.scenario.physics_step
+        for i, dof in enumerate(at["qvel"]):
+            drive = float(data.ctrl[at["ctrl"][i]]) if self.driven[i] else 0.0
+            level = float(self.model.dof_frictionloss[dof])
+            others = float(data.qfrc_passive[dof] - data.qfrc_bias[dof] + d[i])
+            if stage == 0:
+                middle = self.middle[i] if self.drive_step and self.drive_step.rise_first else drive
+                smooth, v, mobility = others + middle, float(data.qvel[dof]), float(data.qLDiagInv[dof])
+                mean, rise, held = coulomb_step(v, smooth, level, mobility, h)
+                sliding = 1.0 - held / h
+                self.rubbing[i] = mean, rise, smooth, 1.0 - sliding * sliding if held > 0.0 else 0.0
+                self.held[i] += held
+            mean, rise, smooth, holding = self.rubbing[i]
+            force = min(max(mean - holding * (others + drive - smooth), -level), level)
+            force += (-rise, 0.0, 0.0, rise)[stage]
+            data.qfrc_applied[dof] = force + (d[i] if self.scenario.plant.direct else 0.0)
+            self.forces[1, i] += force / (6.0, 3.0, 3.0, 6.0)[stage]
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""

@@ -29,7 +29,8 @@ from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive
+from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, moves_alone
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -73,8 +74,9 @@ class Scenario:
       surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s between two runs of the law. The command is held in between.
-      physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms with friction,
-        contact, a mechanism, a Backlash or a plant that is not `smooth`, else up to 1 ms; in both cases up to a quarter
+      physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms with friction
+        (without `exact_friction`), contact, a mechanism, a Backlash or a plant that is not `smooth`, else up to 1 ms;
+        in both cases up to a quarter
         of the clock's jitter. Where 1 ms holds, a drive whose force changes within a control period may lower it, to a
         quarter of that period or half of the drive's time constant, whichever is longer.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
@@ -96,7 +98,7 @@ class Scenario:
       noise_key: a number that changes the random numbers of every seed. Comparisons draw it after the laws are fixed,
         so that no law can know its noise. 0: the random numbers depend on the seed alone.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
-        a Lag, a RateLimit or a DCMotor, else implicitfast.
+        a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
       friction: on every joint, in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
       contact: what the mechanism touches: a Contact that the plant offers, the kind of one, or "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
@@ -273,6 +275,21 @@ class Scenario:
         return without_parts and self.plant.smooth and all(part.drives for part in self.actuator)
 
     @property
+    def exact_friction(self) -> bool:
+        """Whether the callback gives RK4 the moments of Coulomb friction in each step, see `friction.coulomb_step`.
+
+        It knows all other forces on joints that move alone, behind no drive but lags and rate limits. In other
+        scenarios Coulomb friction is MuJoCo's.
+        """
+        parts = {type(part) for part in self.friction}
+        without_parts = self.contact.kind == "none" and self.mechanism == "equation"
+        known = all(part.in_callback for part in self.actuator) and not any(
+            isinstance(d, Push) for d in self.disturbance
+        )
+        rk4 = self.integrator in (None, "RK4")
+        return rk4 and Coulomb in parts <= {Coulomb, Viscous} and without_parts and known and moves_alone(self.plant)
+
+    @property
     def voltage_motor(self) -> DCMotor | None:
         """The DC motor that has its voltage as u; None if u is a force."""
         return next((part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None)
@@ -396,7 +413,7 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
-        "integrator": "RK4" if s.plain_equation else "implicitfast",
+        "integrator": "RK4" if s.plain_equation or s.exact_friction else "implicitfast",
     }
     return {name: value for name, value in defaults.items() if getattr(s, name) is None}
 
@@ -411,7 +428,7 @@ def longest_step(s: Scenario) -> float:
     behind a long delay are slower: a step of half of it is enough. A force that follows u at once sets no limit.
     """
     jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
-    if not s.plain_equation:
+    if not (s.plain_equation or s.exact_friction):
         return min(REALISTIC_STEP, jitter)
     one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(s.actuator[0], Lag)
     moving = [part for part in s.actuator if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited]
@@ -419,16 +436,22 @@ def longest_step(s: Scenario) -> float:
     return min(MAX_STEP, jitter, *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving))
 
 
+def stepped_by_mujoco(s: Scenario) -> Scenario:
+    """Return the scenario with MuJoCo's Coulomb friction, for what runs without the callback's."""
+    return dataclasses.replace(s, integrator="implicitfast") if s.exact_friction else s
+
+
 def _default_steps(s: Scenario) -> int:
     """Return the default number of physics steps per control period.
 
-    Behind a drive, up to four times as many steps are tried, until the input delay is a whole number of steps.
+    Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the input delay is a
+    whole number of steps.
     """
     longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # a scenario that needs less is refused later
     minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
     fitting = (n for n in range(minimum, 4 * minimum + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
-    return next(fitting, minimum) if s.actuator else minimum
+    return next(fitting, minimum) if s.actuator or s.exact_friction else minimum
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:

@@ -53,9 +53,13 @@ CHANNEL = np.dtype(
 #   first, second: the states of the drives, see `DriveStep`
 #   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
 #   middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage, see `DriveStep`
+#   friction, friction_rise: mean of Coulomb friction in a step of RK4, and its rise to the last stage
+#   smooth, holding: the other forces for which these are right, and the share of their change that friction takes up
+#   held: s of a control period for which friction held the joint
 #   stuck, stuck_at, speed: whether a friction by a formula sticks, where, and the speed at the step before
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
-CHANNEL_STATE = floats((*DRIVEN, "stuck", "stuck_at", "speed"))
+RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
+CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
 DRIVE_STEP = floats(DriveStep._fields)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
@@ -63,7 +67,7 @@ JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
 # A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
 # the drive's force, what friction and contacts exert.
 LOGGED = ("x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
-LOG = floats(LOGGED)
+LOG = floats((*LOGGED, "held"))  # and the time for which `exact_friction` held its joint since the sample before, s
 
 # A compiled function: its address, those of its parameters and of its memory, and the bytes of memory a channel has.
 FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
@@ -94,6 +98,8 @@ SIMULATION = np.dtype(
         ("jitter", "i8"), ("missed", "f8"),
         # drives in the callback: whether there are, and what a physics step does to them
         ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
+        # whether the callback gives the joints their Coulomb friction
+        ("exact_friction", "i8"),
         # the sensor: noise, encoder
         ("seed", "f8"), ("sigma_x", "f8"), ("sigma_v", "f8"), ("bias", "f8"), ("counts", "f8"), ("dropout", "f8"),
         ("read_period", "f8"), ("read_delay", "f8"), ("position_error", FUNCTION), ("velocity_error", FUNCTION),

@@ -8,7 +8,7 @@ import warnings
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -53,6 +53,8 @@ class Trace:
       scenario: the Scenario of the run.
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
+      held: time for which dry friction held the joint in the control period that ends at t_k, (K + 1, n), s, by the
+        friction's own state, if the scenario has `exact_friction`; None where dry friction is MuJoCo's, or none.
     """
 
     t: np.ndarray
@@ -68,10 +70,16 @@ class Trace:
     scenario: Scenario
     diverged_at: float | None = None
     failure: str | None = None
+    held: np.ndarray | None = None
 
     def __post_init__(self):
-        for name in ARRAYS:
-            np.ndarray.setflags(getattr(self, name), write=False)  # a TypeError for what is no array
+        for array in self.arrays().values():
+            np.ndarray.setflags(array, write=False)  # a TypeError for what is no array
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the arrays by name; `held` only if it is not None."""
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        return arrays if self.held is None else arrays | {"held": self.held}
 
     def __setstate__(self, fields: dict) -> None:  # so that the arrays of a copy are read-only, too
         vars(self).update(fields)
@@ -86,6 +94,8 @@ class Trace:
         """Return what was run, how it failed if it did, and the range of x and u in each unit."""
         s = self.scenario
         rows = {"plant": s.plant.name, "law": s.law, "gains": s.law.source}
+        if s.exact_friction:
+            rows["dry friction"] = "its mean and first moment in each step"
         rows["samples"] = f"{len(self.t)}, every {s.control_period:g} s"
         if self.failure:
             rows["failed"] = self.failure
@@ -110,9 +120,9 @@ class Trace:
                 f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MAX_TEXT:,} "
                 "are not read back: give it shorter time series"
             )
-        arrays = {name: getattr(self, name) for name in ARRAYS}
+        arrays: dict[str, Any] = {"about": np.array(about)} | self.arrays()
         with replacing(path) as file:
-            np.savez_compressed(file, about=np.array(about), **arrays)
+            np.savez_compressed(file, **arrays)
         return path
 
     @property
@@ -260,13 +270,14 @@ def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
     end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
-    arrays = {name: np.ascontiguousarray(log[name]) for name in LOGGED}
+    names = (*LOGGED, "held") if scenario.exact_friction else LOGGED
+    arrays = {name: np.ascontiguousarray(log[name]) for name in names}
     if scenario.plant.goal:
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
     finite = np.array([np.isfinite(values[:end]).all(axis=1) for values in arrays.values()])
     if not finite.all():
         k = int(np.argmin(finite.all(axis=0)))
-        name = LOGGED[int(np.argmin(finite[:, k]))]
+        name = names[int(np.argmin(finite[:, k]))]
         end, failed_step, failure = k, k * scenario.steps, f"{name} became NaN or inf"
     if failure is not None:
         for values in arrays.values():
@@ -294,7 +305,8 @@ def load(path: str | os.PathLike[str]) -> Trace:
     except Exception as error:
         raise ScenarioError(f"{path} holds no scenario ({words(error)}): give a file that a run wrote") from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
-        arrays = {name: _checked_array(archive, name, scenario) for name in ARRAYS}
+        names = (*ARRAYS, "held") if "held.npy" in archive.namelist() else ARRAYS
+        arrays = {name: _checked_array(archive, name, scenario) for name in names}
     return Trace(**arrays, scenario=scenario, **end)
 
 

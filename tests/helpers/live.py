@@ -91,6 +91,8 @@ def scenario(chosen: dict[str, Any], duration: float) -> smc.Scenario:
     }
     for key in makers.keys() & given.keys():
         fields[key] = makers[key](given.pop(key))
+    if "friction" in fields:
+        fields["integrator"] = "implicitfast"  # MuJoCo's friction, which the page has
     if "counts" in given:
         fields["sensor"] = smc.Encoder(counts=given.pop("counts"))
     if "mass" in given:

@@ -41,9 +41,10 @@ class Run:
     force: np.ndarray
     reaction: np.ndarray
     scenario: SimpleNamespace
+    held: None = None
     diverged_at: float | None = None
     failure: str | None = None
-    plant_diverged = Trace.plant_diverged
+    plant_diverged, arrays = Trace.plant_diverged, Trace.arrays
 
 
 def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=False, **fields):

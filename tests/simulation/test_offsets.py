@@ -14,7 +14,7 @@ from smc_mujoco.simulation import callback
 
 pytestmark = pytest.mark.quick
 
-FIELDS = callback.Offsets._fields[1:]
+STRUCTS = {name: "mjModel" if name in callback.OF_MODEL else "mjData" for name in callback.Offsets._fields[1:]}
 SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
 
 
@@ -59,22 +59,22 @@ def test_offsets_are_where_the_live_arrays_are(live):
     offsets = callback.checked_offsets(model, data)
     assert offsets == callback.offsets()
     assert ctypes.c_int64.from_address(model._address + offsets.nuserdata).value == 17
-    for name in FIELDS:
-        assert (
-            ctypes.c_void_p.from_address(data._address + getattr(offsets, name)).value
-            == getattr(data, name).ctypes.data
-        )
+    for name, struct in STRUCTS.items():
+        of = model if struct == "mjModel" else data
+        assert ctypes.c_void_p.from_address(of._address + getattr(offsets, name)).value == getattr(of, name).ctypes.data
 
 
-@pytest.mark.parametrize("name", FIELDS)
+@pytest.mark.parametrize("name", STRUCTS)
 def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
+    other = {"mjModel": "dof_damping", "mjData": "qacc_warmstart"}[STRUCTS[name]]
+
     def swap(fields):
-        here, there = position(fields, name), position(fields, "qacc_warmstart")
+        here, there = position(fields, name), position(fields, other)
         fields[here], fields[there] = fields[there], fields[here]
         return fields
 
-    doctored(monkeypatch, "mjData", swap)
-    with pytest.raises(callback.LayoutError, match=rf"does not have mjData\.{name} at byte"):
+    doctored(monkeypatch, STRUCTS[name], swap)
+    with pytest.raises(callback.LayoutError, match=rf"does not have {STRUCTS[name]}\.{name} at byte"):
         callback.checked_offsets(*live)
 
 

@@ -774,7 +774,7 @@ EVERYTHING = {
 
 
 def test_defaults_follow_the_fields_that_are_given():
-    ideal, realistic = scenario(), scenario(friction=smc.Coulomb(0.1))
+    ideal, realistic = scenario(), scenario(friction=smc.Viscous(0.1))
     assert (ideal.resolved.integrator, ideal.resolved.physics_step) == ("RK4", 1e-3)
     assert (realistic.resolved.integrator, realistic.resolved.physics_step) == ("implicitfast", REALISTIC_STEP)
     for a, b in ((ideal, realistic), (realistic, ideal)):

@@ -132,7 +132,7 @@ def test_reasons_why_theory_promises_nothing_as_recorded(snapshot):
 
 def test_a_mechanism_with_parts_takes_sixteen_steps_a_period_and_half_of_them_once(snapshot):
     said = []
-    for condition in ("constant", "coulomb"):
+    for condition in ("constant", "coulomb", "lugre"):
         given = smc.plant("duffing"), find_condition(condition), "classical", (4e-3, 1e-3), [0, 3], "tuned", 2.0, None
         setup = accuracies._setup(*given)
         said.append(f"{condition} {setup.periods} {setup.starts}")

@@ -61,7 +61,7 @@ from smc_mujoco.simulation.grid import Starts
 from smc_mujoco.simulation.model import with_values
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import run
-from smc_mujoco.simulation.scenario import Scenario, default_u_max
+from smc_mujoco.simulation.scenario import Scenario, default_u_max, stepped_by_mujoco
 from smc_mujoco.simulation.trace import Trace
 
 SEARCHES = 12  # of a tuning: then twelve runs of two laws decide between them, see `ranking`
@@ -260,6 +260,7 @@ def _cheap(accurate: Evaluator) -> Evaluator:
 
 def _coarse(case: Scenario) -> Scenario:
     """Return a case under Euler's method in place of RK4, or with one step a control period, if it allows that."""
+    case = stepped_by_mujoco(case)
     if case.resolved.integrator == "RK4":
         return dataclasses.replace(case, integrator="Euler")
     try:

@@ -12,7 +12,7 @@ the velocity between law and mechanism.
 
 A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control period, so that the
 error of the first-order integrator does not count. The run of the shortest period is repeated with half the step. RK4,
-for plain equations, keeps the scenario's step.
+for plain equations and exact friction, keeps the scenario's step.
 """
 
 import dataclasses

@@ -1,9 +1,11 @@
 """Friction on every channel's joint: viscous, Coulomb, and LuGre, which sticks without creep.
 
-MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor` actuator.
+MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor` actuator. Under RK4
+the callback simulates Coulomb friction on joints that move alone, see `coulomb_step`.
 """
 
 import dataclasses
+import math
 from collections.abc import Iterator
 
 import mujoco
@@ -42,9 +44,13 @@ class Viscous(Friction):
 class Coulomb(Friction):
     """Dry friction: -level sign(v) on a sliding joint; on a joint at rest, the force up to level that holds it.
 
-    Friction in MuJoCo is a soft constraint, so a stuck joint creeps at (1 - d) tc/2 a0, with impedance d, time constant
-    tc, and a0 the acceleration that friction holds back. With the hardest constraint that is 1e-4 h a0 for a physics
-    step h: 2e-7 rad/s for a pendulum of 0.125 kg m^2 that holds 1 N m at h = 0.25 ms.
+    On joints that move alone, behind no drive but lags and rate limits, RK4's stages get its mean and first moment over
+    the step, as `Scenario.exact_friction` says. Such a joint stops, sticks and turns back within a step.
+
+    Elsewhere it is MuJoCo's. In a step in which a joint stops or turns back, friction then has one direction for all of
+    it. It is a soft constraint, so a stuck joint creeps at (1 - d) tc/2 a0, with impedance d, time constant tc, and a0
+    the acceleration that friction holds back. With the hardest constraint that is 1e-4 h a0 for a physics step h:
+    2e-7 rad/s for a pendulum of 0.125 kg m^2 that holds 1 N m at h = 0.25 ms.
 
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
@@ -62,6 +68,41 @@ class Coulomb(Friction):
         yield Field("dof_frictionloss", dofs, self.level, adds=True)
         yield Field("dof_solref", dofs, HARD_SOLREF)
         yield Field("dof_solimp", dofs, HARD_SOLIMP)
+
+
+def coulomb_step(v, smooth, level, mobility, h):
+    """Return what dry friction does to a joint that moves alone, in a step of h s in which no other force changes.
+
+    Within the step, the joint slides, stops, and then sticks or turns back.
+
+    Args:
+      v: speed at the start of the step, rad/s (m/s).
+      smooth: sum of the other forces on the joint, N m (N).
+      level: of the friction, N m (N).
+      mobility: 1 over the joint's inertia, 1/(kg m^2) (1/kg).
+      h: s.
+
+    Returns:
+      The mean of the friction over the step, N m (N); the rise that gives RK4's stages its first moment, see
+      `drives._rise`; and the time for which it holds the joint at rest, s, which is the last of the step.
+    """
+    left, mean, moment, held = h, 0.0, 0.0, 0.0
+    while left > 0.0:
+        force, span = -smooth, left
+        if v == 0.0 and abs(smooth) <= level:
+            held = left
+        else:
+            direction = math.copysign(1.0, v if v != 0.0 else smooth)
+            force = -level * direction
+            slowing = -direction * (smooth + force) * mobility
+            if abs(v) < slowing * left:
+                span = abs(v) / slowing
+            v = 0.0
+        mean += force * span
+        moment += force * span * (left - 0.5 * span)
+        left -= span
+    mean, moment = mean / h, moment / (h * h)
+    return mean, 6.0 * (0.5 * mean - moment), held
 
 
 @dataclasses.dataclass(frozen=True)

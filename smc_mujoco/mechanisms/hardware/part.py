@@ -135,6 +135,23 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
     return tuple(model.joint(int(joint)).name for joint in joint_ids(model))
 
 
+@functools.lru_cache(maxsize=32)
+def moves_alone(plant: Plant) -> bool:
+    """Return whether each joint of a plant has its own equation: constant inertia, a motor, and no constraint.
+
+    Springs and dampers may join the joints, because their forces are smooth.
+    """
+    model = compiled(plant.spec())
+    motors = np.all(model.actuator_gaintype == mujoco.mjtGain.mjGAIN_FIXED) and np.all(
+        model.actuator_gainprm[:, 0] == 1
+    )
+    motors &= np.all(model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE)
+    motors &= np.all(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE)
+    motors &= model.nactuator == plant.driven and not np.any(model.jnt_actgravcomp)  # u is within the motors' ranges
+    alone = model.nv == model.njnt == plant.n and np.all(model.dof_parentid < 0) and not np.any(model.tendon_armature)
+    return bool(plant.smooth and alone and motors)
+
+
 def column_ends(plant: Plant) -> tuple[str, ...]:
     """Return what follows x, v, u, ... in the name of each channel's column: "", or 0, 1, ..., or _shoulder, ..."""
     if plant.n == 1:

@@ -158,7 +158,8 @@ def test_a_search_has_three_stages_and_screens_at_less_cost(monkeypatch):
     tuned = tune("duffing", "observer_free", objective=goal, searches=1)
     by_equation, accurate, cheap = made
     assert [one.engine for one in made] == [MUJOCO] * 3
-    assert [one.cases[0].resolved.physics_step for one in (accurate, cheap)] == [2.5e-4, 1e-3]
+    stepping = [(one.cases[0].resolved.integrator, one.cases[0].resolved.physics_step) for one in (accurate, cheap)]
+    assert stepping == [("RK4", 1e-3), ("implicitfast", 1e-3)]
     assert by_equation.cases == accurate.cases
     (one,) = tuned.searches
     screened = one.evaluations - len(one.history)
@@ -175,8 +176,10 @@ def test_constraints_are_left_out_only_where_they_are_limits(plant, fields, cons
 
 
 def test_what_needs_a_shorter_step_keeps_its_own():
-    late = smc.Scenario(plant="duffing", law="none", friction=smc.Coulomb(0.3), input_delay=5e-4)
+    late = smc.Scenario(plant="duffing", law="none", friction=smc.Viscous(0.3), input_delay=5e-4)
     assert search._coarse(late) is late
+    dry = search._coarse(smc.Scenario(plant="duffing", law="none", friction=smc.Coulomb(0.3)))
+    assert (dry.resolved.integrator, dry.resolved.physics_step) == ("implicitfast", 1e-3)  # MuJoCo's friction
     plain = search._coarse(smc.Scenario(plant="duffing", law="none"))
     assert plain.resolved.integrator == "Euler"
 
