@@ -7,13 +7,15 @@ without. Memory belongs to a channel and a run, dt comes from the measurement, a
 import functools
 import itertools
 import math
+import re
 
 import numpy as np
 import pytest
 from helpers.plants_ab import called, constant, measured, plant_a, plant_b, plant_c
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import catalogue
+from smc_mujoco.control import estimator, surface
+from smc_mujoco.control.law import catalogue, known_laws
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import ultimate_bound
 
@@ -161,6 +163,20 @@ def test_a_law_names_its_equation_and_its_source():
         assert title[0].isupper(), name
         assert "u = " in formula or "u' = " in formula
         assert name == "none" or "Source" in law.doc
+
+
+ALL = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
+
+
+@pytest.mark.parametrize("template", ALL, ids=lambda t: f"{t.kind}-{t.name}")
+def test_the_gains_in_a_docstring_are_those_of_the_function(template):
+    """Each part of `Gains: a, what it is; b and c, what they are.` begins with gains, and every gain is named."""
+    said = re.search(r"^Gains?: (.*?)(?:\.$|\.\nSource|\Z)", template.doc, re.MULTILINE | re.DOTALL)
+    assert bool(said) is bool(template.gains)
+    parts = said[1].split(";") if said else []
+    first = [re.findall(r"\w+", part)[0] for part in parts]
+    assert set(first) <= template.gains.keys()
+    assert template.gains.keys() <= set(re.findall(r"\w+", said[1] if said else ""))
 
 
 @pytest.mark.filterwarnings("error")

@@ -4,7 +4,8 @@
     result.claims[0].verdict
     result.save("evidence.json")                   # claim -> runs -> numbers -> threshold -> verdict
 
-Thresholds are fixed in the paper's file before any run, and are not moved. `verdict` says how checks become verdicts.
+Thresholds are written into the paper's file before its first run; the file says what was changed after it. `verdict`
+says how checks become verdicts.
 """
 
 from __future__ import annotations
