@@ -64,11 +64,16 @@ def prepare(scenario: object) -> Prepared:
     shared = mechanism(scenario)
     check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
+    return Prepared(scenario, why_not(scenario), shared, key)
+
+
+def why_not(scenario: Scenario) -> str:
+    """Return what of a scenario does not compile, in one sentence; "" if all functions do."""
     try:
         _compile(scenario.resolved)
     except NotCompilable as error:
-        return Prepared(scenario, str(error), shared, key)
-    return Prepared(scenario, "", shared, key)
+        return str(error)
+    return ""
 
 
 def _compile(s: Resolved) -> None:

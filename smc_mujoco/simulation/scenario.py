@@ -9,6 +9,7 @@ import copy
 import dataclasses
 import functools
 import hashlib
+import importlib
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -218,8 +219,14 @@ class Scenario:
 
     @property
     def checked(self) -> bool:
-        """Whether the code of its law, its surface and its estimator is checked, see `Law.checked`."""
-        return all(part.checked for part in (self.law, self.surface, self.velocity) if part)
+        """Whether its law, surface and estimator are checked, see `Law.checked`, and all of the run is compiled code.
+
+        What does not compile, such as a signal, runs in Python with all else: a law is then what its file makes of it
+        during the run, and not the code that was checked.
+        """
+        prepare = importlib.import_module("smc_mujoco.simulation.prepare")  # which imports this module
+        parts = (self.law, self.surface, self.velocity)
+        return all(part.checked for part in parts if part) and not prepare.why_not(self)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()

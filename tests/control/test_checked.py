@@ -586,3 +586,32 @@ def test_the_decision_is_made_once(monkeypatch):
     monkeypatch.setattr(checked, "compiled_for", None)
     assert law.checked
     assert dataclasses.replace(law, gains={"k": 5.0}).checked
+
+
+WORDS = {"a": 1}
+
+
+class InPython(smc.Signal):
+    """A signal that numba cannot compile."""
+
+    @staticmethod
+    def value(t, p):
+        """A constant."""
+        return 0.1 * len(WORDS), 0.0, 0.0
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
+def test_a_run_in_python_is_unchecked_though_its_law_is_checked():
+    """There a law is what its file makes of it during the run: here another function than was checked."""
+    space = {"factor": 1.0}
+    exec("def simple(y, gains, memory):\n    return -factor * y.e, y.e", space)
+    law = smc.law_function(space["simple"])()
+    scenario = smc.Scenario(plant="duffing", law=law, duration=0.01)
+    slow = dataclasses.replace(scenario, disturbance=InPython())
+    assert law.checked
+    assert scenario.checked
+    before, python = smc.run(scenario), smc.run(slow)
+    space["factor"] = 2.0
+    assert not slow.checked
+    np.testing.assert_array_equal(smc.run(scenario).u, before.u)
+    assert smc.run(slow).u[0, 0] != python.u[0, 0]
