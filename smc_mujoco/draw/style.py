@@ -28,6 +28,7 @@ from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import Group, group_trace, groups
 from smc_mujoco.metrics.once_per_trace import once_per_trace
 from smc_mujoco.simulation.conditions import CONDITION_FIELDS
+from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Jump, Push
 from smc_mujoco.simulation.trace import Trace
 
@@ -389,6 +390,8 @@ def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
     if hasattr(traces, "column"):
         raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
+    if isinstance(traces, Scenario):
+        raise ScenarioError("traces is a Scenario: run it first, smc.run(scenario)")
     traces = [traces] if isinstance(traces, Trace) else items_of("traces", traces)
     if others := [given for given in traces if not isinstance(given, Trace)]:
         raise ScenarioError(f"traces has {shown(others[0])}, which is no trace: give those of smc.run or smc.load")

@@ -1,21 +1,27 @@
-"""Plants as users name them: by a name of the library, or by an MJCF model and the joints to control.
+"""Plants as users name them: by a name of the library, or by a model and the joints to control.
 
 as_plant("duffing")
 as_plant("arm.xml:shoulder,elbow")
+as_plant("cart.urdf:slider(motor,partner=pole,u_max=20,x0=0.5)")
 """
 
+import dataclasses
 import re
 from pathlib import Path
 from typing import Any
 
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.mechanisms.plant import Plant, plant
 
-MODEL = re.compile(r"(?P<path>.*\.xml)(?::(?P<joints>.*))?", re.DOTALL)
+MODEL = re.compile(r"(?P<path>.*\.(xml|mjcf|urdf))(?::(?P<joints>.*))?", re.DOTALL | re.IGNORECASE)
+BETWEEN_JOINTS = re.compile(r"[+,](?![^(]*\))")
+JOINT = re.compile(r"\s*(?P<joint>[^(]*?)\s*(?:\((?P<fields>.*)\))?\s*", re.DOTALL)
 
 
 def as_plant(value: object) -> Plant:
     """Return a plant: itself, by its name, or from "FILE.xml:joint,joint"."""
+    if isinstance(value, str) and value.lstrip().startswith("<"):
+        raise ScenarioError("plant is the text of a model: give smc.plant_from(text, channels=['joint'])")
     made = from_text(value) if isinstance(value, str) else value
     if not isinstance(made, Plant):
         raise ScenarioError(
@@ -27,13 +33,46 @@ def as_plant(value: object) -> Plant:
 def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     """Return a plant by its name and parameters, or from FILE.xml:joint,joint in a folder and `plant_from`'s arguments.
 
-    A comma or a plus sign is between the joints: plants are separated by commas on the command line.
+    A comma or a plus sign is between the joints: plants are separated by commas on the command line. Fields of a
+    `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2). The law of a channel and its reference are those
+    of the scenario.
     """
     if not (model := MODEL.fullmatch(text)):
         return plant(text, **values)
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 
-    path, joints = model["path"], [joint.strip() for joint in re.split("[+,]", model["joints"] or "")]
-    if not any(joints):
+    path, joints = model["path"], list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
+    if not joints:
         raise ScenarioError(f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow")
-    return plant_from(folder / path, list(filter(None, joints)), **values)
+    channels = dict(map(_channel, joints))
+    if len(channels) < len(joints):
+        raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
+    return plant_from(folder / path, channels, **values)
+
+
+def _channel(text: str) -> tuple[str, Any]:
+    """Return a joint and its Channel from a text such as "lift(motor,u_max=30)"."""
+    from smc_mujoco.mechanisms.custom.channels import Channel
+
+    read = JOINT.fullmatch(text)
+    if read is None:
+        raise ScenarioError(f"channel {text!r} cannot be read: write it as lift(motor,u_max=30,x0=0.2)")
+    fields: dict[str, Any] = {}
+    known = {field.name: field for field in dataclasses.fields(Channel) if field.name not in ("law", "reference")}
+    for item in filter(str.strip, (read["fields"] or "").split(",")):
+        name, _, value = (part.strip() for part in item.partition("="))
+        find(f"field of channel {read['joint']!r}", name, known)
+        if name == "motor":
+            fields[name] = {"": True, "true": True, "false": False}.get(value.lower(), value)
+        elif name == "partner":
+            fields[name] = value
+        else:
+            fields[name] = _number(f"{name} of channel {read['joint']!r}", value)
+    return read["joint"], Channel(**fields) if fields else None
+
+
+def _number(what: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ScenarioError(f"{what} is {text!r}: give a number") from None

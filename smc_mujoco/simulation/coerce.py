@@ -74,6 +74,9 @@ def _component(kind: str, value: object) -> Component:
     if isinstance(value, Component) and value.kind == kind:
         return value
     field = "velocity" if kind == "estimator" else kind
+    if callable(value):
+        made = ", or smc.law_from(function) for a policy of an observation" * (kind == "law")
+        raise ScenarioError(f"{field} is a bare {type(value).__name__}: give smc.{kind}_function(function){made}")
     raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
@@ -213,7 +216,9 @@ def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
     for item in items:
         if not isinstance(item, Signal):
             amplitude = shown(item) if isinstance(item, int | float) else "0.0"
-            raise ScenarioError(f"reference is {shown(item)}: give one signal, such as smc.Constant({amplitude})")
+            cure = f"give one signal, such as smc.Constant({amplitude})"
+            cure = "give its samples, smc.signals.TimeSeries(times, values)" if callable(item) else cure
+            raise ScenarioError(f"reference is {shown(item)}: {cure}")
     return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
 
 

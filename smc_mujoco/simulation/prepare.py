@@ -8,15 +8,19 @@ What does not compile runs in the reference loop; `prepared.why_not` says why.
 
 import dataclasses
 import math
+import re
 from collections.abc import Hashable, Mapping
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.common.jit import Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
+from smc_mujoco.control.estimator import Reading
+from smc_mujoco.control.joint_law import JointMeasurement
+from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -28,6 +32,9 @@ from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
 IDEAL_SENSOR = Encoder(counts=math.inf)
 DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData without channels, and per channel; measured
+RETURNS_OTHERS = re.compile(r"it returns (\d+) numbers instead of")  # of numba, and of jit.attempting
+UNKNOWN_FIELD = re.compile(r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b")
+FIELDS = {record.__name__: record._fields for record in (Measurement, JointMeasurement, Reading)}
 READING_BYTES = 67  # of a delayed sensor's history, per channel and reading, in mjData and in the Batch; measured
 
 
@@ -64,7 +71,9 @@ def prepare(scenario: object) -> Prepared:
     shared = mechanism(scenario)
     check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
-    return Prepared(scenario, why_not(scenario), shared, key)
+    reason = why_not(scenario)
+    _refuse_mistakes(scenario.resolved, reason)
+    return Prepared(scenario, reason, shared, key)
 
 
 def why_not(scenario: Scenario) -> str:
@@ -74,6 +83,19 @@ def why_not(scenario: Scenario) -> str:
     except NotCompilable as error:
         return str(error)
     return ""
+
+
+def _refuse_mistakes(s: Resolved, reason: str) -> None:
+    """Raise ScenarioError if a component does not compile for a reason that would end each run in Python, too."""
+    components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
+    about = reason.partition(" does not compile: ")[0]
+    of = next((part for part in components if about == f"{part.kind} {part.name!r}"), None)
+    if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
+        count, wanted = mistake[1], {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
+        raise ScenarioError(f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}")
+    if of is not None and (mistake := UNKNOWN_FIELD.search(reason)):
+        record = FIELDS.get(mistake[2], ()) or of.gains
+        raise unknown(f"{'field of y' if mistake[2] in FIELDS else 'gain'} in {about}", mistake[1], record)
 
 
 def _compile(s: Resolved) -> None:

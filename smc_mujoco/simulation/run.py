@@ -75,6 +75,8 @@ def run(
     MuJoCo's eight callbacks are global to the process. During a run no other callback is called, and a run fails if
     other code has set one at its end, or has taken its control callback away meanwhile.
     """
+    if isinstance(scenarios, str):
+        raise ScenarioError(f"cannot run {scenarios!r}: give smc.Scenario(plant={scenarios!r}, law='pid')")
     prepared = list(map(prepare, [scenarios] if isinstance(scenarios, Scenario) else scenarios))
     work, count = sum(item.scenario.work for item in prepared), len(prepared)
     with bar(f"{count} run{'s' * (count != 1)}", work, shown=progress) as progress_bar:

@@ -31,7 +31,7 @@ from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, moves_alone
+from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, joint_names, moves_alone
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -192,7 +192,7 @@ class Scenario:
         check_ranges(self.plant.name, self.plant.ranges, self.resolved.x0)
         check_inertia(self.resolved)
         check_names(self.resolved)
-        if doubt := next(_doubts(self.resolved), None):
+        for doubt in filter(None, (next(_doubts(self.resolved), None), _made_up_bound(self))):
             warnings.warn(doubt, ScenarioWarning, users_stacklevel())
 
     @classmethod
@@ -464,6 +464,11 @@ def _default_steps(s: Scenario) -> int:
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
     """Return what the plant's channels suggest, or the default bound; one number if all channels have the same."""
     default = default_u_max(plant)
+    if plant.own and math.inf in plant.limits:  # the bound of one joint's motor is none of another's
+        given = plant.suggested.get("u_max", (None,) * plant.driven)
+        each = [limit if limit < math.inf else U_MAX for limit in plant.limits]
+        bounds = tuple(limit if bound is None else bound for limit, bound in zip(each, given, strict=True))
+        return bounds if len(set(bounds)) > 1 else bounds[0]
     bounds = tuple(default if bound is None else bound for bound in plant.suggested.get("u_max", (None,)))
     return bounds if len(set(bounds)) > 1 else bounds[0]
 
@@ -657,3 +662,23 @@ def _doubts(s: Resolved) -> Iterator[str]:
                 fact = f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
                 fact += f"{s.plant.name} needs {need:.3g} to hold its start"
                 yield f"{fact}: give the motor more gear, voltage or current"
+
+
+def _made_up_bound(s: Scenario) -> str:
+    """Return a sentence about the joints of your own model whose force only a default bounds; "" if there are none."""
+    if s.u_max is not None or not s.plant.own or s.voltage_motor is not None or s.law.name == "none":
+        return ""
+    driven, u_max = range(s.plant.driven), s.resolved.u_max
+    taken = u_max if isinstance(u_max, tuple) else [u_max for _ in driven]
+    limits = s.plant.limits or [math.inf for _ in driven]
+    suggested = s.plant.suggested.get("u_max", [None for _ in driven])
+    free = [i for i in driven if limits[i] == math.inf and suggested[i] is None]
+    if not free:
+        return ""
+    *before, last = [repr(joint_names(s.plant)[i]) for i in free]
+    joints = f"joints {', '.join(before)} and {last}" if before else f"joint {last}"
+    bounds = list(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
+    verb, number = "are" if len(bounds) > 1 else "is", f"{taken[free[0]]:g}"
+    fact = f"nothing bounds the force on {joints} of {s.plant.name}, so that |u| <= {' and '.join(bounds)} {verb} taken"
+    example = f"u_max={number}" if len(driven) == 1 else f"smc.Channel(u_max={number}) for each"
+    return f"{fact}: give u_max, what your motor gives, such as {example}"

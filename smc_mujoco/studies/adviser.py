@@ -36,7 +36,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, case, check_moving, listed, listed_laws
 from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, ties
-from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, Trial, check_tuned, law_or_template
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget
@@ -109,6 +109,8 @@ def which(
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
     candidates = _candidates(trial, _suited(machine, wanted, laws), extent)
+    if not defaults:
+        check_tuned([*candidates.values()])
     table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
     worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)

@@ -40,6 +40,8 @@ from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import WorstCase, cached_worst_case
 
+NOT_TUNED = "not tuned: "  # at the start of a remark
+
 
 class Candidate(NamedTuple):
     """A law with its gains for a plant."""
@@ -108,6 +110,12 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
     words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"
     best = dataclasses.replace(default, gains=tuned.law.gains).sourced(its.kind, its.search)
     return Candidate(best, sets, words * bool(without_unit))
+
+
+def check_tuned(candidates: Sequence[Candidate]) -> None:
+    """Raise ScenarioError, with the first reason, if no law could be tuned: a comparison could say nothing of them."""
+    if candidates and all(one.remark.startswith(NOT_TUNED) for one in candidates):
+        raise ScenarioError(f"{candidates[0].remark.removeprefix(NOT_TUNED)}, or --defaults to compare default gains")
 
 
 class Trial(NamedTuple):
@@ -216,7 +224,7 @@ class Trial(NamedTuple):
         except search.BrokenLawError:
             raise
         except ScenarioError as error:
-            return _default(law, f"not tuned: {error}")
+            return _default(law, f"{NOT_TUNED}{error}")
         return _candidate(default, tuned)
 
     def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any) -> Table:

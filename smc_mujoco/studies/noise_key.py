@@ -107,8 +107,6 @@ def _drawn(folder: Path, laws: dict[str, dict[str, str]]) -> int:
     if key:
         changes = joined(dict.fromkeys(_change_in_words(law, list(before.values())) for law in new))
         print(f"{changes}: a new noise key is drawn, and all runs are done again", file=sys.stderr)
-    elif public(folder):
-        print(f"{folder / FILE} is damaged: a new noise key is drawn, and all runs are done again", file=sys.stderr)
     forget(folder)
     key = draw_key()
     with contextlib.suppress(OSError, ScenarioError):  # nowhere to write: a study that is stopped then begins again

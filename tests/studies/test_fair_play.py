@@ -270,17 +270,3 @@ def test_a_law_that_gives_up_is_never_among_the_best(tmp_path):
         best = {entry.law for entry in board.entries if entry.rank.best}
         assert "gives_up" not in best, board.metric
         assert board.winner != "gives_up"
-
-
-@pytest.mark.parametrize("text", ["", "{", '{"key": "x", "laws": {}}', '{"key": -5, "laws": {}}'])
-def test_a_damaged_key_is_told_and_all_runs_are_done_again(text, tmp_path, capsys):
-    runs = [smc.Scenario(plant="duffing", law="classical", duration=0.01)]
-    first = smc.study(runs, tmp_path, noise_key="drawn").column("noise_key").tolist()
-    capsys.readouterr()
-    (tmp_path / noise_key.FILE).write_text(text)
-    again = smc.study(runs, tmp_path, noise_key="drawn").column("noise_key").tolist()
-    said = f"{tmp_path / noise_key.FILE} is damaged: a new noise key is drawn, and all runs are done again"
-    assert said in capsys.readouterr().err
-    assert again != first
-    smc.study(runs, tmp_path, noise_key="drawn")
-    assert "damaged" not in capsys.readouterr().err

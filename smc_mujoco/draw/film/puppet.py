@@ -33,6 +33,15 @@ class Motion(NamedTuple):
         return self.poses[max(int(np.searchsorted(self.times, time + 1e-9)) - 1, 0)]
 
 
+def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | np.ndarray) -> list[int]:
+    """Return the bodies that joints move, in order: their own and all that hang on these."""
+    moved = set(model.jnt_bodyid[np.asarray(joints, int)].tolist())
+    for body in range(1, model.nbody):
+        if model.body_parentid[body] in moved:
+            moved.add(body)
+    return sorted(moved)
+
+
 class Puppet:
     """The machine of one scenario, with the channels that a film shows."""
 
@@ -46,11 +55,7 @@ class Puppet:
         self.rail = scene.rail(self.scenario, model)  # m, on which a cart stays; inf without one
         self._joints = model.jnt_qposadr[ids]
         self._rotors = [(k, model.jnt_qposadr[rotor]) for k, rotor in enumerate(rotors) if rotor >= 0]
-        moved = set(model.jnt_bodyid[ids].tolist())
-        for body in range(1, model.nbody):
-            if model.body_parentid[body] in moved:
-                moved.add(body)
-        self.links = sorted(moved)  # the bodies that the channels' joints move
+        self.links = moved_bodies(model, ids)
         off_stage = not self.scenario.plant.on_stage
         self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
         self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0

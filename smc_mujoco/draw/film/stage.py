@@ -14,7 +14,7 @@ from PIL import Image
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arm, arrows, camera, scene
 from smc_mujoco.draw.film.canvas import Canvas
-from smc_mujoco.draw.film.puppet import Motion, Puppet, standing_places
+from smc_mujoco.draw.film.puppet import Motion, Puppet, moved_bodies, standing_places
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import Trace
@@ -61,15 +61,12 @@ class Stage:
         self.rest: list[np.ndarray | None] = [None] * len(traces)
         ends = np.cumsum([0, *(puppet.shapes[0].model.nq for puppet in self.puppets)]).tolist()
         self.blocks = [slice(*pair) for pair in itertools.pairwise(ends)]
-        bodies = np.cumsum([0, *(puppet.shapes[0].model.nbody - 1 for puppet in self.puppets)]).tolist()
-        self.links = [
-            np.flatnonzero(np.isin(self.model.geom_bodyid, np.array(puppet.links) + first) & self.visible())
-            for puppet, first in zip(self.puppets, bodies, strict=False)
-        ]
         material = self.model.geom_matid
         self.paint = np.where((material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba)
         names = [[joint.name for joint in joints(models.spec(scenario))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in its] for k, its in enumerate(names)]
+        moved = [moved_bodies(self.model, its) for its in self.joints]  # by joints: bodies without one may be fused
+        self.links = [np.flatnonzero(np.isin(self.model.geom_bodyid, its) & self.visible()) for its in moved]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):
             self.set_shape(k, 0.0)

@@ -39,7 +39,7 @@ def claims(
         Path | None, typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead.")
     ] = None,
 ) -> None:
-    """Audit a paper's claims: measure each against a threshold that was written before its first run.
+    """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
 
     A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
 

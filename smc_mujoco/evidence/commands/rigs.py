@@ -102,7 +102,7 @@ def _fit(
     terminal, named = Terminal(), columns
     options.check_files(json, figure)
     identified = find(
-        as_plant(rig) if rig not in rigs() and (rig in plants() or ".xml" in rig) else rig,
+        as_plant(rig) if rig not in rigs() and (rig in plants() or ":" in rig) else rig,
         [load(file, named) for file in files],
         quantities or None,
         start=start,

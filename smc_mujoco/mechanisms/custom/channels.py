@@ -23,7 +23,7 @@ ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
-CURE = "give smc.Channel(motor=True) for one ideal motor instead"
+CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -63,6 +63,16 @@ def coerce(channels: object) -> Pairs:
     if not pairs:
         raise ScenarioError("channels is empty: give at least one joint's name")
     return tuple((joint, channel(joint, value)) for joint, value in pairs)
+
+
+def as_text(joint: str, channel: Channel) -> str:
+    """Return a channel as on the command line, such as "lift(motor,x0=0.2)"."""
+    given = [
+        field.name if value is True else f"{field.name}={value if isinstance(value, str) else format(value, 'g')}"
+        for field in dataclasses.fields(channel)
+        if field.name not in SUGGESTED and (value := getattr(channel, field.name)) != field.default
+    ]
+    return f"{joint}({','.join(given)})" if given else joint
 
 
 def joints_of(channels: Pairs) -> list[str]:

@@ -14,6 +14,7 @@ import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -27,6 +28,7 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER
 
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # where a <compiler> may say that assets lie
 XML = (".xml", ".mjcf", ".urdf")
+UNSEEN_GROUP = 3  # of geoms: pictures show groups 0 to 2
 DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
@@ -63,7 +65,9 @@ class Source:
             if not self.path:
                 included = {name: content for name, content in self.assets if name.lower().endswith(XML)}
                 return mujoco.MjSpec.from_string(self.text, include=included or None, assets=dict(self.assets))
-            spec = mujoco.MjSpec.from_file(self.path)
+            spec = (
+                _of_urdf(Path(self.path)) if self.path.lower().endswith(".urdf") else mujoco.MjSpec.from_file(self.path)
+            )
         except ValueError as error:
             raise broken(self.path or self.label, str(error)) from None
         if digest(Path(self.path)) != self.sha256:
@@ -78,7 +82,31 @@ class Source:
             raise broken(self.path or self.label, str(error)) from None
 
 
-def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
+def _of_urdf(path: Path) -> mujoco.MjSpec:
+    """Return a URDF with its visual shapes, which MuJoCo leaves out; they replace the others in pictures."""
+    elements = _elements(path)
+    if not elements or elements[0].tag != "robot":
+        return mujoco.MjSpec.from_file(str(path))
+    robot = elements[0]
+    own = robot.find("mujoco")
+    own = ET.SubElement(robot, "mujoco") if own is None else own
+    compiler = own.find("compiler")
+    compiler = ET.SubElement(own, "compiler") if compiler is None else compiler
+    compiler.attrib = {"discardvisual": "false"} | compiler.attrib
+    compiler.set("meshdir", str(path.parent / compiler.get("meshdir", "")))
+    spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
+    for body in spec.bodies:
+        if any(_only_seen(geom) for geom in body.geoms):
+            for geom in body.geoms:
+                geom.group = geom.group if _only_seen(geom) else UNSEEN_GROUP
+    return spec
+
+
+def _only_seen(geom: mujoco.MjsGeom) -> bool:
+    return not geom.contype and not geom.conaffinity
+
+
+def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> Source:
     """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of dm_control to a Source."""
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
@@ -104,11 +132,13 @@ def source(model: object, assets: Mapping[str, bytes] | None = None) -> Source:
     return Source(str(path), digest(path))
 
 
-def _of_text(text: str, assets: Mapping[str, bytes]) -> Source:
+def _of_text(text: str, assets: Mapping[str, Any]) -> Source:
     """Return the source of a text whose files are all among the assets."""
-    fits = isinstance(assets, Mapping) and all(isinstance(k, str) and isinstance(v, bytes) for k, v in assets.items())
+    kinds = bytes | bytearray | memoryview | str
+    fits = isinstance(assets, Mapping) and all(isinstance(k, str) and isinstance(v, kinds) for k, v in assets.items())
     if not fits:
-        raise ScenarioError(f"assets is {shown(assets)}: give names of files with their contents, as bytes")
+        raise ScenarioError(f"assets is {shown(assets)}: give names of files with their contents, as bytes or text")
+    assets = {name: v.encode() if isinstance(v, str) else bytes(v) for name, v in assets.items()}
     given = {PurePosixPath(name).name for name in assets}
     texts = [text, *(content for name, content in assets.items() if name.lower().endswith(XML))]
     for name in _files(element for content in texts for element in _elements(content)):

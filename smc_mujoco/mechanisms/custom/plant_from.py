@@ -74,7 +74,7 @@ class UserModel:
     def argument(self) -> str:
         """The model as written on the command line, such as arm.xml:shoulder+elbow."""
         path = os.path.relpath(self.source.path) if self.source.path else "FILE.xml"
-        return f"{path}:{'+'.join(joint for joint, _ in self.channels)}"
+        return f"{path}:{'+'.join(own.as_text(joint, channel) for joint, channel in self.channels)}"
 
     def about(self) -> dict:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
@@ -108,7 +108,7 @@ def plant_from(
     channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
     name: str | None = None,
     keyframe: str | None = None,
-    assets: Mapping[str, bytes] | None = None,
+    assets: Mapping[str, bytes | str] | None = None,
     timeout: float = 20.0,
     tip: str | None = None,
 ) -> Plant:
@@ -121,7 +121,7 @@ def plant_from(
       name: name of the plant, and title of its pictures; default: the file's, with the model's own name as the title.
       keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
         unless the scenario has a v0.
-      assets: name -> content of the files that a text names.
+      assets: name -> content of the files that a text names, bytes or text.
       tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many joints may read its
         Jacobian.
       timeout: s that MuJoCo may take to compile the model, first in a child process.
