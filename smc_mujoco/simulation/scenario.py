@@ -27,6 +27,7 @@ from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
+from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -43,6 +44,7 @@ MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
+PLAY_STEP = 1.25e-4  # s, with a Backlash; tests/mechanisms/hardware/test_play.py compares with plastic stops
 MIN_JITTER_STEPS = 4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more
 MIN_RESOLVED_LAG = 0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
 DRIVE_STEPS = 4  # physics steps per control period: enough behind any drive, see `longest_step`
@@ -76,10 +78,10 @@ class Scenario:
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s between two runs of the law. The command is held in between.
       physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms with friction
-        (without `exact_friction`), contact, a mechanism, a Backlash or a plant that is not `smooth`, else up to 1 ms;
-        in both cases up to a quarter
-        of the clock's jitter. Where 1 ms holds, a drive whose force changes within a control period may lower it, to a
-        quarter of that period or half of the drive's time constant, whichever is longer.
+        (without `exact_friction`), contact, a mechanism or a plant that is not `smooth`, half of that with a Backlash,
+        else up to 1 ms; always up to a quarter of the clock's jitter. Where 1 ms holds, a drive whose force changes
+        within a control period may lower it, to a quarter of that period or half of the drive's time constant,
+        whichever is longer.
       u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
         A motor's own limit holds too: see `limits`. If u is a voltage, the bound is in V; its default is the motor's.
       x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0; v0 = 0.
@@ -435,6 +437,8 @@ def longest_step(s: Scenario) -> float:
     behind a long delay are slower: a step of half of it is enough. A force that follows u at once sets no limit.
     """
     jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
+    if any(isinstance(part, Backlash) for part in s.actuator):
+        return min(PLAY_STEP, jitter)
     if not (s.plain_equation or s.exact_friction):
         return min(REALISTIC_STEP, jitter)
     one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(s.actuator[0], Lag)

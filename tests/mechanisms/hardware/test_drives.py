@@ -206,7 +206,7 @@ def test_flanks_meet_without_bounce_and_without_gain(speed, inertia):
 def test_play_comes_after_any_drive(name, order):
     for drive in (DCMotor(inductance=0.0), MOTOR):
         parts = (LuGre(0.05, 0.08, 0.01), *(drive, Backlash(0.02, 1e-3))[::order])
-        model = build(plant(name), *parts)
+        model = build(plant(name), *parts, h=1.25e-4)
         n = len(drive_ids(model))
         assert [model.joint(model.actuator_trnid[i, 0]).name[:6] for i in drive_ids(model)] == ["rotor:"] * n
         own = MOTOR.gear**2 * MOTOR.rotor_inertia
