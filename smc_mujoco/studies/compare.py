@@ -33,7 +33,7 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
-from smc_mujoco.studies.fair_gains import Candidate, Trial, check_tuned, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, Extent
@@ -229,8 +229,6 @@ def compare(
     number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
     number, budget = whole("searches", number, 1, search.MAX_SEARCHES), whole("budget", budget, 1, search.MAX_BUDGET)
     candidates = _candidates(trial, laws, tune, gains, number, budget)
-    for of_plant in () if defaults else candidates.values():
-        check_tuned(of_plant)
     table = trial.run(candidates, count, executor=workers, traces=traces, noise_key=noise_key)
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)

@@ -40,7 +40,7 @@ from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import WorstCase, cached_worst_case
 
-NOT_TUNED = "not tuned: "  # at the start of a remark
+NOT_TUNED, UNTUNABLE = "not tuned: ", "tuning is not possible here: "  # at the start of a remark
 
 
 class Candidate(NamedTuple):
@@ -88,7 +88,7 @@ def _without_search(plant: Plant, law: Component | Template, gains: str) -> Cand
         count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(gain_sets.law(plant, law.name, gains), sets)
-    return _default(law, f"tuning is not possible here: {plant.unscaled.partition(':')[0]}") if plant.unscaled else None
+    return _default(law, f"{UNTUNABLE}{plant.unscaled.partition(':')[0]}") if plant.unscaled else None
 
 
 def _default(law: Component | Template, remark: str = "") -> Candidate:
@@ -113,9 +113,10 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
 
 
 def check_tuned(candidates: Sequence[Candidate]) -> None:
-    """Raise ScenarioError, with the first reason, if no law could be tuned: a comparison could say nothing of them."""
-    if candidates and all(one.remark.startswith(NOT_TUNED) for one in candidates):
-        raise ScenarioError(f"{candidates[0].remark.removeprefix(NOT_TUNED)}, or --defaults to compare default gains")
+    """Raise ScenarioError, with the first reason, if none of several laws could be tuned: none could be advised."""
+    if len(candidates) > 1 and all(one.remark.startswith((NOT_TUNED, UNTUNABLE)) for one in candidates):
+        why = candidates[0].remark.removeprefix(NOT_TUNED)
+        raise ScenarioError(f"{why}; or give laws with gains, or defaults=True (--defaults) for default gains")
 
 
 class Trial(NamedTuple):

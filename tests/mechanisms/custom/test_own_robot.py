@@ -1,5 +1,6 @@
 """A robot of one's own: what a text says of its channels, bounds, mistakes in laws, and the shapes of a URDF."""
 
+import re
 import warnings
 
 import mujoco
@@ -33,6 +34,7 @@ RUN = {"law": "classical", "duration": 0.01}
 def folder(tmp_path, monkeypatch):
     (tmp_path / "mine.xml").write_text(MODEL)
     (tmp_path / "arm.urdf").write_text(ARM)
+    (tmp_path / "one.xml").write_text(re.sub(r"<body pos.*?</body>", "", MODEL, flags=re.DOTALL))
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -161,3 +163,17 @@ def test_machines_on_a_fused_base_have_the_colours_of_their_own_laws(folder, mon
     smc.film(traces, "a.png", at=0.0, size=(320, 180))
     names = [[seen[0].model.body(seen[0].model.geom_bodyid[i]).name for i in its] for its in seen[0].links]
     assert names == [["m0/l1", "m0/l2"], ["m1/l1", "m1/l2"]]
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("mine.xml:tilt(motor,u_max=9)", "tuning is not possible here: it has no nominal model"),
+        ("one.xml:lift(motor,u_max=60)", "one starts at 0 under 'nominal', where a law has nothing"),
+    ],
+)
+def test_what_no_tuning_can_answer_is_refused_before_the_first_run(folder, text, why):
+    with pytest.raises(smc.ScenarioError, match=why) as refused:
+        smc.which(text, laws=["classical", "pid"], conditions="noise", seeds=1, duration=0.05, out=folder / "out")
+    assert "defaults=True" in str(refused.value)
+    assert not list(folder.glob("out/**/*.parquet"))
