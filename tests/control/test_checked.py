@@ -356,21 +356,28 @@ REPLACED = {
 }
 
 
-@pytest.fixture
-def replaced(request):
-    """Let an author say what numba compiles for its own operations, and undo it."""
-    request.param()
+def definitions():
+    """All lists of what numba compiles for its operations and attributes."""
     context, typing = numba_internals.cpu_target.target_context, numba_internals.cpu_target.typing_context
     context.refresh()
-    yield
+    typing.refresh()
     selectors = [*context._defns.values(), *context._getattrs.values(), context._casts]
+    return selectors, [*(selector.versions for selector in selectors), *typing._attributes.values()]
+
+
+@pytest.fixture
+def replaced(request):
+    """Let an author say what numba compiles for its own operations, and undo it: only what the author has added."""
+    before = {id(one) for its in definitions()[1] for one in its}
+    request.param()
+    added = [one for its in definitions()[1] for one in its if id(one) not in before]
+    assert added
+    yield
+    selectors, lists = definitions()
+    for its in lists:
+        its[:] = [one for one in its if not any(one is its_own for its_own in added)]
     for selector in selectors:
-        own = [(kinds, how) for kinds, how in selector.versions if checked._home(checked._written(how))]
-        if len(own) < len(selector.versions):
-            selector.versions[:] = own
-            selector._cache.clear()
-    for templates in typing._attributes.values():
-        templates[:] = [template for template in templates if checked._home(template)]
+        selector._cache.clear()
     checked._found.cache_clear()
 
 
