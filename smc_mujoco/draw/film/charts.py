@@ -9,7 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
@@ -17,7 +19,11 @@ from smc_mujoco.draw.panels import Panel
 from smc_mujoco.simulation.trace import Trace
 
 DPI = 100
-FUTURE_OPACITY = 0.16  # of curves that are still to come
+FUTURE_LINE, FUTURE_BAND = 0.45, 0.12  # opacity of what is still to come
+LANE_BAND = 0.45  # opacity of a band in a lane of its own
+LANE_WIDTH, LANE_HEIGHT = 0.82, 0.84  # of a panel's width and of a lane's pitch; beside a lane is how far u swings
+END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
+SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 LEFT, RIGHT = 0.062, 0.985  # of the width: where the charts begin and end
 CHART_GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one if there are two
 CURSOR = np.array(style.rgb(style.MUTED))
@@ -39,24 +45,29 @@ class Charts:
             axes = figure.subplots(1, len(strip))
             wide = (RIGHT - LEFT + CHART_GAP) / len(strip) - CHART_GAP
             figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.2, top=0.855, wspace=CHART_GAP / wide)
-            artists = []
+            artists, rows = [], []
             for ax, panel in zip(axes, strip, strict=True):
                 set_titles(ax, panel, DPI * scale / 72)
-                ax.set_xlim(0.0, self.end)
-                ax.set_xlabel("time (s)", labelpad=2)
-                ax.tick_params(length=0)
-                panels.mark(ax, style.marks(traces, names), named=False)
-                artists += panels.over_time(ax, panel, colours, bands=not panels.crowded(panel))
+                rows.append(lanes(ax, panel, colours) if in_lanes(panel) else [(ax, panel, colours)])
+                for row, part, shades in rows[-1]:
+                    row.set_xlim(0.0, self.end)
+                    row.tick_params(length=0)
+                    panels.mark(row, style.marks(traces, names), named=False)
+                    bands = in_lanes(panel) or not panels.crowded(panel)
+                    artists += panels.over_time(row, part, shades, among=panel.traces, bands=bands)
+                rows[-1][-1][0].set_xlabel("time (s)", labelpad=2)
+                if in_lanes(panel):
+                    swings(rows[-1])
+            bands = [artist for artist in artists if isinstance(artist, PolyCollection)]
             self.full = picture(canvas)
             for artist in artists:
-                artist.set_alpha(FUTURE_OPACITY * (artist.get_alpha() or 1.0))
+                artist.set_alpha(FUTURE_BAND if artist in bands else FUTURE_LINE * (artist.get_alpha() or 1.0))
             self.faint = picture(canvas)
         height = self.full.shape[0]
-        boxes = [ax.get_window_extent() for ax in axes]
+        boxes = [Bbox.union([ax.get_window_extent() for ax, *_ in row]) for row in rows]
         self.frames = [tuple(round(c) for c in (b.x0, height - b.y1, b.x1, height - b.y0)) for b in boxes]
         self.paths = [
-            [path(ax, trace, panel.quantity, height) for trace in panel.traces]
-            for ax, panel in zip(axes, strip, strict=True)
+            [path(ax, trace, part.quantity, height) for ax, part, _ in row for trace in part.traces] for row in rows
         ]
 
     def at(self, time: float) -> np.ndarray:
@@ -81,6 +92,43 @@ class Charts:
         for radius, ink in ((self.dot + 1.5, np.array(style.rgb(style.PAPER))), (self.dot, colour)):
             cover = np.clip(radius + 0.5 - distance, 0.0, 1.0)[..., None]
             image[rows, cols] = (image[rows, cols] * (1 - cover) + ink * cover).astype(np.uint8)
+
+
+Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, its colours
+
+
+def in_lanes(panel: Panel) -> bool:
+    """Return whether each law's u has a lane: else bands of several laws would hide each other."""
+    return panel.quantity == "u" and len(panel.traces) > 1 and panels.crowded(panel)
+
+
+def lanes(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Row]:
+    """Return a lane for each trace of a panel, from above, in place of its axes, which keep the title."""
+    ax.set_axis_off()
+    pitch, rows = 1.0 / len(panel.traces), list[Row]()
+    for i, (trace, colour) in enumerate(zip(panel.traces, colours, strict=True)):
+        lane = ax.inset_axes((0.0, 1.0 - (i + 1) * pitch, LANE_WIDTH, LANE_HEIGHT * pitch))
+        lane.tick_params(labelbottom=i + 1 == len(panel.traces), labelleft=False)
+        rows.append((lane, panel._replace(traces=[trace]), [colour]))
+    return rows
+
+
+def swings(rows: Sequence[Row]) -> None:
+    """Say beside each lane how far u swings at the end of the run, with a bar; "smooth" if it does not."""
+    for lane, panel, (colour,) in rows:
+        (trace,), (low, high) = panel.traces, lane.get_ylim()
+        for band in lane.collections:
+            band.set_alpha(LANE_BAND)
+        u = trace.u[-max(2, round(END_SHARE * len(trace.t))) :]
+        least, most = float(np.nanmin(u)), float(np.nanmax(u))
+        swing = 0.5 * (most - least)
+        words = f"±{swing:.2g}" if swing > SMOOTH_SHARE * (high - low) else "smooth"
+        words = "fails" if trace.diverged_at is not None else words
+        if words.startswith("±"):
+            ends = lane.transLimits.transform([(0.0, least), (0.0, most)])[:, 1]
+            lane.plot([1.012, 1.012], ends, color=colour, lw=style.points(5), transform=lane.transAxes, clip_on=False)
+        size = style.points(9.5)
+        lane.text(1.035, 0.5, words, transform=lane.transAxes, va="center", fontsize=size, color=style.INK)
 
 
 def set_titles(ax: Axes, panel: Panel, point: float) -> None:

@@ -1,0 +1,65 @@
+"""Where bands of several laws would hide each other, each law's u has a lane, which says how far it swings."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+from helpers.sketch import made
+
+import smc_mujoco as smc
+from smc_mujoco.draw import style
+from smc_mujoco.draw.film import charts
+
+SIZE = (1280, 260)
+LAWS = ("observer_free", "classical", "adaptive")
+
+
+def swinging(law, amplitude):
+    """A run whose u switches between +-amplitude at every sample after its first tenth."""
+    trace = made(smc.Scenario(plant="duffing", law=law, duration=1.0))
+    signs = np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0) * (trace.t > 0.1)
+    return dataclasses.replace(trace, u=(amplitude * signs)[:, None])
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    said = []
+    plain = charts.swings
+    monkeypatch.setattr(charts, "swings", lambda rows: (plain(rows), said.append(rows)))
+    traces = [swinging(law, amplitude) for law, amplitude in zip(LAWS, (0.0, 2.0, 6.0), strict=True)]
+    made_of = charts.Charts(traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0)
+    return made_of, said[0]
+
+
+def test_each_law_has_a_lane_that_says_its_swing(drawn):
+    _, rows = drawn
+    assert [lane.texts[-1].get_text() for lane, *_ in rows] == ["smooth", "±2", "±6"]
+    tops = [lane.get_window_extent().y1 for lane, *_ in rows]
+    assert tops == sorted(tops, reverse=True)
+    for (lane, *_), (below, *_) in itertools.pairwise(rows):
+        assert below.get_window_extent().y1 < lane.get_window_extent().y0
+
+
+def test_two_laws_that_chatter_are_told_apart(drawn):
+    """In the middle of each lane the height of the band is in proportion to the swing, in the law's colour."""
+    made_of, rows = drawn
+    picture = made_of.at(1.0).astype(int)
+    heights = []
+    for lane, _, (colour,) in rows:
+        box = lane.get_window_extent()
+        column = picture[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
+        paper, ink = np.array([255.0] * 3), np.array(style.rgb(colour), float)
+        wanted = paper + charts.LANE_BAND * (ink - paper)
+        heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))
+    assert heights[0] <= 2
+    assert heights[2] == pytest.approx(3.0 * heights[1], rel=0.25)
+
+
+def test_what_is_to_come_is_seen_but_fainter(drawn):
+    made_of, rows = drawn
+    lane = rows[2][0]
+    box = lane.get_window_extent()
+    at = int(SIZE[1] - 0.5 * (box.y0 + box.y1)) - 6, int(0.8 * box.x1 + 0.2 * box.x0)
+    past, future = (made_of.at(time)[at].astype(int) for time in (1.0, 0.2))
+    assert 255 > future.min() > past.min()
