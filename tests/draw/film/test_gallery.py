@@ -1,0 +1,44 @@
+"""The clips of the gallery are what the code would make today: of each, a few pictures are made anew."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from smc_mujoco.common import gl
+from smc_mujoco.draw.film.film import pictures
+
+GALLERY = Path(__file__).parents[3] / "videos" / "gallery.py"
+BLOCK = 25  # px
+MAX_DIFFERENCE = 20.0  # of 255, of the mean of a block: WebP and another renderer change it by a few
+made = importlib.util.spec_from_file_location("gallery", GALLERY)
+assert made is not None
+assert made.loader is not None
+gallery = importlib.util.module_from_spec(made)
+made.loader.exec_module(gallery)
+
+
+def blocks(picture):
+    """Return the mean of each block of a picture, (rows, columns, 3)."""
+    height, width = (size - size % BLOCK for size in picture.shape[:2])
+    return picture[:height, :width].reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).mean(axis=(1, 3))
+
+
+def test_each_file_is_a_clip():
+    assert {path.stem for path in gallery.FOLDER.iterdir()} == set(gallery.CLIPS)
+
+
+@pytest.mark.skipif(bool(gl.missing()), reason="no OpenGL")
+@pytest.mark.parametrize("name", gallery.CLIPS)
+def test_a_clip_is_what_the_code_would_make(name):
+    frames = gallery.CLIPS[name].frames()
+    with Image.open(gallery.FOLDER / f"{name}.webp") as kept:
+        assert (kept.n_frames, kept.size) == (len(frames), frames.size)
+        for k in (len(frames) // 3, 2 * len(frames) // 3):
+            clock = type(frames.clock)(frames.clock.times[k - 1 : k + 1], frames.clock.speeds[k - 1 : k + 1])
+            *_, new = pictures(frames.traces, clock, None, frames.title, frames.size)
+            kept.seek(k)
+            old = np.asarray(kept.convert("RGB"), float)
+            assert np.abs(blocks(old) - blocks(new.astype(float))).max() < MAX_DIFFERENCE, f"{name}: make gallery"
