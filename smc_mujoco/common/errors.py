@@ -29,6 +29,10 @@ class ScenarioError(ValueError):
         super().__init__(printable(f"{start}...{message[-END_OF_MESSAGE:]}" if long else message))
 
 
+class BrokenLawError(ScenarioError):
+    """An error: a law fails whatever its gains are."""
+
+
 class ScenarioWarning(UserWarning):
     """A scenario that runs, but is probably not what its author means. The message is one sentence, as an error's."""
 

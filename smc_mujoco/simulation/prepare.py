@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, shown, unknown
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
 from smc_mujoco.common.jit import Function, NotCompilable
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
@@ -86,16 +86,17 @@ def why_not(scenario: Scenario) -> str:
 
 
 def _refuse_mistakes(s: Resolved, reason: str) -> None:
-    """Raise ScenarioError if a component does not compile for a reason that would end each run in Python, too."""
+    """Raise BrokenLawError if a component does not compile for a reason that would end each run in Python, too."""
     components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     about = reason.partition(" does not compile: ")[0]
     of = next((part for part in components if about == f"{part.kind} {part.name!r}"), None)
     if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
         count, wanted = mistake[1], {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
-        raise ScenarioError(f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}")
+        raise BrokenLawError(f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}")
     if of is not None and (mistake := UNKNOWN_FIELD.search(reason)):
         record = FIELDS.get(mistake[2], ()) or of.gains
-        raise unknown(f"{'field of y' if mistake[2] in FIELDS else 'gain'} in {about}", mistake[1], record)
+        kind = f"{'field of y' if mistake[2] in FIELDS else 'gain'} in {about}"
+        raise BrokenLawError(str(unknown(kind, mistake[1], record)))
 
 
 def _compile(s: Resolved) -> None:

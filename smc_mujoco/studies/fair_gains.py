@@ -22,7 +22,7 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
 from smc_mujoco.common.progress import about, bar, note
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
@@ -222,7 +222,7 @@ class Trial(NamedTuple):
                     lambda made, path: made.save(path),
                     result.load,
                 )
-        except search.BrokenLawError:
+        except BrokenLawError:
             raise
         except ScenarioError as error:
             return _default(law, f"{NOT_TUNED}{error}")

@@ -985,11 +985,11 @@ def real(tmp_path_factory):
 
 def test_a_board_of_chattering_says_where_no_run_was_compared_with_half_its_step(tmp_path):
     said = {}
-    for condition in ("nominal", "coulomb"):
+    for condition in ("nominal", "backlash"):
         runs = grid("duffing", ["classical", "twisting"], condition, 1, duration=0.5)
         boards = leaderboard(run_study(runs, tmp_path / condition), ["itae", "chattering_amplitude"])
         said[condition] = [board.by_step for board in boards], "half the physics step" in " ".join(str(boards).split())
-    assert said == {"nominal": ([False, False], False), "coulomb": ([False, True], True)}
+    assert said == {"nominal": ([False, False], False), "backlash": ([False, True], True)}
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.metrics.conventions import scale
-from smc_mujoco.simulation.scenario import MAX_STEP, REALISTIC_STEP
+from smc_mujoco.simulation.scenario import MAX_STEP, PLAY_STEP, REALISTIC_STEP
 
 LAWS = ("observer_free", "boundary_layer")
 SCORES = ("settling_time", "ultimate_bound", "tv_rate")
@@ -162,7 +162,8 @@ def test_the_obstacles_of_the_study_are_hit():
 
 def test_realistic_mechanisms_take_the_step_of_the_study_by_default():
     steps = {group[0].resolved.physics_step for key, group in brief().items() if key[1] != "encoder"}
-    assert steps == {REALISTIC_STEP, MAX_STEP}  # the latter under RK4, behind a lag or a motor without inductance
+    # MAX_STEP under RK4, behind a lag or a motor without inductance; PLAY_STEP for stops that do not bounce
+    assert steps == {REALISTIC_STEP, MAX_STEP, PLAY_STEP}
 
 
 def table(chosen):

@@ -48,7 +48,7 @@ from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.analysis.tuning.stages import EVOLVED_SHARE, SCREENED_SHARE
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, users_stacklevel, whole
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning, find, users_stacklevel, whole
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
@@ -79,10 +79,6 @@ RULE = (
     " COBYQA, until 2 n + 2 evaluations for n gains lower J by less than 0.1 %. Both may leave the box by a decade"
 )
 Report = Callable[[int], None]
-
-
-class BrokenLawError(ScenarioError):
-    """An error: a law fails whatever its gains are."""
 
 
 def tune(

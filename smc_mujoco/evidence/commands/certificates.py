@@ -85,11 +85,16 @@ def _certified(
 ) -> "tuple[Scenario, Certificate, WorstCase | None]":
     """Return a scenario, its certificate and, if `worst`, the worst case within the bounds."""
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.control import gain_sets
     from smc_mujoco.evidence.certificates.maker import certify as make
+    from smc_mujoco.mechanisms.named import as_plant
     from smc_mujoco.simulation.grid import case
     from smc_mujoco.studies.worst_case import worst_case
 
-    scenario = case(plant, options.law(law), condition, gains=gains)
+    machine, chosen = as_plant(plant), options.law(law)
+    if isinstance(chosen, str) and gain_sets.in_set(machine, chosen, gains):
+        chosen = gain_sets.law(machine, chosen, gains)  # the best of the searches, where run i has those of search i
+    scenario = case(machine, chosen, condition, gains=gains)
     within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
     if worst and within is None:
         raise ScenarioError("--worst needs a bound to search within: give --disturbance")
