@@ -26,11 +26,12 @@ from smc_mujoco.simulation.trace import Trace
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
-MAX_DRAWN_CHANNELS = 9  # channels of a network that are drawn one by one
+MAX_DRAWN_CHANNELS = 40  # channels of a network that are drawn one by one; of more, those between which all lie
 LASTING_QUANTILE = 0.98  # of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
 MAX_SMALL = 12  # channels that each have small panels
 CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
+SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
 COINCIDENT_DISTANCE = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
 COINCIDENT_SHARE = 0.99  # of coinciding curves' samples, so that controls that switch a sample apart coincide; chosen
 DASH_LENGTH = 5.0  # widths of a line
@@ -184,13 +185,14 @@ def meaning(panels: Sequence[Panel]) -> dict[str, str]:
     n = max((len(panel.group.channels) for panel in panels if panel.quantity not in SINGLE), default=1)
     banded = dict.fromkeys(panel.quantity for panel in panels if panel.quantity not in UNBANDED)
     windows = [mean_window(panel.traces) for panel in panels if panel.quantity == "u"]
-    over, single, words = max(filter(None, windows), default=None), len(drawn_channels(n)), {}
+    over, single, words = max(filter(None, windows), default=None), min(n, MAX_DRAWN_CHANNELS), {}
     if banded and (over or n > 1):
         words["band"] = f"range of {', '.join(banded).replace('force', 'delivered')}"
     if over:
         words["line"] = f"mean over {1e3 * over:.3g} ms where it chatters"
     if n > 1:
         words["thin lines"] = f"the {n} channels" if single == n else f"{single} of {n} channels"
+        words["thin lines"] += ", the slowest thick" * any(panel.quantity == "x" for panel in panels)
     if any(panel.quantity in PEAKS for panel in panels):
         words["peaks"] = f"largest in {1e3 * peak_window(panels[0].traces):.3g} ms"
     return words
@@ -219,7 +221,7 @@ def mean_window(traces: Sequence[Trace]) -> float | None:
     low, high = limits(traces, "u")
     times = []
     for trace in filter(smoothed, traces):
-        lines = trace.u.T[drawn_channels(trace.u.shape[1])]
+        lines = trace.u.T[drawn_channels(trace.u)]
         if any(np.abs(smooth(u, window(trace)) - u).max() > VISIBLE_CHATTERING * (high - low) for u in lines):
             times.append(window(trace) * trace.scenario.control_period)
     return max(times, default=None)
@@ -290,8 +292,10 @@ def over_time(
             artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
         look: dict[str, Any] = {"color": colour, "drawstyle": steps}
         if y.shape[1] > 1:
-            for i in drawn_channels(y.shape[1]):
-                artists += ax.plot(*curve(trace, y[:, i], name), alpha=0.8, lw=style.points(LIGHT_LINE), **look)
+            slowest = {int(np.nansum(np.abs(y - trace.r), axis=0).argmax())} if name == "x" else set()
+            for i in sorted({*drawn_channels(y).tolist(), *slowest}):
+                width, alpha = (SLOWEST_LINE, 1.0) if i in slowest else (LIGHT_LINE, 0.55)
+                artists += ax.plot(*curve(trace, y[:, i], name), alpha=alpha, lw=style.points(width), **look)
         else:
             artists += ax.plot(*path, lw=style.points(LINE), ls=dash, **look)
         # a trace that is cut to a close-up may end before its run failed
@@ -398,7 +402,7 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
         x, v = trace.x.mean(axis=1) / (right - left), trace.v.mean(axis=1) / (high - low)
         lines.append((np.concatenate([trace.t, trace.t + trace.t[-1]]), np.concatenate([x, v])))
     for trace, colour, dash in reversed(list(zip(traces, colours, dashes(lines, 1.0), strict=True))):
-        shown, width = drawn_channels(trace.x.shape[1]), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
+        shown, width = drawn_channels(trace.x), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
         for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
             ax.plot(x, v, color=colour, lw=width, ls=dash)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
@@ -452,9 +456,16 @@ def crowded(panel: Panel) -> bool:
     return wide > MAX_BANDS
 
 
-def drawn_channels(n: int) -> np.ndarray:
-    """Return the indices of the channels, of n, that are drawn one by one."""
-    return np.unique(np.linspace(0, n - 1, min(n, MAX_DRAWN_CHANNELS)).round().astype(int))
+def drawn_channels(y: np.ndarray) -> np.ndarray:
+    """Return the indices of the channels that are drawn one by one, of y (K + 1, n), with its least and largest value.
+
+    Their curves reach over all that the channels do, so that no state is hidden.
+    """
+    n = y.shape[1]
+    if n <= MAX_DRAWN_CHANNELS:
+        return np.arange(n)
+    extremes = [int(np.nanargmin(y)) % n, int(np.nanargmax(y)) % n]
+    return np.unique([*np.linspace(0, n - 1, MAX_DRAWN_CHANNELS - 2).round().astype(int), *extremes])
 
 
 def lasting(traces: Sequence[Trace], name: str) -> list[np.ndarray]:

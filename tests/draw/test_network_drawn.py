@@ -1,0 +1,34 @@
+"""Curves of a network's figure reach over all that its channels do; the slowest is thick."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from helpers.sketch import made
+from matplotlib.figure import Figure
+
+import smc_mujoco as smc
+from smc_mujoco.draw import panels
+
+
+def network(n):
+    """A network whose channels fall from starts of both signs, the last but one the most slowly."""
+    plant = smc.plant("pendulum_network", n=n)
+    trace = made(smc.Scenario(plant=plant, law="classical", duration=1.0))
+    starts = np.where(np.arange(n) % 4 == 1, -0.4, 0.1 + 0.4 * np.arange(n) / n)
+    rates = np.where(np.arange(n) == n - 2, 0.5, 5.0)
+    return dataclasses.replace(trace, x=starts * np.exp(-rates * trace.t[:, None]), r=0.0 * trace.r)
+
+
+@pytest.mark.parametrize("n", [5, 20, 60])
+def test_no_drawn_range_is_smaller_than_the_data_s(n):
+    trace = network(n)
+    (panel,) = panels.over_groups([trace], "x")
+    ax = Figure().subplots()
+    panels.over_time(ax, panel, ["#0072B2"])
+    curves = [np.asarray(line.get_ydata(), float) for line in ax.lines if len(line.get_xdata()) > 2]
+    lowest, highest = min(curve.min() for curve in curves), max(curve.max() for curve in curves)
+    assert (lowest, highest) == pytest.approx((trace.x.min(), trace.x.max()), abs=1e-3)
+    assert len(curves) >= min(n, panels.MAX_DRAWN_CHANNELS)
+    thick = max(ax.lines, key=lambda line: line.get_linewidth())
+    assert np.asarray(thick.get_ydata(), float)[-1] == pytest.approx(trace.x[-1, n - 2])
