@@ -321,7 +321,7 @@ class Controller:
         model = np.array([models[0], of_joint])
         done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
         if done < 0:
-            raise ScenarioError("the law raised an exception in the harmonic balance")
+            raise ScenarioError("the law raised an exception in the harmonic balance: correct the law")
         if done < len(x):
             raise ScenarioError(f"the law returned {out[done, 0]:g} at x = {y[X]:g}, v = {y[V]:g}: correct the law")
         return out[:, 0], out[:, 1]

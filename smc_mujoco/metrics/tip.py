@@ -102,7 +102,8 @@ def contacts(trace: Trace) -> Contacts:
     if scenario.contact.kind == "none":
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
     if hidden := _with_hidden_state(scenario):
-        raise ScenarioError(f"the state of {type(hidden[0]).__name__} is not in a trace, so its contacts are unknown")
+        part = type(hidden[0]).__name__
+        raise ScenarioError(f"the state of {part} is not in a trace, so its contacts are unknown: run without {part}")
     compiled = models.compile_model(scenario)
     model = models.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)

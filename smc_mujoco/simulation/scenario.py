@@ -499,7 +499,9 @@ def check_clock(s: Resolved) -> None:
             "give a physics_step that divides it"
         )
     if s.samples < 1:
-        raise ScenarioError(f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} s")
+        raise ScenarioError(
+            f"duration {s.duration:g} s is shorter than one control period of {s.control_period:g} s: give a longer one"
+        )
     if s.samples * s.steps > MAX_STEPS or (s.samples + 1) * s.plant.n > MAX_VALUES:
         raise ScenarioError(
             f"duration {s.duration:g} s is {s.samples:.3g} control samples of {s.plant.n} channels and "
@@ -507,7 +509,9 @@ def check_clock(s: Resolved) -> None:
             f"(at most {MAX_VALUES:.0e} values and {MAX_STEPS:.0e} steps)"
         )
     if s.jump is not None and s.jump.time >= s.duration:
-        raise ScenarioError(f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s")
+        raise ScenarioError(
+            f"jump at {s.jump.time:g} s comes after the end of the run at {s.duration:g} s: give an earlier time"
+        )
     if s.sensor is not None:
         s.sensor.check(s.physics_step)
     s.clock.check(s.control_period, s.physics_step)

@@ -83,15 +83,13 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
 @pytest.mark.slow
 @COARSELY
 def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is(refused):
-    refused(
-        lambda: smc.design.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66", recorded=False
-    )
+    refused(lambda: smc.design.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66")
 
 
 @pytest.mark.slow
 def test_speeds_at_which_a_law_has_no_cycle_do_not_count(refused):
     said = "Hz at least, at whatever speed: give a larger one"
-    refused(lambda: smc.design.gains_for("super_twisting", "duffing", frequency=10.0, **LAG), said, recorded=False)
+    refused(lambda: smc.design.gains_for("super_twisting", "duffing", frequency=10.0, **LAG), said)
 
 
 @smc.law_function(gains={"k": 1.0})

@@ -235,7 +235,7 @@ def test_a_plant_takes_masses_and_lengths_above_0_and_none_of_its_parameters_bey
             assert not taken(name, key, 0.0) or low <= 0.0
         for n in (base.sizes[0] - 1, base.sizes[1] + 1):
             said = "n of {} is {}: give a whole number from {} to {}".format(name, n, *base.sizes)
-            assert refused(lambda name=name, n=n: smc.plant(name, n=n), recorded=False) == said
+            assert refused(lambda name=name, n=n: smc.plant(name, n=n)) == said
     refused(lambda: smc.plant("duffing").load(nuserdata=-1))
 
 

@@ -420,7 +420,7 @@ def test_every_parameter_of_every_plant_must_be_a_finite_number(refused):
         refused(lambda value=value: smc.plant("duffing", beta=value), "duffing", "beta")
     for plant in smc.plants():
         for name in smc.plant(plant).parameters:
-            refused(lambda plant=plant, name=name: smc.plant(plant, **{name: NAN}), plant, name, recorded=False)
+            refused(lambda plant=plant, name=name: smc.plant(plant, **{name: NAN}), plant, name)
 
 
 def test_every_gain_of_every_law_must_be_a_finite_number(refused):
@@ -429,7 +429,7 @@ def test_every_gain_of_every_law_must_be_a_finite_number(refused):
     for law in smc.laws():
         for name, default in smc.law(law).gains.items():
             for value in (NAN,) if default == INF else (NAN, INF):  # a bound that may be none
-                refused(lambda change={name: value}, law=law: smc.law(law, **change), law, name, recorded=False)
+                refused(lambda change={name: value}, law=law: smc.law(law, **change), law, name)
 
 
 def test_gains_that_must_be_positive_are(refused):

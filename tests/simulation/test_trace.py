@@ -303,29 +303,29 @@ def test_a_folder_is_no_trace(tmp_path, refused):
 def test_what_is_no_archive_is_no_trace(tmp_path, refused):
     for content in (b"", b"PK", b"PK\3\4" + bytes(100), b"hello", bytes(1000), b"\x93NUMPY"):
         (tmp_path / "a.npz").write_bytes(content)
-        refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz", recorded=False)
+        refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
 
 
 def test_a_bare_array_is_no_trace(tmp_path, refused):
     np.save(tmp_path / "a.npy", np.zeros(3))
-    refused(lambda: smc.load(tmp_path / "a.npy"), "a.npy", recorded=False)
+    refused(lambda: smc.load(tmp_path / "a.npy"), "a.npy")
 
 
 def test_another_archive_is_no_trace(tmp_path, refused):
     np.savez(tmp_path / "a.npz", x=np.zeros(3))
-    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz", recorded=False)
+    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
 
 
 def test_pickled_objects_are_not_loaded(tmp_path, refused):
     np.savez(tmp_path / "a.npz", about=np.array([{"a": 1}], dtype=object))
-    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz", recorded=False)
+    refused(lambda: smc.load(tmp_path / "a.npz"), "a.npz")
 
 
 def test_a_truncated_file_is_no_trace(trace, tmp_path, refused):
     for part in (0.1, 0.5, 0.9, 0.999):
         path = trace.save(tmp_path / "a.npz")
         path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
-        refused(lambda path=path: smc.load(path), "a.npz", recorded=False)
+        refused(lambda path=path: smc.load(path), "a.npz")
 
 
 def test_a_file_with_a_flipped_byte_is_no_trace_or_the_same_one(trace, tmp_path):
@@ -369,7 +369,7 @@ def test_a_description_that_makes_no_sense_is_no_trace(trace, tmp_path, refused)
         lambda about: about | {"reference": {"kind": "Sinus"}},
     ):
         path = tampered(trace, tmp_path, about)
-        refused(lambda path=path: smc.load(path), recorded=False)
+        refused(lambda path=path: smc.load(path))
 
 
 def test_arrays_of_the_wrong_shape_are_no_trace(trace, tmp_path, refused):
@@ -383,7 +383,7 @@ def test_arrays_of_the_wrong_shape_are_no_trace(trace, tmp_path, refused):
     ):
         assert trace.x.shape == (11, 3)
         path = tampered(trace, tmp_path, x=array)
-        refused(lambda path=path: smc.load(path), "a.npz", recorded=False)
+        refused(lambda path=path: smc.load(path), "a.npz")
 
 
 def with_member(trace, folder, name: str, content: bytes) -> Path:
@@ -425,7 +425,7 @@ def test_a_member_that_is_no_array_is_no_trace(trace, tmp_path, refused):
         b"\x93NUMPY\x09\x00" + bytes(20),
     ):
         path = with_member(trace, tmp_path, "x", content)
-        refused(lambda path=path: smc.load(path), "a.npz", recorded=False)
+        refused(lambda path=path: smc.load(path), "a.npz")
 
 
 def test_a_description_that_is_no_json_is_no_trace(trace, tmp_path, refused):
@@ -433,7 +433,7 @@ def test_a_description_that_is_no_json_is_no_trace(trace, tmp_path, refused):
         text = np.array(about)
         header = f"{{'descr': '{text.dtype.str}', 'fortran_order': False, 'shape': ()}}"
         path = with_member(trace, tmp_path, "about", array(header, text.tobytes()))
-        refused(lambda path=path: smc.load(path), "a.npz", recorded=False)
+        refused(lambda path=path: smc.load(path), "a.npz")
 
 
 def test_a_file_that_is_encrypted_or_packed_in_another_way_is_no_trace(trace, tmp_path, refused):
@@ -442,7 +442,7 @@ def test_a_file_that_is_encrypted_or_packed_in_another_way_is_no_trace(trace, tm
     for offset, value in ((6, 1), (8, 99)):  # of a local header; 8 and 10 of the directory's
         at = good.index(b"PK\1\2") + offset + 2
         path.write_bytes(good[:at] + bytes([value]) + good[at + 1 :])
-        refused(lambda path=path: smc.load(path), "a.npz", recorded=False)
+        refused(lambda path=path: smc.load(path), "a.npz")
 
 
 @pytest.mark.parametrize("name", ["a.npz", "a"])
@@ -454,7 +454,7 @@ def test_a_pipe_that_nobody_writes_to_is_no_trace(name, tmp_path, refused):
 def test_a_scenario_that_could_not_be_read_back_is_not_saved(trace, tmp_path, monkeypatch, refused):
     monkeypatch.setattr("smc_mujoco.simulation.trace.MAX_TEXT", 100)
     said = "its scenario is a text of", "and more than 100 are not read back: give it shorter time series"
-    refused(lambda: trace.save(tmp_path / "a.npz"), *said, recorded=False)  # the text has the versions of packages
+    refused(lambda: trace.save(tmp_path / "a.npz"), *said)  # the text has the versions of packages
     assert names(tmp_path) == []
 
 
@@ -472,13 +472,13 @@ WRITERS = {
 @pytest.mark.parametrize("ending", WRITERS)
 def test_where_a_file_stands_in_the_way_of_a_folder_one_sentence_says_so(ending, trace, tmp_path, refused):
     (tmp_path / "file").write_text("")
-    refused(lambda: WRITERS[ending](trace, tmp_path / "file" / f"a.{ending}"), f"a.{ending}", recorded=False)
+    refused(lambda: WRITERS[ending](trace, tmp_path / "file" / f"a.{ending}"), f"a.{ending}")
 
 
 @pytest.mark.parametrize("ending", WRITERS)
 def test_where_a_folder_stands_in_the_way_of_a_file_nothing_is_left(ending, trace, tmp_path, refused):
     (tmp_path / f"a.{ending}").mkdir()
-    refused(lambda: WRITERS[ending](trace, tmp_path / f"a.{ending}"), f"a.{ending}", recorded=False)
+    refused(lambda: WRITERS[ending](trace, tmp_path / f"a.{ending}"), f"a.{ending}")
     assert names(tmp_path) == [f"a.{ending}"]
 
 
@@ -486,11 +486,11 @@ def test_where_a_folder_stands_in_the_way_of_a_file_nothing_is_left(ending, trac
 @pytest.mark.parametrize("ending", WRITERS)
 def test_a_folder_that_cannot_be_written_is_named(ending, trace, tmp_path, refused):
     tmp_path.chmod(0o500)
-    refused(lambda: WRITERS[ending](trace, tmp_path / f"a.{ending}"), f"a.{ending}", recorded=False)
+    refused(lambda: WRITERS[ending](trace, tmp_path / f"a.{ending}"), f"a.{ending}")
 
 
 def test_a_name_too_long_is_refused(trace, tmp_path, refused):
-    refused(lambda: trace.save(tmp_path / ("a" * 400 + ".npz")), recorded=False)
+    refused(lambda: trace.save(tmp_path / ("a" * 400 + ".npz")))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="resource")
@@ -538,7 +538,7 @@ def test_a_write_that_breaks_off_leaves_the_old_file_and_no_other(
 
     monkeypatch.setattr(os, "replace", breaks)
     if isinstance(error, OSError):
-        refused(lambda: WRITERS[ending](trace, path), f"a.{ending}", error.strerror or error, recorded=False)
+        refused(lambda: WRITERS[ending](trace, path), f"a.{ending}", error.strerror or error)
     else:
         with pytest.raises(KeyboardInterrupt):
             WRITERS[ending](trace, path)

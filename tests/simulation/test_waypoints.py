@@ -153,7 +153,7 @@ def test_a_point_beyond_reach_is_named_with_its_distance(refused):
         "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
         "m away; give points within reach, or another x0",
     )
-    refused(lambda: smc.signals.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said, recorded=False)
+    refused(lambda: smc.signals.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said)
 
 
 def test_a_path_of_countless_pieces_is_refused_at_once(refused):
