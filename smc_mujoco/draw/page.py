@@ -122,7 +122,10 @@ def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
 
 
 def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = "") -> None:
-    """Draw the title with the legend below it, in as few rows as fit, and a note at the right of the title."""
+    """Draw the title with the legend below it, in as few rows as fit, and a note at the right of the title.
+
+    A long title has smaller letters, no smaller than the legend's.
+    """
     size, big, room = style.points(TEXT_SIZE), style.points(TITLE_SIZE), 72 * width - 16
     words, columns = _legend(handles, width)
     if note:
@@ -132,6 +135,7 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         look = {"fontsize": size, "color": style.MUTED, "parse_math": False, "annotation_clip": False}
         text = Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, va="baseline", **look)
         page.add_artist(text).set_in_layout(False)
+    big = max(size, min(big, big * room / style.width(title, big, bold=True))) if title else big
     legend = page.legend(
         handles=handles or [Line2D([], [], lw=0)],
         labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _

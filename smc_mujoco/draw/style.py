@@ -41,6 +41,7 @@ LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logar
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
 MAX_CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
 MIN_DISTANCE = 0.03  # colours closer than this are mistaken for each other, see `distance`; chosen
+DARKEST = 0.32  # lightness of the darkest shade of a ramp, in OKLab; chosen
 OKLAB_CONES = np.array([
     [0.4122214708, 0.5363325363, 0.0514459929],
     [0.2119034982, 0.6806995451, 0.1073969566],
@@ -435,9 +436,24 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return tuple(bytes.fromhex(colour[1:]))  # pyright: ignore[reportReturnType]
 
 
+def mixed(colour: str, other: str, share: float) -> str:
+    """Return a colour mixed with this share of another."""
+    return "#" + "".join(f"{round(a + share * (b - a)):02X}" for a, b in zip(rgb(colour), rgb(other), strict=True))
+
+
 def lighter(colour: str) -> str:
     """Return a law's colour for a dark page: mixed with white."""
-    return "#" + "".join(f"{round((1.0 - WHITE_SHARE) * part + WHITE_SHARE * 255):02X}" for part in rgb(colour))
+    return mixed(colour, PAPER, WHITE_SHARE)
+
+
+def ramp(colour: str, count: int, lightest: float = 0.66) -> list[str]:
+    """Return shades of a colour from light to dark, in equal steps of OKLab's lightness.
+
+    The default of `lightest` has a contrast of 3 : 1 to paper.
+    """
+    shades = [mixed(colour, other, share) for other in (PAPER, "#000000") for share in np.linspace(0.0, 0.95, 96)]
+    lightness = np.array([3.0 * _place(shade)[0] for shade in shades])
+    return [shades[int(np.abs(lightness - level).argmin())] for level in np.linspace(lightest, DARKEST, count)]
 
 
 def letters_on(colour: str) -> str:

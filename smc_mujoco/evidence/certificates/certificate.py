@@ -260,19 +260,20 @@ class Certificate:
             made.sentences  # noqa: B018  # raises if the file is no certificate
             return made
 
-    def figure(self, path: str | os.PathLike[str] | None = None, traces: "Sequence[Trace]" = ()):
+    def figure(self, path: str | os.PathLike[str] | None = None, traces: "Sequence[Trace]" = (), worst_of: int = 0):
         """Draw the state plane: region, level sets, bound, and runs, such as the worst found.
 
         Args:
           path: of the files PATH.svg and PATH.png, or of a .pdf; None: nothing is written.
           traces: runs of the same plant.
+          worst_of: of how many runs they are the worst found; 0: of none.
 
         Raises:
           ScenarioError: an unknown kind of file, or a network, whose states do not fit into a plane.
         """
         from smc_mujoco.evidence.certificates.figure import draw
 
-        return draw(self, traces, path)
+        return draw(self, traces, path, worst_of)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
-from smc_mujoco.draw.region import BLUES
 from smc_mujoco.evidence.certificates import loops
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import EFFORT
@@ -18,10 +19,13 @@ from smc_mujoco.simulation.trace import Trace
 FIGURE_SIZE = (11.0, 5.6)  # inches
 ZOOM_BOUNDS = 2.5  # half-width of the second panel as a multiple of the bound: chosen
 AXIS_POINTS = 801  # points of the plane in each direction
+LIGHTEST, FADED = 0.85, 0.75  # lightness of the levels, in OKLab; share of paper in the region's colour: chosen
 LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
 
 
-def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike[str] | None = None) -> Any:
+def draw(
+    certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike[str] | None = None, worst_of: int = 0
+) -> Any:
     """Draw a certificate's state plane; see `Certificate.figure`."""
     data, unit = certificate.data, certificate.data["unit"]
     if data["plant"]["n"] > 1:
@@ -30,27 +34,31 @@ def draw(certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike
     if part is None and not certificate.stable:
         raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
     paths = pages.files(path)
+    law = style.law_colour(certificate.law)
+    shades = style.ramp(law, 3, LIGHTEST)
+    bounded = part is not None and not certificate.rests
+    width, height = FIGURE_SIZE[0] if bounded else 0.62 * FIGURE_SIZE[0], FIGURE_SIZE[1]
     with style.page(FIGURE_SIZE[0]):
-        bounded = part is not None and not certificate.rests
-        page = pages.blank(FIGURE_SIZE[0] if bounded else 0.62 * FIGURE_SIZE[0], FIGURE_SIZE[1], None)
+        page = pages.blank(width, height, None)
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
         for ax, zoom in zip(axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False):
             X, V = np.meshgrid(x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0))
             if part is None:
-                _energy(ax, certificate, X, V)
+                _energy(ax, certificate, X, V, shades)
             else:
-                _region(ax, certificate, part, X, V)
+                _region(ax, certificate, part, X, V, shades)
             for trace in traces:
-                ax.plot(trace.x[:, 0], trace.v[:, 0], color=style.REACTION, linewidth=style.points(1.2))
+                ax.plot(trace.x[:, 0], trace.v[:, 0], color=law, linewidth=style.points(1.8))
                 ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
             ax.set(xlim=X[0, [0, -1]], ylim=V[[0, -1], 0], xlabel=f"position ({unit})", ylabel=f"velocity ({unit}/s)")
         under = f"|d| ≤ {data['disturbance']:g} {EFFORT[unit]}" if data["disturbance"] else "no disturbance"
         plant = style.plant_name(as_plant(certificate.plant))
-        axes[0].set_title(f"{style.law_name(certificate.law)} on {plant}, {under}")
         if bounded:
             axes[1].set_title("around the bound")
-        _legend(page, certificate, part, bool(traces))
+        handles = _key(certificate, part, shades)
+        handles += [Line2D([], [], color=law, label=_run_words(trace, unit, worst_of)) for trace in traces]
+        pages.set_head(page, width, f"Certificate: {style.law_name(certificate.law)}, {plant}, {under}", handles)
         pages.write(page, paths)
     return page
 
@@ -69,40 +77,45 @@ def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.nda
     return np.linspace(-1.08 * far_x, 1.08 * far_x, AXIS_POINTS), np.linspace(-1.08 * far_v, 1.08 * far_v, AXIS_POINTS)
 
 
-def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray) -> None:
+def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray, shades: Sequence[str]) -> None:
     """Fill the region, and draw its levels and the bound."""
-    W = certificate.level(X, V)
+    W, (light, middle, dark) = certificate.level(X, V), shades
     levels = np.linspace(part["inner"], part["outer"], LEVELS)
-    ax.contourf(X, V, W, [-1.0, part["outer"]], colors=[BLUES[2]], alpha=0.25)
-    ax.contour(X, V, W, levels[1:-1], colors=[BLUES[2]], linewidths=style.points(0.7))
-    ax.contour(X, V, W, levels[-1:], colors=[BLUES[0]], linewidths=style.points(1.6))
-    ax.contourf(X, V, W, [-1.0, part["inner"]], colors=[BLUES[0]], alpha=0.8)
+    ax.contourf(X, V, W, [-1.0, part["outer"]], colors=[style.mixed(light, style.PAPER, FADED)])
+    ax.contour(X, V, W, levels[1:-1], colors=[middle], linewidths=style.points(0.7))
+    ax.contour(X, V, W, levels[-1:], colors=[dark], linewidths=style.points(1.6))
+    ax.contourf(X, V, W, [-1.0, part["inner"]], colors=[light], antialiased=True)
+    ax.contour(X, V, W, levels[:1], colors=[dark], linewidths=style.points(1.0))
     for side in () if certificate.rests else (-1.0, 1.0):
         ax.axvline(side * part["bound"], color=style.INK, linewidth=style.points(0.8), linestyle=(0, (4, 3)))
 
 
-def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray) -> None:
+def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray, shades: Sequence[str]) -> None:
     """Draw level sets of V."""
     value = loops.energy(certificate.data, X, V)
     top = float(loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0])  # the energy at rest at the edge
-    ax.contour(X, V, value, top * np.linspace(0.15, 1.0, LEVELS) ** 2, colors=[BLUES[1]], linewidths=style.points(0.9))
+    ax.contour(X, V, value, top * np.linspace(0.15, 1.0, LEVELS) ** 2, colors=shades[1:2], linewidths=style.points(0.9))
 
 
-def _legend(page: Any, certificate: Any, part: Any, runs: bool) -> None:
-    """Say what the lines are, below the panels."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
+def _key(certificate: Any, part: Any, shades: Sequence[str]) -> list[pages.Handle]:
+    """Return what the areas and the lines of the plane are."""
+    light, middle, dark = shades
+    if part is None:
+        return [Line2D([], [], color=middle, label="level sets of V, which never rises")]
+    ends = f"ends in |x| ≤ {part['bound']:.3g} {certificate.data['unit']}"
+    told = "certified: " + ("comes to rest" if certificate.rests else ends)
+    handles: list[pages.Handle] = [
+        Patch(facecolor=style.mixed(light, style.PAPER, FADED), edgecolor=dark, label=told),
+        Line2D([], [], color=middle, label="level sets of W, which falls"),
+        Patch(facecolor=light, edgecolor=dark, label="innermost level"),
+    ]
+    bound = [Line2D([], [], color=style.INK, linestyle=(0, (4, 3)), label="bound")]
+    return handles + bound * (not certificate.rests)
 
-    handles: list[Any] = [Line2D([], [], color=BLUES[1], label="level sets of V, which never rises")]
-    if part is not None:
-        ends = f"ends in |x| ≤ {part['bound']:.3g} {certificate.data['unit']}"
-        told = "certified: " + ("comes to rest" if certificate.rests else ends)
-        handles = [
-            Patch(facecolor=BLUES[2], edgecolor=BLUES[0], alpha=0.5, label=told),
-            Line2D([], [], color=BLUES[2], label="level sets of W, which falls"),
-            Patch(facecolor=BLUES[0], label="innermost level"),
-        ]
-        handles += [Line2D([], [], color=style.INK, linestyle=(0, (4, 3)), label="bound")] * (not certificate.rests)
-    if runs:
-        handles.append(Line2D([], [], color=style.REACTION, label="run"))
-    page.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=style.points(9.5))
+
+def _run_words(trace: Trace, unit: str, worst_of: int) -> str:
+    """Return what a run is, with the range of its disturbance."""
+    low, high = trace.d.min(), trace.d.max()
+    drawn = f"d from {low:.3g} to {high:.3g}" if low < high else f"d = {low:.3g}"
+    what = f"the worst of {worst_of} runs" if worst_of else "run"
+    return f"{what}, {drawn} {EFFORT[unit]}".replace("-", "−")

@@ -30,8 +30,10 @@ def certify(
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
-    figure: Annotated[Path | None, options.picture("the state plane, with a run")] = None,
-    worst: Annotated[bool, typer.Option("--worst", help="Also find and draw the worst d.")] = False,
+    figure: Annotated[
+        Path | None, options.picture("the state plane, with the worst run found within --disturbance")
+    ] = None,
+    worst: Annotated[bool, typer.Option("--worst", help="Also find the worst d, as for a figure.")] = False,
     check: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again.")
     ] = None,
@@ -63,7 +65,7 @@ def certify(
         made.check()
         terminal.note(f"{check}: every statement is proven", "bold")
     elif plant:
-        scenario, made, worst_run = _certified(plant, law, condition, gains, disturbance, slope, worst)
+        scenario, made, worst_run = _certified(plant, law, condition, gains, disturbance, slope, worst, bool(figure))
     else:
         raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
     terminal.print(tables.certificate(made))
@@ -76,14 +78,22 @@ def certify(
         terminal.wrote(made.save(out))
     if figure:
         shown = worst_run.scenario if worst_run else scenario
-        made.figure(figure, run([shown]) if shown and shown.plant.n == 1 else ())
+        traces = run([shown]) if shown and shown.plant.n == 1 else ()
+        made.figure(figure, traces, worst_run.tried if worst_run else 0)
         terminal.wrote(*pictures)
 
 
 def _certified(
-    plant: str, law: str, condition: str, gains: str, disturbance: float | None, slope: float | None, worst: bool
+    plant: str,
+    law: str,
+    condition: str,
+    gains: str,
+    disturbance: float | None,
+    slope: float | None,
+    worst: bool,
+    drawn: bool,
 ) -> "tuple[Scenario, Certificate, WorstCase | None]":
-    """Return a scenario, its certificate and, if `worst`, the worst case within the bounds."""
+    """Return a scenario, its certificate and, if `worst` or `drawn`, the worst case within its bounds."""
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.control import gain_sets
     from smc_mujoco.evidence.certificates.maker import certify as make
@@ -99,4 +109,5 @@ def _certified(
     if worst and within is None:
         raise ScenarioError("--worst needs a bound to search within: give --disturbance")
     made = make(scenario, within)
-    return scenario, made, worst_case(scenario, METRIC, within, progress=True) if worst else None
+    attacked = within and (worst or (drawn and machine.n == 1))
+    return scenario, made, worst_case(scenario, METRIC, within, progress=True) if attacked else None

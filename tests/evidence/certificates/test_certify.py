@@ -10,6 +10,7 @@ import dataclasses
 import functools
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control import gain_sets
+from smc_mujoco.draw import style
 from smc_mujoco.evidence.certificates.certificate import Certificate
 
 pytest.importorskip("flint", reason="python-flint is not installed: the extra proof does")
@@ -692,3 +694,22 @@ if __name__ == "__main__":
     for name in FORCE:
         left, outside = escapes(name, 100_000, 8.0)
         print(f"{name}: of 100000 starts {left} left the certified set, {outside} did not end within the bound")
+
+
+def test_the_run_inside_a_certified_bound_is_the_worst_found_in_the_laws_colour(tmp_path, monkeypatch, capsys):
+    from smc_mujoco.cli.main import main
+    from smc_mujoco.evidence.certificates import figure
+
+    drawn = []
+    monkeypatch.setattr(figure.pages, "write", lambda page, paths: drawn.append(page))
+    monkeypatch.setattr("smc_mujoco.studies.worst_case.MIN_RUNS", 4)
+    monkeypatch.setattr("smc_mujoco.studies.worst_case.DEFAULT_STEPS", 1)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["certify", "duffing", "--disturbance", "2", "--figure", "d.png"])
+    assert ended.value.code in (0, None)
+    (page,) = drawn
+    (run,) = [text for legend in page.legends for text in legend.get_texts() if "runs" in text.get_text()]
+    assert re.fullmatch(r"the worst of \d+ runs, d from −[12][.\d]* to [12][.\d]* N", run.get_text())
+    lines = [line for line in page.axes[0].lines if len(line.get_xdata()) > 1000]
+    assert [line.get_color() for line in lines] == [style.law_colour("observer_free")]
