@@ -7,7 +7,6 @@ import json
 import matplotlib.text
 import numpy as np
 import pytest
-from helpers.sketch import sketch
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
@@ -367,11 +366,21 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
 
 
 @pytest.mark.parametrize("size", [None, COLUMN])
-def test_a_board_of_made_up_runs_as_recorded(size, snapshot):
-    rows = Rows(laws=("classical", "super_twisting", "adaptive"), still="duffing" if size else "", tiny=size is None)
+def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_settles_is_hollow(size):
+    laws = ("classical", "super_twisting", "adaptive")
+    rows = Rows(laws=laws, still="duffing" if size else "")
     rows.rows = [row for row in rows.rows if row[0] == "duffing"]
-    metrics = ["settling_time", "ultimate_bound", "settles"]
-    assert sketch(smc.plot(rows, metrics=metrics, size=size, title="A board" if size else None)) == snapshot
+    page = smc.plot(rows, metrics=["settling_time", "ultimate_bound", "settles"], size=size)
+    settling, bound, settles = page.axes
+    for k, (law, colour) in enumerate(zip(laws, style.law_colours(laws), strict=True)):
+        sizes = [[row[4] for row in rows.rows if row[1:3] == (name, law)] for name in ("nominal", "noise")]
+        dots = [line for line in bound.lines if line.get_marker() not in ("None", None, "")]
+        mine = [np.array(dot.get_xydata()).tolist()[0] for dot in dots if to_hex(dot.get_color()) == to_hex(colour)]
+        assert mine == [[pytest.approx(np.median(each)), k + 4 * i] for i, each in enumerate(sizes)]
+    fills = {str(dot.get_mfc()).lower() for dot in settling.lines if dot.get_marker() in ("o", "s", "D")}
+    assert (fills == {style.PAPER.lower()}) == (size is not None)
+    shares = {float(np.array(dot.get_xdata())[0]) for dot in settles.lines if dot.get_marker() in ("o", "s", "D")}
+    assert shares == {0.0 if size else 1.0}
 
 
 def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():

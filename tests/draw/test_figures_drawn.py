@@ -1,19 +1,23 @@
-"""Every kind of figure of made-up data, recorded with its places, sizes, colours and words."""
+"""What every figure holds to, whatever it shows: names with units, colours in the legend, data whole and inside."""
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
 from helpers import arms
-from helpers.sketch import failed, made, sketch
+from helpers.sketch import failed, made
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import Chattering
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.analysis.step_halving import StepChange
-from smc_mujoco.draw import amplitudes, region
+from smc_mujoco.draw import amplitudes, region, style
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.draw.pareto import pareto
@@ -24,6 +28,9 @@ from smc_mujoco.simulation.trace import PLANT_DIVERGED
 
 SINE = smc.Sine(0.3, 4.0)
 ALL = ("x", "error", "spread", "v", "u", "delivered", "reaction", "d", "s", "channels", "phase", "settling", "end")
+NEUTRAL = {to_hex(colour) for colour in (style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID)}
+UNIT = re.compile(r"\((?:s|ms|1/s|s²|unit of s|[µm]?(?:m|rad|N|N·m|V)(?:/s)?)\)")
+UNITLESS = re.compile(r"share of .*|(real|imaginary) part|.*\bs")  # also s, whose unit is the law's
 
 
 def switching(trace: smc.Trace, size: float) -> smc.Trace:
@@ -36,77 +43,63 @@ def duffing(law: str, **fields) -> smc.Trace:
     return made(smc.Scenario(plant="duffing", law=law, **{"duration": 1.2} | fields))
 
 
-def test_a_figure_of_a_machine_with_friction_a_gear_a_jump_and_a_failure(snapshot):
+def machines() -> list[smc.Trace]:
+    """Friction, a gear, a jump and a failure."""
     parts = {"friction": Coulomb(0.4), "actuator": smc.Backlash(0.04), "reference": SINE}
     jumping = duffing("classical", jump=smc.Jump(0.5, {"mass": 2.0}), **parts)
     lost = failed(duffing("adaptive", **parts), 700, f"{PLANT_DIVERGED}, at t = 0.7 s")
     rests = dataclasses.replace(jumping, v=np.where(jumping.t < 0.8, 1.0, 0.0)[:, None] * jumping.v)
-    traces = [switching(rests, 1.0), switching(duffing("super_twisting", **parts), 0.7), lost]
-    assert sketch(figure(traces)) == snapshot
+    return [switching(rests, 1.0), switching(duffing("super_twisting", **parts), 0.7), lost]
 
 
-def test_a_figure_of_a_network_under_two_laws(snapshot):
+def network() -> list[smc.Trace]:
     plant = smc.plant("pendulum_network", n=11)
-    traces = [made(smc.Scenario(plant=plant, law=law, duration=0.3)) for law in ("classical", "adaptive")]
-    assert sketch(figure(traces, title="Pendulums", size=(9.0, 6.0))) == snapshot
+    return [made(smc.Scenario(plant=plant, law=law, duration=0.3)) for law in ("classical", "adaptive")]
 
 
-def test_a_column_of_every_panel_of_a_cart_with_a_pole(snapshot):
-    law = smc.law("classical")
-    trace = made(smc.Scenario(plant="cart_pole", law=law, duration=0.4, contact="none", friction=Coulomb(0.01)))
-    small = dataclasses.replace(trace, x=0.01 * trace.x, u=0.02 * trace.u)
-    assert sketch(figure(small, size="ieee-column", panels=ALL, labels=["small"])) == snapshot
+def cart() -> list[smc.Trace]:
+    trace = made(smc.Scenario(plant="cart_pole", law="classical", duration=0.4, contact="none", friction=Coulomb(0.01)))
+    return [dataclasses.replace(trace, x=0.01 * trace.x, u=0.02 * trace.u)]
 
 
-@pytest.mark.parametrize("size", [None, (4.0, 7.0)])
-def test_an_arm_of_which_one_run_is_far_off_and_one_is_hit(size, snapshot):
-    hit = made(smc.Scenario(plant=arms.arm(), law=smc.law("none"), reference=SINE, duration=0.3))
-    push = smc.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
-    hit = dataclasses.replace(hit, scenario=dataclasses.replace(hit.scenario, disturbance=push))
-    far = dataclasses.replace(hit, x=hit.r + 50.0 * (hit.x - hit.r))
-    same = dataclasses.replace(hit, x=hit.x + 1e-4)
-    assert sketch(figure([hit, far, same], labels=["near", "far", "same"], size=size)) == snapshot
+def arm() -> list[smc.Trace]:
+    """One run, and one that is far off."""
+    near = made(smc.Scenario(plant=arms.arm(), law=smc.law("none"), reference=SINE, duration=0.3))
+    return [near, dataclasses.replace(near, x=near.r + 50.0 * (near.x - near.r))]
 
 
-def test_signals_of_two_laws_under_two_conditions(snapshot):
+def conditions() -> dict[str, dict[str, smc.Trace]]:
     calm = [duffing("classical"), switching(duffing("super_twisting"), 0.7)]
-    jump = [
-        dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.4, {"mass": 2.0})))
-        for one in calm
-    ]
+    jumps = [dataclasses.replace(one.scenario, jump=smc.Jump(0.4, {"mass": 2.0})) for one in calm]
+    jump = [dataclasses.replace(one, scenario=scenario) for one, scenario in zip(calm, jumps, strict=True)]
     jump[1] = failed(jump[1], 300, "the law raised ValueError: no")
-    page = signals(
-        {"calm": dict(zip("ab", calm, strict=True)), "heavier": dict(zip("ab", jump, strict=True))}, None, "Duffing"
-    )
-    assert "\n".join(map(sketch, page.subfigs)) == snapshot
+    return {"calm": dict(zip("ab", calm, strict=True)), "heavier": dict(zip("ab", jump, strict=True))}
 
 
-def test_amplitudes_of_two_laws_that_are_equal_at_one_lag(monkeypatch, snapshot):
-    lags = (0.002, 0.01, 0.05)
-    laws = {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)}
-    sizes = {}
-    runs = {f"{tau:g} s": {} for tau in lags}
+def lags():
+    """Two laws whose amplitudes are equal at a lag of 50 ms; half the step changes the run at 10 ms."""
+    times, laws = (0.002, 0.01, 0.05), {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)}
+    sizes, runs = {}, {f"{tau:g} s": {} for tau in times}
     for label, (law, factor, power) in laws.items():
-        for tau in lags:
+        for tau in times:
             trace = duffing(law, actuator=smc.Lag(tau), duration=0.01)
             sizes[id(trace.scenario)] = sizes[id(trace)] = factor * tau**power
             runs[f"{tau:g} s"][label] = trace
     changes = [StepChange(0.05, 0.0), StepChange(0.2, 0.0), StepChange(0.0, 0.01)]
-    monkeypatch.setattr(amplitudes, "predict", lambda one, ranges: Chattering(amplitude=sizes[id(one)], frequency=1.0))
-    monkeypatch.setattr(amplitudes, "channel_cycle", lambda trace: (1.1 * sizes[id(trace)], 3.0))
-    monkeypatch.setattr(amplitudes, "step_halving", lambda traces, channel: changes)
-    assert sketch(amplitudes.amplitudes(runs)) == snapshot
+    with pytest.MonkeyPatch.context() as patch:
+        predicted = lambda one, ranges: Chattering(amplitude=sizes[id(one)], frequency=1.0)  # noqa: E731
+        patch.setattr(amplitudes, "predict", predicted)
+        patch.setattr(amplitudes, "channel_cycle", lambda trace: (1.1 * sizes[id(trace)], 3.0))
+        patch.setattr(amplitudes, "step_halving", lambda traces, channel: changes)
+        return amplitudes.amplitudes(runs)
 
 
-def test_harmonic_balance_and_the_last_periods_of_a_run(snapshot):
-    scenarios = [
-        smc.Scenario(plant="duffing", law=law, actuator=smc.Lag(0.01), duration=1.2)
-        for law in ("super_twisting", "observer_free")
-    ]
+def balance():
+    lag = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 1.2}
+    scenarios = [smc.Scenario(law=law, **lag) for law in ("super_twisting", "observer_free")]
     cycle = Chattering(amplitude=0.2, amplitude_x=0.01, frequency=8.0, response=complex(-0.02, 0.003))
     changes = [StepChange(0.11, 0.0), StepChange(0.09, 0.05)]
-    page = nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
-    assert sketch(page) == snapshot
+    return nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
 
 
 def accuracy(law: str, plant: str = "duffing", order: float = 1.9, theory: float | None = 2.0) -> Accuracy:
@@ -118,21 +111,168 @@ def accuracy(law: str, plant: str = "duffing", order: float = 1.9, theory: float
     return Accuracy(**names, periods=periods, e=scaling, s=scaling, runs=8, failed=0, floor=1e-9)
 
 
-@pytest.mark.parametrize("size", [None, "ieee-column"])
-def test_orders_of_laws_with_and_without_a_theory(size, snapshot):
-    rows = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("adaptive", order=math.nan)]
-    page = orders(rows if size else [rows[0], accuracy("super_twisting", "van_der_pol")], size=size)
-    assert sketch(page) == snapshot
-
-
-@pytest.mark.parametrize("size", [None, (4.0, 6.0)])
-def test_maps_of_states_that_converge_early_or_late_or_not(size, snapshot):
+def basins() -> list[Basin]:
     outcome = np.array([[CONVERGES, CONVERGES, DOES_NOT], [CONVERGES, UNDECIDED, DOES_NOT]], np.int8)
     decided = np.array([[2.0, 4.0, 8.0], [8.0, 16.0, 1.0]])
     names = {"plant": "van_der_pol", "unit": "m", "duration": 16.0, "outcome": outcome, "decided_at": decided}
     grid = {"x": np.array([-1.0, 0.0, 2.0]), "v": np.array([-3.0, 3.0])}
-    maps = [Basin(law="classical", source="tuned", **names, **grid), Basin(law="adaptive", **names, **grid)]
-    assert sketch(region.draw(maps, size=size)) == snapshot
+    return [Basin(law="classical", source="tuned", **names, **grid), Basin(law="adaptive", **names, **grid)]
+
+
+LAWS = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("adaptive", order=math.nan)]
+PAGES = {
+    "machines": lambda: figure(machines()),
+    "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
+    "every panel": lambda: figure(cart(), size="ieee-column", panels=ALL, labels=["small"]),
+    "arm": lambda: figure(arm(), labels=["near", "far"]),
+    "signals": lambda: signals(conditions(), None, "Duffing"),
+    "lags": lags,
+    "balance": balance,
+    "orders": lambda: orders([accuracy("super_twisting"), accuracy("super_twisting", "van_der_pol")]),
+    "orders of laws": lambda: orders(LAWS, size="ieee-column"),
+    "maps": lambda: region.draw(basins()),
+}
+
+
+def places(line: Line2D) -> np.ndarray:
+    """The points of a line or a mark, (points, 2)."""
+    return np.array(line.get_xydata(), float)
+
+
+def every(page) -> list[Axes]:
+    """All axes that show data, also those within others."""
+    outer = [*page.axes, *(ax for part in getattr(page, "subfigs", []) for ax in part.axes)]
+    return list(dict.fromkeys(ax for each in outer for ax in [each, *each.child_axes] if ax.lines or ax.collections))
+
+
+def legends(page) -> list:
+    parts = [page, *getattr(page, "subfigs", []), *page.axes]
+    return [one for part in parts for one in getattr(part, "legends", [getattr(part, "legend_", None)]) if one]
+
+
+@pytest.mark.parametrize("kind", PAGES)
+def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(kind):
+    page = PAGES[kind]()
+    page.draw_without_rendering()
+    outer = [ax for ax in page.axes if ax.get_visible()]
+    words = {axis.get_label_text() for ax in outer for axis in (ax.xaxis, ax.yaxis)} - {""}
+    assert not [label for label in words if not UNIT.search(label) and not UNITLESS.fullmatch(label)]
+    assert all(ax.get_ylabel() for ax in outer)
+    labelled = [ax for ax in every(page) if ax.get_xlabel()]
+    for ax in every(page):
+        assert ax in labelled or any(np.allclose(ax.get_xlim(), one.get_xlim()) for one in labelled)
+        (low, high), shown = sorted(ax.get_xlim()), [line for line in ax.lines if line.get_transform() == ax.transData]
+        assert not [line for line in shown if len(places(line)) == 1 and not low <= places(line)[0, 0] <= high]
+    handles = [one for legend in legends(page) for one in legend.legend_handles]
+    assert all(text.get_text() for legend in legends(page) for text in legend.get_texts())
+    entries = {to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor()) for one in handles}
+    drawn = {to_hex(line.get_color()) for ax in every(page) for line in ax.lines} - NEUTRAL
+    assert drawn <= entries
+
+
+def shown(page, label: str) -> Axes:
+    return next(ax for ax in page.axes if ax.get_ylabel() == label)
+
+
+def curve(ax: Axes, colour: str) -> np.ndarray:
+    """The line of a trace as (times, values), without its marks."""
+    lines = [line for line in ax.lines if to_hex(line.get_color()) == to_hex(colour) and line.get_marker() == "None"]
+    assert len(lines) == 1
+    return places(lines[0]).T
+
+
+def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
+    traces = machines()
+    page, colours = figure(traces), style.law_colours([trace.scenario.law for trace in traces])
+    ends = [1.2, 1.2, 0.699]
+    for label, values in {"position x (m)": "x", "reaction (N)": "reaction", "delivered (N)": "force"}.items():
+        for trace, colour, end in zip(traces, colours, ends, strict=True):
+            t, y = curve(shown(page, label), colour)
+            truth = getattr(trace, values)[trace.t <= end + 1e-9, 0]
+            assert (t[0], t[-1]) == pytest.approx((0.0, end))
+            assert (y[0], y[-1], y.min(), y.max()) == pytest.approx((truth[0], truth[-1], truth.min(), truth.max()))
+    rows = shown(page, "control u (N)").child_axes
+    assert [row.get_title(loc="left") for row in rows] == ["Classical", "Super-twisting", "Adaptive"]
+    for trace, row in zip(traces, rows, strict=True):
+        (band,) = row.collections
+        low, high = band.get_paths()[0].get_extents().intervaly
+        assert (low, high) == pytest.approx((np.nanmin(trace.u), np.nanmax(trace.u)))
+        assert np.abs(curve(row, row.lines[0].get_color())[1]).max() < 0.5  # the mean has no teeth
+    crosses = [line for ax in every(page) for line in ax.lines if line.get_marker() == "X"]
+    assert {to_hex(cross.get_color()) for cross in crosses} == {to_hex(colours[2])}
+    assert sum(places(cross)[0, 0] == pytest.approx(0.699) for cross in crosses) >= 5
+    jumps = [line for line in shown(page, "position x (m)").lines if places(line)[:, 0].tolist() == [0.5, 0.5]]
+    assert len(jumps) == 1
+
+
+def test_the_settling_band_is_two_percent_around_the_reference():
+    traces = machines()
+    ax = shown(figure(traces), "position x (m)")
+    band = next(one for one in ax.collections if to_hex(one.get_facecolor()[0]) == to_hex(style.BAND))
+    low, high = band.get_paths()[0].get_extents().intervaly
+    half = 0.02 * abs(traces[0].x[0, 0] - traces[0].r[0, 0])
+    assert (low, high) == pytest.approx((traces[0].r.min() - half, traces[0].r.max() + half))
+
+
+def test_the_slowest_channel_of_a_network_is_thick_and_none_is_left_out():
+    traces = network()
+    for trace, row in zip(traces, shown(figure(traces), "angle x (rad)").child_axes, strict=True):
+        lines = [line for line in row.lines if line.get_gid() is None]
+        assert len(lines) == 11
+        thick = max(lines, key=lambda line: line.get_linewidth())
+        np.testing.assert_allclose(thick.get_ydata(), trace.x[:, np.abs(trace.x - trace.r).sum(axis=0).argmax()])
+
+
+def test_joints_of_an_arm_have_panels_in_their_own_units_that_hold_the_run_that_is_far_off():
+    traces = arm()
+    page = figure(traces, labels=["near", "far"])
+    labels = [ax.get_ylabel() for ax in page.axes]
+    units = {"reach": ("m", "N"), "turn": ("rad", "N·m"), "lift": ("rad", "N·m")}
+    assert labels[:9] == [f"{j} {k} ({u})" for j, (m, n) in units.items() for k, u in (("x", m), ("e", m), ("u", n))]
+    low, high = shown(page, "reach x (m)").get_ylim()
+    assert low <= traces[1].x[:, 0].min() < traces[1].x[:, 0].max() <= high
+
+
+def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_runs_are_hollow():
+    (ax,) = lags().axes
+    assert [text.get_text() for text in ax.texts] == ["equal at 50 ms"]
+    lines = [line for line in ax.lines if len(places(line)) == 3]
+    expected = [(3.0 * 1e-3, 1.0), (60.0 * 1e-6, 2.0)]
+    for line, (factor, power) in zip(lines, expected, strict=True):
+        np.testing.assert_allclose(line.get_xdata(), [2.0, 10.0, 50.0])
+        np.testing.assert_allclose(line.get_ydata(), factor * np.array([2.0, 10.0, 50.0]) ** power)
+    dots = [line for line in ax.lines if line.get_marker() == "o"]
+    hollow = [places(dot)[0, 0] for dot in dots if to_hex(dot.get_mfc()) == to_hex(style.PAPER)]
+    assert hollow == pytest.approx([10.0, 10.0])
+    assert len(dots) == 6
+
+
+@pytest.mark.parametrize("order", [1.9, math.nan])
+def test_marks_of_errors_are_the_largest_of_all_starts_filled_in_the_fit_with_the_slopes_of_fit_and_theory(order):
+    page = orders([accuracy("super_twisting", order=order)])
+    for ax in page.axes:
+        marks = {places(line)[0, 0]: line for line in ax.lines if line.get_marker() == "o"}
+        assert {h: places(line)[0, 1] for h, line in marks.items()} == pytest.approx({4: 8, 2: 2, 1: 0.5, 0.5: 0.125})
+        assert [h for h, line in marks.items() if line.get_mfc() == "none"] == [4.0]
+        ends = [places(line) for line in ax.lines if len(places(line)) == 2]
+        slopes = [np.log(y[0] / y[1]) / np.log(x[0] / x[1]) for x, y in (pair.T for pair in ends) if x[0] != x[1]]
+        assert slopes == pytest.approx([1.9, 2.0] if order == 1.9 else [])
+    words = page.legends[0].get_texts()[0].get_text()
+    assert ("1.90 (2)" in words) == (order == 1.9)
+
+
+def test_shares_of_a_map_are_those_of_its_states_and_add_up():
+    page = region.draw(basins())
+    for ax, its in zip(page.axes, basins(), strict=True):
+        legend = ax.get_legend()
+        assert legend is not None
+        texts = [text.get_text() for text in legend.get_texts()]
+        shares = {words: float(share.removesuffix(" %")) for words, share in (text.split(": ") for text in texts)}
+        assert [*shares.values()] == pytest.approx([16.7, 16.7, 16.7, 16.7, 33.3])
+        assert [re.findall(r"[\d.]+ s", words) for words in shares] == [["2 s"], ["4 s"], ["8 s"], [], ["16 s"]]
+        (mesh,) = ax.collections
+        assert np.ravel(mesh.get_array()).tolist() == [0, 1, 4, 2, 3, 4]
+        assert ("gains: tuned" in ax.get_title(loc="left")) == (its.source == "tuned")
 
 
 def test_equal_blues_of_maps_side_by_side_are_equal_times():
