@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from smc_mujoco.evidence.accuracy.scaling import fit, scaling
+from smc_mujoco.draw import style
+from smc_mujoco.evidence.accuracy.orders import orders
+from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling, fit, scaling
 
 pytestmark = pytest.mark.quick
 
@@ -79,3 +81,27 @@ def test_an_order_below_the_promised_one_has_a_reason():
     assert measured(H**1.7, theory=2.0).why == "no reason seen"
     assert measured(H**2, theory=1.0, saturated="u is at its bound").why == "falls faster than promised"
     assert measured(H, theory=None, saturated="u is at its bound").why == ""
+
+
+def test_a_picture_writes_orders_at_the_ends_of_lines_and_draws_none_that_tells_nothing():
+    """Super-twisting's e had the order 1.14 +- 1.35 here, and a legend with the order of its s."""
+    h = (4e-3, 2e-3, 1e-3, 5e-4)
+
+    def law(name, e, low, high):
+        errors = ((8.0**e, 4.0**e, 2.0**e, 1.0),)
+        scalings = {q: Scaling(errors=errors, used=h, order=e, low=low, high=high, theory=2.0, why="") for q in "es"}
+        about = {"plant": "duffing", "condition": "constant", "gains": "shipped", "unit": "m", "floor": 1e-9}
+        return Accuracy(law=name, periods=h, runs=4, failed=0, **about, **scalings)
+
+    told, untold = law("twisting", 1.75, 1.25, 2.25), law("super_twisting", 1.14, -0.21, 2.49)
+    page = orders([told, untold])
+    for ax in page.axes:
+        fits = [line for line in ax.lines if np.unique(np.asarray(line.get_xdata())).size > 1]
+        assert {line.get_color() for line in fits} == {style.law_colour("twisting")}
+        written = {text.get_text(): text.xy for text in ax.texts}
+        assert written == {
+            "1.75 ±0.50 (2)": pytest.approx((4.0, 8.0**1.75)),
+            "untold (2)": pytest.approx((4.0, 8.0**1.14)),
+        }
+    (legend,) = page.legends
+    assert not [text for text in legend.get_texts() if any(map(str.isdigit, text.get_text()))]
