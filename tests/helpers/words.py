@@ -21,7 +21,7 @@ def recorded(file: str, names: Iterable[str]) -> list[str]:
     if "--snapshot-update" in sys.argv or not record.exists():
         return list(names)
     text = record.read_text(encoding="utf-8")
-    return [name for name in names if re.search(rf"(^  |\[){re.escape(name)}(\(|\]$)", text, re.MULTILINE)]
+    return [name for name in names if re.search(rf"(^  |\[|^ +'){re.escape(name)}(\(|\]$|':)", text, re.MULTILINE)]
 
 
 def words(text: str) -> str:
