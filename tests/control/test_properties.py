@@ -158,10 +158,6 @@ def test_an_unknown_property_is_named():
         suitable(["smooth"])
 
 
-def test_a_property_is_said_as_recorded(snapshot):
-    assert {name: one.words for name, one in PROPERTIES.items()} == snapshot
-
-
 def test_gains_that_are_held_are_not_counted():
     assert searched(catalogue()["super_twisting"]) == ["k1", "k2", "c"]
 

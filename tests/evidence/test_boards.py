@@ -501,31 +501,41 @@ def found_of(survived, **percent):
 
 
 @ROBOTS
-def test_a_row_stands_on_the_board_by_its_score(robot, monkeypatch, snapshot):
-    trace, said = SimpleNamespace(scenario=boards.on_board(robot, "none")), []
+def test_a_row_stands_on_the_board_by_its_score(robot, monkeypatch):
+    trace = SimpleNamespace(scenario=boards.on_board(robot, "none"))
     best = boards.Criteria(0.3, 3.0, 6.0, 1.0, 0.5, 0.001, 20.0)
     middle = boards.Criteria(1.2, 10.0, 6.0, 1.0, 2.0, 0.02, 100.0)
-    for values in (best, middle, best._replace(velocity_cost=1e3), best._replace(swing_up_time=math.inf)):
+    scored = {best: 0.906305197, middle: 0.563265827, best._replace(velocity_cost=1e3): 0.737465323}
+    for values, score in {**scored, best._replace(swing_up_time=math.inf): 0.0}.items():
         monkeypatch.setattr(standings, "criteria", lambda _, values=values: values)
-        said.append(", ".join(f"{row.name} {row.score:.9g}" for row in boards.board(trace, "mine")))
+        board = boards.board(trace, "mine")
+        assert [row.score for row in board] == sorted((row.score for row in board), reverse=True)
+        (mine,) = [row for row in board if row.name == "mine"]
+        assert mine.score == pytest.approx(score, abs=1e-9)
+        assert {row.name for row in board} - {"mine"} == {row.name for row in boards.SIMULATION[robot]["v2"]}
     rows = boards.robustness_board(robot, {"a": found_of(21), "b": found_of(2, delay=10)})
-    said += [str(rows[0]), ", ".join(f"{row.name} {row.score:.9g}" for row in rows)]
-    assert "\n".join(said) == snapshot
+    assert (rows[0].name, set(rows[0][1:-1]), rows[0].score) == ("a", {100.0}, 1.0)
+    (other,) = [row for row in rows if row.name == "b"]
+    assert other.score == pytest.approx(0.699206349, abs=1e-9)
+    assert [row.score for row in rows] == sorted((row.score for row in rows), reverse=True)
 
 
-def test_an_entry_is_described_and_runs_by_the_rules(snapshot):
-    said = []
-    for template in (entries.acrobot_swing_up, entries.pendubot_swing_up):
-        about = {name: value for name, value in vars(template).items() if name not in ("function", "conditions")}
-        said += [f"{name}: {value}" for name, value in about.items()] + [str(template.function.__doc__)]
-        ((words, holds),) = template.conditions.items()
-        said += [f"{words}: {[holds(SimpleNamespace(k=k, phi=6.0)) for k in (2.999, 3.0, 3.001)]}"]
-    runs = [(name, run) for robot in boards.ROBOTS for name, run in boards.experiments(robot).items()]
-    said += [f"{name}: {run.law.of_channel(0)}, {run.velocity}" for name, run in runs]
-    assert "\n".join([*said, str(boards.on_board("pendubot", "none"))]) == snapshot
-    assert str(dataclasses.replace(runs[0][1], law="none", velocity="measured")) == str(
-        boards.on_board("acrobot", "none")
-    )
+def test_an_entry_is_described_and_runs_by_the_rules():
+    for robot in boards.ROBOTS:
+        template = getattr(entries, f"{robot}_swing_up")
+        assert (template.plants, template.memory, template.relative_degree) == ((robot,), 1, 1)
+        assert template.continuous
+        assert robot in str(template.function.__doc__)
+        (holds,) = template.conditions.values()
+        assert [holds(SimpleNamespace(k=k, phi=6.0)) for k in (2.999, 3.0, 3.001)] == [False, False, True]
+        gains = {"Riccati": (9.0, 6.0), "linear": (9e6, 6e6), "clipped": (6e6, 6e6), "sliding": (9.0, 0.06)}
+        rules = boards.on_board(robot, "none")
+        for name, run in boards.experiments(robot).items():
+            law, kind = run.law.of_channel(0), name.removeprefix("trajectory + ")
+            assert tuple(law.gains.values()) == pytest.approx(gains[kind.rstrip("*")])
+            assert run.velocity.name == ("measured" if kind.endswith("*") else "savitzky_golay")
+            assert dataclasses.replace(run, law="none", velocity="measured") == rules
+        assert (rules.duration, rules.control_period, rules.resolved.u_max) == (10.0, 0.002, 6.0)
 
 
 # errors and the command

@@ -376,12 +376,14 @@ class Pair(Module):
         return observation, observation
 
 
-def test_what_is_no_action_ends_the_run_with_a_sentence(torch, snapshot):
+def test_what_is_no_action_ends_the_run_with_a_sentence(torch):
     wrong = {"two": lambda o: [1.0, 2.0], "none": lambda o: [np.nan], "pair": Pair(np.float64)}
     ends = {name: briefly(smc.policy(act)).failure for name, act in wrong.items()}
     free = smc.Scenario(plant="duffing", law=smc.policy(lambda o: o[:1]), duration=0.002, u_max=math.inf)
     ends["no bound"] = smc.run(free).failure
-    assert ends == snapshot
+    for name, said in {"two": "2 numbers", "none": "nan", "pair": "Pair", "no bound": "u_max is inf"}.items():
+        assert said in str(ends[name])
+        assert "t = 0 s" in str(ends[name])
 
 
 class Broken:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.certificates import LEVELS, certificate, part
 from helpers.sketch import made as trace_of
-from helpers.sketch import sketch
+from matplotlib.contour import ContourSet
 from scipy.interpolate import RegularGridInterpolator
 
 import smc_mujoco as smc
@@ -39,16 +39,45 @@ SAID = {
 }  # fmt: skip
 
 
-def test_a_certificate_says_what_its_theorems_say(snapshot):
-    lines = []
-    for name, made in SAID.items():
-        lines += [f"{name}: {made!r}", *made.sentences]
-        facts = (made.theorem, made.holds, made.stable, made.bound, f"{made.surface:g}")
-        lines.append(f"  {', '.join(map(str, facts))}")
-        lines += [f"  {one.name} {one.margin:g} {one.unit}, {one.holds}: {one.words}" for one in made.conditions]
-    assert "\n".join(lines) == snapshot
-    assert re.sub("(<[^>]*>)+", "|", SAID["a switching law"]._repr_html_()) == snapshot
+FACTS = {  # theorem, holds, stable, bound, slope; of each theorem: proven (+), not (-) or nothing (?), and its numbers
+    "fails and falls": ("level sets", True, False, 0.3, 3.0, [["-", "-0.250 N s/m"],
+                        ["+", "|x| = 0.666 m", "|x| <= 0.300 m", "|d| <= 2 N"]]),
+    "without d": ("saturated PD", True, True, 0.0, 3.0, [["+", "without d", "exponentially"]]),
+    "every condition fails": ("saturated PD", False, False, None, 3.0, [
+        ["-", "-1.00 N m s/rad", "-2.00 (", "-3.00 N m (", "-4.00 N m/rad"], ["-", "-6.00 N m ("],
+        ["-", "-7.00 N m/s", "-8.00 N m/s"]]),
+    "a switching law": ("saturated PD", False, True, None, 2.0, [
+        ["+", "without d"], ["+", "|x| <= 1.25 rad", "|s| <= 0.500 rad/s", "|d| <= 2 N m"],
+        ["+", "|x| = 0.999 rad", "come to rest", "|d| <= 2 N m", "start is not among them"]]),
+    "nothing under a disturbance": ("saturated PD", False, True, None, 3.0, [["+"], ["?", "|d| <= 2 N"]]),
+    "a terminal surface": ("reaching", False, False, None, 1.0, [["+", "0.810 m", "after 1.90 s", "|d| <= 2 N"]]),
+    "super-twisting": ("super-twisting", False, False, None, 1.5, [
+        ["+", "|x| <= 0.300 m", "|d| <= 0.5 N", "|d'| <= 1.75 N/s"]]),
+}  # fmt: skip
+BEGIN = {"+": "proven by", "-": "not proven by", "?": "nothing is proven"}
+
+
+@pytest.mark.parametrize("name", SAID)
+def test_a_certificate_says_what_its_theorems_say(name):
+    made, (*facts, due) = SAID[name], FACTS[name]
+    assert [made.theorem, made.holds, made.stable, made.bound, made.surface] == facts
+    *told, left = made.sentences
+    assert len(told) == len(due)
+    for sentence, (mark, *parts) in zip(told, due, strict=True):
+        assert sentence.startswith(BEGIN[mark])
+        assert [part for part in parts if part not in sentence] == []
+        assert ("not among them" in sentence, "exponentially" in sentence) == (
+            "start is not among them" in parts, "exponentially" in parts)  # fmt: skip
+    assert "delay (input_delay(time=0.004))" in left
+    assert "noise" in left
+    assert [one.holds for one in made.conditions] == [one.margin >= 0.0 for one in made.conditions]
     assert len(set(SAID.values())) == len(SAID)  # each is its own key
+
+
+def test_a_notebook_shows_each_condition_with_its_margin():
+    cells = re.sub(r"(<[^>]*>\s*)+", "|", SAID["a switching law"]._repr_html_())
+    assert "|theorem|condition|holds|margin|saturated PD|damping|yes|0.500 N m s/rad|" in cells
+    assert re.search(r"\|start\|(no|NO)\|-0\.100", cells)
 
 
 def test_a_certificate_prints_what_is_said_under_a_disturbance_and_no_control_characters():
@@ -83,12 +112,34 @@ def test_the_set_of_a_switching_law_is_a_strip_and_of_a_stable_loop_everything()
         SAID["a terminal surface"].level(x, s)
 
 
-@pytest.mark.parametrize("name", ["fails and falls", "without d", "a switching law"])
-def test_the_plane_of_a_certificate_is_drawn_as_recorded(name, snapshot, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "axes", "shown", "inner"),
+    [
+        ("fails and falls", 2, ["certified", "level sets", "innermost", "bound", "run"], [0.1, 0.6]),
+        ("without d", 1, ["level sets"], []),
+        ("a switching law", 1, ["certified", "level sets", "innermost"], [0.1, 0.6]),
+    ],
+)
+def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(name, axes, shown, inner, monkeypatch):
     monkeypatch.setattr("smc_mujoco.evidence.certificates.figure.AXIS_POINTS", 81)
     made = SAID[name]
     run = trace_of(smc.Scenario(plant=made.plant, law="pid", duration=0.2))
-    assert sketch(made.figure(traces=[run] if made.bound else [])) == snapshot
+    page = made.figure(traces=[run] if made.bound else [])
+    unit = made.data["unit"]
+    assert [(one.get_xlabel(), one.get_ylabel()) for one in page.axes] == axes * [
+        (f"position ({unit})", f"velocity ({unit}/s)")
+    ]
+    (legend,) = page.legends
+    for words, text in zip(shown, legend.get_texts(), strict=True):
+        assert text.get_text().startswith(words)
+    levels = {float(level) for one in page.axes for area in one.collections if isinstance(area, ContourSet)
+              for level in area.levels}  # fmt: skip
+    assert set(inner) <= levels
+    assert len(levels) >= 5
+    for one in page.axes if made.bound else []:
+        dashed = [line for line in one.lines if line.get_linestyle() == "--"]
+        assert {x for line in dashed for x in line.get_xdata()} == {-made.bound, made.bound}
+        assert any(np.array_equal(line.get_xdata(), run.x[:, 0]) for line in one.lines)
 
 
 @pytest.mark.parametrize(("name", "sentence"), [

@@ -360,7 +360,7 @@ def test_bounds_of_a_disturbance_are_those_of_its_sum(signals, bounds):
     assert maker._bounds(smc.Scenario(plant="duffing", law="pid", disturbance=signals)) == pytest.approx(bounds)
 
 
-def test_what_is_left_out_is_said_in_full(snapshot):
+def test_what_is_left_out_is_said_in_full():
     plain = smc.Scenario(plant="duffing", law=gain_sets.law("duffing", "observer_free"))
     machine = smc.Scenario(
         plant="duffing", law=gain_sets.law("duffing", "observer_free"), friction=smc.Coulomb(0.3), input_delay=0.004,
@@ -368,8 +368,19 @@ def test_what_is_left_out_is_said_in_full(snapshot):
         actuator=smc.Lag(0.01), jump=smc.Jump(1.0, {"M": 1.2}), control_period=0.002, physics_step=0.00025,
         clock=smc.Clock(jitter=0.0005, missed=0.3),
     )  # fmt: skip
-    told = [f"{name}: {text}" for one in (plain, machine) for name, text in maker.left_out(one).items()]
-    assert "\n".join(told) == snapshot
+    names = ["sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"]
+    rates = {"sampling": {"samples": {"period": 0.001}}, "rounding": {"RK4": {"step": 0.001}}}
+    assert maker.left_out(plain) == {name: {} for name in names} | rates
+    assert maker.left_out(machine) == {
+        "sampling": {"samples": {"period": 0.002, "jitter": 0.0005, "missed": 0.3}},
+        "delay": {"input_delay": {"time": 0.004}},
+        "noise": {
+            "noise": {"position": 0.01, "velocity": 0.02}, "levant": {},
+            "Encoder": {"counts": 2000.0, "bias": 0.0, "dropout": 0.0, "delay": 0.0},
+        },
+        "dry friction": {"Coulomb": {"level": 0.3}}, "contact": {}, "drive": {"Lag": {"tau": 0.01}},
+        "other parameters": {"jump": {"time": 1.0, "M": 1.2}}, "rounding": {"RK4": {"step": 0.00025}},
+    }  # fmt: skip
 
 
 def test_a_window_is_the_widest_range_of_levels_that_no_cell_spoils_and_the_lowest_of_equals():
