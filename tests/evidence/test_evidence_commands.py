@@ -169,7 +169,7 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
     "certify duffing --disturbance 2 --worst --out d.json --figure f": (0, [
         "certify(Scenario(plant duffing, law observer_free, gains of kind shipped, u_max=6.0, condition='nominal')",
         "Uncertainty(disturbance=2.0, slope=None", "'ultimate_bound', Uncertainty(disturbance=2.0", "progress=True)",
-        "figure(a Certificate, Path(f), ['a trace'])", "theorem condition holds margin",
+        "figure(a Certificate, Path(f), ['a trace'], 40)", "theorem condition holds margin",
         "saturated PD damping no -0.250 N s/m", "restoring yes 0.125", "|x| = 0.666 m", "|x| <= 0.300 m", "|d| <= 2 N",
         "40 runs", "|x| = 0.312 m", "wrote d.json", "wrote f.svg",
     ]),
