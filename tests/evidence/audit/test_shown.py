@@ -3,6 +3,7 @@
 import math
 import re
 
+import numpy as np
 import pytest
 
 from smc_mujoco.common.errors import ScenarioError
@@ -122,7 +123,7 @@ def test_the_figure_has_a_row_for_each_claim_and_a_dot_for_each_check(claims):
     assert [one.get_text()[:3] for one in labels] == [f"{MARKS[one.verdict]} {one.id}" for one in claims]
     assert [one.get_color() for one in labels] == [COLOURS[one.verdict] for one in claims]
     dots = {(round(x, 3), round(y, 3), line.get_markerfacecolor() != "none")
-            for line in axes.lines if line.get_marker() == "o" for x, y in line.get_xydata()}  # fmt: skip
+            for line in axes.lines if line.get_marker() == "o" for x, y in np.asarray(line.get_xydata())}  # fmt: skip
     above, below = -0.125, 0.125
     holds, never = round(math.log10(0.25), 3), 3.0
     due = {(holds, k + above, True) for k in (0, 1, 2, 5)} | {(holds, k + below, True) for k in (0, 1, 3, 5)}

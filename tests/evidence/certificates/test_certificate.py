@@ -136,9 +136,9 @@ def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(name, axes, show
               for level in area.levels}  # fmt: skip
     assert set(inner) <= levels
     assert len(levels) >= 5
-    for one in page.axes if made.bound else []:
+    for one, bound in [(one, made.bound) for one in page.axes if made.bound]:
         dashed = [line for line in one.lines if line.get_linestyle() == "--"]
-        assert {x for line in dashed for x in line.get_xdata()} == {-made.bound, made.bound}
+        assert {x for line in dashed for x in line.get_xdata()} == {-bound, bound}
         assert any(np.array_equal(line.get_xdata(), run.x[:, 0]) for line in one.lines)
 
 
