@@ -1,4 +1,4 @@
-"""What the calls of studies refuse, and what their arguments and defaults become, recorded; nothing is run."""
+"""What the calls of studies refuse, and what their arguments and defaults become; nothing is run."""
 
 import pytest
 from helpers.arguments import told
@@ -48,47 +48,75 @@ def stopped(monkeypatch):
 
 
 LAWS = ["classical", "pid", "adaptive"]
-ASKED = [
-    lambda: smc.which("duffing", laws=LAWS),
-    lambda: smc.which("duffing", quick=True, laws=LAWS[:2], progress=True, threads=3),
-    lambda: smc.which(
-        "duffing", ["nominal", "noise"], "no-velocity, calm", LAWS[:2], seeds=5, duration=2.0, noise_key=7, out="mine",
-        starts=smc.starts(spread=0.1),
-    ),
-    lambda: smc.compare(LAWS),
-    lambda: smc.compare(LAWS, quick=True, seeds=2, progress=False),
-    lambda: smc.compare(
-        ["classical", smc.law("pid", kp=20.0)], "cart_pole", "noise", 3, tune=False, gains="study", budget=30,
-        out="mine", traces="all", noise_key=5, threads=2, duration=2.0, executor="dask://host:1",
-    ),
-    lambda: smc.compare(["classical"], "duffing", "noise", 3, gains="tracking", quick=True, budget=12),
-]  # fmt: skip
+CHANGES = {  # call -> argument, its value, and what a part is then given
+    smc.which: [
+        ("laws", LAWS[:2], "['classical', 'pid']"), ("conditions", "noise", "['noise']"), ("seeds", 5, "range(0, 5)"),
+        ("duration", 2.0, "[2.0, None]"), ("noise_key", 7, "noise_key: 7"), ("out", "mine", "study mine"),
+        ("starts", smc.starts(spread=0.1), "spread=0.1"), ("threads", 3, "threads: 3"),
+        ("progress", True, "progress: True"), ("needs", "no-velocity, calm", "filtered_difference"),
+        ("quick", True, "searches: 3"),
+    ],
+    smc.compare: [
+        ("plants", "cart_pole", "cart_pole"), ("conditions", "noise", "['noise']"), ("seeds", 3, "range(0, 3)"),
+        ("tune", False, "tune: False"), ("gains", "study", "gains: 'study'"), ("budget", 30, "[30, "),
+        ("out", "mine", "study mine"), ("traces", "all", "traces: 'all'"), ("noise_key", 5, "noise_key: 5"),
+        ("threads", 2, "threads: 2"), ("duration", 2.0, "[2.0, None]"), ("progress", False, "progress: False"),
+        ("executor", "dask://host:1", "executor: 'dask://host:1'"), ("quick", True, "searches: 6"),
+    ],
+}  # fmt: skip
 
 
-def test_what_is_asked_reaches_gains_and_runs_with_these_defaults(stopped, snapshot):
-    for ask in ASKED:
-        stopped.append("")
+@pytest.mark.parametrize(
+    ("call", "name", "value", "given"), [(call, *change) for call, changes in CHANGES.items() for change in changes]
+)
+def test_every_argument_reaches_the_search_for_gains_or_the_runs(call, name, value, given, stopped):
+    asked = []
+    for arguments in ({}, {name: value}):
+        stopped.clear()
+        with pytest.raises(Reached):
+            call(**{"laws": LAWS} | ({"plant": "duffing"} if call is smc.which else {}) | arguments)
+        asked.append("\n".join(stopped))
+    assert given not in asked[0]
+    assert given in asked[1]
+
+
+def test_by_default_laws_are_tuned_by_twelve_searches_and_run_on_all_from_a_key_that_is_drawn(stopped):
+    found = []
+    for ask in (lambda: smc.which("duffing", laws=LAWS), lambda: smc.compare(LAWS)):
+        stopped.clear()
         with pytest.raises(Reached):
             ask()
-    assert "\n".join(stopped) == snapshot
+        found.append([*stopped])
+    which, compared = found
+    for calls in found:
+        assert all("searches: 12" in call and "[64, None, None" in call for call in calls if call.startswith("gains"))
+        assert all("noise_key: 'drawn'" in call and "half_steps: True" in call for call in calls[-1:])
+    assert "['nominal', 'noise', 'sine'] range(0, 24) [5.0, None]" in which[1]
+    assert len([call for call in compared if call.startswith("gains")]) == 5  # plants
 
 
-def test_robust_has_an_adversary_with_these_defaults(stopped, monkeypatch, snapshot):
+def test_robust_has_an_adversary_for_each_law_in_each_condition_with_the_bound_on_the_disturbance(stopped, monkeypatch):
     """The contest is given; what is asked of it is told."""
-    monkeypatch.setattr(fair_gains, "study", lambda runs, folder, **options: stopped.append(f"study {folder}"))
+    asked = []
+    monkeypatch.setattr(fair_gains, "study", lambda runs, folder, **options: None)
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
-    monkeypatch.setattr(
-        fair_gains, "cached_worst_case", lambda *given, **options: stopped.append(told([*given, options]))
-    )
+    monkeypatch.setattr(fair_gains, "cached_worst_case", lambda *given, **options: asked.append((given, options)))
 
     def contest(table, worst, candidates, plant, needs, relevant):
-        stopped.append(told(["contest", plant, sorted(worst), needs, relevant]))
+        asked.append((sorted(worst), needs, relevant))
         reached()
 
     monkeypatch.setattr(adviser, "_contest", contest)
     with pytest.raises(Reached):
         smc.which("duffing", ["nominal", "noise"], "calm,robust", LAWS, seeds=2, relevant=0.1)
-    assert "\n".join(stopped) == snapshot
+    *attacks, contest_given = asked
+    assert contest_given == (sorted(LAWS), ("calm", "robust"), 0.1)
+    paths, runs, classes = zip(*(given[:3] for given, _ in attacks), strict=True)
+    assert [path.name for path in paths] == [f"{k}-duffing-{law}.json" for law in LAWS for k in (0, 1)]
+    assert [(one.law.name, one.condition) for one in runs] == [
+        (law, name) for law in LAWS for name in ("nominal", "noise")
+    ]
+    assert {one.disturbance for one in classes} == {1.0}
 
 
 @smc.law_function(gains={"k": 4.0})

@@ -221,88 +221,123 @@ def test_latex_has_no_letter_that_an_engine_may_not_know():
     assert TEX["²"] == "$^2$"
 
 
-# every word
+# what is said of every board
 
 
-@pytest.mark.parametrize(
-    ("options", "stand"),
-    [
-        ({"metrics": (*METRICS, "settling_time")}, {}),
-        ({"metrics": ["itae", "settling_time"], "relevant": 0.5}, {"seeds": 3}),
-        ({"metrics": ["itae", "settles"], "by": ("plant", "condition")}, {"conditions": ("nominal", "noise")}),
-        ({"metrics": ["itae"]}, {"conditions": tuple("abcde"), "seeds": 6}),
-    ],
-)
-def test_boards_say_as_recorded(options, stand, snapshot):
-    made = leaderboard(Stand(**stand), **options)
-    units = [one.unit for one in made]
-    assert f"{plain(made, 100)}{units}" == snapshot
+BOARDS = [
+    ({"metrics": (*METRICS, "settling_time")}, {}),
+    ({"metrics": ["itae", "settling_time"], "relevant": 0.5}, {"seeds": 3}),
+    ({"metrics": ["itae", "settles"], "by": ("plant", "condition")}, {"conditions": ("nominal", "noise")}),
+    ({"metrics": ["itae"]}, {"conditions": tuple("abcde"), "seeds": 6}),
+    ({}, {"conditions": ("nominal", "noise")}),
+]
 
 
-def test_boards_of_plants_in_several_units_as_recorded(snapshot):
-    """All metrics, by default; positions are in m and in rad."""
-    stand = Stand(conditions=("nominal", "noise"))
-    stand.columns["plant"] = np.where(stand.column("condition") == "noise", "inverted_pendulum", "duffing")
-    assert plain(leaderboard(stand), 100) == snapshot
+@pytest.mark.parametrize(("options", "stand"), BOARDS, ids=range(len(BOARDS)))
+def test_every_column_has_its_unit_every_cell_its_interval_and_each_metric_one_verdict_with_what_it_is_of(
+    options, stand
+):
+    data = Stand(**stand)
+    if not options:  # all metrics, of plants in m and in rad
+        data.columns["plant"] = np.where(data.column("condition") == "noise", "inverted_pendulum", "duffing")
+    made = leaderboard(data, **options)
+    said, tables = " ".join(plain(made, 100).split()), made.tables
+    names = {"itae": "ITAE", "settles": "share that settles", "ultimate_bound": "ultimate bound"}
+    for one in made:
+        length = "rad" if "pendulum" in one.about else "m"
+        force = "N m" if length == "rad" else "N"
+        units = {"itae": "{x} s^2", "settles": "", "ultimate_bound": "{x}", "settling_time": "s"}
+        assert one.unit == units.get(one.metric, one.unit)
+        heading = f"({(one.unit or '%').replace('{x}', length).replace('{u}', force)})"
+        assert any(heading in " ".join(str(cell).split()) for table in tables for cell in table.headings)
+        assert names.get(one.metric, "") in said
+        assert all(name in one.verdict for name in (one.label, *one.group.values()))
+        assert (one.winner is None) == ("no winner" in one.result)
+        assert one.winner is None or f"{one.winner} wins" in one.result
+        few = stand.get("seeds", SEEDS) < 20  # for one or five comparisons
+        assert ("too few" in one.result) is few
+        for entry in one.entries:
+            low, _, high = spread(entry.interval, one.metric).partition("–")
+            assert low in said
+            assert high in said
+    assert all(f"{stand.get('seeds', SEEDS)} seeds" in table.title for table in tables)
+    assert ("corrected for" in said) == (made[0].family > 1)
+    assert f"{100 * options.get('relevant', 0.03):.0f} % of the larger value" in said
+    assert ("fewer than 6" in said) == (stand.get("seeds", SEEDS) < 6)
 
 
-def test_why_there_is_no_winner_as_recorded(snapshot):
+@pytest.fixture(scope="module")
+def pair() -> board.Board:
+    """The board of one metric under two conditions, in both of which the third law wins."""
     (made,) = leaderboard(Stand(conditions=("nominal", "noise")), metrics=["itae"])
-    first, second = made.blocks
-    laws, none, about = (
-        dict.fromkeys(LAWS, 2),
-        dict.fromkeys(LAWS, 0),
-        Search(rule="CMA-ES", evaluations=90, about_defaults=True),
+    return made
+
+
+REASONS = {  # changes of the first block -> what stands instead of a winner
+    "barred": ({"untuned": ("second", "third", EVIL)}, "third wins under noise"),
+    "all fail": ({"ahead": None, "best": (), "lacking": dict.fromkeys(LAWS, 2)}, "every law has runs that fail"),
+    "undecided": ({"ahead": None, "best": (), "undecided": ("second",)}, "too few samples to tell"),
+    "few sets": ({"ahead": None, "samples": 3, "sets": 3}, "3 sets of gains, too few for 2 comparisons"),
+    "linked sets": ({"ahead": None, "samples": 2, "sets": 3}, "3 sets of gains: 2 samples, too few"),
+    "few runs of two": ({"ahead": None, "samples": 1, "runs": 7}, "7 distinct runs: 1 sample, too few"),
+    "repeated runs": ({"ahead": None, "samples": 4, "runs": 4}, "4 distinct runs, too few"),
+}
+
+
+@pytest.mark.parametrize("reason", REASONS)
+def test_where_there_is_no_winner_the_reason_is_said(reason, pair):
+    change, said = REASONS[reason]
+    blocks = [dataclasses.replace(pair.blocks[0], **change)] + [pair.blocks[1]] * (reason == "barred")
+    entries = tuple(dataclasses.replace(one, rank=one.rank._replace(best=False)) for one in pair.entries)
+    one = dataclasses.replace(pair, blocks=tuple(blocks), entries=entries if reason == "undecided" else pair.entries)
+    assert one.result.startswith("no winner")
+    assert said in one.result
+    assert ("too few for" in one.too_few) == ("too few for" in one.result)
+
+
+def test_a_winner_is_told_by_how_much_for_which_gains_and_in_which_conditions(pair):
+    first, second = pair.blocks
+    both = pair.result
+    assert both.startswith("third wins in both conditions: at least ")
+    assert both.endswith(", ahead in 20 of 20 runs, for these gains")
+    here = dataclasses.replace(pair, blocks=(first, dataclasses.replace(second, ahead="second", best=("second",))))
+    assert here.result.startswith("no winner in both conditions: third wins under nominal, loses under noise")
+    assert dataclasses.replace(pair, blocks=(dataclasses.replace(first, lead=None),)).result == (
+        "third wins, for these gains"
     )
-    about = Source(kind=TUNED, search=about)
-    changes = {
-        "one condition": {"blocks": (first,)},
-        "wins here and there": {"blocks": (first, dataclasses.replace(second, ahead="second", best=("second",)))},
-        "barred": {"blocks": (dataclasses.replace(first, untuned=("second", "third", EVIL)), second)},
-        "all fail": {"blocks": (dataclasses.replace(first, ahead=None, best=(), lacking=laws),)},
-        "never": {"blocks": (dataclasses.replace(first, ahead=None, best=(), lacking=laws),), "unit": "s"},
-        "one law": {"entries": made.entries[:1], "blocks": (dataclasses.replace(first, ahead=None),)},
-        "undecided": {
-            "blocks": (dataclasses.replace(first, ahead=None, best=(), undecided=("second",), lacking=none),),
-            "entries": tuple(dataclasses.replace(one, rank=one.rank._replace(best=False)) for one in made.entries),
-        },
-        "few sets": {"blocks": (dataclasses.replace(first, ahead=None, samples=3, sets=3),)},
-        "linked sets": {"blocks": (dataclasses.replace(first, ahead=None, samples=2, sets=3),)},
-        "few runs of two": {"blocks": (dataclasses.replace(first, ahead=None, samples=1, runs=7),)},
-        "repeated runs": {
-            "blocks": (dataclasses.replace(first, ahead=None, samples=4, runs=4),),
-            "entries": tuple(dataclasses.replace(one, interval=one.interval._replace(n=4)) for one in made.entries),
-        },
-        "few for many": {"blocks": (dataclasses.replace(first, ahead=None, samples=6, runs=20),), "family": 40},
-        "without an interval": {"blocks": (dataclasses.replace(first, lead=None),)},
-        "searched about defaults": {
-            "blocks": (dataclasses.replace(first, sets=3), second),
-            "entries": tuple(
-                dataclasses.replace(one, sources=(about,), failed=k) for k, one in enumerate(made.entries)
-            ),
-        },
-        "sensor": {"metric": "ultimate_bound", "unit": "{x}", "resolution": 0.02, "by_step": True},
-    }
-    said = []
-    for name, change in changes.items():
-        one = dataclasses.replace(made, **change)
-        failures = filter(None, [one.failures(entry) for entry in one.entries])
-        said += [
-            f"{name}: {one.result}; {one.too_few}; {', '.join(failures)}",
-            *dict.fromkeys(each.sample for each in one.blocks),
-        ]
-        said += [board.key([one])] if name in ("repeated runs", "few for many", "sensor") else []
-    assert "\n".join(said) == snapshot
+    alone = dataclasses.replace(pair, entries=pair.entries[:1], blocks=(dataclasses.replace(first, ahead=None),))
+    assert alone.result == "no winner: one law"
+    ever = dataclasses.replace(first, ahead=None, best=(), lacking=dict.fromkeys(LAWS, 2))
+    assert "never end" in dataclasses.replace(pair, blocks=(ever,), unit="s").result
+    many = dataclasses.replace(pair, blocks=(dataclasses.replace(first, ahead=None, samples=6, runs=20),), family=40)
+    assert "6 samples, too few for 40 comparisons" in many.result
+    assert "corrected for 40 comparisons" in board.key([many])
+    about = Source(kind=TUNED, search=Search(rule="CMA-ES", evaluations=90, about_defaults=True))
+    entries = tuple(dataclasses.replace(one, sources=(about,), failed=k) for k, one in enumerate(pair.entries))
+    searched = dataclasses.replace(pair, entries=entries)
+    assert "about its defaults and not by the rule" in searched.result
+    failures = [searched.failures(one) for one in entries]
+    assert [bool(words) for words in failures] == [False, True, True]
+    assert "2 of 40" in failures[2]
+    sensor = dataclasses.replace(pair, metric="ultimate_bound", unit="{x}", resolution=0.02, by_step=True)
+    assert board.key([sensor]) != board.key([dataclasses.replace(sensor, resolution=0.0, by_step=False)])
 
 
-def test_effects_in_words(snapshot):
-    effects = [
-        (0.85, 0.8, 0.9), (1.15, 1.1, 1.2), (0.95, 0.93, 1.02), (0.3, 0.2, 0.4), (0.3, 0.2, 0.5), (0.25, 0.0, 0.4),
-        (0.0, 0.0, 0.3), (20.0, 12.0, 30.0), (20.0, 10.0, 30.0), (math.inf, 15.0, math.inf), (1.0, 1.0, 1.0),
-        (0.9, 0.0, math.inf), (1.0, 0.98, 1.01), (0.9005, 0.9, 0.901), (math.inf, 2.0, math.inf),
-    ]  # fmt: skip
-    said = []
-    for values in effects:
-        effect = Effect(*values, 5, 8, True, 0.1)
-        said += [board.size_in_words(effect), Lead("a", "b", effect._replace(sets=bool(len(said) % 4))).words]
-    assert "\n".join(said) == snapshot
+EFFECTS = [  # ratio, its interval, the size in words
+    (0.85, 0.8, 0.9, "15 % less (10 to 20 %)"), (1.15, 1.1, 1.2, "15 % more (10 to 20 %)"),
+    (0.95, 0.93, 1.02, "5 % less (-2 to 7 %)"), (0.3, 0.2, 0.4, "3.33 times less (2.50 to 5.00 times)"),
+    (0.3, 0.2, 0.5, "70 % less (50 to 80 %)"), (0.25, 0.0, 0.4, "4.00 times less (2.50 times or more)"),
+    (0.0, 0.0, 0.3, "the other has no value in most runs"),
+    (20.0, 12.0, 30.0, "20.0 times as much (12.0 to 30.0 times)"),
+    (20.0, 10.0, 30.0, "1900 % more (900 to 2900 %)"), (1.0, 1.0, 1.0, "no difference"),
+    (math.inf, 15.0, math.inf, "the other alone has a value in most runs"),
+    (0.9, 0.0, math.inf, "10 % less (too few for an interval)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("ratio", "low", "high", "said"), EFFECTS)
+def test_a_difference_is_told_in_percent_or_in_times_with_its_interval(ratio, low, high, said):
+    effect = Effect(ratio, low, high, 5, 8, True, 0.1)
+    assert board.size_in_words(effect) == said
+    for sets, of in ((False, "runs"), (True, "sets of gains")):
+        assert Lead("a", "b", effect._replace(sets=sets)).words.endswith(f", ahead in 5 of 8 {of}")

@@ -1,4 +1,4 @@
-"""What worst cases, accuracies, needs and kept files say and are named, of made-up numbers, recorded."""
+"""What worst cases, accuracies, needs and kept files say and are named, of made-up numbers."""
 
 import dataclasses
 import math
@@ -10,14 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.sketch import made
-from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.bootstrap import Interval
 from smc_mujoco.analysis.ranking import Rank
 from smc_mujoco.common import cache
 from smc_mujoco.common.tabular import plain
-from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.accuracy import accuracy as accuracies
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, Run, Setup
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
@@ -47,15 +45,33 @@ def attacked(law: str, value: float, median: float, **fields: object) -> WorstCa
     return WorstCase(value=value, median=median, **given | both | fields)
 
 
-def test_worst_cases_say_as_recorded(snapshot):
+def rows_of(text: str) -> dict[str, list[str]]:
+    """The cells of a printed table by the name that begins a row, without its mark."""
+    return {line.split()[0].rstrip("*"): line.split()[1:] for line in text.splitlines() if line.strip()}
+
+
+def test_worst_cases_stand_from_the_least_with_their_places_by_median_their_class_and_what_lies_outside():
     cases = [
         attacked("classical", 0.2, 0.05, outside="the law is for |d| <= 0.1 N", sets=3),
         attacked("pid", math.inf, 0.04, found_by="sine"),
         attacked("adaptive", 0.1, 0.07, unit=""),
     ]
-    said = [plain(WorstCases(cases), 100), plain(WorstCases(cases[:2]), 100), plain(cases[0], 100), repr(cases[1])]
-    said += [case.heading for case in cases] + [str(cases[0].about().keys())]
-    assert "\n".join(said) == snapshot
+    text = plain(WorstCases(cases), 100)
+    rows = rows_of(text)
+    assert [law for law in rows if law in ("adaptive", "classical", "pid")][:3] == ["adaptive", "classical", "pid"]
+    assert rows["adaptive"] == ["0.100", "0.0700", "3", "bang-bang"]
+    assert rows["pid"] == ["fails", "0.0400", "1", "sine"]
+    assert "tau between the two orders: -1.00" in text
+    assert "tau" not in plain(WorstCases(cases[:2]), 100)  # of two laws there is no order to speak of
+    assert ["in m," in plain(WorstCases(those), 100) for those in (cases, cases[:2])] == [False, True]
+    for said in (text, plain(cases[0], 100)):
+        assert "classical: the law is for |d| <= 0.1 N" in said
+    for case, sets in ((cases[0], True), (cases[1], False)):
+        assert ("any of 3 parameter sets" in case.heading) is sets
+        assert all(part in case.heading for part in ("duffing", "|d| <= 0.5 N", "mass x 0.8 to 1.2"))
+    assert all(part in repr(cases[1]) for part in ("pid on duffing", "rms error fails", "0.0400 m", "|d| <= 0.5 N"))
+    names = "value median unit found_by tried metric outside seed sets within scenario"
+    assert list(cases[0].about()) == names.split()
 
 
 @pytest.mark.parametrize("field", ["value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"])
@@ -93,67 +109,94 @@ def measured(law: str, condition: str = "constant", gains: str = "shipped", why:
     return Accuracy(**names, periods=periods, e=scaling, s=free, failed=failed, floor=1e-9)
 
 
-def test_accuracies_say_as_recorded(snapshot):
+def test_a_table_of_accuracies_marks_laws_with_a_reason_and_says_whose_gains_are_not_tuned():
     rows = [measured("classical"), measured("pid", gains="default", why="the gains violate k > d", failed=2)]
     table = AccuracyTable([*rows, measured("adaptive", "coulomb", gains="default")])
-    assert plain(table, 100) == snapshot
+    first, second = plain(table, 100).split("duffing, coulomb")
+    lines = rows_of(first)
+    assert lines["classical"] == ["8.0e-01", "5.0e-02", "1.90", "±0.20", "none", "2,", "1"]
+    assert "pid* " in first
+    assert "classical* " not in first
+    assert "* pid: the gains violate k > d" in first
+    assert "pid has its default gains, classical is tuned" in first
+    assert "|e| in m, gains: default" in second
+    assert "tune it too" not in second
 
 
-def test_reasons_why_theory_promises_nothing_as_recorded(snapshot):
-    fields = [
-        {"actuator": smc.Lag(0.01)}, {"input_delay": 1e-3}, {"clock": smc.Clock(jitter=1e-4)},
-        {"noise": smc.Noise(1e-3)}, {"sensor": smc.Encoder(counts=4096)},
-        {"velocity": smc.estimator("filtered_difference")},
-        {"law": smc.law("nested_third_order")}, {},
-    ]  # fmt: skip
-    said = []
-    for change in fields:
-        try:
-            said.append(accuracies._why_no_promise(dataclasses.replace(RUN, **change)))
-        except smc.ScenarioError as error:
-            said.append(f"{change}: {error}")
+PROMISED = [  # change of the run, whether theory promises an order
+    ({"actuator": smc.Lag(0.01)}, False), ({"input_delay": 1e-3}, False), ({"clock": smc.Clock(jitter=1e-4)}, False),
+    ({"noise": smc.Noise(1e-3)}, False), ({"sensor": smc.Encoder(counts=4096)}, False),
+    ({"velocity": smc.estimator("filtered_difference")}, False), ({"law": smc.law("nested_third_order")}, False),
+    ({}, True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "promised"), PROMISED, ids=lambda given: str(given)[:20])
+def test_theory_promises_an_order_only_to_ideal_channels_of_the_law_s_relative_degree(change, promised):
+    assert bool(accuracies._why_no_promise(dataclasses.replace(RUN, **change))) is not promised
+
+
+def test_bounds_that_are_reached_and_steps_that_matter_are_reasons_from_their_thresholds_on():
     scenario = dataclasses.replace(RUN, law=smc.law("super_twisting", k1=0.01, k2=9.0))
     setup = Setup([scenario] * 4, (2e-3, 1e-3), 2)
-    for saturated in (0.0499, 0.05, 0.5):
-        said += map(str, accuracies._reasons(setup, [Run({}, 0.01), Run({}, saturated)]))
-    for error, halved in ((1.0, 1.25), (1.0, 1.26), (1.0, 0.74), (1e-9, 2e-9), (math.inf, 1.0), (1.0, math.inf)):
-        said.append(accuracies._step_change(error, halved, 2e-9))
+    told = {
+        share: [kind for kind, words in accuracies._reasons(setup, [Run({}, 0.01), Run({}, share)]) if "bound" in words]
+        for share in (0.0499, 0.05, 0.5)
+    }
+    assert told == {0.0499: [], 0.05: ["saturated"], 0.5: ["saturated"]}
+    changes = [(1.0, 1.25), (1.0, 1.26), (1.0, 0.74), (1e-9, 2e-9), (math.inf, 1.0), (1.0, math.inf)]
+    found = [accuracies._step_change(error, halved, 2e-9) for error, halved in changes]
+    assert [bool(words) for words in found] == [False, True, True, False, False, False]
+    assert "+26 %" in found[1]
+    assert "-26 %" in found[2]
+
+
+def test_an_order_is_of_periods_at_which_no_run_failed_and_a_failure_is_its_reason():
+    scenario = dataclasses.replace(RUN, law=smc.law("super_twisting", k1=0.01, k2=9.0))
+    setup = Setup([scenario] * 5, (2e-3, 1e-3), 2)
     parts = {"e": (1.0, 0.9, 0.8), "s": (0.3, 0.2, 0.1)}
-    halved = {"e": (0.4, 0.4, 0.4), "s": (0.1, 0.1, 0.1)}
+    halved = Run({"e": (0.4, 0.4, 0.4), "s": (0.1, 0.1, 0.1)})
     runs = [Run(parts), Run({name: np.divide(values, 4.0) for name, values in parts.items()})] * 2
+    row = accuracies._row(setup, [*runs, halved])
+    assert row.e.errors == ((0.8, 0.2), (0.8, 0.2))  # at the end of each run
+    assert row.s.errors == ((pytest.approx(0.1), pytest.approx(0.025)),) * 2
+    assert (row.e.used, row.s.used) == ((2e-3, 1e-3),) * 2
+    assert (row.e.order, row.s.order) == (pytest.approx(2.0), pytest.approx(2.0))
+    assert (row.runs, row.failed, row.unit, row.gains) == (4, 0, "m", "yours")
     lost = Run(dict.fromkeys(parts, (math.inf,) * 3), failure="it blew up")
-    for failing in ([], [lost]):
-        given = [*runs[: 4 - len(failing)], *failing, Run(halved)]
-        row = accuracies._row(setup._replace(scenarios=[scenario] * 5), given)
-        said += [f"{one.errors} {one.used} {one.order:.6f} {one.theory} {one.why}" for one in (row.e, row.s)]
-        said.append(f"{row.gains} {row.unit} {row.periods} {row.runs} {row.failed} {row.floor:g}")
-    assert "\n".join(said) == snapshot
+    row = accuracies._row(setup, [*runs[:3], lost, halved])
+    assert (row.e.used, row.failed) == ((2e-3,), 1)
+    assert math.isnan(row.e.order)
+    assert "1 of 4 runs failed, the first: it blew up" in row.e.why
+    assert "+100 %" in row.e.why
+    assert "+300 %" in row.s.why
 
 
-def test_a_mechanism_with_parts_takes_sixteen_steps_a_period_and_half_of_them_once(snapshot):
-    said = []
-    for condition in ("constant", "coulomb", "lugre"):
-        given = smc.plant("duffing"), find_condition(condition), "classical", (4e-3, 1e-3), [0, 3], "tuned", 2.0, None
-        setup = accuracies._setup(*given)
-        said.append(f"{condition} {setup.periods} {setup.starts}")
-        said += [
-            f"{one.seed} {one.control_period:g} {one.physics_step:g} {one.x0} {one.duration}" for one in setup.scenarios
-        ]
-    assert "\n".join(said) == snapshot
+@pytest.mark.parametrize(("condition", "steps"), [("constant", 1), ("coulomb", 1), ("lugre", 16)])
+def test_a_mechanism_with_parts_takes_sixteen_steps_a_period_and_half_of_them_once(condition, steps):
+    given = smc.plant("duffing"), find_condition(condition), "classical", (4e-3, 1e-3), [0, 3], "tuned", 2.0, None
+    setup = accuracies._setup(*given)
+    assert (setup.periods, setup.starts) == ((4e-3, 1e-3), 2)
+    *whole, half = setup.scenarios
+    assert [(one.seed, one.control_period) for one in whole] == [(0, 4e-3), (0, 1e-3), (3, 4e-3), (3, 1e-3)]
+    expected = [min(one.control_period, 1e-3) if steps == 1 else one.control_period / 16 for one in whole]
+    assert [one.physics_step for one in whole] == pytest.approx(expected)
+    assert (half.control_period, half.physics_step) == pytest.approx((1e-3, 1e-3 / steps / 2))
+    assert [one.x0 is None for one in whole] == [True, True, False, False]  # the first start is the plant's own
+    assert whole[2].x0 == whole[3].x0
 
 
-def test_needs_and_choices_say_as_recorded(snapshot):
+def test_a_choice_has_an_interval_below_a_median_that_has_one_and_the_median_below_a_worst_case():
     cases = (attacked("classical", 0.2, 0.05), attacked("classical", 0.3, 0.02))
     first = Choice(
         law=smc.law("classical"), remark="", rank=Rank("classical", 1.0, 1.0, True), settles=1.0, reliable=True,
         fit=True, worst=cases, medians={"fast": Interval(0.5, 0.4, 0.6, 8), "calm": Interval(1.0, 1.0, 1.0, 8)},
     )  # fmt: skip
-    other = dataclasses.replace(first, law=smc.law("pid"), remark="a remark")
-    said = [first.below(need) for need in ("fast", "calm", "robust")] + [first.gains, other.gains]
-    said += [
-        str([metric.name for metric in ties(smc.plant(plant))]) for plant in ("duffing", "pendulum_network", "panda")
-    ]
-    assert "\n".join(said) == snapshot
+    assert [first.below(need) for need in ("fast", "calm")] == ["0.400–0.600", ""]
+    assert "0.0200" in first.below("robust")  # of the case with the largest worst found
+    assert "a remark" in dataclasses.replace(first, remark="a remark").gains
+    for plant in ("duffing", "pendulum_network", "panda"):
+        assert [metric.name for metric in ties(smc.plant(plant))] == ["overshoot", "energy"]
 
 
 def test_names_of_files(tmp_path):
@@ -183,19 +226,24 @@ def test_a_result_is_read_only_where_its_seal_fits(tmp_path):
     assert [one.read_text() for one in tmp_path.iterdir()] == ["four"]  # those with other hashes are removed
 
 
-def test_tasks_of_the_arm_as_recorded(snapshot):
-    """Every field of every task, and every law with the gains that the search found."""
-    said = []
-    for task in ("sway", "payload", "wall", "behind", "blow"):
-        one = arms.scenario(task, smc.law("none"), seed=2, payload=0.5)
-        fields = {field.name: getattr(one, field.name) for field in dataclasses.fields(one)}
-        del fields["plant"], fields["law"], fields["reference"], fields["friction"]
-        points = [np.array(signal.values) for signal in one.references]
-        said.append(f"{task} {words(str(fields['x0']))} {[round(float(p.sum()), 3) for p in points]}")
-        said.append(str({name: value for name, value in fields.items() if name != "x0"}))
-    said += [repr(arms.gained(name)) for name in arms.GAINS] + [repr(arms.hybrid(one)) for one in (False, True)]
-    said += [f"{arms.gained(name).source} {arms.gained(name).source.search}" for name in [*arms.GAINS][:1]]
-    assert "\n".join(said) == snapshot
+@pytest.mark.parametrize("task", ["sway", "payload", "wall", "behind", "blow"])
+def test_a_task_of_the_arm_has_its_part_its_seed_and_all_that_disturbs_it(task):
+    one = arms.scenario(task, smc.law("none"), seed=2, payload=0.5)
+    assert one.seed == 2
+    assert one.noise is not None
+    assert dict(one.mismatch) == {"payload": 0.5}  # the law knows nothing of it
+    assert (one.jump is not None) is (task == "payload")
+    assert bool(one.disturbance) is (task == "blow")
+    assert (one.contact is not None and one.contact.kind == "wall") is (task in ("wall", "behind"))
+
+
+@pytest.mark.parametrize("name", arms.GAINS)
+def test_gains_of_laws_of_the_arm_are_those_that_a_search_found_within_its_torques(name):
+    law = arms.gained(name)
+    assert law.source.search is not None
+    assert law.source.kind == "shipped"
+    assert law.gains != smc.law(name).gains
+    assert all(np.isfinite(np.ravel(value)).all() for key, value in law.gains.items() if key != "w_max")
 
 
 def test_the_figures_of_worst_cases_are_of_their_runs_with_their_names(monkeypatch):
@@ -213,7 +261,10 @@ def test_the_figures_of_worst_cases_are_of_their_runs_with_their_names(monkeypat
     assert one.plot(title="mine", panels=["x"]).legends[0].get_title().get_text() == "mine"
 
 
-def test_an_accuracy_has_these_runs_by_default(monkeypatch, snapshot):
+SETUP = smc.plant("duffing"), find_condition("constant"), "classical", (4e-3, 1e-3), [0], "tuned", 2.0, None
+
+
+def test_an_accuracy_has_three_starts_at_five_periods_and_one_run_at_half_the_step_by_default(monkeypatch):
     asked = []
     monkeypatch.setattr(
         accuracies, "stream", lambda scenarios, threads, report: asked.append((scenarios, threads)) or {}
@@ -221,30 +272,23 @@ def test_an_accuracy_has_these_runs_by_default(monkeypatch, snapshot):
     with pytest.raises(KeyError):  # no run was measured
         smc.accuracy("classical", "duffing")
     (scenarios, threads), *_ = asked
-    runs = [
-        f"{one.seed} {one.control_period:g} {one.physics_step:g} {one.duration} {one.condition}" for one in scenarios
-    ]
-    gains = scenarios[0].law.gains == gain_sets.law("duffing", "classical").gains
-    assert "\n".join([f"{threads} {gains} {scenarios[0].condition}", *runs]) == snapshot
+    periods = [4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]
+    runs = [(seed, period, min(period, 1e-3)) for seed in range(3) for period in periods] + [(0, 2.5e-4, 1.25e-4)]
+    assert [(one.seed, one.control_period, one.physics_step) for one in scenarios] == runs
+    assert {(one.duration, one.condition) for one in scenarios} == {(10.0, "constant")}
+    assert threads is None
+    assert scenarios[0].law.gains == accuracies._setup(*SETUP).scenarios[0].law.gains
 
 
-def test_what_cannot_be_sent_is_said_as_recorded(monkeypatch, snapshot):
-    said = []
-
-    def told(call, *given):
-        with pytest.raises(smc.ScenarioError) as error:
-            call(*given)
-        said.append(str(error.value))
-
-    told(pickling.packed, threading.Lock())
-    told(executors.run_on_worker, b"cnot_there\nf\n.", [])
+def test_what_cannot_be_sent_is_refused_with_the_cure_for_each_side(monkeypatch, refused):
+    refused(lambda: pickling.packed(threading.Lock()), "plain functions")
+    refused(lambda: executors.run_on_worker(b"cnot_there\nf\n.", []), "not_there", "install there")
     monkeypatch.setattr(run_key, "description", lambda one: {"versions": {"mujoco": "1", "numba": "2"}})
     monkeypatch.setattr(run_key, "key", lambda *_, **__: "other")
     monkeypatch.setattr(executors.platform, "python_version", lambda: "3")
-    told(executors.run_on_worker, pickle.dumps([RUN]), ["key"])
+    refused(lambda: executors.run_on_worker(pickle.dumps([RUN]), ["key"]), "classical", "Python 3, mujoco 1, numba 2")
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
-    told(pickling.packed, threading.Lock())
-    assert "\n".join(said) == snapshot
+    refused(lambda: pickling.packed(threading.Lock()), "pip install cloudpickle")
 
 
 def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):
