@@ -70,7 +70,7 @@ def figure(
     model has small panels of x and its reference, of u, and of the error if a reference moves. Joints without an
     actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the actuator's
     force and of the reaction of friction and contacts, arms of their tip. The end of a failed run and the instant at
-    which a plant changes are marked. Curves that coincide are dashed in turn.
+    which a plant changes are marked. Curves that agree from the start are drawn once, in ink, until they part.
 
     Args:
       traces: one or several traces.
@@ -218,7 +218,7 @@ def _draw_over_time(page, cells: Sequence[SubplotSpec], overview: Sequence[tuple
         for ax, part, colours in rows:
             axes.append(ax)
             ax.set_xlim(0.0, runs.span[0])
-            drawing.over_time(ax, part, colours, among=panel.traces)
+            drawing.over_time(ax, part, colours, among=panel.traces, names=runs.names)
             drawing.mark(ax, runs.changes, named=ax is axes[0])
             ax.tick_params(labelbottom=False)
         _equal_ranges(frame, rows)
@@ -273,7 +273,7 @@ def _draw_small(page, cell: SubplotSpec, small: Sequence[Sequence[Panel]], runs:
             ax.set_ylabel(panel.label, fontsize=_fitting(panel.label, cell, len(small), page))
             ax.set_xlim(0.0, runs.span[0])
             ax.locator_params(axis="y", nbins=3)
-            drawing.over_time(ax, panel, runs.colours)
+            drawing.over_time(ax, panel, runs.colours, names=runs.names)
             drawing.mark(ax, runs.changes, named=named and i == k == 0)
             ax.tick_params(labelbottom=i == len(small) - 1)
             if i == len(small) - 1:
@@ -302,7 +302,7 @@ def _draw_beside(
             ax.set(xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
         else:
             panel = places[0]._replace(quantity="settling")
-            drawing.over_time(ax, panel, runs.colours)
+            drawing.over_time(ax, panel, runs.colours, names=runs.names)
             words = f"time (s)\nthe largest in {1e3 * drawing.peak_window(panel.traces):.3g} ms"
             ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
 
@@ -311,7 +311,7 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, runs: Runs) -> None:
     """Draw the close-up of the last samples of u."""
     frame, rows = _rows(page, cell, panel, runs)
     for ax, part, colours in rows:
-        drawing.last_samples(ax, part, colours, panel.traces)
+        drawing.last_samples(ax, part, colours, panel.traces, runs.names)
     _equal_ranges(frame, rows)
     plant = panel.traces[0].scenario.plant
     letter = f"{joint_names(plant)[0]} u" if plant.driven > 1 or plant.direct else "control u"

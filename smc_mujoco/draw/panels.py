@@ -15,6 +15,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 
+from smc_mujoco.common.text import joined
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
@@ -32,9 +33,10 @@ MAX_SMALL = 12  # channels that each have small panels
 CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
-COINCIDENT_DISTANCE = 0.02  # of a panel's height, about the width of a line: curves no farther apart are dashed in turn
-COINCIDENT_SHARE = 0.99  # of coinciding curves' samples, so that controls that switch a sample apart coincide; chosen
-DASH_LENGTH = 5.0  # widths of a line
+COINCIDENT_DISTANCE = 0.01  # of a panel's height, below the width of a line: curves no farther apart agree
+COINCIDENT_SHARE = 0.99  # of agreeing curves' samples, so that controls that switch a sample apart agree; chosen
+MIN_AGREEMENT = 0.15  # of the time that a panel shows: curves that agree for less have their colours there; chosen
+ALL = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six"}
 MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's, and how many share a row; chosen
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
@@ -60,7 +62,7 @@ SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number o
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
 UNDIVERGED_SHARE = 0.8  # of a run whose plant diverged: its first part sets a panel's range if no run lasts; chosen
 MARGIN = 0.08  # of a panel's height, above and below its curves
-REFERENCE = "reference"  # id of a reference's lines
+REFERENCE, AGREED = "reference", "agreed"  # ids of a reference's lines, and of those of several traces that agree
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
     "x": lambda trace: trace.x,
@@ -262,12 +264,18 @@ def until(trace: Trace, time: float) -> Trace:
 
 
 def over_time(
-    ax: Axes, panel: Panel, colours: Sequence[str], among: Sequence[Trace] = (), bands: bool = True
+    ax: Axes,
+    panel: Panel,
+    colours: Sequence[str],
+    among: Sequence[Trace] = (),
+    bands: bool = True,
+    names: Sequence[str] = (),
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
-    The reference of x is drawn in front, its settling band behind. The traces `among` set the range, by default the
-    panel's own; `bands`: whether to draw ranges behind the lines.
+    The reference of x is drawn in front, its settling band behind. Traces that agree from the start are drawn once, in
+    ink, with words; their colours begin where they part. The traces `among` set the range, by default the panel's own;
+    `bands`: whether to draw ranges behind the lines; `names`: of the traces, for the words.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
@@ -280,11 +288,14 @@ def over_time(
     if name in ("x", "e"):
         target(ax, panel)
     lines = [curve(trace, mean, name) for trace, mean in zip(panel.traces, means, strict=True)]
-    places = [(t, np.log10(y)) for t, y in lines] if name in PEAKS else lines
     heights = limits(panel.traces, name)
-    styles = dashes(places, np.ptp(np.log10(heights) if name in PEAKS else heights))
-    for trace, colour, mean, path, dash in reversed(
-        list(zip(panel.traces, colours, means, lines, styles, strict=True))
+    one_line = name in SINGLE or len(panel.group.channels) == 1
+    exact = [(trace.t, np.log10(y) if name in PEAKS else y) for trace, y in zip(panel.traces, means, strict=True)]
+    height = float(np.ptp(np.log10(heights) if name in PEAKS else heights))
+    shared = agreements(exact, height) if one_line else []
+    starts = partings(shared, len(lines))
+    for trace, colour, mean, path, start in reversed(
+        list(zip(panel.traces, colours, means, lines, starts, strict=True))
     ):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         if bands and name not in UNBANDED:
@@ -297,11 +308,16 @@ def over_time(
                 width, alpha = (SLOWEST_LINE, 1.0) if i in slowest else (LIGHT_LINE, 0.55)
                 artists += ax.plot(*curve(trace, y[:, i], name), alpha=alpha, lw=style.points(width), **look)
         else:
-            artists += ax.plot(*path, lw=style.points(LINE), ls=dash, **look)
+            artists += ax.plot(*between(path, start, np.inf), lw=style.points(LINE), **look)
         # a trace that is cut to a close-up may end before its run failed
         if trace.diverged_at is not None and trace.t[-1] + trace.scenario.control_period > trace.diverged_at - 1e-9:
             last = np.clip(mean[-1], *ax.get_ylim())
             artists += ax.plot(trace.t[-1], last, "X", color=colour, clip_on=False, zorder=5, **cross())
+    for who, start, stop in shared:
+        steps = "steps-post" if name == "u" and not smoothed(panel.traces[who[0]]) else "default"
+        look = {"color": style.INK, "lw": style.points(LINE), "drawstyle": steps, "gid": AGREED}
+        artists += ax.plot(*between(lines[who[0]], start, stop), **look)
+    tell_agreements(ax, shared, lines, names)
     return artists
 
 
@@ -310,24 +326,80 @@ def cross() -> dict[str, Any]:
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
 
 
-def dashes(lines: Sequence[tuple[np.ndarray, np.ndarray]], height: float) -> list[Any]:
-    """Return a style for each line in a panel of this height: solid, or dashed in turn for lines that coincide."""
+Agreement = tuple[list[int], float, float]  # of these lines, from one time to another, s
+
+
+def agreements(lines: Sequence[tuple[np.ndarray, np.ndarray]], height: float) -> list[Agreement]:
+    """Return until when all lines (times and values) agree in a panel of this height, and which of them never part."""
+    first, last = span_of(lines)
+    until = [[_parting(one, other, COINCIDENT_DISTANCE * height) for other in lines] for one in lines]
     groups: list[list[int]] = []
-    for i, (t, y) in enumerate(lines):
-        for group in groups:
-            at, first = lines[group[0]]
-            if min(len(t), len(at)) > 1 and t[-1] == at[-1]:
-                apart = np.abs(np.interp(at, t, y) - first)
-                if np.quantile(apart, COINCIDENT_SHARE) <= COINCIDENT_DISTANCE * height:
-                    group.append(i)
-                    break
-        else:
-            groups.append([i])
-    styles: list[Any] = ["-"] * len(lines)
-    for group in groups:
-        for k, i in enumerate(group if len(group) > 1 else ()):
-            styles[i] = (DASH_LENGTH * k, (DASH_LENGTH, DASH_LENGTH * (len(group) - 1)))
-    return styles
+    for i in range(len(lines)):
+        group = next((group for group in groups if until[group[0]][i] >= last), None)
+        groups.append([i]) if group is None else group.append(i)
+    stop = min(until[0])
+    together = first < stop < last and stop - first >= MIN_AGREEMENT * (last - first)
+    start = stop if together else first
+    whole = [([*range(len(lines))], first, stop)] * (together and len(lines) > 1)
+    return [*whole, *((group, start, last) for group in groups if len(group) > 1)]
+
+
+def span_of(lines: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[float, float]:
+    """Return the first and the last time of lines; 0 for lines without points."""
+    times = np.concatenate([t for t, _ in lines])
+    return (float(times.min()), float(times.max())) if times.size else (0.0, 0.0)
+
+
+def partings(shared: Sequence[Agreement], count: int) -> list[float]:
+    """Return until when each of `count` lines agrees with another; -inf for none."""
+    return [max((stop for who, _, stop in shared if i in who), default=-np.inf) for i in range(count)]
+
+
+def _parting(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray], apart: float) -> float:
+    """Return until when two lines are no farther apart than that, s, but for a small share of their points."""
+    t = one[0][one[0] <= other[0].max(initial=-np.inf) + 1e-9]
+    if not t.size:
+        return -np.inf
+    near = np.abs(np.interp(t, *other) - one[1][: len(t)]) <= apart
+    share = np.cumsum(near) / np.arange(1, len(t) + 1)
+    return float(t[near & (share >= COINCIDENT_SHARE)].max(initial=-np.inf))
+
+
+def between(path: tuple[np.ndarray, np.ndarray], start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the part of a line between two times, s, with its ends; nothing if it ends before."""
+    t, y = path
+    if not t.size or start >= t[-1]:
+        return t[:0], y[:0]
+    at = np.unique([*t[(t >= start) & (t <= stop)], *np.clip([start, stop], t[0], t[-1])])
+    return at, np.interp(at, t, y)
+
+
+def tell_agreements(
+    ax: Axes,
+    shared: Sequence[Agreement],
+    lines: Sequence[tuple[np.ndarray, np.ndarray]],
+    names: Sequence[str],
+    unit: str = "s",
+) -> None:
+    """Write which traces each line in ink shows, and until when, in rows where fewer of the curves are."""
+    (first, last), size = span_of(lines), style.points(9.0)
+    middle = float(np.mean([np.interp(0.5 * (first + last), *path) for path in lines if len(path[0])] or [0.0]))
+    top = ax.transLimits.transform(ax.transScale.transform(np.array([last, middle])))[1] < 0.5
+    for k, (who, _, stop) in enumerate(shared):
+        few = joined([names[i] for i in who]) if names else f"{len(who)} of {len(lines)}"
+        parts = stop < last - 1e-9
+        words = ALL.get(len(who), f"all {len(who)}") if len(who) == len(lines) else few
+        words += f" agree until {stop:.3g} {unit}" if parts else " agree"
+        room = 72 * ax.get_window_extent().width / ax.figure.dpi
+        words = style.cropped(words, room - size, size)
+        left = style.width(words, size) > room * (stop - first) / (last - first)
+        at, down = (stop, 1.0 if top else 0.0), (-1 if top else 1) * size * (0.4 + 1.3 * k)
+        look = {"ha": "left" if left else "right", "va": "top" if top else "bottom", "fontsize": size}
+        look |= {"bbox": {"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5}, "in_layout": False}
+        place = (0.4 * (size if left else -size), down)
+        ax.annotate(words, at, place, ("data", "axes fraction"), "offset points", parse_math=False, **look)
+        if parts:
+            ax.axvline(stop, color=style.RULE, lw=style.points(0.9), zorder=1.5)
 
 
 def clip_impacts(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
@@ -397,17 +469,19 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
     """Draw v over x of traces, and of a reference that moves. A ring marks the start of a trace."""
     (left, right), (low, high) = limits(traces, "x"), limits(traces, "v")
     ax.set_xlim(left, right)
-    lines = []  # x, then v, as one curve: traces coincide if both do
-    for trace in traces:
-        x, v = trace.x.mean(axis=1) / (right - left), trace.v.mean(axis=1) / (high - low)
-        lines.append((np.concatenate([trace.t, trace.t + trace.t[-1]]), np.concatenate([x, v])))
-    for trace, colour, dash in reversed(list(zip(traces, colours, dashes(lines, 1.0), strict=True))):
-        shown, width = drawn_channels(trace.x), style.points(LINE if trace.x.shape[1] == 1 else LIGHT_LINE)
+    one = traces[0].x.shape[1] == 1
+    places = [(trace.t, trace.x[:, 0] / (right - left) + 1j * trace.v[:, 0] / (high - low)) for trace in traces]
+    shared, width = agreements(places, 1.0) if one else [], style.points(LINE if one else LIGHT_LINE)
+    for trace, colour, start in reversed(list(zip(traces, colours, partings(shared, len(traces)), strict=True))):
+        shown, later = drawn_channels(trace.x), trace.t >= start
         for x, v in zip(trace.x.T[shown], trace.v.T[shown], strict=True):
-            ax.plot(x, v, color=colour, lw=width, ls=dash)
+            ax.plot(x[later], v[later], color=colour, lw=width)
             ax.plot(x[0], v[0], "o", color=colour, mfc="white", ms=style.points(6), zorder=4)
         if trace.diverged_at is not None:
             ax.plot(trace.x[-1, 0], trace.v[-1, 0], "X", color=colour, zorder=5, **cross())
+    for (first, *_), start, stop in shared:
+        part = (traces[first].t >= start) & (traces[first].t <= stop)
+        ax.plot(traces[first].x[part, 0], traces[first].v[part, 0], color=style.INK, lw=width, gid=AGREED)
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.9), zorder=1)
     for trace, _, r in references(traces):
@@ -420,7 +494,9 @@ def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
     ax.set_ylim(low, high)
 
 
-def last_samples(ax: Axes, panel: Panel, colours: Sequence[str], among: Sequence[Trace]) -> None:
+def last_samples(
+    ax: Axes, panel: Panel, colours: Sequence[str], among: Sequence[Trace], names: Sequence[str] = ()
+) -> None:
     """Draw the last samples of u of the first channel, each held until the next, of the longest run of `among`."""
     traces, stop = panel.traces, end(among)
     begin = max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in among))
@@ -433,8 +509,13 @@ def last_samples(ax: Axes, panel: Panel, colours: Sequence[str], among: Sequence
         low, high = shown.min(), shown.max()
         half = max(0.62 * (high - low), MIN_CLOSE_UP / 2 * max(map(abs, span(traces, "u")))) or 1.0
         ax.set_ylim((low + high) / 2 - half, (low + high) / 2 + half)
-    for (t, u), colour, dash in reversed(list(zip(lines, colours, dashes(lines, np.ptp(ax.get_ylim())), strict=True))):
-        ax.step(t, u, where="post", color=colour, lw=style.points(LINE), ls=dash)
+    shared = agreements(lines, float(np.ptp(ax.get_ylim())))
+    for path, colour, since in reversed(list(zip(lines, colours, partings(shared, len(lines)), strict=True))):
+        ax.step(*between(path, since, np.inf), where="post", color=colour, lw=style.points(LINE))
+    for who, since, until in shared:
+        path = between(lines[who[0]], since, until)
+        ax.step(*path, where="post", color=style.INK, lw=style.points(LINE), gid=AGREED)
+    tell_agreements(ax, shared, lines, names, "ms")
     if all(trace.diverged_at is not None for trace in traces):
         words = "the run failed" if len(traces) == 1 else "all runs failed"
         ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=style.MUTED)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import smc_mujoco as smc
 from smc_mujoco.draw import page as pages
@@ -31,7 +32,8 @@ def one() -> smc.Trace:
 def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
     """The trace as if another law had made it, a little otherwise."""
     scenario = dataclasses.replace(trace.scenario, law=smc.law(law))
-    return dataclasses.replace(trace, scenario=scenario, x=trace.r + factor * (trace.x - trace.r), v=factor * trace.v)
+    x, changed = trace.r + factor * (trace.x - trace.r), {name: factor * getattr(trace, name) for name in "vus"}
+    return dataclasses.replace(trace, scenario=scenario, x=x, **changed)
 
 
 def ten(trace: smc.Trace) -> list[smc.Trace]:
@@ -181,7 +183,7 @@ def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
     for ax, line in drawn:
         low, high = ax.get_ylim()
         assert low < line.get_ydata().min() <= line.get_ydata().max() < high
-        assert line.get_zorder() > max(curve.get_zorder() for curve in curves(ax))
+        assert line.get_zorder() > max(curve.get_zorder() for curve in ax.lines if curve.get_gid() != panels.REFERENCE)
 
 
 def test_a_reference_that_moves_is_in_the_phase_portrait_without_its_jumps(one):
@@ -233,17 +235,34 @@ def test_labels_of_laws_are_written_one_way():
     assert not [name for name in map(style.law_name, smc.laws()) if "_" in name]
 
 
-def test_curves_that_coincide_are_all_seen(one):
-    near = under(one, "pid", 1.01)
-    same = [one, dataclasses.replace(near, u=np.where(one.t < 0.005, -3.0, 1.0)[:, None] * one.u)]
-    same.append(dataclasses.replace(under(one, "adaptive", 0.3), u=0.3 * one.u))
-    for ax in figure(same, panels=["x", "phase", "settling"]).axes:
-        adaptive, pid, classical = curves(ax)  # the first is on top
-        assert adaptive.get_linestyle() == "-"
-        assert [line.get_linestyle() for line in (pid, classical)] == ["--", "--"]
-        assert pid._unscaled_dash_pattern[0] != classical._unscaled_dash_pattern[0]
+def test_curves_that_agree_are_drawn_once_in_ink_until_they_part(one):
+    """Until 1.9 s a relay covered three other laws of the Furuta pendulum; elsewhere they were dashed in turn."""
+    half = one.t[-1] / 2
+    later = dataclasses.replace(one, x=one.x + 0.5 * np.where(one.t > half, one.t - half, 0.0)[:, None])
+    same = [one, later, dataclasses.replace(later, u=-one.u)]
+    for ax in figure(same, labels=list("abc"), panels=["x", "settling"]).axes:
+        ink = [line for line in ax.lines if line.get_gid() == panels.AGREED]
+        assert {line.get_color() for line in ink} == {style.INK}
+        agreed, late = [np.asarray(line.get_xdata()) for line in ink]
+        assert (agreed[0], late[-1]) == (0.0, one.t[-1])
+        assert agreed[-1] == late[0] == pytest.approx(half, rel=0.1)
+        alone = [np.asarray(line.get_xdata())[0] for line in curves(ax)]
+        assert alone == [agreed[-1]], "the first law, from where it parts from the others"
+        words = [f"all three agree until {late[0]:.3g} s", "b and c agree"]
+        assert [text.get_text() for text in ax.texts] == words
     zero = 0.0 * one.t
-    assert panels.dashes([(one.t, zero), (one.t, np.where(one.t < 0.1 * one.t[-1], 1.0, 0.0))], 1.0) == ["-"] * 2
+    brief = [
+        (one.t, zero),
+        (one.t, np.where(one.t < 0.9 * one.t[-1], 0.0, 1.0)),
+        (one.t, np.where(one.t < 0.1, 0.0, -1.0)),
+    ]
+    assert panels.agreements(brief, 1.0) == [], "for a short time alone, or not to the end"
+
+
+def test_commands_whose_means_agree_but_of_which_one_chatters_do_not_agree(one):
+    chatters = dataclasses.replace(one, u=one.u + 0.5 * (-1.0) ** np.arange(len(one.t))[:, None])
+    (ax,) = figure([one, chatters], panels=["u"]).axes
+    assert not [line for line in ax.findobj(Line2D) if line.get_gid() == panels.AGREED]
 
 
 @pytest.mark.slow
