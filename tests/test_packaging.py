@@ -113,7 +113,6 @@ def test_the_wheel_says_what_it_is_and_needs(wheel):
         "dm-control",
         "mediapy",
         "imageio-ffmpeg",
-        "plotly",
         "distributed",
     } == set()
     assert "mujoco<5,>=3.17" in needs
@@ -218,7 +217,6 @@ OPTIONAL = (
     "imageio_ffmpeg",
     "IPython",
     "jinja2",
-    "plotly",
     "distributed",
     "gymnasium",
 )
@@ -272,7 +270,7 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
-    "smc.report('r', quick=True)": ["a report", "jinja2 and plotly", "pip install 'smc-mujoco[report]'"],
+    "smc.report('r', quick=True)": ["a report", "jinja2", "pip install 'smc-mujoco[report]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
     "films.film([t], 'a')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
 }

@@ -82,8 +82,9 @@ def plot(
                 axes[i, k].set_xlabel(label)
                 axes[i, k].tick_params(labelleft=k == 0)
             over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
-            above = None if width >= pages.NARROW else over_never
-            axes[i, 0].set_title(style.plant_name(plant), y=above, parse_math=False)
+            its_name = style.plant_name(plant)
+            beside = style.width(f"{its_name}  never", style.points(pages.TEXT_SIZE), bold=True) < room
+            axes[i, 0].set_title(its_name, y=None if beside else over_never, parse_math=False)
         pages.set_head(page, width, title or "Medians by condition", key, shared)
         pages.write(page, paths)
     return page
@@ -139,7 +140,9 @@ def _panel(
         ax.xaxis.set_minor_formatter(NullFormatter())  # numbers between decades would overlap
     for (j, condition), (k, law) in itertools.product(enumerate(conditions), enumerate(colours)):
         if (condition, law) in intervals:
+            said = f"{style.law_name(law)}, {condition.replace('_', ' ')}: {intervals[condition, law].median:.3g}"
             look = {"color": colours[law], "marker": marks[law], "ms": style.points(6), "mec": "none"}
+            look["gid"] = pages.hint(said)
             _dot(ax, intervals[condition, law], j * height + k, look)
     if not sizes:
         ax.set_xticks([])

@@ -6,6 +6,7 @@ A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. I
 
 import io
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -202,6 +203,11 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
     return [base.with_name(f"{base.name}.{kind}") for kind in ((format,) if format else several)]
 
 
+def hint(text: str) -> str:
+    """Return the gid of what shows a text in a browser, where the pointer rests on it in an SVG."""
+    return f"hint: {text}"
+
+
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
     """Write a figure to files of these names. The same figure gives the same files."""
     if not paths:
@@ -213,6 +219,9 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
     for path in paths:
         with replacing(path) as part:
             whole.savefig(part, format=path.suffix[1:], dpi=DPI, metadata=dates[path.suffix])
+            if path.suffix == ".svg":
+                text = Path(part).read_text(encoding="utf-8")
+                Path(part).write_text(re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8")
     whole.set_layout_engine(layout)
 
 

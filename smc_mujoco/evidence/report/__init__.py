@@ -44,11 +44,11 @@ def report(
     Raises:
       ScenarioError: an impossible number of seeds or threads, a folder that cannot be written, records of no known
         rig, or a further law that is unknown or has no tuned gains.
-      MissingPackageError: jinja2 or plotly is not installed.
+      MissingPackageError: jinja2 is not installed.
     """
     from smc_mujoco.common import extras
 
-    if why := extras.missing("report", "a report", "jinja2", "plotly"):
+    if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
     from smc_mujoco.analysis.ranking import checked_share
     from smc_mujoco.common.errors import items_of, whole

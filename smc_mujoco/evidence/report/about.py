@@ -20,7 +20,7 @@ from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies.table import Table
 
-SHOWN_PACKAGES = ("plotly", "pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
+SHOWN_PACKAGES = ("pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
 
 
 class Gains(NamedTuple):

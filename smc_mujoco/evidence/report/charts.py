@@ -1,19 +1,23 @@
-"""Charts of a report: plotly's figures, with a panel for each plant and a colour for each law; and SVG pictures.
-
-Numbers have five digits. The pictures are those of the suite's other commands.
-"""
+"""Charts of a report: SVG files, drawn as all figures of the suite, put into the page with its colours."""
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import NullFormatter
 
-from smc_mujoco.draw import region
+from smc_mujoco.common.files import scratch
+from smc_mujoco.draw import dot_plot, region
+from smc_mujoco.draw import page as pages
 from smc_mujoco.evidence.report import words
-from smc_mujoco.evidence.report.films import picture
 from smc_mujoco.evidence.report.words import style
 from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.mechanisms.plant import catalogue as known_plants
@@ -24,196 +28,173 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Field, Front
+    from smc_mujoco.studies.table import Table
 
-FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
-KEYS_PER_LINE = 5  # laws in a line of a legend
-LINE_HEIGHT = 21  # px, of a line of a legend
-NAME_FONT = {"size": 11.5, "color": style.INK}  # of laws beside their lines
+WIDTH = style.JOURNAL_WIDTH  # inches, of charts: their letters have 11 px at least, also on a phone, see style.css
 FALLS, RISES = "#DCEAF4", "#C05A21"  # where V falls, where it rises: different in lightness, not only in hue
-# Of logarithmic axes. Plotly writes powers a quarter larger than this size.
-LOG_AXIS: dict[str, Any] = {"type": "log", "exponentformat": "power", "tickfont": {"size": 9}}
-AXIS = {
-    "gridcolor": style.GRID,
-    "showline": True,
-    "linecolor": style.RULE,
-    "zeroline": False,
-    "ticks": "",
-    "tickfont": {"size": 11, "color": style.MUTED},
-    "title": {"font": {"size": 12, "color": style.MUTED}, "standoff": 6},
-}
-STYLE = {
-    "font": {"family": FONT, "size": 12, "color": style.INK},
-    "paper_bgcolor": "rgba(0,0,0,0)",
-    "plot_bgcolor": "rgba(0,0,0,0)",
-    "legend": {"orientation": "h", "x": 0, "yanchor": "bottom", "font": {"size": 12}},
-    "hoverlabel": {"font": {"family": FONT, "size": 12}, "bgcolor": "#FFFFFF", "bordercolor": style.RULE},
-    "hovermode": "closest",
-    "dragmode": "zoom",
-    "xaxis": AXIS,
-    "yaxis": AXIS,
-}
-Panel = dict[str, Any]  # row and column
+# Colours of the suite's style -> those of the page, which differ by day and by night. All others become lighter there.
+OF_PAGE = {style.INK: "ink", style.MUTED: "muted", style.GRID: "line", style.RULE: "edge", style.PAPER: "page"}
+OF_PAGE |= {style.RC["axes.edgecolor"]: "edge", style.DISTURBANCE: "soft", style.BAND: "rule", "#000000": "ink"}
 
 
-def panels(
-    titles: Sequence[str], height: int, margin: tuple[int, int, int, int], gap: float
-) -> tuple[go.Figure, list[Panel]]:
-    """Return a figure of panels in a row, with a title at the left of each; and the panels.
+def picture(draw: Callable[[Path], object]) -> bytes:
+    """Return the SVG file that a function draws."""
+    with scratch() as folder:
+        draw(folder / "picture.svg")
+        return (folder / "picture.svg").read_bytes()
 
-    Height and margin (left, right, top, bottom) are in px, the gap between panels is a share of the whole.
+
+def embedded(svg: bytes, name: str, maps: bool = False) -> str:
+    """Return an SVG file as a part of a page, whose width and colours it has; `name` tells its ids from others'.
+
+    By night the colours of laws become lighter, those of maps stay.
     """
-    fig = make_subplots(1, len(titles), subplot_titles=titles, horizontal_spacing=gap)
-    font = {"size": 12, "color": style.INK}
-    fig.update_annotations(font=font, xanchor="left", align="left", yanchor="bottom", yshift=4)
-    for title, axis in zip(fig.layout.annotations, fig.select_xaxes(), strict=True):  # pyright: ignore[reportAttributeAccessIssue] plotly makes it
-        title.x = axis.domain[0]
-    sides = dict(zip("lrtb", margin, strict=True))
-    fig.update_layout(height=height, margin=sides, showlegend=False)
-    fig.layout.template = {"layout": STYLE}  # in place of plotly's own, of 7 kB
-    return fig, [{"row": 1, "col": 1 + k} for k in range(len(titles))]
+    text = svg.decode()
+    text = re.sub(r"<metadata>.*?</metadata>|<style .*?</style>", "", text[text.index("<svg") :], flags=re.S)
+    text = re.sub(r'(<svg[^>]*?) width="[\w.]*" height="[\w.]*"', r"\1", re.sub(r' id="\w+_\d+"', "", text))
+    text = re.sub(r'( id="|url\(#|xlink:href="#)', rf"\1{name}-", text)
+    own = {known.lower(): f"var(--{css})" for known, css in OF_PAGE.items()}
+    other = "{}" if maps else "color-mix(in srgb, white var(--lift), {})"
+    return re.sub(r"#[0-9a-f]{6}(?=[;\"])", lambda m: own.get(m[0], other.format(m[0])), text)
 
 
-def _label(law: str) -> str:
-    """Return a law's name for a chart."""
-    return words.escape(words.law(law))
+def panels(titles: Sequence[str], height: float, share_y: bool = False) -> tuple[Figure | SubFigure, list[Axes]]:
+    """Return a page with panels in a row; the height is in inches."""
+    page = pages.blank(WIDTH, height)
+    axes = page.subplots(1, len(titles), squeeze=False, sharey=share_y)[0].tolist()
+    for ax, title in zip(axes, titles, strict=True):
+        ax.set_title(title, parse_math=False)
+        ax.tick_params(which="both", length=0)
+    return page, axes
 
 
 def _plants(plants: Sequence[str]) -> list[str]:
-    """Return titles of panels, on two lines where there are more than three."""
-    names = [words.bold(words.plant(plant)) for plant in plants]
-    return [name.replace(" network", "<br>network") for name in names] if len(names) > 3 else names
+    """Return titles of panels, on two lines where there are several."""
+    names = list(map(words.plant, plants))
+    return [name.replace(" network", "\nnetwork") for name in names] if len(names) > 2 else names
 
 
-def rounded(values: Sequence[float] | np.ndarray, digits: int = 5) -> list[float | None]:
-    """Return numbers with few digits; None for what is not finite."""
-    return [float(f"{v:.{digits}g}") if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]
+def medians(table: "Table", condition: str) -> bytes:
+    """Draw each law's median in one condition, with its interval: a row of panels per plant, a column per metric."""
+    title, some = f"Medians, {words.condition(condition)}", table.select(condition=condition)
+    plants, laws = (len(set(some.column(name).tolist())) for name in ("plant", "law"))
+    size = WIDTH, 1.1 + plants * (0.7 + dot_plot.LINE_HEIGHT * (laws + 1))
+    return picture(lambda path: dot_plot.plot(some, path, words.MAIN_METRICS, title, size, format="svg"))
 
 
-def fronts(drawn: "Sequence[Front]") -> go.Figure:
-    """Draw tracking against variation: a panel per plant, a staircase per law; a dot at the study's gains."""
+def fronts(drawn: "Sequence[Front]") -> bytes:
+    """Draw tracking against variation: a panel per plant, a staircase per law; a large dot at the study's gains."""
     plants = list(dict.fromkeys(front.plant for front in drawn))
     laws = list(dict.fromkeys(front.law for front in drawn))
-    legend = LINE_HEIGHT * math.ceil(len(laws) / KEYS_PER_LINE)  # px that it takes above the panels
-    fig, places = panels(_plants(plants), 380 + legend, (60, 12, 62 + legend, 54), 0.035)
-    named: set[str] = set()  # laws in the legend, where a click switches all their curves
-    for front in drawn:
-        place, colour = places[plants.index(front.plant)], words.colour(front.law)
-        common = {"name": _label(front.law), "legendgroup": front.law, **place}
-        common["hovertemplate"] = "variation %{x:.3g} 1/s<br>tracking %{y:.3g} s²"
-        across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # steps to the right
-        line, small = {"color": colour, "width": 1.5, "shape": "hv"}, {"size": 4, "color": colour}
-        key = {"mode": "lines+markers", "line": line, "marker": small, "showlegend": front.law not in named}
-        fig.add_scatter(**common, **key, x=rounded(across), y=rounded(up))
-        dot = {"size": 12, "color": colour, "line": {"width": 2, "color": "#FFFFFF"}}
-        tracking, variation = front.chosen
-        fig.add_scatter(**common, x=[variation], y=[tracking], mode="markers", marker=dot, showlegend=False)
-        named.add(front.law)
-    for place, plant in zip(places, plants, strict=True):
-        on_plant = [front for front in drawn if front.plant == plant]
-        across = _span([v for f in on_plant for v in (*f.variation, f.chosen[1])], 1e-3)
-        up = _span([v for f in on_plant for v in (*f.tracking, f.chosen[0])], None)
-        tick = max(1, math.ceil((across[1] - across[0]) / 4))
-        fig.update_xaxes(LOG_AXIS, title_text="variation, 1/s", range=across, tickangle=0, dtick=tick, **place)
-        fig.update_yaxes(LOG_AXIS, range=up, dtick=1, **place)
-    fig.update_yaxes(title_text="tracking, s²", row=1, col=1)
-    return fig.update_layout(showlegend=True, legend={"y": 1 + 52 / 264})
+    with style.page(WIDTH):
+        keys = [Line2D([], [], color=words.colour(law), lw=3, label=words.law(law)) for law in laws]
+        page, axes = panels(_plants(plants), 3.6 + pages.head_height(WIDTH, keys))
+        for ax, plant in zip(axes, plants, strict=True):
+            on_plant = [front for front in drawn if front.plant == plant]
+            for front in on_plant:
+                _front(ax, front)
+            ax.set(xscale="log", yscale="log", xlabel="variation (1/s)")
+            ax.yaxis.set_minor_formatter(NullFormatter())
+            ax.set_xlim(_span([v for front in on_plant for v in (*front.variation, front.chosen[1])], 1e-3))
+            ax.set_ylim(_span([v for front in on_plant for v in (*front.tracking, front.chosen[0])], None))
+        axes[0].set_ylabel("tracking (s²)")
+        pages.set_head(page, WIDTH, "Tracking against variation", keys)
+        return picture(lambda path: pages.write(page, [path]))
 
 
-def _span(values: Sequence[float], floor: float | None) -> list[float]:
-    """Return the ends of a logarithmic axis, in decades.
+def _front(ax: Axes, front: "Front") -> None:
+    """Draw a law's staircase, and its chosen gains."""
+    colour, (tracking, variation) = words.colour(front.law), front.chosen
+    across, up = zip(*sorted(zip(front.variation, front.tracking, strict=True)), strict=True)  # steps to the right
+    ax.step(across, up, where="post", color=colour, marker="o", ms=3, mec="none", gid=pages.hint(words.law(front.law)))
+    said = f"{words.law(front.law)}: variation {variation:.3g} 1/s, tracking {tracking:.3g} s²"
+    ax.plot(variation, tracking, "o", ms=9, color=colour, mec=style.PAPER, mew=1.5, zorder=3, gid=pages.hint(said))
+
+
+def _span(values: Sequence[float], floor: float | None) -> tuple[float, float]:
+    """Return the ends of a logarithmic axis.
 
     It shows all values down to `floor` of the largest, or up to 1000 times the smallest where that is None.
     """
     above = [v for v in values if v > 0] or [1.0]
     low, high = (min(above), min(max(above), 1e3 * min(above))) if floor is None else (0.0, max(above))
-    low = max(low, min(above), (floor or 0.0) * high)
-    return [math.log10(low) - 0.15, math.log10(high) + 0.15]
+    return max(low, min(above), (floor or 0.0) * high) / 1.4, high * 1.4
 
 
-def margins(drawn: "Sequence[Margin]", kind: str) -> go.Figure:
+def margins(drawn: "Sequence[Margin]", kind: str) -> bytes:
     """Draw the largest level of one kind that each law tolerates: a panel per plant; a bar marks linear theory.
 
     A triangle means that the search ended there without a failure, a cross that even the level 0 is not tolerated.
     """
     plants = list(dict.fromkeys(margin.plant for margin in drawn))
     laws = list(dict.fromkeys(margin.law for margin in drawn))
-    fig, places = panels(_plants(plants), 98 + 19 * len(laws), (172, 14, 42, 28), 0.025)
-    names = [_label(law) for law in reversed(laws)]  # the first at the top
-    fig.update_yaxes(categoryarray=names, categoryorder="array", range=[-0.6, len(laws) - 0.4], showgrid=False, dtick=1)
-    fig.update_yaxes(showticklabels=False).update_yaxes(showticklabels=True, tickfont=NAME_FONT, **places[0])
-    for place, plant in zip(places, plants, strict=True):
-        its = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
-        theory = [margin for margin in its if margin.theory is not None and math.isfinite(margin.theory)]
-        sizes = [v for margin in its for v in (margin.value, margin.theory or 0.0) if math.isfinite(v)]
-        end = 1.15 * (max(sizes, default=0.0) or 1.0)
-        symbols = ["x" if math.isnan(m.value) else "circle" if m.value < m.searched else "triangle-right" for m in its]
-        x = [0.0 if math.isnan(margin.value) else min(margin.value, end) for margin in its]
-        marker = {"size": 10, "color": [words.colour(margin.law) for margin in its], "symbol": symbols}
-        stems = {"array": [0.0] * len(x), "arrayminus": x, "symmetric": False, "color": style.RULE, "width": 0}
-        common = {"mode": "markers", "cliponaxis": False, **place}
-        common["hovertemplate"] = "<b>%{y}</b><br>%{x:.3g}<extra></extra>"
-        fig.add_scatter(**common, x=x, y=[_label(margin.law) for margin in its], marker=marker, error_x=stems)
-        bar = {"size": 15, "symbol": "line-ns", "line": {"width": 2.5, "color": style.INK}}
-        fig.add_scatter(**common, x=[m.theory for m in theory], y=[_label(m.law) for m in theory], marker=bar)
-        fig.update_xaxes(range=[-0.03 * end, end], nticks=4, rangemode="tozero", **place)
-    return fig
+    with style.page(WIDTH):
+        page, axes = panels(_plants(plants), 0.9 + 0.2 * len(laws), share_y=True)
+        for ax, plant in zip(axes, plants, strict=True):
+            its = [margin for margin in drawn if (margin.plant, margin.kind) == (plant, kind)]
+            sizes = [v for margin in its for v in (margin.value, margin.theory or 0.0) if math.isfinite(v)]
+            end = 1.15 * (max(sizes, default=0.0) or 1.0)
+            for margin in its:
+                _margin(ax, margin, laws.index(margin.law), end)
+            ax.set_xlim(-0.03 * end, end)
+            ax.grid(visible=False, axis="y")
+        axes[0].set_ylim(len(laws) - 0.4, -0.6)  # the first at the top
+        axes[0].set_yticks(range(len(laws)), list(map(words.law, laws)))
+        return picture(lambda path: pages.write(page, [path]))
 
 
-def meanings(drawn: "Sequence[Basin]") -> dict[str, str]:
-    """Return colour -> its meaning, for the colours that occur in any of the maps."""
-    after = region.convergence_times(drawn)
-    there = {int(k) for basin in drawn for k in np.unique(region.colour_indices(basin, after))}
-    texts = region.meanings(after, "at rest, known after {:g} s", "does not come to rest here")
-    return {region.COLOURS[k]: text for k, text in texts.items() if k in there}
+def _margin(ax: Axes, margin: "Margin", line: int, end: float) -> None:
+    """Draw a law's margin on its line of a panel that ends at `end`."""
+    none, more = math.isnan(margin.value), margin.value >= margin.searched
+    at, colour = 0.0 if none else min(margin.value, end), words.colour(margin.law)
+    value = "none" if none else f"{'at least ' * more}{margin.value:.3g} {words.typeset(margin.unit)}"
+    said = pages.hint(f"{words.law(margin.law)}: {value}")
+    ax.hlines(line, 0.0, at, color=style.RULE, lw=2.0)
+    ax.plot(at, line, "x" if none else ">" if more else "o", ms=7, color=colour, clip_on=False, gid=said)
+    if margin.theory is not None and math.isfinite(margin.theory):
+        said = pages.hint(f"linear theory: {margin.theory:.3g} {words.typeset(margin.unit)}")
+        ax.plot(margin.theory, line, "|", ms=12, mew=2, color=style.INK, gid=said)
 
 
-def basins(drawn: "Sequence[Basin]", after: Sequence[float]) -> go.Figure:
+def basins(drawn: "Sequence[Basin]", after: Sequence[float]) -> bytes:
     """Draw the maps of one plant: a panel a law, x across, x' up; `after` is from `convergence_times` of all maps."""
-    fig, places = panels([words.bold(words.law(basin.law)) for basin in drawn], 232, (54, 8, 24, 44), 0.02)
     unit = drawn[0].unit
-    for place, basin, title in zip(places, drawn, fig.layout.annotations, strict=True):  # pyright: ignore[reportAttributeAccessIssue] plotly makes it
-        title.font.color = words.colour(basin.law)
-        fig.add_trace(_plane(basin.x, basin.v, region.colour_indices(basin, after), region.COLOURS), **place)
-    for place, basin in zip(places, drawn, strict=True):
-        corner = {"x": 1, "y": 1, "xref": "x domain", "yref": "y domain", "xanchor": "right", "yanchor": "bottom"}
-        font = {"size": 11, "color": style.MUTED}
-        share = f"{100 * basin.share:.0f} %"
-        fig.add_annotation(corner, text=share, font=font, yshift=4, showarrow=False, **place)
-    fig.update_xaxes(title_text=f"x, {unit}", showgrid=False, nticks=5)
-    fig.update_yaxes(showgrid=False, nticks=6, showticklabels=False)
-    for place in places[1:]:
-        fig.update_yaxes(matches="y", **place)
-    return fig.update_yaxes(title_text=f"x′, {unit}/s", showticklabels=True, **places[0])
+    with style.page(WIDTH):
+        meanings = region.meanings(after, "at rest, known after {:g} s", "does not come to rest here")
+        keys = [Patch(facecolor=region.COLOURS[k], edgecolor=style.RULE, label=text) for k, text in meanings.items()]
+        titles = [f"{words.law(basin.law)}, {100 * basin.share:.0f} %" for basin in drawn]
+        page, axes = panels(titles, 2.7 + pages.head_height(WIDTH, keys), share_y=True)
+        for ax, basin in zip(axes, drawn, strict=True):
+            _plane(ax, basin.x, basin.v, region.colour_indices(basin, after), region.COLOURS, unit)
+        axes[0].set_ylabel(f"x′ ({unit}/s)")
+        pages.set_head(page, WIDTH, words.plant(drawn[0].plant), keys)
+        return picture(lambda path: pages.write(page, [path]))
 
 
-def _plane(x: np.ndarray, v: np.ndarray, classes: np.ndarray, colours: Sequence[str]) -> go.Heatmap:
-    """Return a map of classes (nv, nx), 0, 1, ..., each in its colour."""
-    steps = len(colours)
-    bands = [[(k + side) / steps, colour] for k, colour in enumerate(colours) for side in (0, 1)]
-    common = {"zmin": -0.5, "zmax": steps - 0.5, "colorscale": bands, "showscale": False}
-    hover = "x %{x:.3g}, x′ %{y:.3g}<extra></extra>"
-    return go.Heatmap(common, x=rounded(x), y=rounded(v), z=classes.astype(np.int8), hovertemplate=hover)
+def _plane(ax: Axes, x: np.ndarray, v: np.ndarray, classes: np.ndarray, colours: Sequence[str], unit: str) -> None:
+    """Draw a map of classes (nv, nx), 0, 1, ..., each in its colour."""
+    look = {"cmap": ListedColormap(colours), "vmin": -0.5, "vmax": len(colours) - 0.5, "rasterized": True}
+    ax.pcolormesh(x, v, classes.astype(np.int8), **look)
+    ax.grid(visible=False)
+    ax.set_xlabel(f"x ({unit})")
 
 
-def fields(drawn: "Sequence[Field]") -> go.Figure:
+def fields(drawn: "Sequence[Field]") -> bytes:
     """Draw where V rises, dark, and the line s = 0: a panel per plant, x across, x' up."""
     titles = _plants([field.plant for field in drawn])
-    titles = [f"{title}, {100 * field.share:.0f} %" for title, field in zip(titles, drawn, strict=True)]
-    fig, places = panels(titles, 246, (48, 8, 38, 44), 0.045)
-    lines = {"coloring": "none", "start": 0, "end": 0, "size": 1, "showlabels": False}
-    zero = {"contours": lines, "hoverinfo": "skip", "showscale": False, "line": {"width": 1.5, "color": style.INK}}
-    for place, field in zip(places, drawn, strict=True):
-        fig.add_trace(_plane(field.x, field.v, field.rises, (FALLS, RISES)), **place)
-        heights = [rounded(row, 3) for row in field.s[::4, ::4]]
-        fig.add_contour(**zero, x=rounded(field.x[::4]), y=rounded(field.v[::4]), z=heights, **place)
-        unit = known_plants()[field.plant].unit if field.plant in known_plants() else ""
-        fig.update_xaxes(title_text=f"x, {unit}", showgrid=False, nticks=4, **place)
-    return fig.update_yaxes(showgrid=False, nticks=5).update_yaxes(title_text="x′, rad/s or m/s", **places[0])
+    with style.page(WIDTH):
+        page, axes = panels([f"{t}, {100 * f.share:.0f} %" for t, f in zip(titles, drawn, strict=True)], 2.8)
+        for ax, field in zip(axes, drawn, strict=True):
+            unit = known_plants()[field.plant].unit if field.plant in known_plants() else ""
+            _plane(ax, field.x, field.v, field.rises, (FALLS, RISES), unit)
+            ax.contour(field.x, field.v, field.s, levels=[0.0], colors=[style.INK], linewidths=1.5)
+        axes[0].set_ylabel("x′ (rad/s or m/s)")
+        return picture(lambda path: pages.write(page, [path]))
 
 
 def orders(table: "AccuracyTable") -> bytes:
     """Draw the largest errors over the control period, with theory's slopes."""
-    return picture(lambda path: table.plot(path, format="svg"))
+    return picture(lambda path: table.plot(path, size=(WIDTH, 7.5), format="svg"))
 
 
 def record(shown: "Repeated") -> bytes:

@@ -1,14 +1,14 @@
 """Films and pictures of a report's scenes, runs side by side. They are small, as they are part of the page."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 from smc_mujoco.common.files import scratch
 from smc_mujoco.draw.figure import figure
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.encoder import encoder
+from smc_mujoco.evidence.report import charts
 from smc_mujoco.evidence.report.plan import Report
 from smc_mujoco.simulation.trace import Trace
 
@@ -39,13 +39,7 @@ def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whol
         return path.read_bytes()
 
 
-def picture(draw: Callable[[Path], object]) -> bytes:
-    """Return the SVG file that a function draws."""
-    with scratch() as folder:
-        draw(folder / "picture.svg")
-        return (folder / "picture.svg").read_bytes()
-
-
 def curves(traces: Sequence[Trace], title: str) -> bytes:
     """Draw x and u of every law over time."""
-    return picture(lambda path: figure(traces, path, title=title, panels=("x", "u"), format="svg"))
+    size = charts.WIDTH, 5.6
+    return charts.picture(lambda path: figure(traces, path, title=title, panels=("x", "u"), size=size, format="svg"))

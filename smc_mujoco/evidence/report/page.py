@@ -2,9 +2,8 @@
 
     page(findings)                 # the HTML, a str
 
-Each section is a template of its name. Text is escaped by jinja2. Charts are JSON in the page, drawn by plotly.js,
-which is embedded once; films and pictures are data URIs. A content security policy in the file forbids everything that
-is not in it.
+Each section is a template of its name. Text is escaped by jinja2. Charts are SVG in the page, films data URIs. A
+content security policy in the file forbids everything that is not in it.
 """
 
 import base64
@@ -62,7 +61,7 @@ def environment() -> "Environment":
         lstrip_blocks=True,
     )
     made.filters |= {
-        "json": lambda figure: Markup(figure.to_json().replace("<", "\\u003c")),
+        "embedded": lambda *of: Markup(charts.embedded(*of)),
         "margin_kind": words.kind,
         "law_name": words.law,
     }
@@ -73,12 +72,12 @@ def environment() -> "Environment":
 def page(findings: Findings) -> str:
     """Return the report as HTML."""
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     made, share = environment(), findings.about.plan.relevant
     made.globals |= {
         "f": findings,
         "about": findings.about,
+        "first_film": next((scene for scene in findings.scenes if scene.film), None),
         "gains_set": GAINS,
         "infinity": math.inf,
         "answer": answer,
@@ -90,7 +89,6 @@ def page(findings: Findings) -> str:
     return made.get_template("page.jinja").render(
         css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
-        plotly=Markup(get_plotlyjs().replace("</script", "<\\/script")),
         sections=SECTIONS,
         # tables: what identifies a row -> column -> cell
         board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),

@@ -34,7 +34,7 @@ def report(
     progress: bool = False,
 ) -> Path:
     """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and checks.svg beside it."""
-    if why := extras.missing("report", "a report", "jinja2", "plotly"):
+    if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
     folder = Path(out)
     with bar("claims", shown=progress, counted=True) as drawn:

@@ -3,7 +3,6 @@
 Colours and names are those of `draw.style`; numbers those of the terminal's tables, three significant digits.
 """
 
-import html
 import math
 import re
 from collections.abc import Iterable
@@ -99,13 +98,3 @@ def pretty(text: str) -> str:
     names = {name: plant(name) for name in plants()} | {name: law(name).lower() for name in laws()}
     known = "|".join(sorted((name for name in names if "_" in name or name in plants()), key=len, reverse=True))
     return re.sub(rf"\b({known})\b(?!_)", lambda m: names[m[1]], text)
-
-
-def escape(text: str) -> str:
-    """Return text for a chart, where HTML tags would have an effect."""
-    return html.escape(text, quote=False)
-
-
-def bold(text: str) -> str:
-    """Return text for a chart's heading, in bold."""
-    return f"<b>{escape(text)}</b>"

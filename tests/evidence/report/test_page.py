@@ -3,7 +3,6 @@
 import dataclasses
 import html
 import inspect
-import json
 import math
 import re
 from types import SimpleNamespace
@@ -15,10 +14,11 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.region_of_attraction import Basin
+from smc_mujoco.draw import region
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.report import answer, page, rigs, words
+from smc_mujoco.evidence.report import answer, charts, page, rigs, words
 from smc_mujoco.evidence.report.about import About, Gains
 from smc_mujoco.evidence.report.films import Scene
 from smc_mujoco.evidence.report.oscillation import Oscillation
@@ -327,34 +327,20 @@ def findings():
     found = tuple(margins())
     made = scores, boards, claims, fields, fronts, oscillations, basins, machines, repeated, scenes
     return Findings(
-        **{one.__name__: tuple(one()) for one in made}, worst=tuple(worst_cases()), margins=found,
+        **{one.__name__: tuple(one()) for one in made}, medians=b"<svg/>", worst=tuple(worst_cases()), margins=found,
         by_set={"tuned": found[:6], "study": found[:4]}, accuracies=AccuracyTable(accuracies()), about=about(),
     )  # fmt: skip
 
 
-PLOT = re.compile(r'<script type="application/json" data-plot="(.*?)">(.*?)</script>', re.S)
-
-
-def drawn(plot):
-    """Return a chart's data and layout, a line for each trace, axis and part; of a chart like another its titles."""
-    figure = json.loads(plot[2], parse_float=lambda text: float(f"{float(text):.9g}"), parse_constant=pytest.fail)
-    if plot[1] != "plot-field":  # the first; all have the same
-        figure["layout"].pop("template")
-    if plot[1] == "plot-margin-mass":
-        figure = {"data": [], "layout": {"annotations": figure["layout"]["annotations"]}}
-    traces = [f"  {json.dumps(trace, ensure_ascii=False)}" for trace in figure["data"]]
-    parts = [f"  {name}: {json.dumps(part, ensure_ascii=False)}" for name, part in figure["layout"].items()]
-    return html.escape("\n".join([f"chart {plot[1]}", *traces, *parts, ""]), quote=False)
+SVG = re.compile(r"<svg.*?</svg>", re.S)
 
 
 def said(text):
-    """Return what a page says, a line for each row, with the target of each link, and its charts."""
+    """Return what a page says, a line for each row, with the target of each link."""
     text = re.sub(r"<style>.*?</style>", "", text, flags=re.S)
-    text = re.sub(r"<script>.*?</script>", "", PLOT.sub(drawn, text), flags=re.S)
+    text = re.sub(r"<script>.*?</script>", "", SVG.sub("", text), flags=re.S)
+    text = re.sub(r'<div class="plot" role="img" aria-label="(.*?)">', r"chart: \1", text)
     text = re.sub(r'<a [^>]*?href="(.*?)".*?>(.*?)</a>', r"\2 [\1]", text, flags=re.S)
-    text = re.sub(
-        r'<img ([^>]*?)alt="(.*?)"(.*?)>', r"picture: \2 (\1\3)", re.sub(r"(svg.xml;base64,)[^\"]*", r"\1", text)
-    )
     text = re.sub(r'<video [^>]*?aria-label="(.*?)" src="(.*?)">', r"video: \1 (\2)", text)
     text = re.sub(r"<select.*?</select>", "", text, flags=re.S)
     text = re.sub(r"--law: (#\w+)[^>]*?>", r">\1 ", text)
@@ -362,17 +348,33 @@ def said(text):
     return re.sub(r"\n\s+", "\n", html.unescape(re.sub(r"<[^>]*?>", "", text)))
 
 
-def test_a_page_says_and_draws_its_findings(findings, snapshot, monkeypatch):
-    import plotly.graph_objects as go
-
-    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "")
-    whole = page.page(findings)
-    for plot in PLOT.finditer(whole):
-        go.Figure(json.loads(plot[2]))  # which refuses what plotly does not know
-    text, _, defined = map(said, whole.partition('<h3 id="definitions">'))
+def test_a_page_says_its_findings(findings, snapshot):
+    text, _, defined = map(said, page.page(findings).partition('<h3 id="definitions">'))
     for metric in metrics():
         assert said(words.pretty(str(inspect.getdoc(metric.formula)).split("\n\n")[-1])) in defined, metric.name
     assert re.sub(r"the package’s \d+ laws", "the package’s laws", text) == snapshot  # a new one needs no new record
+
+
+def test_charts_have_the_colours_of_the_page_and_say_their_numbers_where_the_pointer_rests(findings):
+    shown = {kind: charts.embedded(charts.margins(findings.margins, kind), kind) for kind in ("delay", "mass")}
+    hints = {kind: re.findall(r"<title>(.*?)</title>", svg) for kind, svg in shown.items()}
+    for margin in findings.margins:
+        value = (
+            "none"
+            if math.isnan(margin.value)
+            else f"{'at least ' * (margin.value >= margin.searched)}{margin.value:.3g}"
+        )
+        assert any(hint.startswith(f"{words.law(margin.law)}: {value}") for hint in hints[margin.kind]), margin
+    ids = [re.findall(r' id="(.*?)"', svg) for svg in shown.values()]
+    assert set(ids[0]) & set(ids[1]) == set()
+    for svg in shown.values():
+        assert set(re.findall(r"(?:url\(|href=\")#([^\")]*)", svg)) <= set(re.findall(r' id="(.*?)"', svg))
+        assert "metadata" not in svg
+        colours = set(re.findall(r"(?<!, )#[0-9a-f]{6}", svg))
+        assert colours == set()  # each is the page's, or lighter by night
+    maps = charts.embedded(charts.basins(findings.basins, [2.5, 5.0, 10.0]), "maps", maps=True)
+    assert region.COLOURS[0].lower() in maps
+    assert "--lift" not in maps
 
 
 def cells(rows, metric="itae"):

@@ -108,7 +108,7 @@ def test_a_report_needs_its_packages(tmp_path, monkeypatch):
     for one in (make, paper.report):
         with pytest.raises(extras.MissingPackageError, match="install it"):
             one("gaber" if one is paper.report else tmp_path)
-    assert [given for given, _ in asked] == [("report", "a report", "jinja2", "plotly")] * 2
+    assert [given for given, _ in asked] == [("report", "a report", "jinja2")] * 2
 
 
 def test_records_of_a_folder_are_read_in_the_order_of_their_names(tmp_path, monkeypatch):
@@ -161,7 +161,7 @@ def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch,
     done, bars = [], Bars(False)
     names = (
         "rigs.repeated grid judged_claims worst_cases all_margins margins_by_set all_basins all_scenes rigs.machines "
-        "oscillation.oscillations accuracies leaderboard scores.scores fields fronts about.about"
+        "oscillation.oscillations accuracies leaderboard charts.medians scores.scores fields fronts about.about"
     )
 
     def stub(name):
@@ -208,7 +208,7 @@ def test_what_the_grid_was_is_told(monkeypatch):
     monkeypatch.setattr(about, "in_words", lambda sources: f"in words {sources}")
     its = about.about(SMALL, table, {"grid": 1.5}, "no renderer")
     assert (its.plan, its.runs, its.failed, its.seeds, its.sources) == (SMALL, 5, 3, 3, "in words ['tuned']")
-    assert list(its.versions) == ["a", "plotly", "pyarrow", "scipy"]
+    assert list(its.versions) == ["a", "pyarrow", "scipy"]
     assert (its.spent, its.no_film) == ({"grid": 1.5}, "no renderer")
 
 
@@ -346,4 +346,3 @@ def test_words_are_those_of_the_suite_and_unknown_names_are_words():
     assert words.pretty("`steps` of eps != alphadot in van_der_pol under observer_free") == (
         "steps of ε ≠ α′ in Van der Pol under observer-free"
     )
-    assert words.escape('<b>"') == '&lt;b&gt;"'

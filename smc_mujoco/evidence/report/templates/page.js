@@ -1,50 +1,7 @@
 "use strict";
 (() => {
   const all = (selector, from = document) => [...from.querySelectorAll(selector)];
-  const PRINTED = { rows: 40, width: 1016 }; // rows of a long table on paper; px, of A4 landscape within its margins
-
-  // charts, one after another so that the page answers meanwhile
-  const plots = all(".plot");
-  const config = {
-    displaylogo: false, responsive: true, showSendToCloud: false, // no network, not even at a click
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-  };
-  const dark = matchMedia("(prefers-color-scheme: dark)");
-  // Colours of the style on a dark page; all others, of laws, become lighter, as in style.css.
-  const NIGHT = { "#1F2429": "#E6E9EC", "#646C75": "#A5ADB5", "#E3E6E9": "#2A3037", "#B9BFC5": "#4F5861", "#FFFFFF": "#15191E" };
-  const white = parseFloat(document.documentElement.style.getPropertyValue("--white"));
-  const lighter = (c) => Math.round((1 - white) * c + white * 255);
-  const shade = (text) => {
-    if (NIGHT[text.toUpperCase()]) return NIGHT[text.toUpperCase()];
-    if (/^#[0-9a-f]{6}$/i.test(text)) {
-      return `#${[1, 3, 5].map((k) => lighter(parseInt(text.slice(k, k + 2), 16)).toString(16).padStart(2, "0")).join("")}`;
-    }
-    return text;
-  };
-  const night = (part) => {
-    if (typeof part === "string") return shade(part);
-    if (Array.isArray(part)) return part.map(night);
-    if (part === null || typeof part !== "object" || ["heatmap", "contour"].includes(part.type)) return part; // maps stay
-    return Object.fromEntries(Object.entries(part).map(([key, its]) => [key, night(its)]));
-  };
-  const draw = (plot, nightly = dark.matches) => {
-    const wanted = nightly ? "night" : "day";
-    if (plot.dataset.drawn === wanted) return;
-    plot.dataset.drawn = wanted;
-    const read = JSON.parse(document.querySelector(`script[data-plot="${plot.id}"]`).textContent);
-    const figure = nightly ? night(read) : read;
-    Plotly.react(plot, figure.data, figure.layout, config);
-  };
-  dark.addEventListener("change", () => plots.filter((plot) => plot.dataset.drawn).forEach((plot) => draw(plot)));
-  const next = (k) => {
-    if (k === plots.length) {
-      document.documentElement.dataset.ready = "yes";
-      return;
-    }
-    draw(plots[k]);
-    setTimeout(next, 0, k + 1);
-  };
-  setTimeout(next, 0, 0);
+  const PRINTED = 40; // rows of a long table on paper
 
   // tables: sorting
   const value = (row, k) => {
@@ -131,28 +88,25 @@
   }, { rootMargin: "-10% 0px -70% 0px" });
   for (const id of links.keys()) spy.observe(document.getElementById(id));
 
-  // on paper: everything drawn and open, charts as wide as the paper, long tables cut with a line that says so
+  // on paper: everything open, long tables cut with a line that says so
   let closed = [];
   addEventListener("beforeprint", () => {
-    plots.forEach((plot) => draw(plot, false));
     closed = all("details:not([open])");
     for (const part of closed) part.open = true;
-    for (const plot of plots) Plotly.relayout(plot, { autosize: false, width: PRINTED.width });
     for (const table of all("table.long")) {
       const rows = [...table.tBodies[0].rows].filter((row) => !row.hidden);
-      rows.forEach((row, k) => row.classList.toggle("unprinted", k >= PRINTED.rows));
+      rows.forEach((row, k) => row.classList.toggle("unprinted", k >= PRINTED));
       const note = document.createElement("p");
       note.className = "printnote";
       const all = table.tBodies[0].rows.length;
-      note.textContent = `Printed: ${Math.min(rows.length, PRINTED.rows)} of ${all} rows, those shown on the screen first.`;
-      if (all > PRINTED.rows) table.after(note);
+      note.textContent = `Printed: ${Math.min(rows.length, PRINTED)} of ${all} rows, those shown on the screen first.`;
+      if (all > PRINTED) table.after(note);
     }
   });
   addEventListener("afterprint", () => {
     for (const part of closed) part.open = false;
     for (const note of all(".printnote")) note.remove();
     for (const row of all(".unprinted")) row.classList.remove("unprinted");
-    for (const plot of plots) Plotly.relayout(plot, { autosize: true, width: null });
-    plots.forEach((plot) => draw(plot));
   });
+  document.documentElement.dataset.ready = "yes";
 })();
