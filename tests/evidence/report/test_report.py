@@ -620,20 +620,21 @@ def contrast(a, b):
 def colours(page, selector, what):
     """The colours of what a selector finds, "#rrggbb"."""
     found = page.eval_on_selector_all(selector, f"all => [...new Set(all.map(e => getComputedStyle(e).{what}))]")
-    return {"#{:02x}{:02x}{:02x}".format(*map(int, re.findall(r"\d+", one)[:3])) for one in found if "rgb" in one}
+    parts = [([float(v) for v in re.findall(r"[\d.]+", one)[:3]], "srgb" in one) for one in found if "rgb" in one]
+    return {"#{:02x}{:02x}{:02x}".format(*(round(v * (255 if share else 1)) for v in rgb)) for rgb, share in parts}
 
 
 def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
     night = Seen(browser, made.as_uri(), scheme="dark")
     (back,) = colours(night.page, "body", "backgroundColor")
-    letters = colours(night.page, ".plot g[transform*=scale]", "fill")
+    letters = colours(night.page, "#figure-medians g[transform*=scale]", "fill")
     assert min(contrast(colour, back) for colour in letters) > 4.5
-    marks = colours(night.page, "#figure-medians g:has(> title) use", "fill")
+    marks = colours(night.page, "#figure-medians g:has(> title) use", "fill") - {back}
     assert min(contrast(colour, back) for colour in marks) > 2.5
     assert len(marks) >= len(TINY.laws)
     for media in ({"media": "print"}, {"media": "screen", "color_scheme": "light"}):  # on paper all is dark on white
         night.page.emulate_media(**media)
-        by_day = colours(night.page, ".plot g[transform*=scale]", "fill")
+        by_day = colours(night.page, "#figure-medians g[transform*=scale]", "fill")
         assert min(contrast(colour, "#ffffff") for colour in by_day) > 4.5
     assert colours(night.page, "body", "backgroundColor") == {"#ffffff"}
     assert night.said == []
