@@ -326,3 +326,41 @@ def test_dry_friction_of_zero_does_not_halve_the_default_budget():
     smooth = smc.Scenario(plant=smc.plant("servo_axis", cf=0.0), law="pid")
     within, rubbing = smc.Uncertainty(disturbance=1.0), smc.Uncertainty(disturbance=1.0, friction=(0.0, 0.1))
     assert default_budget(smooth, within) == pytest.approx(2 * default_budget(smooth, rubbing), abs=1)
+
+
+def searching(tried: list[tuple[Any, float, int]], **members: Any) -> Search:
+    """A search that has tried members of these values and origins; nothing is run."""
+    made: Any = SimpleNamespace(**members)
+    metric: Any = None
+    search = Search(made, metric, 10**6, None, lambda done: None)
+    search.tried = [attack.Tried(member, (value, 0.0), origin) for member, value, origin in tried]
+    return search
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7])
+def test_most_changes_are_of_the_worst_member_then_of_the_worst_of_other_origins_and_none_of_milder_ones(count):
+    order = np.random.default_rng(count).permutation(count).tolist()
+    tried = [(k, float(k), k) for k in order] + [("milder", -1.0, count - 1)]
+    search = searching(tried, changed=lambda member, rng: member)
+    parents: list[Any] = [case.member for case in search._changes(np.random.default_rng(0))]
+    worst = [*range(count - 1, -1, -1)][: len(attack.CHANGES_PER_PARENT)]
+    shares = [parents.count(member) for member in worst]
+    assert list(dict.fromkeys(parents)) == worst
+    assert shares == sorted(shares, reverse=True)
+    assert len(parents) == attack.BATCH_MEMBERS
+
+
+def test_an_evolution_begins_with_the_worst_member_and_climbs():
+    start, means = [], []
+
+    def moved(member, z, knots):
+        start.append(member)
+        return z
+
+    search = searching([("mild", 1.0, 0), ("worst", 2.0, 1)], size=lambda knots: 3, moved=moved)
+    for generation in search._evolution(np.random.default_rng(0)):
+        points: list[Any] = [case.member for case in generation]
+        means.append(float(np.mean([point.sum() for point in points])))
+        search.tried += [attack.Tried(point, (float(point.sum()), 0.0), 1) for point in points]
+    assert set(start) == {"worst"}
+    assert means[-1] > means[0] + 0.1

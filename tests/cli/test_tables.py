@@ -2,10 +2,13 @@
 
 import io
 import math
+import re
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from rich.console import Console
+from rich.table import Column
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
@@ -94,6 +97,38 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
     assert ["physics_step" in text for text in tables_of] == [False, True, False]  # the cure, where one is marked
     assert "pid 0.100 0.125 5.00 4.50 100 % 25 %" in cells[2]
     assert ["s (m/s)" in tables_of[1], "s (rad/s)" in tables_of[2]] == [True, True]
+
+
+def columns() -> list[Column]:
+    return [Column(no_wrap=True), Column(justify="right", no_wrap=True), Column(no_wrap=True)]
+
+
+@pytest.mark.parametrize(("make", "gap"), [
+    (lambda: tables.plain(*columns()), 2),
+    (lambda: tables.titled("", *columns(), padding=0, show_edge=False, pad_edge=False), 1),
+])  # fmt: skip
+def test_columns_are_apart_by_as_much_as_a_table_says_and_begin_at_its_edge(make, gap):
+    table = make()
+    for row in (["x" * 5, "1.000", "y"], ["x", "2", "yy"]):
+        table.add_row(*row)
+    first, *_ = [line for line in printed([table]).splitlines() if "xxxxx" in line]
+    assert first.startswith("xxxxx" + " " * gap + "1.000" + " " * gap + "y")
+
+
+@pytest.mark.parametrize("make", [
+    lambda: tables.trace_summary(VOLTS), lambda: tables.scores("runs", {"none": VOLTS, "a law": VOLTS}),
+    lambda: tables.answers(["tv_rate", "peak"], {"nominal": {"none": VOLTS}}),
+    lambda: [tables.catalogue("names", [("n" * k, "what it is") for k in (1, 9)])],
+])  # fmt: skip
+def test_no_two_cells_of_a_row_touch(make):
+    for table in make():
+        cells = [
+            [str(cell).split("\n")[0] for cell in row] for row in zip(*(c.cells for c in table.columns), strict=True)
+        ]
+        lines = printed([table]).splitlines()
+        for row in cells:
+            words = [cell for cell in row if cell]
+            assert any(re.search(r"\s+".join(re.escape(word) for word in words), line) for line in lines), row
 
 
 def test_an_overshoot_beyond_a_thousand_percent_has_no_digits():

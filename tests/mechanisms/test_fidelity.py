@@ -6,6 +6,7 @@ import pytest
 from helpers.models import unnamed
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms import fidelity
 from smc_mujoco.mechanisms.fidelity import deviation
 from smc_mujoco.mechanisms.geometry import coil
 from smc_mujoco.mechanisms.geometry.pendulum_chain import HOOK_ARM
@@ -181,3 +182,14 @@ def test_a_coil_winds_as_often_as_it_says_at_its_radius_about_its_line():
     assert abs(angle[-1] - angle[0]) == pytest.approx(3 * 2 * np.pi)
     np.testing.assert_allclose(np.hypot(y, z - 0.3), 0.02, rtol=1e-5)
     np.testing.assert_allclose(x, np.linspace(0.1, 0.5, len(x)), rtol=1e-5)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 8])
+def test_states_of_each_channel_fill_what_is_reached_and_channels_differ(n):
+    states = fidelity._states(n, 2.0)
+    assert states.shape[1:] == (2, n)
+    assert len(states) >= 500
+    assert np.abs(states).max() <= 2.0
+    assert (states.max(axis=0) > 1.9).all()
+    assert (states.min(axis=0) < -1.9).all()
+    assert n == 1 or not np.allclose(states[:, :, 0], states[:, :, -1])

@@ -105,3 +105,10 @@ def test_a_picture_writes_orders_at_the_ends_of_lines_and_draws_none_that_tells_
         }
     (legend,) = page.legends
     assert not [text for text in legend.get_texts() if any(map(str.isdigit, text.get_text()))]
+
+
+@pytest.mark.parametrize("theory", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("floor", [1e-5, 1e-3])
+def test_errors_that_stop_falling_are_said_to_level_off_whatever_order_was_promised(theory, floor):
+    assert "levels off" in measured((H / H[0]) ** theory + floor + 0.3, theory=theory).why
+    assert measured((H / H[0]) ** theory, theory=theory).why == ""

@@ -1,0 +1,38 @@
+"""Legends have as many columns as fit, and pages one column of panels where two would be too narrow."""
+
+import numpy as np
+import pytest
+from matplotlib.lines import Line2D
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.draw import page, style
+
+
+def wide(labels: list[str], columns: int, size: float) -> float:
+    """The width in points of labels with their samples in so many columns."""
+    widths = [
+        max(style.width(line, size) for line in label.split("\n")) + (page.ENTRY_SAMPLE + page.ENTRY_SPACE) * size
+        for label in labels
+    ]
+    return sum(max(part) for part in np.array_split(widths, columns))
+
+
+@pytest.mark.parametrize("width", [3.5, 5.0, 7.16, 12.8])
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 9, 14])
+def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_longer_than_its_share(width, count):
+    handles = [Line2D([], [], label="law " * (1 + 7 * k % 5)) for k in range(count)]
+    with style.page(width):
+        labels, columns = page._legend(handles, width)
+        size, room = style.points(page.TEXT_SIZE), 72 * width - 16
+        assert columns == 1 or wide(labels, columns, size) < room
+        assert all(wide(labels, more, size) >= room for more in range(columns + 1, count + 1))
+        longest = max(wide([label], 1, size) for label in labels)
+        assert longest <= 72 * width * (0.55 if columns > 1 else 0.95) + 1.0
+
+
+@pytest.mark.parametrize("side", page.SIDE_RANGE)
+def test_the_ends_of_the_range_of_a_side_are_sizes_and_what_lies_beyond_is_none(side):
+    assert page.measure((side, 5.0)) == (side, 5.0)
+    beyond = np.nextafter(side, 0.0 if side < 5.0 else np.inf)
+    with pytest.raises(ScenarioError, match="inches"):
+        page.measure((5.0, float(beyond)))
