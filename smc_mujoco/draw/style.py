@@ -1,7 +1,7 @@
 """Style of figures and films: colours, labels, units and fonts.
 
-Laws and plants state their labels in their own files. A law has one colour in all pictures: the one that its file
-states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else one of
+Laws and plants state their labels in their own files. A law has one colour in nearly all pictures: the one that its
+file states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else one of
 `_palette`. Matplotlib's petroff10 has only ten colours for fifty laws. Two of them are the grey of failed runs, and one
 is the violet of friction.
 """
@@ -23,6 +23,7 @@ from smc_mujoco.common.text import capital
 from smc_mujoco.control import estimator as estimators
 from smc_mujoco.control import surface as surfaces
 from smc_mujoco.control.component import Component, Template
+from smc_mujoco.control.gain_sets import LAWS
 from smc_mujoco.control.law import known_laws
 from smc_mujoco.mechanisms.plant import EFFORT, Plant, catalogue
 from smc_mujoco.metrics.conventions import Group, group_trace, groups
@@ -39,19 +40,15 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 REACTION = "#9018F0"
 LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
-MAX_CHROMA = 0.12  # above it, colours are compared by hue and lightness only, see `distance`; chosen
-MIN_DISTANCE = 0.03  # colours closer than this are mistaken for each other, see `distance`; chosen
-DARKEST = 0.32  # lightness of the darkest shade of a ramp, in OKLab; chosen
-OKLAB_CONES = np.array([
-    [0.4122214708, 0.5363325363, 0.0514459929],
-    [0.2119034982, 0.6806995451, 0.1073969566],
-    [0.0883024619, 0.2817188376, 0.6299787005],
+MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
+LIGHTEST, DARKEST = 61.0, 21.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper; of a ramp
+SIGHTS = np.array([  # linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 ])  # fmt: skip
-OKLAB = np.array([
-    [0.2104542553, 0.7936177850, -0.0040720468],
-    [1.9779984951, -2.4285922050, 0.4505937099],
-    [0.0259040371, 0.7827717662, -0.8086757660],
-])  # fmt: skip
+XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]])
 
 FULL_WIDTH, JOURNAL_WIDTH = 12.8, 10.0  # inches: 1280 px of SVG, 1920 of PNG; narrower pages have smaller letters
 RC = {
@@ -120,18 +117,22 @@ def law_colour(law: Component | str) -> str:
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
-    The library's laws have their colours. Only where two would be mistaken for each other, as where a law runs twice,
-    the later one gets the colour farthest from all in the picture. Laws that are not of the library, whose colours say
-    nothing, come after them, wherever they stand, and keep twice the distance.
+    The library's laws have their colours. Only where two would be mistaken for each other, the later one gets the
+    colour farthest from all in the picture: any 12 laws are then 13.7 apart, 24 are 9.6. Laws that are not of the
+    library, whose colours say nothing, come after them, wherever they stand. A law that runs several times has shades
+    of its colour, from light to dark.
     """
-    library = [_template(law)[1] in known_laws().own for law in laws]
+    names = [_template(law)[1] for law in laws]
     colours: dict[int, str] = {}
-    for i in sorted(range(len(laws)), key=lambda i: not library[i]):
-        wanted, apart = law_colour(laws[i]), MIN_DISTANCE if library[i] else 2.0 * MIN_DISTANCE
-        clear = all(distance(wanted, other) > apart for other in colours.values())
-        used = [*colours.values(), PAPER, DISTURBANCE, REACTION, FAILED]
-        free = () if clear else [colour for colour in _grid(len(colours)) if colour not in used]
-        colours[i] = wanted if clear else _farthest(free, used)[0]
+    for i in sorted(range(len(laws)), key=lambda i: (names[i] not in known_laws().own, i)):
+        again = [k for k, name in enumerate(names) if name == names[i]]
+        wanted, shades = law_colour(laws[i]), len(again) > 1
+        if shades:
+            wanted = ramp(wanted, len(again))[again.index(i)]
+        if not shades and any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
+            used = [*colours.values(), PAPER, INK, DISTURBANCE, REACTION, FAILED]
+            wanted = _farthest([colour for colour in _grid(len(colours)) if colour not in used], used)
+        colours[i] = wanted
     return [colours[i] for i in range(len(laws))]
 
 
@@ -139,47 +140,45 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 def _palette() -> dict[str, str]:
     """Return the colours of the library's laws that state none, each the farthest from all before it.
 
-    The baselines, which are beside other laws most often, are first.
+    Those that `compare` runs by default are first, then baselines. The former are at least MIN_DISTANCE apart in four
+    sights. All 55 cannot be: 218 of their 1,485 pairs are closer.
     """
     laws = known_laws().own.values()
-    colours, used = {}, [PAPER, DISTURBANCE, REACTION, FAILED, *(law.colour for law in laws if law.colour)]
-    for law in sorted((law for law in laws if not law.colour), key=lambda law: law.family != "baseline"):
-        colours[law.name] = _farthest([colour for colour in _grid(0) if colour not in used], used)[0]
+    colours, used = {}, [PAPER, INK, DISTURBANCE, REACTION, FAILED, *(law.colour for law in laws if law.colour)]
+    free = [law for law in laws if not law.colour]
+    for law in sorted(free, key=lambda law: (law.name not in LAWS, law.family != "baseline")):
+        colours[law.name] = _farthest([colour for colour in _grid(0) if colour not in used], used)
         used.append(colours[law.name])
     return colours
 
 
-def _farthest(colours: Sequence[str], others: Sequence[str]) -> tuple[str, float]:
-    """Return the colour whose `distance` to the nearest of the others is largest, and that distance."""
-    from scipy.spatial.distance import cdist
-
-    nearest = cdist([_place(colour) for colour in colours], [_place(other) for other in others]).min(axis=1)
-    return colours[int(nearest.argmax())], float(nearest.max())
+def _farthest(colours: Sequence[str], others: Sequence[str]) -> str:
+    """Return the colour whose `distance` to the nearest of the others is largest."""
+    seen, beside = (np.array([_seen(colour) for colour in some]) for some in (colours, others))
+    apart = np.linalg.norm(seen[:, None] - beside, axis=-1).min(axis=(1, 2))
+    return colours[int(apart.argmax())]
 
 
 @functools.cache
 def _grid(count: int) -> tuple[str, ...]:
     """Return a grid of colours that are neither pale nor dull, at least twice as many as `count`."""
-    hues = 24
+    hues = 36
     while hues < count / 2:
         hues *= 2  # a few grids serve all counts
-    parts = itertools.product(range(hues), (0.26, 0.4, 0.52), (0.45, 0.7))
+    parts = itertools.product(range(hues), (0.24, 0.33, 0.42, 0.51, 0.6), (0.45, 0.7, 0.95))
     colours = (
         "#" + "".join(f"{round(255 * c):02X}" for c in colorsys.hls_to_rgb(k / hues, lightness, saturation))
         for k, lightness, saturation in parts
     )
-    return tuple(colour for colour in colours if 3.0 * _place(colour)[0] < 0.75)
+    return tuple(colour for colour in colours if _seen(colour)[0][0] < LIGHTEST)
 
 
 @functools.cache
-def _place(colour: str) -> tuple[float, float, float]:
-    """Return a colour's coordinates for `distance`: a third of its lightness, green-red and blue-yellow.
-
-    They are those of OKLab (B. Ottosson, 2020), with strong colours dampened.
-    """
-    lightness, a, b = (OKLAB @ np.cbrt(OKLAB_CONES @ _linear(colour))).tolist()
-    damp = min(1.0, MAX_CHROMA / math.hypot(a, b)) if a or b else 1.0
-    return lightness / 3.0, damp * a, damp * b
+def _seen(colour: str) -> np.ndarray:
+    """Return a colour in CIELAB (D65) as each of SIGHTS sees it, (4, 3)."""
+    t = np.clip(SIGHTS @ _linear(colour), 0.0, 1.0) @ XYZ.T / XYZ.sum(axis=1)
+    x, y, z = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29).T
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)]).T
 
 
 def _linear(colour: str) -> np.ndarray:
@@ -189,8 +188,8 @@ def _linear(colour: str) -> np.ndarray:
 
 
 def distance(one: str, other: str) -> float:
-    """Return the distance of two colours in OKLab, in which hue counts most, so that two greens are close."""
-    return math.dist(_place(one), _place(other))
+    """Return the least distance of two colours in CIELAB over normal sight and three kinds of colour blindness."""
+    return float(np.linalg.norm(_seen(one) - _seen(other), axis=1).min())
 
 
 def law_name(law: Component | str) -> str:
@@ -446,13 +445,10 @@ def lighter(colour: str) -> str:
     return mixed(colour, PAPER, WHITE_SHARE)
 
 
-def ramp(colour: str, count: int, lightest: float = 0.66) -> list[str]:
-    """Return shades of a colour from light to dark, in equal steps of OKLab's lightness.
-
-    The default of `lightest` has a contrast of 3 : 1 to paper.
-    """
+def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
+    """Return shades of a colour from light to dark, in equal steps of lightness."""
     shades = [mixed(colour, other, share) for other in (PAPER, "#000000") for share in np.linspace(0.0, 0.95, 96)]
-    lightness = np.array([3.0 * _place(shade)[0] for shade in shades])
+    lightness = np.array([_seen(shade)[0][0] for shade in shades])
     return [shades[int(np.abs(lightness - level).argmin())] for level in np.linspace(lightest, DARKEST, count)]
 
 

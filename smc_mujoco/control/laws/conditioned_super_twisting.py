@@ -29,7 +29,6 @@ from smc_mujoco.control.units import FORCE_PER_ROOT, FORCE_RATE, RATE, Gain
     conditions={"k1 > sqrt(k2), for k1 > sqrt(k2 + L)": lambda g: g.k1**2 > g.k2},
     label="Conditioned super-twisting",
     short="CS",
-    colour="#6A4C93",
 )
 def conditioned_super_twisting(y, gains, memory):
     s, v_eq = sliding(y, gains.c)

@@ -19,7 +19,10 @@ from smc_mujoco.simulation.trace import Trace
 FIGURE_SIZE = (11.0, 5.6)  # inches
 ZOOM_BOUNDS = 2.5  # half-width of the second panel as a multiple of the bound: chosen
 AXIS_POINTS = 801  # points of the plane in each direction
-LIGHTEST, FADED = 0.85, 0.75  # lightness of the levels, in OKLab; share of paper in the region's colour: chosen
+LIGHTEST, FADED = (
+    82.0,
+    0.75,
+)  # lightness of the innermost level, in CIELAB; share of paper in the region's colour: chosen
 LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
 
 
