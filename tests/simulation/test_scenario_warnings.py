@@ -43,17 +43,6 @@ def test_what_is_taken_for_another_unit_ends_where_it_should():
         assert (warned(fields(high)), warned(fields(1.001 * high))) == (with_high, 0)
 
 
-def test_warnings_are_whole_sentences(snapshot):
-    plain = {"plant": "inverted_pendulum", "law": "none", "duration": 6.0}
-    motor, turned = {"actuator": smc.DCMotor(gear=1.0)}, {"x0": 30.0}
-    said = []
-    for fields in (motor, turned):
-        with pytest.warns(smc.errors.ScenarioWarning) as caught:
-            smc.Scenario(**plain | fields)
-        said += [str(one.message) for one in caught]
-    assert said == snapshot
-
-
 def test_angles_of_several_turns_may_be_degrees():
     for fields in DEGREES:
         with pytest.warns(

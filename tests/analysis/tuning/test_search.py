@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.words import words
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search, search_space, stages
@@ -384,17 +383,33 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
 
 
-def test_a_tuning_says_what_was_searched_and_how(found, tmp_path, snapshot):
+def test_a_tuning_says_each_gain_its_range_and_whether_it_is_at_a_bound_or_searches_disagree(found, tmp_path):
     gains = {"lam": 2.0, "k1": 3.0}, {"lam": 600.0, "k1": 1e-3}
     plain, extreme = (dataclasses.replace(found, law=dataclasses.replace(found.law, gains=one)) for one in gains)
     alone = dataclasses.replace(plain, searches=found.searches[:1])
     far = found.searches[0].best._replace(objective=7.0 * found.objective)
     apart = dataclasses.replace(plain, searches=(dataclasses.replace(found.searches[0], best=far), *found.searches[1:]))
-    tables = [one.tables[0] for one in (plain, extreme, alone, apart)]
-    said = [words(f"{one.title} {one.headings} {one.rows} {one.notes}") for one in tables] + [words(repr(plain))]
-    goals = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")), Objective(weight=0.0)
-    stored = sorted(json.loads(found.save(tmp_path / "a.json").read_text()))
-    assert [*said, *map(str, goals), goals[0].describe(), stored] == snapshot
+    tables = {
+        name: one.tables[0]
+        for name, one in {"plain": plain, "extreme": extreme, "alone": alone, "apart": apart}.items()
+    }
+    for name, table in tables.items():
+        assert [row[0] for row in table.rows] == ["lam", "k1"]
+        assert [bool(row[-1]) for row in table.rows] == [False, name == "extreme"]  # at its lower bound
+        assert len(table.headings) == len(table.rows[0])
+    notes = {name: " ".join(table.notes) for name, table in tables.items()}
+    assert "J up to 7 times the least" in notes["apart"]
+    assert notes["alone"] != notes["plain"] != notes["apart"]
+    assert "lam=2" in repr(plain)
+    goal, free = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")), Objective(weight=0.0)
+    assert all(part in str(goal) for part in ("nominal, sine", "0.001 TV", "|u| <= 12", "chattering of s <= 0.01"))
+    assert not any(part in str(free) for part in ("|u| <=", "chattering", "0.001 TV"))
+    assert goal.describe() == {
+        "chattering": 0.01, "conditions": ["nominal", "sine"], "control_period": 0.001, "duration": 5.0,
+        "starts": {"by": 0.0, "spread": 0.2, "x0": None}, "u_max": 12.0, "weight": 0.001,
+    }  # fmt: skip
+    names = "at_bound before bounds budget definition record rule scales scenario searched searches seed versions"
+    assert sorted(json.loads(found.save(tmp_path / "a.json").read_text())) == names.split()
 
 
 def test_what_is_no_tuning_is_refused(found, tmp_path, refused):
