@@ -44,10 +44,10 @@ def slug(name: str, max_bytes: int = MAX_NAME) -> str:
     return part
 
 
-def as_path(path: object) -> Path:
-    """Return a path; raise ScenarioError for what is none."""
+def as_path(path: object, what: str = "the path") -> Path:
+    """Return a path; raise ScenarioError, which names `what`, for what is none."""
     if not isinstance(path, str | os.PathLike):
-        raise ScenarioError(f"the path is {shown(path)}: give the name of a file as a text")
+        raise ScenarioError(f"{what} is {shown(path)}: give the name of a file or folder as a text")
     return Path(path)
 
 

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown
 from smc_mujoco.control import from_text
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -80,19 +80,9 @@ def _component(kind: str, value: object) -> Component:
     raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name")
 
 
-def real(**limits: Any) -> Callable[[str, float, Any], float]:
-    """Return the converter for a field that is a number, within limits as of `errors.number`."""
-    return lambda name, value, s: number(name, value, **limits)
-
-
 def input_delay(name: str, value: float, s: Any) -> float:
     """Return a delay, s, that is not longer than the run."""
     return number(name, value, low=0.0, high=s.duration)
-
-
-def seed(name: str, value: int, s: Any) -> int:
-    """Return a seed, or a key of seeds."""
-    return whole(name, value, 0, MAX_SEED)
 
 
 def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
@@ -145,17 +135,6 @@ def physics_step(name: str, value: float | None, s: Any) -> float | None:
     if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
     return period / round(count)
-
-
-def one_of(names: Sequence[str]) -> Callable[[str, str | None, Any], str | None]:
-    """Return the converter for a field that is one of `names` or None."""
-
-    def convert(name: str, value: str | None, s: Any) -> str | None:
-        if value is None or (isinstance(value, str) and value in names):
-            return value
-        raise unknown(name, value, names)
-
-    return convert
 
 
 def mechanism(name: str, value: str, s: Any) -> str:

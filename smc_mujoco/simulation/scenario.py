@@ -13,12 +13,13 @@ import importlib
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import html
+from smc_mujoco.common.constraints import Number, OneOf, Whole, of_fields
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Template, gain_text
@@ -125,10 +126,10 @@ class Scenario:
     # converted in this order
     plant: Plant = field(coerce.plant)
     law: Law = field(coerce.laws, None)
-    model: str | None = field(coerce.one_of(coerce.MODELS), None)
+    model: Annotated[str, OneOf(names=coerce.MODELS)] | None = None
     surface: Surface | None = field(coerce.surface, None)
-    duration: float = field(coerce.real(above=0.0, high=MAX_TIME), 10.0)
-    control_period: float = field(coerce.real(above=0.0, low=MIN_TIME), 1e-3)
+    duration: Annotated[float, Number(above=0.0, high=MAX_TIME)] = 10.0
+    control_period: Annotated[float, Number(low=MIN_TIME)] = 1e-3
     physics_step: float | None = field(coerce.physics_step, None)
     u_max: float | tuple[float, ...] | None = field(coerce.bound, None)
     x0: tuple[float, ...] | None = field(coerce.state, None)
@@ -144,9 +145,9 @@ class Scenario:
     velocity: Estimator | None = field(coerce.velocity, None)
     mismatch: Mapping[str, float] = field(coerce.mismatch, None)
     jump: Jump | None = field(coerce.instance(Jump, "smc.Jump(time=..., factors=...)"), None)
-    seed: int = field(coerce.seed, 0)
-    noise_key: int = field(coerce.seed, 0)
-    integrator: str | None = field(coerce.one_of(coerce.INTEGRATORS), None)
+    seed: Annotated[int, Whole(low=0, high=MAX_SEED)] = 0
+    noise_key: Annotated[int, Whole(low=0, high=MAX_SEED)] = 0
+    integrator: Annotated[str, OneOf(names=coerce.INTEGRATORS)] | None = None
     friction: tuple[Friction, ...] = field(coerce.friction, None)
     contact: Contact = field(coerce.contact, None)
     mechanism: str = field(coerce.mechanism, "equation")
@@ -208,9 +209,13 @@ class Scenario:
 
     def _convert(self) -> None:
         """Convert every field from what the user gave."""
+        declared = of_fields(Scenario)
         for f in dataclasses.fields(self):
+            value = getattr(self, f.name)
             if convert := f.metadata.get("convert"):
-                vars(self)[f.name] = convert(f.name, getattr(self, f.name), self)  # the class is frozen
+                vars(self)[f.name] = convert(f.name, value, self)  # the class is frozen
+            elif f.name in declared:
+                vars(self)[f.name] = declared[f.name](f.name, value)
 
     @functools.cached_property
     def noise_seed(self) -> int:

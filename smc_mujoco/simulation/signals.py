@@ -14,11 +14,12 @@ Times are in seconds. A reference is in m or rad, a disturbance in N or N m.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numba import njit
 
+from smc_mujoco.common.constraints import Natural, Number, Positive, constrain
 from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation import philox
@@ -30,15 +31,13 @@ SINUSOIDS = 32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 %
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """Base of all signals, which checks that every parameter is a finite number.
+    """Base of all signals, which checks that every parameter is a finite number, within the constraint of its type.
 
     If the class attribute `cartesian` is true, the signal is a force on bodies, N, not on joints: a `Push` on one body,
     or else a horizontal force on the body of each channel.
     """
 
     memory: ClassVar[int] = 0  # floats of state in each channel
-    positive: ClassVar[tuple[str, ...]] = ()  # names of parameters that must be > 0
-    natural: ClassVar[tuple[str, ...]] = ()  # names of parameters that must be >= 0
     random: ClassVar[bool] = False  # whether `value` takes memory, seed, channel and stream
     series: ClassVar[bool] = False  # whether `value` takes data
     sees: ClassVar[bool] = False  # whether `value` takes e, de and s; then it is called once per control sample
@@ -48,11 +47,9 @@ class Signal:
     value: ClassVar[Callable[..., tuple[float, float, float]]]  # static: value, first and second derivative
 
     def __post_init__(self):
+        constrain(self)
         for name, value in self.parameters().items():
-            above = 0.0 if name in self.positive else -math.inf
-            low = 0.0 if name in self.natural else -math.inf
-            checked = number(f"{type(self).__name__}'s {name}", value, above=above, low=low)
-            object.__setattr__(self, name, checked)
+            object.__setattr__(self, name, number(f"{type(self).__name__}'s {name}", value))
 
     def parameters(self) -> dict[str, float]:
         """Return parameter name -> value."""
@@ -132,9 +129,7 @@ class MinimumJerk(Signal):
 
     amplitude: float
     time: float
-    duration: float
-
-    positive = ("duration",)
+    duration: Positive
 
     @staticmethod
     def value(t, p):
@@ -150,9 +145,7 @@ class Pulse(Signal):
 
     amplitude: float
     time: float
-    width: float
-
-    positive = ("width",)
+    width: Positive
 
     @staticmethod
     def value(t, p):
@@ -169,9 +162,7 @@ class Impulse(Signal):
 
     impulse: float
     time: float
-    width: float = 5e-3
-
-    positive = ("width",)
+    width: Positive = 5e-3
 
     def __post_init__(self):
         super().__post_init__()
@@ -194,10 +185,9 @@ class Gust(Signal):
 
     amplitude: float
     time: float
-    width: float
+    width: Positive
 
     cartesian = True
-    positive = ("width",)
 
     @staticmethod
     def value(t, p):
@@ -227,10 +217,9 @@ class Push(Signal):
     y: float = 0.0
     z: float = 0.0
     time: float = 1.0
-    width: float = 0.05
+    width: Positive = 0.05
 
     cartesian = True
-    positive = ("width",)
 
     def parameters(self) -> dict[str, float]:
         return {name: getattr(self, name) for name in ("x", "y", "z", "time", "width")}
@@ -263,11 +252,10 @@ class Relay(Signal):
     s: float = 0.0
     rate: float = 0.0
     error: float = 0.0
-    slope: float = 0.0
-    start: float = 0.0
+    slope: Natural = 0.0
+    start: Natural = 0.0
 
     memory = 1  # its force now
-    natural = ("slope", "start")
     sees = True
 
     @staticmethod
@@ -288,13 +276,11 @@ class OrnsteinUhlenbeck(Signal):
     depend on the physics step and the control period. `dt` defaults to 1 ms.
     """
 
-    sigma: float
-    tau: float
-    dt: float = 1e-3
+    sigma: Natural
+    tau: Positive
+    dt: Positive = 1e-3
 
     memory = 3  # next knot, value at the last knot, value at the next
-    positive = ("tau", "dt")
-    natural = ("sigma",)
     random = True
 
     @staticmethod
@@ -325,12 +311,11 @@ class BandLimited(Signal):
     The path is the same under every physics step and control period.
     """
 
-    sigma: float
-    low: float
+    sigma: Natural
+    low: Natural
     high: float
 
     memory = 2 * SINUSOIDS  # angular frequencies, phases
-    natural = ("sigma", "low")
     random = True
 
     def __post_init__(self):
@@ -379,14 +364,13 @@ class Noise:
       position_error, velocity_error: signals that are added to what is measured, such as Held(times, values).
     """
 
-    position: float = 0.0
-    velocity: float = 0.0
+    position: Natural = 0.0
+    velocity: Natural = 0.0
     position_error: Signal | None = dataclasses.field(default=None, repr=False)
     velocity_error: Signal | None = dataclasses.field(default=None, repr=False)
 
     def __post_init__(self):
-        for name in ("position", "velocity"):
-            object.__setattr__(self, name, number(f"Noise's {name}", getattr(self, name), low=0.0))
+        constrain(self)
         for error in self.errors:
             is_signal = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
             if not is_signal or (error and (error.random or error.cartesian or error.sees)):
@@ -407,11 +391,11 @@ class Jump:
     payload, it has terms, which are added.
     """
 
-    time: float
+    time: Natural
     factors: Mapping[str, float]
 
     def __post_init__(self):
-        object.__setattr__(self, "time", number("Jump's time", self.time, low=0.0))
+        constrain(self)
         object.__setattr__(self, "factors", parameter_factors("Jump", self.factors))
 
 
@@ -440,12 +424,11 @@ class Clock:
       missed: probability that a sample is missed, 0 .. 0.99. The last command then stays.
     """
 
-    jitter: float = 0.0
-    missed: float = 0.0
+    jitter: Natural = 0.0
+    missed: Annotated[float, Number(low=0.0, high=MAX_MISSED)] = 0.0
 
     def __post_init__(self):
-        object.__setattr__(self, "jitter", number("Clock's jitter", self.jitter, low=0.0))
-        object.__setattr__(self, "missed", number("Clock's missed", self.missed, low=0.0, high=MAX_MISSED))
+        constrain(self)
 
     @property
     def regular(self) -> bool:

@@ -14,10 +14,13 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import SimpleNamespace
+from typing import Annotated
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common import constraints
+from smc_mujoco.common.constraints import Natural, Positive, constrain
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -38,7 +41,7 @@ ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
 DEFAULT_FORCE_SHARE = 1 / 6  # of the force of the weakest drive: the disturbance of the default class; chosen
 DEFAULT_FRICTION_SCALE = (0.5, 1.5)  # of the default class; chosen
 
-Range = tuple[float, float]
+Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -66,32 +69,26 @@ class Uncertainty:
       ScenarioError: a bound that is no number, or out of order.
     """
 
-    disturbance: float = 0.0
-    slope: float | None = None
-    position_noise: float = 0.0
-    velocity_noise: float = 0.0
-    hold: float = 0.05
+    disturbance: Natural = 0.0
+    slope: Positive | None = None
+    position_noise: Natural = 0.0
+    velocity_noise: Natural = 0.0
+    hold: Positive = 0.05
     delay: Range = (0.0, 0.0)
-    jitter: float = 0.0
-    mass: Range = (1.0, 1.0)
-    parameters: Mapping[str, Range] = frozen({})
+    jitter: Natural = 0.0
+    mass: Annotated[tuple[float, float], constraints.Range(above=0.0)] = (1.0, 1.0)
+    parameters: Mapping[str, tuple[float, float]] = frozen({})
     friction: Range = (0.0, 0.0)
     friction_scale: Range = (1.0, 1.0)
-    x0: float = 0.0
+    x0: Natural = 0.0
 
     def __post_init__(self):
-        put = vars(self).update  # the class is frozen
-        for name in ("disturbance", "position_noise", "velocity_noise", "jitter", "x0"):
-            put({name: number(f"Uncertainty's {name}", getattr(self, name), low=0.0)})
-        put(hold=number("Uncertainty's hold", self.hold, above=0.0))
-        if self.slope is not None:
-            put(slope=number("Uncertainty's slope", self.slope, above=0.0))
-        for name in ("delay", "mass", "friction", "friction_scale"):
-            put({name: _range(name, getattr(self, name), 0.0, strict=name == "mass")})
+        constrain(self)
         if not isinstance(self.parameters, Mapping):
             raise ScenarioError(f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name")
-        ranges = {str(name): _range(name, value, -math.inf) for name, value in self.parameters.items()}
-        put(parameters=frozen(ranges))
+        of = constraints.Range()
+        ranges = {str(name): of(f"Uncertainty's {name}", value) for name, value in self.parameters.items()}
+        vars(self)["parameters"] = frozen(ranges)  # the class is frozen
         bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0
         ends = self.delay, self.mass, self.friction, self.friction_scale, *self.parameters.values()
         if not any(bounds) and not any(low < high for low, high in ends):
@@ -152,17 +149,6 @@ def outside(scenario: Scenario, within: Uncertainty) -> str:
     if admits and any(beside.values()):
         reasons.append(f"its theorem is without {joined(name for name, there in beside.items() if there)}")
     return "; ".join(reasons)
-
-
-def _range(name: str, value: object, lower_bound: float, strict: bool = False) -> Range:
-    if not isinstance(value, tuple | list) or len(value) != 2:
-        raise ScenarioError(f"Uncertainty's {name} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)")
-    low, high = (number(f"Uncertainty's {name}", one, low=lower_bound) for one in value)
-    if strict and low <= 0.0:
-        raise ScenarioError(f"Uncertainty's {name} begins at {low:g}: give factors greater than 0")
-    if low > high:
-        raise ScenarioError(f"Uncertainty's {name} is from {low:g} to {high:g}: give the lowest first")
-    return low, high
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -3,13 +3,24 @@
 import dataclasses
 import math
 from collections.abc import Iterator
+from typing import Annotated
 
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.mjcb import compiled
-from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, PLAY, ROTOR, Actuator, driven_ids, drives
-from smc_mujoco.mechanisms.plant import Field
+from smc_mujoco.mechanisms.hardware.part import (
+    HARD_SOLIMP,
+    HARD_SOLREF,
+    PLAY,
+    ROTOR,
+    Actuator,
+    Natural,
+    driven_ids,
+    drives,
+)
+from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)
 MIN_INERTIA = 1e-9  # kg m^2 (kg): a lighter rotor is lost in rounding
@@ -37,14 +48,9 @@ class Backlash(Actuator):
 
     drives = False
 
-    gap: float
-    rotor_inertia: float = 1e-3
-    rotor_damping: float = 0.0
-
-    def __post_init__(self) -> None:
-        self.check_numbers("gap", low=0.0)
-        self.check_numbers("rotor_inertia", low=MIN_INERTIA)
-        self.check_numbers("rotor_damping", low=0.0)
+    gap: Natural
+    rotor_inertia: Annotated[float, Number(low=MIN_INERTIA, high=MAX_PARAMETER)] = 1e-3
+    rotor_damping: Natural = 0.0
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         rigid = compiled(spec.copy())

@@ -23,10 +23,12 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Hashable, Iterator, Sequence
+from typing import Annotated
 
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.constraints import Number
 from smc_mujoco.common.errors import ScenarioError, shown, unknown
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Field, Plant
@@ -65,14 +67,13 @@ class Contact(Part):
     """
 
     kind: str
-    friction: float | None = None
-    restitution: float | None = None
+    friction: Annotated[float, Number(low=0.0, high=MAX_FRICTION)] | None = None
+    restitution: Annotated[float, Number(low=0.0, high=MAX_RESTITUTION)] | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not isinstance(self.kind, str):
             raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
-        self.check_numbers("friction", low=0.0, high=MAX_FRICTION)
-        self.check_numbers("restitution", low=0.0, high=MAX_RESTITUTION)
 
     def check(self, plant: Plant) -> None:
         """Check that the plant offers this contact."""

@@ -17,13 +17,23 @@ changes linearly there.
 import dataclasses
 import math
 from collections.abc import Iterator
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, unknown
-from smc_mujoco.mechanisms.hardware.part import Actuator, NominalDrive, drive_ids, drives
+from smc_mujoco.common.constraints import Number, OneOf
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.part import (
+    Actuator,
+    Limit,
+    Natural,
+    NominalDrive,
+    Offset,
+    Positive,
+    drive_ids,
+    drives,
+)
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
@@ -51,10 +61,7 @@ class Lag(Actuator):
 
     in_callback: ClassVar[bool] = True
 
-    tau: float
-
-    def __post_init__(self) -> None:
-        self.check_numbers("tau", low=0.0)
+    tau: Natural
 
     @property
     def delay(self) -> float:
@@ -75,10 +82,7 @@ class RateLimit(Actuator):
 
     in_callback: ClassVar[bool] = True
 
-    rate: float
-
-    def __post_init__(self) -> None:
-        self.check_numbers("rate", above=0.0, high=math.inf, infinite=True)
+    rate: Limit
 
     @property
     def limited(self) -> bool:
@@ -128,34 +132,28 @@ class DCMotor(Actuator):
       command: what u is: "torque", N m (N) at the joint, or "voltage", V.
     """
 
-    resistance: float = 0.299
-    inductance: float = 0.0823e-3
-    torque_constant: float = 30.2e-3
-    gear: float = 12.25
-    rotor_inertia: float = 142e-7
-    cogging: float = 0.0
-    poles: float = 12.0
-    voltage: float = 24.0
-    current: float = 30.0
-    ripple: float = 0.0
-    bars: float = 9.0
-    bridge: float = 0.01
-    bridge_2: float = 0.01
-    brush: float = 0.0
-    brush_2: float = 0.35
-    command: str = "torque"
+    resistance: Annotated[float, Number(low=MIN_RESISTANCE, high=MAX_PARAMETER)] = 0.299
+    inductance: Natural = 0.0823e-3
+    torque_constant: Positive = 30.2e-3
+    gear: Positive = 12.25
+    rotor_inertia: Natural = 142e-7
+    cogging: Natural = 0.0
+    poles: Natural = 12.0
+    voltage: Limit = 24.0
+    current: Limit = 30.0
+    ripple: Natural = 0.0
+    bars: Positive = 9.0
+    bridge: Positive = 0.01
+    bridge_2: Positive = 0.01
+    brush: Offset = 0.0
+    brush_2: Offset = 0.35
+    command: Annotated[str, OneOf(names=COMMANDS)] = "torque"
 
     def __post_init__(self) -> None:
-        if self.command not in COMMANDS:
-            raise unknown("command of DCMotor", self.command, COMMANDS)
-        self.check_numbers("resistance", above=0.0, low=MIN_RESISTANCE)
-        self.check_numbers("torque_constant", "gear", "bars", "bridge", "bridge_2", above=0.0)
-        self.check_numbers("inductance", "rotor_inertia", "cogging", "poles", "ripple", low=0.0)
-        self.check_numbers("brush", "brush_2", low=-MAX_PARAMETER)
+        super().__post_init__()
         if self.ripple and self.delay:
             both = f"ripple {self.ripple:g} and inductance {self.inductance:g} H"
             raise ScenarioError(f"DCMotor has {both}, and ripple is of a current without delay: give inductance=0")
-        self.check_numbers("voltage", "current", above=0.0, high=math.inf, infinite=True)
         if not self.constant >= MIN_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
             weak = f"gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak"
             raise ScenarioError(f"DCMotor's {weak} for a resistance of {self.resistance:g} ohm: give a stronger motor")

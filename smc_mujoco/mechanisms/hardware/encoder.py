@@ -11,11 +11,13 @@ controller differentiates the positions.
 
 import dataclasses
 import math
+from typing import Annotated
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, whole
+from smc_mujoco.common.constraints import Finite, Natural, Positive, Probability, Whole
+from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
 from smc_mujoco.mechanisms.plant import Field
 
@@ -40,19 +42,11 @@ class Encoder(Part):
     With the velocity estimator "measured" there is also a tachometer, with the same period, delay and losses.
     """
 
-    counts: float = 4096
-    bias: float = 0.0
-    dropout: float = 0.0
-    period: float | None = None
-    delay: float = 0.0
-
-    def __post_init__(self):
-        if not (isinstance(self.counts, float) and self.counts == math.inf):
-            object.__setattr__(self, "counts", whole("Encoder's counts", self.counts, 2, 2**32))
-        self.check_numbers("bias", high=math.inf)
-        self.check_numbers("dropout", low=0.0, high=1.0)
-        self.check_numbers("period", above=0.0, high=math.inf)
-        self.check_numbers("delay", low=0.0, high=math.inf)
+    counts: Annotated[float, Whole(low=2, high=2**32, infinite=True)] = 4096
+    bias: Finite = 0.0
+    dropout: Probability = 0.0
+    period: Positive | None = None
+    delay: Natural = 0.0
 
     def quantum(self, hinge: bool) -> float:
         """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""

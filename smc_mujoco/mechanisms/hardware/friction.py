@@ -12,7 +12,17 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.part import HARD_SOLIMP, HARD_SOLREF, PASSIVE, Friction, dof_ids, joint_ids, joints
+from smc_mujoco.mechanisms.hardware.part import (
+    HARD_SOLIMP,
+    HARD_SOLREF,
+    PASSIVE,
+    Friction,
+    Natural,
+    Positive,
+    dof_ids,
+    joint_ids,
+    joints,
+)
 from smc_mujoco.mechanisms.plant import Field
 
 # Where a dcmotor's bristles lie in the compiled model.
@@ -31,10 +41,7 @@ class Viscous(Friction):
 
     forces = ("b",)
 
-    b: float
-
-    def __post_init__(self) -> None:
-        self.check_numbers("b", low=0.0)
+    b: Natural
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         yield Field("dof_damping", dof_ids(model), self.b, adds=True)
@@ -58,10 +65,7 @@ class Coulomb(Friction):
 
     forces = ("level",)
 
-    level: float
-
-    def __post_init__(self) -> None:
-        self.check_numbers("level", low=0.0)
+    level: Natural
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         dofs = dof_ids(model)
@@ -137,15 +141,14 @@ class LuGre(Friction):
     bristles = True
     forces = "coulomb", "static"
 
-    coulomb: float
-    static: float
-    stribeck: float
-    stiffness: float = 1e3
-    damping: float | None = None
+    coulomb: Positive
+    static: Positive
+    stribeck: Positive
+    stiffness: Positive = 1e3
+    damping: Natural | None = None
 
     def __post_init__(self) -> None:
-        self.check_numbers("coulomb", "static", "stribeck", "stiffness", above=0.0)
-        self.check_numbers("damping", low=0.0)
+        super().__post_init__()
         if self.static < self.coulomb:
             raise ScenarioError(
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: give static >= coulomb"

@@ -10,13 +10,15 @@ channel's actuator drives, if it is not the channel's joint itself.
 
 import dataclasses
 import functools
+import math
 from collections.abc import Hashable, Iterator
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.constraints import Number, constrain
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
@@ -27,22 +29,19 @@ HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
 HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; equal, so the rest has no effect
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
+# Numbers of parts; those that may be infinite switch a limit off
+Offset = Annotated[float, Number(low=-MAX_PARAMETER, high=MAX_PARAMETER)]
+Natural = Annotated[float, Number(low=0.0, high=MAX_PARAMETER)]
+Positive = Annotated[float, Number(above=0.0, high=MAX_PARAMETER)]
+Limit = Annotated[float, Number(above=0.0, high=math.inf, infinite=True)]
+
 
 @dataclasses.dataclass(frozen=True)
 class Part:
     """Base of all parts."""
 
-    def check_numbers(self, *names: str, **bounds: Any) -> None:
-        """Replace fields by floats within bounds of `errors.number`. None stays if it is the field's default."""
-        limits: dict[str, Any] = {"high": MAX_PARAMETER} | bounds
-        for name in names:
-            value, optional = getattr(self, name), getattr(type(self), name, 0.0) is None
-            if value is not None or not optional:
-                object.__setattr__(self, name, self._number(f"{type(self).__name__}'s {name}", value, **limits))
-
-    def _number(self, name: str, value: Any, **limits: Any) -> Any:
-        """Return the value of a field, a number within limits."""
-        return number(name, value, **limits)
+    def __post_init__(self) -> None:
+        constrain(self)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Add the part's objects to a mechanism, for every channel."""

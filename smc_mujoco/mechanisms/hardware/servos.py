@@ -20,7 +20,7 @@ from typing import NamedTuple
 from smc_mujoco.common.errors import find
 from smc_mujoco.common.files import read_json
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
-from smc_mujoco.mechanisms.hardware.sliding import PerJoint, Sliding
+from smc_mujoco.mechanisms.hardware.sliding import NaturalPerJoint, PositivePerJoint, Sliding
 
 LOAD_FACTORS = ("km", "ke", "kms", "kes", "kmq", "keq")  # factors on the two torques of the gearbox
 
@@ -54,21 +54,17 @@ class ServoFriction(Sliding):
 
     forces = ("kv", "kc", "kcs", *LOAD_FACTORS)
 
-    kv: PerJoint = 0.0
-    kc: PerJoint = 0.0
-    km: PerJoint = 0.0
-    ke: PerJoint = 0.0
-    kcs: PerJoint = 0.0
-    kms: PerJoint = 0.0
-    kes: PerJoint = 0.0
-    kmq: PerJoint = 0.0
-    keq: PerJoint = 0.0
-    vs: PerJoint = 1.0
-    alpha: PerJoint = 1.0
-
-    def __post_init__(self) -> None:
-        self.check_numbers("kv", "kc", "kcs", *LOAD_FACTORS, low=0.0)
-        self.check_numbers("vs", "alpha", above=0.0)
+    kv: NaturalPerJoint = 0.0
+    kc: NaturalPerJoint = 0.0
+    km: NaturalPerJoint = 0.0
+    ke: NaturalPerJoint = 0.0
+    kcs: NaturalPerJoint = 0.0
+    kms: NaturalPerJoint = 0.0
+    kes: NaturalPerJoint = 0.0
+    kmq: NaturalPerJoint = 0.0
+    keq: NaturalPerJoint = 0.0
+    vs: PositivePerJoint = 1.0
+    alpha: PositivePerJoint = 1.0
 
     @staticmethod
     def value(v, motor, load, p):

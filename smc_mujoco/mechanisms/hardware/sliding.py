@@ -26,12 +26,12 @@ The callback writes the friction as the control of an actuator `passive:<joint>`
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
-import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.constraints import Each, Number
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, Friction, joints
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Plant
 
@@ -40,6 +40,8 @@ BRISTLE_FREQUENCY = 200.0  # rad/s, natural, of a stuck joint, critically damped
 MAX_EXPONENT = 700.0  # exp of more overflows
 
 PerJoint = float | Sequence[float]  # one number for all channels, or one for each
+NaturalPerJoint = Annotated[PerJoint, Each(one=Number(low=0.0, high=MAX_PARAMETER))]
+PositivePerJoint = Annotated[PerJoint, Each(one=Number(above=0.0, high=MAX_PARAMETER))]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -65,12 +67,6 @@ class Sliding(Friction):
         contacts and limits of the step before, without the joint's damping. p has the numbers of its channel, by name.
         """
         raise NotImplementedError
-
-    def _number(self, name: str, value: Any, **limits: Any) -> Any:
-        """Return the value of a field, a number within limits or a tuple of them."""
-        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
-            return tuple(number(f"{name}[{i}]", item, **limits) for i, item in enumerate(value))
-        return number(name, value, **limits)
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if a field is a sequence and does not have one number for each channel of the plant."""
@@ -129,15 +125,10 @@ class Sigmoid(Sliding):
 
     forces = "p1", "hold"
 
-    p1: PerJoint
-    p2: PerJoint
-    p3: PerJoint = 0.0
-    hold: PerJoint | None = None
-
-    def __post_init__(self) -> None:
-        self.check_numbers("p1", "hold", low=0.0)
-        self.check_numbers("p2", above=0.0)
-        self.check_numbers("p3", low=-MAX_PARAMETER)
+    p1: NaturalPerJoint
+    p2: PositivePerJoint
+    p3: Annotated[PerJoint, Each(one=Number(low=-MAX_PARAMETER, high=MAX_PARAMETER))] = 0.0
+    hold: NaturalPerJoint | None = None
 
     @staticmethod
     def value(v, motor, load, p):

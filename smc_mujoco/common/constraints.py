@@ -1,0 +1,178 @@
+"""What a field of data or an argument may be, declared with its type: `tau: Annotated[float, Number(low=0.0)]`.
+
+Data whose __post_init__ calls `constrain`, and the arguments of a function with the decorator `constrained`, are then
+what is declared, or a ScenarioError is raised. None passes if the type names it, as `Positive | None` does. What
+depends on several values is checked by hand.
+"""
+
+import dataclasses
+import functools
+import inspect
+import math
+import typing
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.common.files import as_path
+
+P, T = ParamSpec("P"), TypeVar("T")
+
+
+class Constraint:
+    """Base of constraints. Called with the name of a thing and a value, one returns the value as what it declares."""
+
+    def __call__(self, what: str, value: Any) -> Any:
+        raise NotImplementedError
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Number(Constraint):
+    """A number > `above`, >= `low` and <= `high`, finite unless `infinite`, as a float."""
+
+    above: float = -math.inf
+    low: float = -math.inf
+    high: float = math.inf
+    infinite: bool = False
+
+    def __call__(self, what: str, value: Any) -> float:
+        return number(what, value, above=self.above, low=self.low, high=self.high, infinite=self.infinite)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Whole(Constraint):
+    """A whole number from `low` to `high`, as an int; also inf if `infinite`."""
+
+    low: int
+    high: int
+    infinite: bool = False
+
+    def __call__(self, what: str, value: Any) -> float:
+        if self.infinite and isinstance(value, float) and value == math.inf:
+            return value
+        return whole(what, value, self.low, self.high)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class OneOf(Constraint):
+    """One of some names."""
+
+    names: Sequence[str]
+
+    def __call__(self, what: str, value: Any) -> str:
+        if isinstance(value, str) and value in self.names:
+            return value
+        raise unknown(what, value, self.names)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Flag(Constraint):
+    """True or False."""
+
+    def __call__(self, what: str, value: Any) -> bool:
+        if isinstance(value, bool):
+            return value
+        raise ScenarioError(f"{what} is {shown(value)}: give True or False")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Each(Constraint):
+    """A value that satisfies `one`, or a sequence of such values, as a tuple."""
+
+    one: Constraint
+
+    def __call__(self, what: str, value: Any) -> Any:
+        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+            return tuple(self.one(f"{what}[{i}]", item) for i, item in enumerate(value))
+        return self.one(what, value)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Range(Constraint):
+    """Two numbers, as `Number` declares them, the lowest first."""
+
+    above: float = -math.inf
+    low: float = -math.inf
+
+    def __call__(self, what: str, value: Any) -> tuple[float, float]:
+        if not isinstance(value, tuple | list) or len(value) != 2:
+            raise ScenarioError(f"{what} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)")
+        low, high = (number(what, one, above=self.above, low=self.low) for one in value)
+        if low > high:
+            raise ScenarioError(f"{what} is from {low:g} to {high:g}: give the lowest first")
+        return low, high
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class FilePath(Constraint):
+    """The path of a file or folder, as a Path."""
+
+    def __call__(self, what: str, value: Any) -> Path:
+        return as_path(value, what)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class OrNone(Constraint):
+    """None, or what satisfies `one`."""
+
+    one: Constraint
+
+    def __call__(self, what: str, value: Any) -> Any:
+        return None if value is None else self.one(what, value)
+
+
+Finite = Annotated[float, Number()]
+Natural = Annotated[float, Number(low=0.0)]
+Positive = Annotated[float, Number(above=0.0)]
+Probability = Annotated[float, Number(low=0.0, high=1.0)]
+
+
+def of_type(kind: Any) -> Constraint | None:
+    """Return the constraint in a type, which lets None pass if the type names it; None without one."""
+    if typing.get_origin(kind) is Annotated:
+        return next((note for note in typing.get_args(kind)[1:] if isinstance(note, Constraint)), None)
+    options = typing.get_args(kind)
+    found = next(filter(None, map(of_type, options)), None)
+    return OrNone(one=found) if found and type(None) in options else found
+
+
+@functools.cache
+def of_fields(kind: type) -> dict[str, Constraint]:
+    """Return the constraint of each field of a class of data that declares one."""
+    types = {field.name: field.type for field in dataclasses.fields(kind)}
+    if any(isinstance(one, str) for one in types.values()):  # under `from __future__ import annotations`
+        types |= {name: one for name, one in typing.get_type_hints(kind, include_extras=True).items() if name in types}
+    return {name: found for name, one in types.items() if (found := of_type(one))}
+
+
+@functools.cache
+def of_parameters(function: Callable) -> dict[str, Constraint]:
+    """Return the constraint of each parameter that declares one."""
+    return {name: found for name, one in function.__annotations__.items() if (found := of_type(one))}
+
+
+def constrain(data: Any) -> None:
+    """Replace the fields of frozen data that declare a constraint by what it makes of them."""
+    for name, constraint in of_fields(type(data)).items():
+        object.__setattr__(data, name, constraint(f"{type(data).__name__}'s {name}", getattr(data, name)))
+
+
+def constrained(function: Callable[P, T]) -> Callable[P, T]:
+    """Check the arguments of each call whose parameters declare a constraint, before the function runs."""
+    constraints, signature = of_parameters(function), inspect.signature(function)
+
+    @functools.wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> T:
+        try:
+            given = signature.bind(*args, **kwargs)
+        except TypeError:
+            return function(*args, **kwargs)  # raises it in the function's own words
+        for name, constraint in constraints.items():
+            if name in given.arguments:
+                given.arguments[name] = constraint(name, given.arguments[name])
+        return function(*given.args, **given.kwargs)
+
+    return checked
