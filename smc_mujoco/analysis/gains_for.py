@@ -20,7 +20,8 @@ import numpy as np
 from smc_mujoco.analysis import margins
 from smc_mujoco.analysis.chattering import Chattering, predict
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, number, users_stacklevel
+from smc_mujoco.common.constraints import Positive, constrained
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, Template
@@ -79,16 +80,14 @@ def gains_for(
     return design(Scenario(law=law, plant=plant, **fields), amplitude, frequency, channel)  # type: ignore[arg-type]
 
 
-def design(base: Scenario, amplitude: float | None, frequency: float | None = None, channel: int = 0) -> Design:
+@constrained
+def design(base: Scenario, amplitude: Positive | None, frequency: Positive | None = None, channel: int = 0) -> Design:
     """Return the largest gains for the law of a scenario. Arguments and errors are those of `gains_for`."""
     if amplitude is None and frequency is None:
         raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
     if not base.law.uniform:
         cure = "give one number for each gain"
         raise ScenarioError(f"gains_for needs gains that all channels share, not {base.law}: {cure}")
-    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
-        if value is not None:
-            number(name, value, above=0.0)
     predictions = 0
     with bar(f"gains of {base.law.name} on {base.plant.name}") as progress_bar:
 

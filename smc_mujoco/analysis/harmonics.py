@@ -12,13 +12,14 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.analysis.state_space import NONLINEAR_FLAGS, rates
-from smc_mujoco.common.errors import ScenarioError, number, whole
+from smc_mujoco.common.constraints import Positive, Whole, constrained
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.common.mjcb import installed
 from smc_mujoco.control.component import Component, Template
@@ -356,8 +357,12 @@ def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.nda
     return made
 
 
+@constrained
 def describing_function(
-    law: Component | Template | str, amplitude: float, omega: float, samples: int = 4_000_000
+    law: Component | Template | str,
+    amplitude: Positive,
+    omega: Positive,
+    samples: Annotated[int, Whole(low=2, high=MAX_SAMPLES)] = 4_000_000,
 ) -> complex:
     """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), in continuous time.
 
@@ -375,8 +380,6 @@ def describing_function(
     Raises:
       ScenarioError: a law that does not compile, or raises; an amplitude, omega or number of samples that is not > 0.
     """
-    amplitude, omega = number("amplitude", amplitude, above=0.0), number("omega", omega, above=0.0)
-    samples = whole("samples", samples, 2, MAX_SAMPLES)
     h = math.tau / omega / samples
     resolved = Scenario(plant="duffing", law=law, model="none").resolved
     controller = Controller(resolved.velocity, None, resolved.law.of_channel(0))

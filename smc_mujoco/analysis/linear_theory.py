@@ -23,10 +23,12 @@ import functools
 import math
 from collections.abc import Callable
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.constraints import Finite, Natural, Positive, constrained
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.design import DIFFERENCE_STEP
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import Plant
@@ -100,19 +102,21 @@ def sampled_mode(at: Linear, stiffness: float, h: float) -> tuple[np.ndarray, np
 # stability
 
 
-def smallest_lam(plant: Plant, k1: float) -> float:
+@constrained
+def smallest_lam(plant: Plant, k1: Natural) -> float:
     """Return the lam above which (1) is stable in continuous control, at least 0.
 
     By Routh-Hurwitz both coefficients of (1) must be positive: lam > -D and lam k1 > -K_j for every mode. A result of 0
     confirms the paper's claim; with inf no lam is enough.
     """
-    k1, at = number("k1", k1, low=0.0), linear(plant)
+    at = linear(plant)
     soft = -float(at.modes[0])
     stiff = soft / k1 if k1 > 0.0 else (math.inf if soft >= 0.0 else 0.0)
     return max(0.0, -at.damping, stiff)
 
 
-def critical_delay(plant: Plant, lam: float, k1: float, control_period: float) -> float:
+@constrained
+def critical_delay(plant: Plant, lam: Natural, k1: Natural, control_period: Positive) -> float:
     """Return the input delay in s up to which (1) is stable: 0 if it is unstable without delay, inf if it never is.
 
     With a delay of m periods h the equation of a mode is 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1 and
@@ -121,9 +125,8 @@ def critical_delay(plant: Plant, lam: float, k1: float, control_period: float) -
     whose gain is above 1 at the highest frequency, z = -1, tolerates less than one period. A loop with a stiff spring,
     K_j > lam k1, may be stable again with a longer delay.
     """
-    lam, k1 = number("lam", lam, low=0.0), number("k1", k1, low=0.0)
-    at, h = linear(plant), number("control_period", control_period, above=0.0)
-    return min(_crossing(at, stiffness, lam, k1, h) for stiffness in at.modes) if lam else 0.0
+    at = linear(plant)
+    return min(_crossing(at, stiffness, lam, k1, control_period) for stiffness in at.modes) if lam else 0.0
 
 
 def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> float:
@@ -149,9 +152,9 @@ def _crossing(at: Linear, stiffness: float, lam: float, k1: float, h: float) -> 
 # at rest
 
 
-def steady_error(plant: Plant, lam: float, k1: float, d: float) -> float:
+@constrained
+def steady_error(plant: Plant, lam: Natural, k1: Natural, d: Finite) -> float:
     """Return |x| at rest of (1) under a constant d on every channel, worst channel, rad or m: |d| / (lam k1 + K)."""
-    lam, k1, d = number("lam", lam, low=0.0), number("k1", k1, low=0.0), number("d", d)
     loop = linear(plant).stiffness + lam * k1 * np.eye(plant.n)
     return float(np.abs(np.linalg.solve(loop, np.full(plant.n, d))).max())
 
@@ -174,7 +177,8 @@ def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable
     return force
 
 
-def tolerated_force(plant: Plant, law: Law, max_error: float, u_max: float = math.inf) -> float | None:
+@constrained
+def tolerated_force(plant: Plant, law: Law, max_error: Positive, u_max: float = math.inf) -> float | None:
     """Return the largest constant d, or dry friction, with which the plant comes to rest within |x| <= max_error.
 
     It is None for a law without linear part. Dry friction up to this level may also stop the plant closer to 0.
@@ -184,11 +188,10 @@ def tolerated_force(plant: Plant, law: Law, max_error: float, u_max: float = mat
     force = restoring_force(plant, law, u_max)
     if force is None:
         return None
-    max_error = number("max_error", max_error, above=0.0)
     falls = np.flatnonzero(np.diff(np.r_[0.0, force(DISPLACEMENTS)]) < 0.0)
     size = falls[0] if falls.size else DISPLACEMENTS.size  # of the DISPLACEMENTS up to the force's first maximum
     ends = DISPLACEMENTS[max(size - 2, 0)], DISPLACEMENTS[min(size, DISPLACEMENTS.size - 1)]
-    peak = minimize_scalar(
+    peak: Any = minimize_scalar(
         lambda x: -float(force(np.array([x]))[0]), bounds=ends, method="bounded", options={"xatol": 1e-9 * ends[1]}
     )
     return max(-float(peak.fun) if max_error >= peak.x else float(force(np.array([max_error]))[0]), 0.0)

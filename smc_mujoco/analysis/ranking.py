@@ -49,16 +49,17 @@ laws have too few units for any verdict, the law is undecided, and not among the
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from smc_mujoco.analysis.bootstrap import LEVEL, middle
-from smc_mujoco.common.errors import number
+from smc_mujoco.common.constraints import Number, constrained
 
 MAX_EXACT = 60  # samples; with more the normal approximation of the rank sum is used
 RELEVANT = 0.03  # r, default share of the larger value that is relevant; chosen
+Relevant = Annotated[float, Number(low=0.0, high=0.5)]
 TREND_POWER = 5  # the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
 LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
 MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
@@ -109,6 +110,7 @@ class Comparison:
     law -> y' and rho of each run, NaN where they are not known; default: nowhere.
     """
 
+    @constrained
     def __init__(
         self,
         scores: Mapping[str, ArrayLike],
@@ -116,7 +118,7 @@ class Comparison:
         shares: bool = False,
         outcomes: Mapping[str, ArrayLike] | None = None,
         sets: Mapping[str, ArrayLike] | None = None,
-        relevant: float = RELEVANT,
+        relevant: Relevant = RELEVANT,
         limits: Limits | None = None,
         untested: ArrayLike = False,
         halves: Mapping[str, ArrayLike] | None = None,
@@ -125,7 +127,7 @@ class Comparison:
         def stacked(by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
             return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
 
-        self.laws, self.shares, self.relevant = tuple(sorted(scores)), shares, checked_share(relevant)
+        self.laws, self.shares, self.relevant = tuple(sorted(scores)), shares, relevant
         self.cells = cells = stacked(scores, float)  # (laws, blocks, seeds)
         unknown = np.full(cells.shape, math.nan)
         self.halves = unknown if halves is None else stacked(halves, float)  # as cells, at half the physics step
@@ -479,11 +481,6 @@ def exceeds(a: ArrayLike, b: ArrayLike, floor: ArrayLike = 0.0, relevant: float 
     """Return whether a is larger than b by more than what is relevant, with both at least the floor q; a, b >= 0."""
     larger, smaller = np.asarray(np.maximum(a, floor)), np.asarray(np.maximum(b, floor))
     return np.asarray((larger > smaller) & ((1.0 - relevant) * larger > smaller))
-
-
-def checked_share(relevant: float) -> float:
-    """Return the share of a value that is relevant. Raise ScenarioError if it is out of range."""
-    return number("relevant", relevant, low=0.0, high=0.5)
 
 
 # the signed-rank test

@@ -19,7 +19,8 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, whole
 from smc_mujoco.common.files import as_path
 
-P, T = ParamSpec("P"), TypeVar("T")
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class Constraint:
@@ -124,10 +125,14 @@ class OrNone(Constraint):
         return None if value is None else self.one(what, value)
 
 
+MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
+
 Finite = Annotated[float, Number()]
 Natural = Annotated[float, Number(low=0.0)]
 Positive = Annotated[float, Number(above=0.0)]
 Probability = Annotated[float, Number(low=0.0, high=1.0)]
+Seed = Annotated[int, Whole(low=0, high=MAX_SEED)]
+Timeout = Annotated[float, Number(above=0.0, high=86_400.0)]  # s, a day at most
 
 
 def of_type(kind: Any) -> Constraint | None:

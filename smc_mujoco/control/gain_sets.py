@@ -18,8 +18,9 @@ import functools
 import inspect
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json
 from smc_mujoco.control import source
@@ -32,6 +33,7 @@ from smc_mujoco.mechanisms.plant import catalogue as plants_known
 
 SETS = ("study", "tuned", "tracking")
 KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
+NameOfSet = Annotated[str, OneOf(names=(*KNOWN_SETS,))]
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
 # The laws on the report's first page: the four of the paper, two more of its first study, and the first law of each
 # other family in the table of docs/catalogue.md, which was written before any tuning.
@@ -56,14 +58,14 @@ def file_of(gains: str) -> Path:
 STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 
 
-def law(plant: str | Plant, name: str, gains: str = "tuned", seed: int | None = None) -> Component:
+@constrained
+def law(plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | None = None) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
     A run with this seed has the gains of search number `seed` modulo their number. Without a seed: the gains with the
     least J of all searches.
     """
     base = find_law(name)
-    find("set of gains", gains, KNOWN_SETS)
     if gains == "default":
         return base
     plant = as_plant(plant)
@@ -84,9 +86,9 @@ def general() -> tuple[str, ...]:
     return *LAWS, *sorted(others)
 
 
-def general_laws(plants: Sequence[str | Plant], gains: str) -> list[str]:
+@constrained
+def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
     """List the general laws that have gains in a set on each of these plants, those of LAWS first."""
-    find("set of gains", gains, KNOWN_SETS)
     named = [as_plant(plant) for plant in plants]
     if names := [name for name in general() if all(in_set(plant, name, gains) for plant in named)]:
         return names

@@ -7,12 +7,13 @@ one in the next step, which ignores the action, as gymnasium's own vector enviro
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
+from smc_mujoco.common.constraints import Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.envs.episode import Setting, bounded
 from smc_mujoco.envs.gymnasium_env import TimeLimited, action_space, observation_space
@@ -37,14 +38,15 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  # as gymnasium has it
 
+    @constrained
     def __init__(
         self,
         plant: Plant | str,
-        num_envs: int = 1,
+        num_envs: Annotated[int, Whole(low=1, high=MAX_COPIES)] = 1,
         task: str = "regulate",
         changes: Mapping[str, Any] | None = None,
         threads: int | None = None,
-        max_episode_steps: int | None = None,
+        max_episode_steps: Annotated[int, Whole(low=1, high=10**15)] | None = None,
         render_mode: None = None,
     ):
         """Make copies of a plant with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`.
@@ -54,12 +56,11 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         """
         if render_mode is not None:
             raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
-        self.num_envs = whole("num_envs", num_envs, 1, MAX_COPIES)
+        self.num_envs = num_envs
         self.setting = Setting(plant, task, changes, edit=remove_scenery)
         disable_unused_constraints(self.setting.model)
         samples = self.setting.scenario.samples
-        steps = samples if max_episode_steps is None else whole("max_episode_steps", max_episode_steps, 1, 10**15)
-        self.max_samples = min(samples, steps)
+        self.max_samples = samples if max_episode_steps is None else min(samples, max_episode_steps)
         self.single_action_space = action_space(self.setting)
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)

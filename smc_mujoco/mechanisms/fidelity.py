@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import find, number
+from smc_mujoco.common.constraints import Positive, constrained
+from smc_mujoco.common.errors import find
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, write
@@ -13,7 +14,8 @@ RANDOM_STATES = 500  # random states of a network
 SEED = 0
 
 
-def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) -> float:
+@constrained
+def deviation(plant: Plant | str, mechanism: str, reach: Positive | None = None) -> float:
     """Return the largest |x'' - f| over the largest |f|, for states with |x| and |v| up to `reach`, without a command.
 
     x'' is the mechanism's, f the plant's equation with the same parameters. The states of one channel lie on a grid,
@@ -26,7 +28,7 @@ def deviation(plant: Plant | str, mechanism: str, reach: float | None = None) ->
     """
     plant = as_plant(plant)
     variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)
-    reach = number("reach", max(map(abs, plant.x0)) if reach is None else reach, above=0.0)
+    reach = max(map(abs, plant.x0)) if reach is None else reach
     spec = plant.spec()
     variant.edit(spec)
     model = compiled(spec)

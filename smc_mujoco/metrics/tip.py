@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.constraints import Positive, constrained
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import drive_ids, initial_pose, joint_ids, joint_names
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
@@ -152,7 +153,8 @@ def _jump_sample(trace: Trace) -> int:
     return len(trace.t) if scenario.jump is None else -(-scenario.jump_step // scenario.steps)
 
 
-def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
+@constrained
+def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
     """Return scores of an arm's tip, by name.
 
     Args:
@@ -171,7 +173,7 @@ def tip_scores(trace: Trace, force: float | None = None) -> dict[str, float]:
     error = tip_error(trace)
     values = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
     if knows_contacts(trace.scenario):
-        wanted = trace.scenario.law.gains.get("force") if force is None else number("force", force, above=0.0)
+        wanted = trace.scenario.law.gains.get("force") if force is None else force
         pressed = contacts(trace)
         late = pressed.force[trace.t >= trace.t[0] + FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)]
         values["mean_force"] = late.mean()

@@ -29,7 +29,6 @@ T = TypeVar("T")
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
 MODELS = ("none", "nominal")
 MIN_TIME = 1e-9  # s, of periods
-MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
 REST = Constant(0.0)
 
 ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the order of the driven channels

@@ -15,11 +15,12 @@ import dataclasses
 import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.constraints import Natural, Whole, constrained
 from smc_mujoco.common.errors import (
     MAX_ITEMS,
     ScenarioError,
@@ -86,7 +87,8 @@ class Starts:
         return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
 
 
-def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by: float = 0.0) -> Starts:
+@constrained
+def starts(x0: float | Sequence[float] | None = None, spread: Natural = SPREAD, by: Natural = 0.0) -> Starts:
     """Return where the runs of a grid begin, by seed.
 
     Args:
@@ -99,7 +101,7 @@ def starts(x0: float | Sequence[float] | None = None, spread: float = SPREAD, by
     """
     items = items_of("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
     middle = None if x0 is None else tuple(number("x0", item) for item in items)
-    return Starts(x0=middle, spread=number("spread", spread, low=0.0), by=number("by", by, low=0.0))
+    return Starts(x0=middle, spread=spread, by=by)
 
 
 def grid(
@@ -165,18 +167,19 @@ def all_combinations(
     return scenarios
 
 
+@constrained
 def case(
     plant: str | Plant,
     law: str | Law | Template,
     condition: str | Condition = "nominal",
     duration: float = DURATION,
     gains: str = "tuned",
-    seed: int = 0,
+    seed: Annotated[int, Whole(low=0, high=GRID_SEEDS - 1)] = 0,
     starts: Starts | None = None,
     changes: Mapping[str, Any] = frozen({}),
 ) -> Scenario:
     """Return one run of a grid, with `changes` of the fields that its condition sets."""
-    plant, condition, seed = as_plant(plant), find_condition(condition), whole("seed", seed, 0, GRID_SEEDS - 1)
+    plant, condition = as_plant(plant), find_condition(condition)
     fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
     if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}

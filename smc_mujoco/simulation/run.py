@@ -14,13 +14,14 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from typing import overload
+from typing import Annotated, overload
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import mjcb
-from smc_mujoco.common.errors import ScenarioError, users_stacklevel, whole
+from smc_mujoco.common.constraints import Whole, constrained
+from smc_mujoco.common.errors import ScenarioError, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
@@ -148,11 +149,12 @@ def _batches(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[li
         yield batch
 
 
-def cores(threads: int | None = None) -> int:
+@constrained
+def cores(threads: Annotated[int, Whole(low=1, high=1024)] | None = None) -> int:
     """Return how many simulations to step at once: `threads`, or one for each core that this process may use."""
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return whole("threads", threads, 1, 1024)
+    return threads
 
 
 class ScenarioBatch:

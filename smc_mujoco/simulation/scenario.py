@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import html
-from smc_mujoco.common.constraints import Number, OneOf, Whole, of_fields
+from smc_mujoco.common.constraints import MAX_SEED, Number, OneOf, Seed, of_fields
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control.component import Template, gain_text
@@ -37,7 +37,7 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.coerce import MAX_SEED, MIN_TIME
+from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.philox import PROCESS
 from smc_mujoco.simulation.signals import Clock, Impulse, Jump, Noise, OrnsteinUhlenbeck, PerChannel, Push, Signal
 
@@ -145,8 +145,8 @@ class Scenario:
     velocity: Estimator | None = field(coerce.velocity, None)
     mismatch: Mapping[str, float] = field(coerce.mismatch, None)
     jump: Jump | None = field(coerce.instance(Jump, "smc.Jump(time=..., factors=...)"), None)
-    seed: Annotated[int, Whole(low=0, high=MAX_SEED)] = 0
-    noise_key: Annotated[int, Whole(low=0, high=MAX_SEED)] = 0
+    seed: Seed = 0
+    noise_key: Seed = 0
     integrator: Annotated[str, OneOf(names=coerce.INTEGRATORS)] | None = None
     friction: tuple[Friction, ...] = field(coerce.friction, None)
     contact: Contact = field(coerce.contact, None)

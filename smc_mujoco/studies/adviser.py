@@ -17,17 +17,18 @@ of `ties`, less first. The first law is advised, unless all are level.
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import Interval, median_of
 from smc_mujoco.analysis.paired_runs import SETTLES, Group, Scores
-from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, checked_share, linked, ranked, ranks
+from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Rank, Relevant, linked, ranked, ranks
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, default_class
-from smc_mujoco.common.errors import ScenarioError, number, unknown, whole
+from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
+from smc_mujoco.common.errors import ScenarioError, unknown
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.properties import PROPERTIES, suitable
@@ -61,21 +62,22 @@ class Extent(NamedTuple):
 FULL, QUICK = Extent(5.0, search.SEARCHES, search.BUDGET, 1), Extent(3.0, 3, 16, 3)
 
 
+@constrained
 def which(
     plant: str | Plant,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     needs: str | Sequence[str] = (),
     laws: str | Component | Template | Sequence[str | Component | Template] | None = None,
-    seeds: int = 24,
-    duration: float | None = None,
+    seeds: Annotated[int, Whole(low=1, high=10_000)] = 24,
+    duration: Positive | None = None,
     starts: Starts | None = None,
-    out: str | Path = "which",
+    out: Annotated[str | Path, FilePath()] = "which",
     quick: bool = False,
     threads: int | None = None,
     progress: bool = False,
     defaults: bool = False,
     unchecked: bool = False,
-    relevant: float = RELEVANT,
+    relevant: Relevant = RELEVANT,
     noise_key: int | str = DRAWN,
     within: Uncertainty | None = None,
 ) -> Advice:
@@ -102,16 +104,15 @@ def which(
       ScenarioError: an unknown name, no law that suits, or a need without a number on this plant.
     """
     extent, machine = QUICK if quick else FULL, as_plant(plant)
-    count, relevant = whole("seeds", seeds, 1, 10_000), checked_share(relevant)
     compared, properties = _needs(needs, machine)
-    length = extent.duration if duration is None else number("duration", duration, above=0.0)
+    length = extent.duration if duration is None else duration
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
     candidates = _candidates(trial, _suited(machine, wanted, laws), extent)
     if not defaults:
         check_tuned([*candidates.values()])
-    table = trial.run({machine.name: [*candidates.values()]}, count, noise_key=noise_key)
+    table = trial.run({machine.name: [*candidates.values()]}, seeds, noise_key=noise_key)
     worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
     return Advice(

@@ -7,13 +7,14 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from smc_mujoco.analysis import paired_runs
-from smc_mujoco.analysis.ranking import RELEVANT, checked_share
+from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
-from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown, whole
+from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
@@ -36,7 +37,7 @@ from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
 from smc_mujoco.studies.noise_key import DRAWN
-from smc_mujoco.studies.study import FULL, QUICK, Extent
+from smc_mujoco.studies.study import FULL, QUICK, Extent, Traces
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, WorstCases
 
@@ -166,27 +167,28 @@ class Compared(Tables):
         return dot_plot.plot(self.table, path, metrics or dot_plot.METRICS, **options)
 
 
+@constrained
 def compare(
     laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
-    seeds: int = search.SEARCHES,
+    seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = search.SEARCHES,
     tune: bool = True,
     worst: bool | Uncertainty = False,
     executor: "executors.Workers | None" = None,
     *,
-    out: str | os.PathLike[str] = "compared",
+    out: Annotated[str | os.PathLike[str], FilePath()] = "compared",
     metrics: Sequence[str] = METRICS,
-    duration: float | None = None,
+    duration: Positive | None = None,
     starts: Starts | None = None,
-    gains: str = "tuned",
-    searches: int | None = None,
-    budget: int = search.BUDGET,
+    gains: gain_sets.NameOfSet = "tuned",
+    searches: search.Searches | None = None,
+    budget: search.Budget = search.BUDGET,
     quick: bool = False,
     defaults: bool = False,
     unchecked: bool = False,
-    relevant: float = RELEVANT,
-    traces: str = "none",
+    relevant: Relevant = RELEVANT,
+    traces: Traces = "none",
     noise_key: int | str = DRAWN,
     threads: int | None = None,
     progress: bool = True,
@@ -220,33 +222,23 @@ def compare(
     Raises:
       ScenarioError: an unknown name, or arguments that `grid`, `study` or `leaderboard` refuse.
     """
-    count, relevant = whole("seeds", seeds, 1, MAX_ITEMS), checked_share(relevant)
     workers = executors.as_executor("local" if executor is None else executor)
-    _check_names(metrics, gains, out)
+    for name in items_of("metrics", metrics):
+        find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     if not isinstance(worst, bool | Uncertainty):
         raise ScenarioError(f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)")
     trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
     number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
-    number, budget = whole("searches", number, 1, search.MAX_SEARCHES), whole("budget", budget, 1, search.MAX_BUDGET)
     candidates = _candidates(trial, laws, tune, gains, number, budget)
-    table = trial.run(candidates, count, executor=workers, traces=traces, noise_key=noise_key)
+    table = trial.run(candidates, seeds, executor=workers, traces=traces, noise_key=noise_key)
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant, found, unchecked)
-    unseen = trial.unseen(candidates, count, int(table.column("noise_key")[0]))
+    unseen = trial.unseen(candidates, seeds, int(table.column("noise_key")[0]))
     sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
     outside = {p: tuple(c.law.name for c in candidates[p] if not c.law.checked) for p in unseen}
     boards[:0] = objective_boards(unseen, sources, defaults, relevant, outside, unchecked)
     return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found)
-
-
-def _check_names(metrics: Sequence[str], gains: str, out: object) -> None:
-    """Raise ScenarioError for an unknown metric or set of gains, or an `out` that is no path."""
-    for name in items_of("metrics", metrics):
-        find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
-    find("set of gains", gains, gain_sets.KNOWN_SETS)
-    if not isinstance(out, str | os.PathLike):
-        raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
 
 
 def _trial(

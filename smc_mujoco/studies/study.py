@@ -12,12 +12,13 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from smc_mujoco.analysis.step_halving import halved, repeats_all
-from smc_mujoco.common.errors import ScenarioError, find, printable, shown
+from smc_mujoco.common.constraints import FilePath, OneOf, constrained
+from smc_mujoco.common.errors import ScenarioError, printable, shown
 from smc_mujoco.common.files import slug, to_json
 from smc_mujoco.common.progress import counter
 from smc_mujoco.control.gain_sets import LAWS
@@ -36,7 +37,7 @@ from smc_mujoco.studies.table import Table
 # One condition of each kind. IDEAL: the paper's. REAL: friction, drive, gear, sensor and obstacles.
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
-TRACES = ("none", "worst", "all")  # choices of traces to save
+Traces = Annotated[str, OneOf(names=("none", "worst", "all"))]  # choices of traces to save
 REPEATED_SEEDS = 4  # one seed in so many is repeated at half the step, where no constraint acts under RK4; chosen
 
 
@@ -61,14 +62,15 @@ QUICK = Extent(
 )
 
 
+@constrained
 def study(
     scenarios: Iterable[Scenario],
-    out: str | os.PathLike[str],
+    out: Annotated[str | os.PathLike[str], FilePath()],
     resume: bool = True,
     executor: "executors.Workers" = "local",
     threads: int | None = None,
     progress: bool = False,
-    traces: str = "none",
+    traces: Traces = "none",
     noise_key: int | str = 0,
     half_steps: bool = False,
 ) -> Table:
@@ -97,10 +99,7 @@ def study(
       ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that are missing or die.
         Finished runs stay.
     """
-    if not isinstance(out, str | os.PathLike):
-        raise ScenarioError(f"out is {shown(out)}: give the path of a folder")
     where = executors.as_executor(executor)
-    find("choice of traces", traces, dict.fromkeys(TRACES))
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}

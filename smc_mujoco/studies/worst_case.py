@@ -10,14 +10,15 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from smc_mujoco.analysis.worst_case.search import Search
 from smc_mujoco.analysis.worst_case.uncertainty import Members, Uncertainty, default_class, outside
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.errors import ScenarioError, find, shown, whole
+from smc_mujoco.common.constraints import Seed, Whole, constrained
+from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -166,12 +167,13 @@ class WorstCases(Tables, list[WorstCase]):
         return figure(run([*runs.values()]), path, [*runs], **options)
 
 
+@constrained
 def worst_case(
     scenario: Scenario | Sequence[Scenario],
     metric: str = METRIC,
     within: Uncertainty | None = None,
-    budget: int | None = None,
-    seed: int = 0,
+    budget: Annotated[int, Whole(low=1, high=MAX_BUDGET)] | None = None,
+    seed: Seed = 0,
     threads: int | None = None,
     progress: bool = False,
 ) -> WorstCase:
@@ -200,8 +202,7 @@ def worst_case(
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)
-    budget = default_budget(scenario, within) if budget is None else whole("budget", budget, 1, MAX_BUDGET)
-    seed = whole("seed", seed, 0, 2**53 - 1)
+    budget = default_budget(scenario, within) if budget is None else budget
     members = Members(scenarios, within)
     work = 2 * budget * scenario.work
     with bar(f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress) as drawn:

@@ -21,7 +21,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown
+from smc_mujoco.common.constraints import Natural, Positive, constrain
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics import catalogue as metrics
@@ -64,11 +65,11 @@ class Objective:
 
     conditions: tuple[Condition, ...] = CONDITIONS  # names, or your own; each is one run of a candidate
     starts: Starts = DEFAULT_STARTS  # initial states of the runs
-    weight: float = 1e-3  # w, s^3
-    duration: float = DURATION  # of a run, s
-    control_period: float = CONTROL_PERIOD  # s
-    u_max: float | None = None  # bound on |u|, the same for every law, N or N m; default: as in a grid
-    chattering: float | None = None
+    weight: Natural = 1e-3  # w, s^3
+    duration: Positive = DURATION  # of a run, s
+    control_period: Positive = CONTROL_PERIOD  # s
+    u_max: Positive | None = None  # bound on |u|, the same for every law, N or N m; default: as in a grid
+    chattering: Positive | None = None
 
     def __post_init__(self):
         conditions = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
@@ -76,10 +77,7 @@ class Objective:
             raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
         checked_starts(self.starts)
-        number("weight", self.weight, low=0.0)
-        for name in ("duration", "control_period", "u_max", "chattering"):
-            if getattr(self, name) is not None:
-                number(name, getattr(self, name), above=0.0)
+        constrain(self)
 
     def __str__(self) -> str:
         terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"

@@ -29,7 +29,7 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -48,7 +48,8 @@ from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.analysis.tuning.stages import EVOLVED_SHARE, SCREENED_SHARE
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning, find, users_stacklevel, whole
+from smc_mujoco.common.constraints import Whole, constrained
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning, find, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
@@ -67,6 +68,8 @@ from smc_mujoco.simulation.trace import Trace
 SEARCHES = 12  # of a tuning: then twelve runs of two laws decide between them, see `ranking`
 BUDGET = 64  # evaluations of a search, for each gain
 MAX_BUDGET = 10_000
+Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
+Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
 # How long a search takes, as a rule, in evaluations of its whole budget: its descent, which ends early; and all stages
 # by the equation, with the evaluation by MuJoCo in the end.
@@ -81,18 +84,19 @@ RULE = (
 Report = Callable[[int], None]
 
 
+@constrained
 def tune(
     plant: Plant | str,
     law: Component | Template | str,
-    budget: int = BUDGET,
-    seed: int = 0,
+    budget: Budget = BUDGET,
+    seed: Annotated[int, Whole(low=0, high=MAX_TUNING_SEED)] = 0,
     objective: Objective | str = "balanced",
     threads: int | None = None,
     progress: bool = False,
     conditions: Sequence[Condition | str] | Condition | str | None = None,
     starts: Starts | None = None,
     chattering: float | None = None,
-    searches: int = SEARCHES,
+    searches: Searches = SEARCHES,
     folder: str | os.PathLike[str] | None = None,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for every law.
@@ -119,20 +123,18 @@ def tune(
     changes = {"conditions": conditions, "starts": starts, "chattering": chattering}
     goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
     goal = dataclasses.replace(goal, **{name: value for name, value in changes.items() if value is not None})
-    budget, count = whole("budget", budget, 1, MAX_BUDGET), whole("searches", searches, 1, MAX_SEARCHES)
-    whole("seed", seed, 0, MAX_TUNING_SEED)
     task = _task(plant, coerce.law(law), goal, budget, seed, threads)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure = _failure_of_law(task)
-    with bar(f"{task.law.name} on {task.plant.name}", count * task.size, shown=progress, counted=True) as shown:
+    with bar(f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True) as shown:
 
         def found(i: int) -> Found:
             made = task.kept(i, failure, shown.advance, folder)
-            shown.reached((i + 1) * task.size, count * task.size)
+            shown.reached((i + 1) * task.size, searches * task.size)
             return made
 
-        tuned = _result(task, tuple(map(found, range(count))))
+        tuned = _result(task, tuple(map(found, range(searches))))
     _warn_of_result(tuned)
     return tuned.sourced()
 

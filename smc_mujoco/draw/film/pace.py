@@ -7,11 +7,11 @@ slow motion is reduced step by step, around pushes last. The same traces give th
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number
+from smc_mujoco.common.constraints import Number, constrained
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.simulation.trace import Trace
@@ -24,7 +24,8 @@ MOTION_MARGIN = 0.1  # s before and after fast motion that are shown as slowly a
 IMPACT_TIME = 0.04  # s around the start of a contact, and around the middle of a push
 REST_MARGIN = 0.3  # s after motion, and before it, that are not shown faster
 MAX_LENGTH = 1.85, 8.0  # duration of a film: in durations of the run, or in s if that is more; chosen
-SPEED_RANGE = 0.01, 100.0
+Rate = Annotated[float, Number(low=1.0, high=120.0)]  # frames per second
+Speed = Annotated[float, Number(low=0.01, high=100.0)]  # times real time
 
 
 class Clock(NamedTuple):
@@ -39,14 +40,16 @@ class Clock(NamedTuple):
         return Clock(self.times[inside], self.speeds[inside])
 
 
-def clock(traces: Trace | Sequence[Trace], fps: float, speed: float | None = None) -> Clock:
+@constrained
+def clock(
+    traces: Trace | Sequence[Trace],
+    fps: Rate,
+    speed: Speed | None = None,
+) -> Clock:
     """Return the times of a film's frames from t = 0 to the end of the longest trace; `speed` None: the rule above."""
-    traces, fps = style.same_plant(traces), number("fps", fps)
-    if not 1.0 <= fps <= 120.0:
-        raise ScenarioError(f"fps is {fps:g}: give 1 to 120")
+    traces = style.same_plant(traces)
     whole = end(traces)
     if speed is not None:
-        speed = number("speed", speed, low=SPEED_RANGE[0], high=SPEED_RANGE[1])
         times = np.arange(int(whole * fps / speed + 1e-6) + 1) * (speed / fps)
         return Clock(times, np.full(len(times), speed))
     grid, wanted = speeds(traces, fps)

@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, items_of, number, one_line, shown, whole
+from smc_mujoco.common.constraints import constrained
+from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -128,13 +129,14 @@ def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
     )
 
 
+@constrained
 def accuracy(
     laws: str | Law | Template | Sequence[str | Law | Template],
     plants: str | Plant | Sequence[str | Plant],
     periods: Sequence[float] = PERIODS,
     conditions: str | Condition | Sequence[str | Condition] = DEFAULT_CONDITION,
     seeds: int | Iterable[int] = DEFAULT_SEEDS,
-    gains: str = "tuned",
+    gains: sets.NameOfSet = "tuned",
     duration: float = DURATION,
     starts: Starts | None = None,
     threads: int | None = None,
@@ -235,7 +237,6 @@ def _setup(
         raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
     if len(units := set(plant.units[: plant.driven])) > 1:
         raise ScenarioError(f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit")
-    find("set of gains", gains, sets.KNOWN_SETS)
     gain_set = gains if not isinstance(law, str) or sets.in_set(plant, law, gains) else "default"
 
     def scenario(seed: int, h: float, divisor: int = 1) -> Scenario:

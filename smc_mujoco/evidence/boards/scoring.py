@@ -20,10 +20,11 @@ github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten 
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.evidence.boards.published import Row
 from smc_mujoco.mechanisms.plants.double_pendulum import L2
@@ -93,13 +94,16 @@ def criteria(trace: Trace) -> Criteria:
     )
 
 
-def score(of: Trace | Mapping[str, Any] | Criteria | Row, version: str = "v2") -> float:
+@constrained
+def score(
+    of: Trace | Mapping[str, Any] | Criteria | Row, version: Annotated[str, OneOf(names=(*VERSIONS,))] = "v2"
+) -> float:
     """Return the score of a run, in 0 .. 1, or of criteria by name, such as those of a published row.
 
     Raises:
       ScenarioError: an unknown version, a criterion that is missing, or another plant.
     """
-    wanted = find("version of the boards", version, VERSIONS)
+    wanted = VERSIONS[version]
     measured = criteria(of) if isinstance(of, Trace) else of
     values: Mapping[str, Any] = measured if isinstance(measured, Mapping) else measured._asdict()
     for name in wanted:

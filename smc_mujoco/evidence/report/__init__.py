@@ -11,22 +11,26 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from smc_mujoco.analysis.ranking import Relevant
+from smc_mujoco.common.constraints import Whole, constrained
 
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.plan import Plan
 
 
+@constrained
 def report(
     out: str | os.PathLike[str] = "report",
     quick: bool = False,
-    seeds: int | None = None,
+    seeds: Annotated[int, Whole(low=1, high=10_000)] | None = None,
     threads: int | None = None,
     progress: bool = False,
     plan: "Plan | None" = None,
     records: str | os.PathLike[str] | None = None,
     laws: Sequence[str] = (),
-    relevant: float | None = None,
+    relevant: Relevant | None = None,
 ) -> Path:
     """Compute a study and write its report, out/report.html.
 
@@ -50,17 +54,16 @@ def report(
 
     if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
-    from smc_mujoco.analysis.ranking import checked_share
-    from smc_mujoco.common.errors import items_of, whole
+    from smc_mujoco.common.errors import items_of
     from smc_mujoco.common.files import replacing
     from smc_mujoco.evidence.report import page, stages
     from smc_mujoco.evidence.report.plan import FULL, QUICK, Bars
 
     plan = plan or (QUICK if quick else FULL)
     if seeds is not None:
-        plan = dataclasses.replace(plan, seeds=whole("seeds", seeds, 1, 10_000))
+        plan = dataclasses.replace(plan, seeds=seeds)
     if relevant is not None:
-        plan = dataclasses.replace(plan, relevant=checked_share(relevant))
+        plan = dataclasses.replace(plan, relevant=relevant)
     if laws:
         plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *items_of("laws", laws)))))
     folder = Path(out)

@@ -12,10 +12,11 @@ import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown, whole
 from smc_mujoco.common.files import write_json
 from smc_mujoco.common.progress import bar
@@ -39,6 +40,7 @@ POOR_FIT = 80.0  # percent: a fit below this may mean that the search ended in t
 PERFECT_FIT = 99.99  # percent: residuals beyond it are the simulation's; chosen
 UNIT_FACTOR = 5.0  # factor between a quantity before and after, beyond which a column may be in another unit; chosen
 FACTOR_TOLERANCE = 0.1  # relative difference up to which such factors count as the same; chosen
+Count = Annotated[int, Whole(low=1, high=1000)]
 MAX_FIT_LOSS = 0.1  # percent, by which the fit of a whole record may fall without a note; chosen
 
 
@@ -120,13 +122,13 @@ class Identified:
                 )
         return sentences
 
-    def drawn(self, count: int = 8, seed: int = 0) -> Rig:
+    @constrained
+    def drawn(self, count: Count = 8, seed: Seed = 0) -> Rig:
         """Return the rig with an ensemble of other parameter sets that the records allow, for rankings over them.
 
         They are drawn from the normal distribution of the errors, and cut to the ranges.
         """
-        whole("count", count, 1, 1000)
-        names, rng = list(self.values), np.random.default_rng(whole("seed", seed, 0, 2**53 - 1))
+        names, rng = list(self.values), np.random.default_rng(seed)
         spread, middle = (np.array([of[name] for name in names]) for of in (self.errors, self.values))
         draws = rng.multivariate_normal(middle, self.correlations * np.outer(spread, spread), count, method="eigh")
         known = [self.rig.quantities[name] for name in names]
@@ -163,14 +165,15 @@ class Identified:
         return residual_figure(self.rig.label, t, measured, {"twin": predicted}, fits, self.rig.units, path)
 
 
+@constrained
 def identify(
     of: Rig | Plant | str,
     records: Source | Sequence[Source],
     quantities: Sequence[str] | None = None,
     *,
     start: Mapping[str, float] | None = None,
-    starts: int = 4,
-    seed: int = 0,
+    starts: Count = 4,
+    seed: Seed = 0,
     most: int = 30,
     progress: bool = False,
 ) -> Identified:
@@ -197,8 +200,6 @@ def identify(
     twin, data = _twin(of, many)
     twin = twin.with_values(start or {})
     names = _checked_names(twin, quantities)
-    whole("starts", starts, 1, 1000)
-    whole("seed", seed, 0, 2**53 - 1)
     fits_before = tuple(twin.fits(data))  # also refuses records that are too short
     for record, fit in zip(data, fits_before, strict=True):
         twin.refuse_degrees(record, fit)

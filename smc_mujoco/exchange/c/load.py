@@ -24,7 +24,8 @@ import numpy as np
 from numba import carray, njit
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, number, shown, whole
+from smc_mujoco.common.constraints import Timeout, constrained
+from smc_mujoco.common.errors import ScenarioError, shown, whole
 from smc_mujoco.common.guard import Arithmetic, computed
 from smc_mujoco.common.jit import AtAddress, Function, call_int, pointer
 from smc_mujoco.control.component import Template, as_gains, gain_at, gain_text, template_decorator
@@ -35,7 +36,6 @@ from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build, sandbox
 
 LIBRARY_SUFFIXES = (".so", ".dylib")
-MAX_TIMEOUT = 86_400.0  # s
 DEFAULT_MEMORY = 8
 
 
@@ -232,14 +232,19 @@ def check(
     yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
 
 
-def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: float) -> sandbox.Library:
+@constrained
+def _library(
+    source: str | Path,
+    symbol: str,
+    flags: Sequence[str],
+    timeout: Timeout,
+) -> sandbox.Library:
     """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
     if sys.platform == "win32":
         raise ScenarioError(
             f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
         )
     path = Path(source)
-    timeout = number("timeout", timeout, above=0.0, high=MAX_TIMEOUT)
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
     if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):

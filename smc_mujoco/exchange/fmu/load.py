@@ -24,6 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.constraints import Positive, Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, number, one_line, shown, unknown
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import no_room, reading
@@ -39,7 +40,6 @@ from smc_mujoco.exchange.fmu.slave import CONSTANT_TYPES, REAL_TYPES, Slave
 
 INPUT_FIELDS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))
 PERIOD_TOLERANCE = 1e-6  # relative difference below which two periods are equal
-MAX_TIMEOUT = 86_400.0  # s: a day
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
@@ -152,15 +152,16 @@ def extracted(path: str, digest: str) -> Path:
     return folder
 
 
+@constrained
 def law_from_fmu(
     path: str | os.PathLike[str],
     *,
     variables: Mapping[str, str] | None = None,
     constants: Mapping[str, float] | None = None,
-    period: float | None = None,
+    period: Positive | None = None,
     name: str | None = None,
     isolate: bool = True,
-    timeout: float = 30.0,
+    timeout: Timeout = 30.0,
 ) -> Template:
     """Load a controller in an FMU as a law, such as one that Simulink or a Modelica tool exported.
 
@@ -192,7 +193,6 @@ def law_from_fmu(
         import fmpy  # noqa: F401
     with reading(path, "functional mock-up unit", "give the path of an .fmu file") as file:
         file.open("rb").close()
-    timeout = number("timeout", timeout, above=0.0, high=MAX_TIMEOUT)
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     about = _description(file, digest)
     known = {variable.name: variable for variable in about.modelVariables}
@@ -207,7 +207,7 @@ def law_from_fmu(
         constants=tuple((key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()),
         parameters=tuple(theirs for theirs, _ in gains.values()),
         once=bool(about.coSimulation.canBeInstantiatedOnlyOncePerProcess),
-        period=_period(about) if period is None else number("period", period, above=0.0),
+        period=_period(about) if period is None else period,
     )
     if isolate:
         _try(law, [gain.default for _, gain in gains.values()], timeout)

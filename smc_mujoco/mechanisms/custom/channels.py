@@ -6,17 +6,19 @@ A motor of gear 1 replaces the actuator that drives a channel's joint.
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import mujoco
 
-from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown
+from smc_mujoco.common.constraints import Flag, Number, constrain
+from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE
 
 MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
+Place = Annotated[float, Number(low=-1e6, high=1e6)]  # rad or m
 Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
 ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # transmissions to one joint
@@ -42,13 +44,16 @@ class Channel:
         every channel a law, or no channel. None: the default bound, and rest at 0.
     """
 
-    motor: bool = False
+    motor: Annotated[bool, Flag()] = False
     partner: str | None = None
-    x0: float | None = None
-    partner_x0: float | None = None
+    x0: Place | None = None
+    partner_x0: Place | None = None
     law: Any = None
-    u_max: float | None = None
+    u_max: Annotated[float, Number(above=0.0, infinite=True)] | None = None
     reference: Any = None
+
+    def __post_init__(self) -> None:
+        constrain(self)
 
 
 Pairs = tuple[tuple[str, Channel], ...]  # each a joint and its Channel
@@ -89,15 +94,9 @@ def channel(joint: object, value: object) -> Channel:
     made = Channel() if value is None else Channel(**value) if isinstance(value, Mapping) else value
     if not isinstance(made, Channel):
         raise ScenarioError(f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None")
-    if not isinstance(made.motor, bool):
-        raise ScenarioError(f"motor of channel {joint!r} is {shown(made.motor)}: give True or False")
     if made.partner is None and made.partner_x0 is not None:
         raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
-    place: dict[str, Any] = {"low": -1e6, "high": 1e6}
-    limits = {"x0": place, "partner_x0": place, "u_max": {"above": 0.0, "infinite": True}}
-    given = {name: (getattr(made, name), bounds) for name, bounds in limits.items() if getattr(made, name) is not None}
-    numbers = {name: number(f"{name} of channel {joint!r}", x, **bounds) for name, (x, bounds) in given.items()}
-    return dataclasses.replace(made, **numbers)
+    return made
 
 
 def suggested(channels: Pairs) -> dict[str, tuple]:

@@ -23,6 +23,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import errors
+from smc_mujoco.common.constraints import Timeout, constrained
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.mechanisms.custom import channels as own
 from smc_mujoco.mechanisms.custom import mjcf
@@ -35,7 +36,6 @@ from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
 
-MAX_TIMEOUT = 86_400.0  # s, of a timeout
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"
@@ -103,13 +103,14 @@ class UserFields:
             yield Field("opt.gravity", slice(None), model.opt.gravity * (p.grav / self.gravity))
 
 
+@constrained
 def plant_from(
     path: "str | os.PathLike | mujoco.MjSpec | RootElement",
     channels: Mapping[str, Channel | Mapping | None] | Iterable[str],
     name: str | None = None,
     keyframe: str | None = None,
     assets: Mapping[str, bytes | str] | None = None,
-    timeout: float = 20.0,
+    timeout: Timeout = 20.0,
     tip: str | None = None,
 ) -> Plant:
     """Make a plant of an MJCF model.
@@ -136,7 +137,7 @@ def plant_from(
     several laws are mixed with the laws' colours.
     """
     source = mjcf.source(path, assets)
-    mjcf.tried(source, errors.number("timeout", timeout, above=0.0, high=MAX_TIMEOUT))
+    mjcf.tried(source, timeout)
     if name is not None and catalogue().taken(errors.name("name", name)):  # laws and gains refer to plants by name
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     return _plant(source, own.coerce(channels), name, keyframe, tip)
