@@ -5,6 +5,7 @@ what is declared, or a ScenarioError is raised. None passes if the type names it
 depends on several values is checked by hand.
 """
 
+import contextlib
 import dataclasses
 import functools
 import inspect
@@ -16,7 +17,7 @@ from typing import Annotated, Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, number, shown, unknown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, unknown, whole
 from smc_mujoco.common.files import as_path
 
 P = ParamSpec("P")
@@ -81,14 +82,20 @@ class Flag(Constraint):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Each(Constraint):
-    """A value that satisfies `one`, or a sequence of such values, as a tuple."""
+    """A value that satisfies `one`, or a list with such a value for each channel, as a tuple."""
 
     one: Constraint
 
     def __call__(self, what: str, value: Any) -> Any:
-        if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
-            return tuple(self.one(f"{what}[{i}]", item) for i, item in enumerate(value))
-        return self.one(what, value)
+        if (
+            not isinstance(value, Sequence | np.ndarray)
+            or isinstance(value, str | bytes)
+            or not getattr(value, "ndim", 1)
+        ):
+            return self.one(what, value)
+        if not (listed := items_of(what, value)):
+            raise ScenarioError(f"{what} is {shown(value)}: give a number, or one for each driven channel")
+        return tuple(self.one(f"{what}[{i}]", item) for i, item in enumerate(listed))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -149,7 +156,9 @@ def of_fields(kind: type) -> dict[str, Constraint]:
     """Return the constraint of each field of a class of data that declares one."""
     types = {field.name: field.type for field in dataclasses.fields(kind)}
     if any(isinstance(one, str) for one in types.values()):  # under `from __future__ import annotations`
-        types |= {name: one for name, one in typing.get_type_hints(kind, include_extras=True).items() if name in types}
+        with contextlib.suppress(NameError):  # names that only a type checker imports
+            hints = typing.get_type_hints(kind, include_extras=True)
+            types = {name: hints[name] for name in types}
     return {name: found for name, one in types.items() if (found := of_type(one))}
 
 

@@ -9,7 +9,6 @@ import dataclasses
 import importlib
 import inspect
 import keyword
-import math
 import re
 import sys
 import warnings
@@ -17,16 +16,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple, TypedDict
 
-import numpy as np
-
 from smc_mujoco.common import errors
-from smc_mujoco.common.errors import ScenarioError, find, items_of, number, shown, unknown, users_stacklevel, whole
+from smc_mujoco.common.constraints import Each, Number
+from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel, whole
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain, Unit
 
 GainConditions = Mapping[str, Callable[[SimpleNamespace], bool]]
 GainValue = float | tuple[float, ...]  # one number for all channels, or one for each driven channel
+ANY_GAIN = Each(one=Number(infinite=True))
 FINITE_TIME = ("", "s", "e")  # values of the option: what a law brings to 0 in finite time
 AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a function of the gains
 
@@ -104,7 +103,7 @@ class Component:
         return super().__reduce__()
 
     def __post_init__(self):
-        gains = {name: _checked_gain(f"{self.name}'s {name}", gain, infinite=True) for name, gain in self.gains.items()}
+        gains = {name: ANY_GAIN(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.source.gains != self.gains:  # the gains were replaced
             object.__setattr__(self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains))
@@ -174,15 +173,6 @@ def unit_cure(name: str, default: GainValue) -> str:
     gain = f'gains={{"{name}": Gain({gain_text(default)}, UNIT)}}'
     units = "FORCE, RATE, SPEED or another of smc_mujoco.control.units, or Unit() for a number without one"
     return f"write {gain} in its decorator, where UNIT is {units}"
-
-
-def _checked_gain(name: str, value: object, **limits: Any) -> GainValue:
-    """Return a gain, one number or a tuple of one for each channel, checked as `number` checks it."""
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes) and getattr(value, "ndim", 1):
-        if not (listed := items_of(name, value)):
-            raise ScenarioError(f"{name} is {shown(value)}: give a number, or one for each driven channel")
-        return tuple(number(f"{name}[{i}]", one, **limits) for i, one in enumerate(listed))
-    return number(name, value, **limits)
 
 
 def _template_at(module: str, name: str) -> "Template | None":
@@ -262,10 +252,7 @@ class Template:
             if key not in values:
                 raise unknown(f"gain of {self.name}", key, values)
             gain = self.gains[key]
-            above = 0.0 if gain.positive else -math.inf
-            low = 0.0 if gain.nonnegative else -math.inf
-            infinite = bool(np.isinf(gain.default).any())
-            values[key] = _checked_gain(f"{self.name}'s {key}", value, above=above, low=low, infinite=infinite)
+            values[key] = gain.constraint(f"{self.name}'s {key}", value)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
                 text = gain_text(values[key])
                 raise ScenarioError(f"{self.name}'s {key} is {text}: give one number for all channels")
@@ -333,7 +320,7 @@ def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict
         if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
             raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
         gain = value if isinstance(value, Gain) else Gain(value)
-        default = _checked_gain(f"default of gain {key}", gain.default, infinite=True)
+        default = ANY_GAIN(f"default of gain {key}", gain.default)
         checked[key] = dataclasses.replace(gain, default=default)
     for key, gain in checked.items():
         if not (gain.unit is None or isinstance(gain.unit, Unit) or callable(gain.unit)):

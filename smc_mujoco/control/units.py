@@ -8,9 +8,14 @@ behaves the same in every system of units.
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.common.constraints import Each, Number
 
 
 class Unit(NamedTuple):
@@ -58,6 +63,13 @@ class Gain:
     held: bool = False  # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
     over: str | None = None  # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
     shared: bool = False  # whether it is one number for all joints in a law of many joints, instead of a vector
+
+    @property
+    def constraint(self) -> Each:
+        """What it may be: one number, or one for each channel."""
+        infinite = bool(np.isinf(self.default).any())
+        above, low = 0.0 if self.positive else -math.inf, 0.0 if self.nonnegative else -math.inf
+        return Each(one=Number(above=above, low=low, infinite=infinite))
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
         """Return the unit at these values of all gains."""

@@ -7,7 +7,6 @@ actuated degree of freedom. Its actuator, its two sensors and its body are found
 
 import dataclasses
 import functools
-import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +16,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.catalogue import Catalogue, catalogue_of
-from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, number, unknown, whole
+from smc_mujoco.common.constraints import Number
+from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, unknown, whole
 from smc_mujoco.common.files import shipped
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.mjcb import compiled
@@ -131,6 +131,11 @@ class Plant:
     def positive(self) -> frozenset[str]:
         """Parameters that must be greater than 0: masses and lengths."""
         return frozenset({self.mass, "M", "m", "l"}) & frozenset(self.parameters)
+
+    def constraint(self, parameter: str) -> Number:
+        """Return what a parameter may be."""
+        low = 1e-6 if parameter in self.positive else 0.0 if parameter in (*self.dry, *self.added) else -MAX_PARAMETER
+        return Number(low=low, high=MAX_PARAMETER)
 
     @property
     def driven(self) -> int:
@@ -261,10 +266,7 @@ def plant(name: str, **parameters: float) -> Plant:
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
-        above, low = (0.0, 1e-6) if key in base.positive else (-math.inf, -MAX_PARAMETER)
-        values[key] = number(f"{name}'s {key}", value, above=above, low=low, high=MAX_PARAMETER)
-    for key in (*base.dry, *base.added):
-        number(f"{name}'s {key}", values[key], low=0.0)
+        values[key] = base.constraint(key)(f"{name}'s {key}", value)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
     smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth
     return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth)

@@ -312,12 +312,12 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[SetConstant]
         yield _of_range((-within.x0, within.x0), functools.partial(_with_start, i=i))
 
 
-def _of_range(bounds: Range, put: SetConstant) -> SetConstant:
+def _of_range(bounds: tuple[float, float], put: SetConstant) -> SetConstant:
     low, high = bounds
     return lambda scenario, share: put(scenario, min(low + share * (high - low), high))
 
 
-def _multiples(name: str, bounds: Range, step: float) -> Range:
+def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:
     """Return the lowest and the highest multiple of a step, s, within bounds; ScenarioError for none but 0."""
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
