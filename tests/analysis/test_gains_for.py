@@ -100,7 +100,6 @@ def without_units(y, gains, memory):
 def test_bad_input_is_one_sentence(refused):
     for law, wanted in [
         ("classical", {}),
-        ("classical", {"amplitude": -1.0}),
         ("classical", {"frequency": 100.0, "u_max": 0.005}),
         (without_units(), {"amplitude": 1e-3}),
         (smc.law("classical", k=(1.0, 2.0)), {"amplitude": 1.0, "plant": "double_pendulum"}),

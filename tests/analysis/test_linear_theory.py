@@ -101,24 +101,6 @@ def test_a_law_that_switches_has_no_theory(name):
     assert linear_theory.tolerated_force(plant, law, 0.1) is None
 
 
-def test_every_argument_out_of_range_is_refused_by_its_name(refused):
-    plant, law = smc.plant("duffing"), smc.law("observer_free")
-    calls = (
-        lambda x: linear_theory.smallest_lam(plant, x),
-        lambda x: linear_theory.critical_delay(plant, x, 1.0, H),
-        lambda x: linear_theory.critical_delay(plant, 1.0, x, H),
-        lambda x: linear_theory.critical_delay(plant, 1.0, 1.0, x),
-        lambda x: linear_theory.steady_error(plant, x, 1.0, 0.2),
-        lambda x: linear_theory.steady_error(plant, 1.0, x, 0.2),
-        lambda x: linear_theory.tolerated_force(plant, law, x),
-    )
-    for call in calls:
-        for x in (-1.0, math.nan, math.inf):
-            refused(lambda call=call, x=x: call(x))
-    refused(lambda: linear_theory.steady_error(plant, 1.0, 1.0, math.nan))
-    refused(lambda: linear_theory.tolerated_force(plant, law, 0.0))
-
-
 # smallest lambda
 
 

@@ -145,8 +145,3 @@ def test_where_nothing_renders_show_says_so_before_it_films(cell, trace, monkeyp
 def test_outside_of_a_notebook_show_names_what_to_call(trace):
     with pytest.raises(smc.ScenarioError, match=r"needs a notebook: .* smc.film\(traces, 'film.mp4'\)"):
         smc.show(trace)
-
-
-def test_a_speed_that_no_film_has_is_refused_at_once(trace):
-    with pytest.raises(smc.ScenarioError, match="fps is 0"):
-        smc.film(trace, fps=0.0)

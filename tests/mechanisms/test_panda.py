@@ -268,7 +268,6 @@ def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: smc.plant("panda", payload=-1.0), "panda's payload is -1: give at least 0"),
         (
             lambda: smc.Scenario(plant="panda", law="none", mismatch={"payload": -1.0}),
             "panda's true payload becomes -1: give other factors",

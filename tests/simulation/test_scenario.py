@@ -47,7 +47,7 @@ NO_NUMBERS = [
 
 
 def test_a_field_that_is_no_number_is_refused(refused):
-    for field in ["duration", "control_period", "input_delay", "physics_step"]:
+    for field in ["input_delay", "physics_step"]:
         for value in NO_NUMBERS:
             if field != "physics_step" or value is not None:
                 refused(lambda value=value, field=field: scenario(**{field: value}), field, repr(value))
@@ -63,7 +63,7 @@ def test_a_bound_is_none_one_number_or_one_a_channel(refused):
 
 
 def test_a_field_out_of_its_range_is_refused(refused):
-    for field in ["duration", "control_period", "u_max", "input_delay", "physics_step"]:
+    for field in ["u_max", "input_delay", "physics_step"]:
         for value in (NAN, -INF, -1.0, *(() if field == "u_max" else (INF,))):
             refused(lambda value=value, field=field: scenario(**{field: value}), field, f"{value:g}")
         for value in () if field == "input_delay" else (0, -0.0):
@@ -210,7 +210,6 @@ def test_an_unknown_name_suggests_the_nearest(refused):
         (lambda: scenario(plant="pendulum_netwrok"), "pendulum_netwrok", "pendulum_network"),
         (lambda: scenario(law="super_twistin"), "super_twistin", "super_twisting"),
         (lambda: scenario(velocity="measure"), "measure", "measured"),
-        (lambda: scenario(integrator="implicitfst"), "implicitfst", "implicitfast"),
         (lambda: scenario(mismatch={"alpah": 2.0}), "alpah", "alpha"),
         (lambda: scenario(jump=smc.Jump(0.5, {"detla": 2.0})), "detla", "delta"),
         (lambda: smc.law("observer_free", lamb=2.0), "lamb", "lam"),
@@ -231,7 +230,7 @@ ODD = [None, 5, 1.5, True, [], {}, ..., np.eye(30), np.array(["duffing", "x"]), 
 
 def test_what_is_no_name_at_all_is_refused_and_finds_nothing(refused):
     for value in ODD:
-        for field in ("plant", "law", *(() if value is None else ("velocity", "integrator"))):  # None means the default
+        for field in ("plant", "law", *(() if value is None else ("velocity",))):  # None means the default
             refused(lambda field=field, value=value: scenario(**{field: value}), field)
         for find in (smc.plant, smc.law, smc.estimator):
             refused(lambda find=find, value=value: find(value))
@@ -279,40 +278,6 @@ SIGNALS = [
     smc.signals.Gust(1.0, 2.0, 3.0),
     smc.signals.BandLimited(1.0, 2.0, 3.0),
 ]
-
-
-def test_every_parameter_of_every_signal_must_be_a_finite_number(refused):
-    for signal in SIGNALS:
-        for name in signal.parameters():
-            for value in (NAN, INF, None, "1", True, [1.0], np.zeros(2), 1j, 10**400):
-                change = {name: value}
-                refused(
-                    lambda change=change, signal=signal: dataclasses.replace(signal, **change),
-                    type(signal).__name__,
-                    name,
-                )
-
-
-def test_widths_and_time_constants_are_positive(refused):
-    for make, name in [
-        (lambda value: smc.signals.Pulse(1.0, 0.0, width=value), "width"),
-        (lambda value: smc.signals.Impulse(1.0, 0.0, width=value), "width"),
-        (lambda value: smc.signals.Gust(1.0, 0.0, width=value), "width"),
-        (lambda value: smc.signals.OrnsteinUhlenbeck(1.0, tau=value), "tau"),
-        (lambda value: smc.signals.OrnsteinUhlenbeck(1.0, 1.0, dt=value), "dt"),
-    ]:
-        for value in (0.0, -1.0):
-            refused(lambda value=value, make=make, name=name: make(value), name, f"{value:g}")
-
-
-def test_the_spread_of_process_noise_is_not_negative(refused):
-    refused(lambda: smc.signals.OrnsteinUhlenbeck(-0.1, 1.0), "sigma", "-0.1")
-
-
-def test_measurement_noise_is_a_finite_number_not_negative(refused):
-    for field in ["position", "velocity"]:
-        for value in (NAN, INF, -0.1, None, "1", True, np.zeros(2)):
-            refused(lambda value=value, field=field: smc.Noise(**{field: value}), "Noise", field)
 
 
 def test_a_noise_that_is_no_noise_is_refused(refused):
@@ -373,19 +338,9 @@ def test_a_jump_after_the_end_is_refused(refused):
         refused(lambda time=time: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
 
 
-def test_a_jump_s_time_is_a_finite_number_not_negative(refused):
-    for time in (NAN, INF, -0.1, None, "1", True):
-        refused(lambda time=time: smc.Jump(time, {"M": 2.0}), "Jump", "time")
-
-
 def test_a_jump_that_is_no_jump_is_refused(refused):
     for value in (0.5, {"M": 2.0}, (0.5, {"M": 2.0}), "now"):
         refused(lambda value=value: scenario(jump=value), "jump")
-
-
-def test_a_seed_is_a_whole_number_that_a_float_holds(refused):
-    for seed in (-1, 2**53, 1.5, True, None, "1", NAN, [1]):
-        refused(lambda seed=seed: scenario(seed=seed), "seed", repr(seed))
 
 
 @pytest.mark.parametrize("seed", [0, 2**53 - 1])
@@ -413,28 +368,6 @@ def test_a_network_takes_every_size_in_its_range(n):
 
 def test_a_single_plant_takes_no_size(refused):
     refused(lambda: smc.plant("duffing", n=2), "duffing", "2")
-
-
-def test_every_parameter_of_every_plant_must_be_a_finite_number(refused):
-    for value in (NAN, INF, None, "1", True, [1.0]):
-        refused(lambda value=value: smc.plant("duffing", beta=value), "duffing", "beta")
-    for plant in smc.plants():
-        for name in smc.plant(plant).parameters:
-            refused(lambda plant=plant, name=name: smc.plant(plant, **{name: NAN}), plant, name)
-
-
-def test_every_gain_of_every_law_must_be_a_finite_number(refused):
-    for value in (NAN, INF, None, "1", True, [], [NAN], 10**400):
-        refused(lambda value=value: smc.law("classical", c=value), "classical", "c")
-    for law in smc.laws():
-        for name, default in smc.law(law).gains.items():
-            for value in (NAN,) if default == INF else (NAN, INF):  # a bound that may be none
-                refused(lambda change={name: value}, law=law: smc.law(law, **change), law, name)
-
-
-def test_gains_that_must_be_positive_are(refused):
-    refused(lambda: smc.law("boundary_layer", phi=0.0), "phi", "0")
-    refused(lambda: smc.law("observer_free", lam=-1.0), "lam", "-1")
 
 
 def test_a_law_s_memory_is_a_whole_number_of_floats(refused):

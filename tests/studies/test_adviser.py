@@ -496,8 +496,6 @@ def test_without_a_velocity_sensor_velocity_is_differentiated(folder):
         ({"laws": [FAST, smc.law("observer_free")]}, "two laws have one name"),
         ({"conditions": "jump_mil"}, "did you mean 'jump_mild'"),
         ({"conditions": "a: friction=Coulomb(-1)"}, "Coulomb"),
-        ({"seeds": 0}, "seeds is 0"),
-        ({"duration": 0.0}, "duration is 0"),
     ],
 )
 def test_what_cannot_be_is_one_sentence_before_anything_is_searched(arguments, sentence, tmp_path, monkeypatch):

@@ -136,25 +136,24 @@ SCENES = [
 REFUSED = {
     smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itaee"]}],
     smc.study: [
-        {"out": 3}, {"scenarios": [3]}, {"scenarios": []}, {"scenarios": "duffing"}, {"traces": "best"},
+        {"scenarios": [3]}, {"scenarios": []}, {"scenarios": "duffing"},
         {"executor": "ray"}, {"executor": "dask://host"}, {"executor": "dask://:80"}, {"executor": "dask://host:65536"},
         {"executor": 3}, {"noise_key": "secret"}, {"noise_key": -1}, {"noise_key": 2**53},
     ],
     smc.compare: [
-        {"seeds": 0}, {"relevant": -0.1}, {"duration": 0.0}, {"budget": 0}, {"metrics": ["itaee"]}, {"gains": "best"},
-        {"out": 3}, {"laws": "clasical"}, {"plants": "dufing"}, {"conditions": "nois"}, {"executor": "ray"},
+        {"metrics": ["itaee"]}, {"laws": "clasical"}, {"plants": "dufing"}, {"conditions": "nois"}, {"executor": "ray"},
     ],
     smc.which: [
-        {"needs": "fats"}, {"seeds": 0}, {"seeds": 10_001}, {"duration": -1.0}, {"relevant": -0.1},
-        {"needs": "accurate, robst"}, {"needs": "two-gains", "laws": "pid"}, {"laws": [LAW, LAW(k=2.0)]},
+        {"needs": "fats"}, {"needs": "accurate, robst"}, {"needs": "two-gains", "laws": "pid"},
+        {"laws": [LAW, LAW(k=2.0)]},
     ],
     smc.accuracy: [
         {"periods": [1e-3]}, {"periods": [1e-3, 1e-3]}, {"periods": [1e-3, 0.0]}, {"seeds": 0}, {"seeds": 10_001},
-        {"conditions": PERIOD}, {"gains": "best"}, {"conditions": "nois"},
+        {"conditions": PERIOD}, {"conditions": "nois"},
     ],
     smc.worst_case: [
         {"scenario": "duffing"}, {"scenario": []}, {"scenario": [RUN, OTHER]}, {"within": 2.0}, {"metric": "rms"},
-        {"budget": 0}, {"budget": 1_000_001}, {"seed": -1}, {"seed": 2**53}, {"metric": "spread_bound"},
+        {"metric": "spread_bound"},
     ],
     smc.Scene: SCENES,
     smc.Table.read: [{"path": "none.parquet"}],

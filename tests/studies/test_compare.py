@@ -179,7 +179,6 @@ def test_what_cannot_run_is_refused_before_any_gains_are_searched(tmp_path, monk
     monkeypatch.setattr(fair_gains.Trial, "tuned", None)
     for arguments, said in (
         (([my_law], "duffing", "noisy"), "did you mean 'noise'"),
-        (([my_law], "duffing", "nominal", 0), "seeds is 0"),
         (([my_law, my_law(lam=2.0)], "duffing"), "two laws have the name 'my_law'"),
         (([my_law], "duffing", "nominal", 1, True, False, "ray"), "executor is 'ray'"),
     ):

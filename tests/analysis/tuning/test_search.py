@@ -432,11 +432,6 @@ def test_bad_input_is_one_sentence(refused):
         {"law": "none"},
         {"law": "hierarchical"},
         {"plant": "cart_pole", "law": "classical"},
-        {"budget": 0},
-        {"searches": 0},
-        {"searches": 1001},
-        {"budget": 2.5},
-        {"seed": -1},
         {"objective": "best"},
         {"threads": 0},
     ]:
@@ -480,12 +475,8 @@ def test_a_bad_objective_is_refused(refused):
         {"conditions": ("calm",)},
         {"conditions": 3},
         {"conditions": ()},
-        {"weight": -1.0},
     ):
         refused(lambda changed=changed: Objective(**changed))
-    for name in ("duration", "u_max", "control_period", "chattering"):
-        for value in (0.0, math.inf, "1"):
-            refused(lambda changed={name: value}: Objective(**changed))
 
 
 # the command

@@ -113,12 +113,6 @@ def test_speeds_in_words(speed, words):
     assert pace.speed_words(speed) == words
 
 
-@pytest.mark.parametrize("speed", [0.0, -1.0, 1e3, float("nan"), "fast"])
-def test_speeds_that_are_none_are_refused(base, speed):
-    with pytest.raises(smc.ScenarioError, match="speed is"):
-        pace.clock([base], FPS, speed)
-
-
 def test_most_frames_of_a_settling_run_show_motion():
     traces = smc.run(
         list(smc.paper.comparison("van_der_pol", laws=("observer_free", "classical"), duration=10.0).values())

@@ -606,8 +606,6 @@ def test_wrong_arguments_are_one_sentence(file):
         (None, {"gains": {"k1": np.ones(2)}}, "gain k1 of my_law.c is (1, 1): give it one number"),
         (None, {"memory": 0}, "memory is 0"),
         (".", {}, "cannot take a law from '.': give a .c file"),
-        (None, {"timeout": 0}, "timeout is 0"),
-        (None, {"timeout": 1e12}, "timeout is 1e+12: give at most 86400"),
         (None, {"symbol": "a b"}, "symbol is 'a b': give the name of a C function"),
         (None, {"symbol": "my_step"}, "my_law.c has no function my_step: define int my_step(const smc_measurement"),
         (None, {"flags": "-O3"}, "flags is '-O3': give several"),

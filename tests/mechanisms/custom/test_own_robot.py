@@ -54,7 +54,7 @@ def test_a_text_says_of_a_channel_what_python_says(folder):
         ("mine.xml:lift(moto)", "unknown field of channel 'lift' 'moto': did you mean 'motor'?"),
         ("mine.xml:lift(u_max=a)", "u_max of channel 'lift' is 'a': give a number"),
         ("mine.xml:lift(motor)+lift", "names a joint twice"),
-        ("mine.xml:lift(motor=2)", "motor of channel 'lift' is '2': give True or False"),
+        ("mine.xml:lift(motor=2)", "Channel's motor is '2': give True or False"),
         ("mine.xml:lift", r"give smc.Channel\(motor=True\), or JOINT\(motor\) in a text, for one ideal motor"),
         (MODEL, "plant is the text of a model: give smc.plant_from"),
     ],

@@ -424,31 +424,6 @@ def test_a_sensor_keeps_as_many_readings_as_are_under_way_in_parts_of_64():
 # bad values
 
 
-def test_bad_numbers_are_refused_in_one_sentence():
-    for field, value, says in (
-        ("counts", 1, "counts is 1: give a whole number"),
-        ("counts", 0, "counts is 0"),
-        ("counts", -4096, "counts is -4096"),
-        ("counts", 10.5, "counts is 10.5"),
-        ("counts", math.nan, "counts is nan"),
-        ("counts", -math.inf, "counts is -inf"),
-        ("counts", "4096", "counts is '4096'"),
-        ("counts", None, "counts is None"),
-        ("counts", True, "counts is True"),
-        ("bias", math.nan, "bias is nan: give a finite number"),
-        ("bias", "0", "bias is '0': give a number"),
-        ("dropout", math.nan, "dropout is nan"),
-        ("period", "1 ms", "period is '1 ms'"),
-        ("delay", math.nan, "delay is nan"),
-    ):
-        with pytest.raises(smc.ScenarioError) as caught:
-            smc.Encoder(**{field: value})
-        message = str(caught.value)
-        assert f"Encoder's {says}" in message
-        assert "\n" not in message
-        assert "give" in message
-
-
 @pytest.mark.parametrize("field", ["period", "delay"])
 def test_times_that_are_no_whole_number_of_steps_are_refused(field):
     with pytest.raises(

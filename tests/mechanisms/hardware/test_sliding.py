@@ -352,8 +352,6 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: smc.hardware.Sigmoid((1.0, -1.0), 5.0), "Sigmoid's p1[1] is -1: give at least 0"),
-        (lambda: smc.hardware.Sigmoid(1.0, 5.0, "much"), "Sigmoid's p3 is 'much': give a number"),
         (lambda: smc.hardware.servo("mx65"), "unknown servo 'mx65': did you mean 'mx64'?"),
         (lambda: smc.hardware.servo("mx64", "m7"), "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6"),
         (
