@@ -137,6 +137,7 @@ MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
 Finite = Annotated[float, Number()]
 Natural = Annotated[float, Number(low=0.0)]
 Positive = Annotated[float, Number(above=0.0)]
+Bound = Annotated[float, Number(above=0.0, infinite=True)]  # inf: no bound
 Probability = Annotated[float, Number(low=0.0, high=1.0)]
 Seed = Annotated[int, Whole(low=0, high=MAX_SEED)]
 Timeout = Annotated[float, Number(above=0.0, high=86_400.0)]  # s, a day at most

@@ -14,11 +14,11 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import SimpleNamespace
-from typing import Any, NamedTuple, TypedDict
+from typing import Annotated, Any, NamedTuple, TypedDict
 
 from smc_mujoco.common import errors
-from smc_mujoco.common.constraints import Each, Number
-from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel, whole
+from smc_mujoco.common.constraints import Each, Number, Whole, constrained
+from smc_mujoco.common.errors import ScenarioError, find, shown, unknown, users_stacklevel
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, NONE, YOURS, Search, Source, combined
 from smc_mujoco.control.units import Gain, Unit
@@ -338,20 +338,20 @@ def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callab
     return decorate if function is None else decorate(function)
 
 
+@constrained
 def template_decorator(
     kind: str,
     gains: Mapping[str, float | Gain] | None = None,
-    memory: int = 8,
+    memory: Annotated[int, Whole(low=1, high=10_000)] = 8,
     positive: Iterable[str] = (),
     nonnegative: Iterable[str] = (),
-    relative_degree: int = 1,
+    relative_degree: Annotated[int, Whole(low=1, high=10)] = 1,
     conditions: GainConditions | None = None,
     plants: Iterable[str] = (),
     **options: Any,
 ) -> Callable[[Callable], Template]:
     """Return a decorator that turns a function into a Template."""
     checked = as_gains(gains)
-    memory, relative_degree = whole("memory", memory, 1, 10_000), whole("relative_degree", relative_degree, 1, 10)
     if isinstance(plants, str):
         raise ScenarioError(f"plants is {shown(plants)}: give several names, such as ({plants!r},)")
     for option, keys in OPTION_KEYS.items():

@@ -20,10 +20,11 @@ import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
@@ -174,7 +175,14 @@ def _unpickled(content: bytes, classes: tuple[type, ...], version: str, predicts
     return Network(_library("torch", "network").load(io.BytesIO(content), weights_only=False), predicts)
 
 
-def policy(act: Any, *, reference: bool = False, name: str | None = None, units: str = "u_max") -> Law:
+@constrained
+def policy(
+    act: Any,
+    *,
+    reference: bool = False,
+    name: str | None = None,
+    units: Annotated[str, OneOf(names=(*UNITS,))] = "u_max",
+) -> Law:
     """Return a policy as a law.
 
     Args:
@@ -197,8 +205,6 @@ def policy(act: Any, *, reference: bool = False, name: str | None = None, units:
     Raises:
       ScenarioError: none of these, no such file, a library that is not installed, or other units.
     """
-    if units not in UNITS:
-        raise ScenarioError(f"units is {shown(units)}: give {' or '.join(map(repr, UNITS))}")
     try:
         function, its_name = _callable(act)
     except ScenarioError:

@@ -370,11 +370,6 @@ def test_a_single_plant_takes_no_size(refused):
     refused(lambda: smc.plant("duffing", n=2), "duffing", "2")
 
 
-def test_a_law_s_memory_is_a_whole_number_of_floats(refused):
-    for memory in (0, -1, 10_001, 1.5, NAN, INF, None, "8", "much", [8]):
-        refused(lambda memory=memory: smc.law_function(memory=memory), "memory")
-
-
 def test_a_gain_s_name_can_be_written_after_a_dot(refused):
     for name in ("1k", "k 1", "_k", "", "lambda", "class", 5):
         refused(lambda name=name: smc.law_function(gains={name: 1.0}), "gain", repr(name))

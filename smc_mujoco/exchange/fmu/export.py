@@ -14,11 +14,12 @@ import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.common.constraints import Each, Number, OneOf, Positive, constrained
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import no_room, replacing, scratch, with_ending
 from smc_mujoco.common.process import TimedOut
 from smc_mujoco.control.component import Template
@@ -36,22 +37,24 @@ from smc_mujoco.simulation.scenario import Scenario, check_surface
 FOLDER, MIXED_JOINTS = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
 FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 COMPILE_TIMEOUT = 120.0  # s
+BOUND = Number(above=0.0, infinite=True)  # on |u| of a joint
 # Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
 BINARY_FLAGS = ("-std=c99", "-fvisibility=hidden", "-s")
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
 
 
+@constrained
 def law_to_fmu(
     law: Law | Template | str | Scenario,
     path: str | os.PathLike[str] | None = None,
     *,
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
-    control_period: float | None = None,
+    control_period: Positive | None = None,
     u_max: float | Sequence[float] | None = None,
-    model: str | None = None,
-    joint: str | None = None,
+    model: Annotated[str, OneOf(names=coerce.MODELS)] | None = None,
+    joint: Annotated[str, OneOf(names=(*description.JOINT_UNITS,))] | None = None,
     joints: int | None = None,
     binary: bool = True,
 ) -> Path:
@@ -89,7 +92,6 @@ def law_to_fmu(
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:
         joint = "hinge" if joint is None else joint
-        find("joint", joint, description.JOINT_UNITS)
     controller = _controller(law, **chosen)
     plain = re.sub(r"\W+", "_", controller.law.name, flags=re.ASCII).strip("_")
     identifier = plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")  # of C
@@ -130,15 +132,13 @@ def _controller(
         raise ScenarioError(f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out")
     if sliding is not None:
         check_surface(sliding, chosen)
-    if model not in (None, *coerce.MODELS):
-        raise ScenarioError(f"model is {shown(model)}: give 'none' or 'nominal'")
     if chosen.requires_model and model == "none":
         raise ScenarioError(f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'")
     return Controller(
         law=chosen,
         surface=sliding,
         estimator=None if estimator is None or estimator.name == "measured" else estimator,
-        period=1e-3 if control_period is None else number("control_period", control_period, above=0.0),
+        period=1e-3 if control_period is None else control_period,
         u_max=_bounds(math.inf if u_max is None else u_max, count),
         modelled=chosen.requires_model or model == "nominal",
         joints=count,
@@ -148,10 +148,10 @@ def _controller(
 def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
     """Return the bound on |u| of each joint, from one for all or one for each."""
     if not (joints and isinstance(u_max, Sequence | np.ndarray)):
-        return (number("u_max", u_max, above=0.0, infinite=True),) * max(1, joints)
+        return (BOUND("u_max", u_max),) * max(1, joints)
     if len(u_max) != joints:
         raise ScenarioError(f"u_max has {len(u_max)} values for {joints} joints: give one, or {joints}")
-    return tuple(number(f"u_max[{i}]", bound, above=0.0, infinite=True) for i, bound in enumerate(u_max))
+    return Each(one=BOUND)("u_max", u_max)
 
 
 def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:

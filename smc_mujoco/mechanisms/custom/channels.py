@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 import mujoco
 
-from smc_mujoco.common.constraints import Flag, Number, constrain
+from smc_mujoco.common.constraints import Bound, Flag, Number, constrain
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE
@@ -49,7 +49,7 @@ class Channel:
     x0: Place | None = None
     partner_x0: Place | None = None
     law: Any = None
-    u_max: Annotated[float, Number(above=0.0, infinite=True)] | None = None
+    u_max: Bound | None = None
     reference: Any = None
 
     def __post_init__(self) -> None:

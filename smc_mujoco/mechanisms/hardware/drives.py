@@ -22,11 +22,10 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.constraints import Number, OneOf
+from smc_mujoco.common.constraints import Bound, Number, OneOf
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     Actuator,
-    Limit,
     Natural,
     NominalDrive,
     Offset,
@@ -82,7 +81,7 @@ class RateLimit(Actuator):
 
     in_callback: ClassVar[bool] = True
 
-    rate: Limit
+    rate: Bound
 
     @property
     def limited(self) -> bool:
@@ -139,8 +138,8 @@ class DCMotor(Actuator):
     rotor_inertia: Natural = 142e-7
     cogging: Natural = 0.0
     poles: Natural = 12.0
-    voltage: Limit = 24.0
-    current: Limit = 30.0
+    voltage: Bound = 24.0
+    current: Bound = 30.0
     ripple: Natural = 0.0
     bars: Positive = 9.0
     bridge: Positive = 0.01

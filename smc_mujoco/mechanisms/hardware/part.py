@@ -10,7 +10,6 @@ channel's actuator drives, if it is not the channel's joint itself.
 
 import dataclasses
 import functools
-import math
 from collections.abc import Hashable, Iterator
 from typing import Annotated, ClassVar, NamedTuple
 
@@ -29,11 +28,10 @@ HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
 HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; equal, so the rest has no effect
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
-# Numbers of parts; those that may be infinite switch a limit off
+# Numbers of parts
 Offset = Annotated[float, Number(low=-MAX_PARAMETER, high=MAX_PARAMETER)]
 Natural = Annotated[float, Number(low=0.0, high=MAX_PARAMETER)]
 Positive = Annotated[float, Number(above=0.0, high=MAX_PARAMETER)]
-Limit = Annotated[float, Number(above=0.0, high=math.inf, infinite=True)]
 
 
 @dataclasses.dataclass(frozen=True)
