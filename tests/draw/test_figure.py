@@ -138,17 +138,6 @@ def cart_and_pole(**fields) -> smc.Trace:
     return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields))
 
 
-def test_a_pole_has_panels_of_its_own_in_its_own_unit(tmp_path):
-    text = words(draw_figure.figure([cart_and_pole()]))
-    for name in ("position x (m)", "velocity v (m/s)", "free angle q (rad)", "velocity q′ (rad/s)", "control u (N)"):
-        assert name in text
-    assert "reaction" not in text
-    assert "sliding variable s (" not in text  # of the cart and the pole: its unit is the law's
-    rubbed = words(draw_figure.figure([cart_and_pole(friction=Coulomb(0.01))]))
-    assert "reaction (N)" in rubbed
-    assert "reaction on q (N·m)" in rubbed
-
-
 def test_the_band_around_each_joint_is_that_of_its_own_scale():
     trace = cart_and_pole()
     shown = [panel for name in ("x", "spread", "u", "force", "s") for panel in panels.over_groups([trace], name)]
@@ -174,19 +163,6 @@ def test_a_film_has_a_chart_of_each_joint():
     np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
 
 
-def test_a_slide_and_a_hinge_that_are_driven_share_no_panel(tmp_path):
-    (tmp_path / "arm.xml").write_text("""
-      <mujoco><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/><geom size=".1" contype="0"/>
-        <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1" contype="0"/></body></body></worldbody>
-      <actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>""")
-    plant = smc.plant_from(tmp_path / "arm.xml", ["lift", "turn"])
-    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.5, x0=0.1))
-    text = words(draw_figure.figure([trace]))
-    for name in ("lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"):
-        assert name in text
-    assert "mean" not in text.replace("line: mean over", "")
-
-
 def test_refuses_what_shares_no_axes(pair, tmp_path):
     with pytest.raises(smc.ScenarioError, match="no traces"):
         figure([], tmp_path / "a")
@@ -201,21 +177,12 @@ def test_refuses_what_shares_no_axes(pair, tmp_path):
         figure(pair, tmp_path / "file" / "a")
 
 
-def test_a_voltage_is_drawn_in_volts_beside_forces_in_newton_metres(tmp_path):
+def test_commands_in_volts_and_in_newton_metres_share_no_axes(tmp_path):
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0)
-    volts = smc.Scenario(
-        plant=smc.plant("furuta", cf=1e-4), law="none", duration=0.1, feedforward=smc.Constant(0.03),
-        actuator=dataclasses.replace(motor, command="voltage"),
-    )  # fmt: skip
-    torque = dataclasses.replace(volts, actuator=motor)
-    one, other = smc.run([volts, torque])
-    text = words(draw_figure.figure([one]))
-    assert all(label in text for label in ("u (V)", "reaction (N·m)"))
-    assert "u (N·m)" not in text
-    assert "sliding variable" not in text  # the law has none
-    assert "u (N·m)" in words(draw_figure.figure([other]))
+    torque = smc.Scenario(plant="furuta", law="none", duration=0.01, actuator=motor)
+    volts = dataclasses.replace(torque, actuator=dataclasses.replace(motor, command="voltage"))
     with pytest.raises(smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"):
-        figure([one, other], tmp_path / "c")
+        figure(smc.run([volts, torque]), tmp_path / "c")
 
 
 def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told(pair):
@@ -427,23 +394,6 @@ def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> sm
     return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 3.0} | parts)))
 
 
-def test_an_overview_of_friction_has_a_panel_of_the_reaction_and_marks_where_it_holds(pair, tmp_path):
-    rubbed = realistic(friction=Coulomb(0.5))
-    text = words(draw_figure.figure([pair[0], rubbed]))
-    assert "reaction (N)" in text
-    assert "range of u, reaction, s" in text or "band" not in text
-    ideal = words(draw_figure.figure(pair))
-    assert "reaction" not in ideal
-    assert "held by friction" not in ideal
-
-
-def test_an_overview_with_an_actuator_has_a_panel_of_what_it_delivers(tmp_path):
-    late = realistic(actuator=smc.Lag(0.05), duration=1.0)
-    text = words(draw_figure.figure([late]))
-    assert "delivered (N)" in text
-    assert "reaction" not in text  # nothing rubs or touches
-
-
 @pytest.mark.slow
 def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
     hit = realistic(contact="stops", v0=3.0)
@@ -452,11 +402,6 @@ def test_blows_are_told_and_do_not_squash_what_lasts(tmp_path):
     assert "|reaction|" not in words(draw_figure.figure([realistic(friction=Coulomb(0.5))]))
     (ax,) = (ax for ax in draw_figure.figure([hit]).axes if ax.get_ylabel() == "reaction (N)")
     assert ax.get_ylim()[1] < 0.5 * np.abs(hit.reaction).max()
-
-
-def test_a_realistic_network_has_its_reactions(tmp_path):
-    rubbed = realistic(plant="pendulum_network", friction=Coulomb(0.2), duration=1.0)
-    assert "reaction (N·m)" in words(draw_figure.figure([rubbed]))
 
 
 @pytest.mark.slow

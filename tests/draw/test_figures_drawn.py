@@ -183,6 +183,52 @@ def curve(ax: Axes, colour: str) -> np.ndarray:
     return (np.concatenate([*common, own]) if not len(own) or own[0, 0] > 0.0 else own).T
 
 
+MOTOR = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0)
+ARM = """
+<mujoco><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/><geom size=".1" contype="0"/>
+  <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1" contype="0"/></body></body></worldbody>
+<actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>"""
+PANELS = {  # what is run -> labels that a figure of it has, and parts of labels that it has not
+    "ideal": ({"plant": "duffing"}, ["position x (m)", "control u (N)", "velocity v (m/s)"], ["reaction", "delivered"]),
+    "friction": ({"plant": "duffing", "friction": Coulomb(0.5)}, ["reaction (N)"], ["delivered"]),
+    "a drive": ({"plant": "duffing", "actuator": smc.Lag(0.05)}, ["delivered (N)"], ["reaction"]),
+    "a pole": (
+        {"plant": "cart_pole", "law": "hierarchical", "model": "nominal"},
+        ["position x (m)", "velocity v (m/s)", "free angle q (rad)", "velocity q′ (rad/s)", "control u (N)"],
+        ["reaction", "sliding variable s ("],  # whose unit is the law's
+    ),
+    "a pole with friction": (
+        {"plant": "cart_pole", "friction": Coulomb(0.01)}, ["reaction (N)", "reaction on q (N·m)"], [],
+    ),
+    "a network with friction": (
+        {"plant": "pendulum_network", "friction": Coulomb(0.2)},
+        ["angle x (rad)", "max − min x (rad)", "control u (N·m)", "reaction (N·m)"], ["mean x"],
+    ),
+    "a slide and a hinge": (
+        {"plant": smc.plant_from(ARM, ["lift", "turn"], name="own")},
+        ["lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"], ["mean"],
+    ),
+    "volts": (
+        {"plant": "furuta", "law": "none", "actuator": dataclasses.replace(MOTOR, command="voltage")},
+        ["control u (V)", "reaction (N·m)"], ["u (N·m)", "sliding variable"],  # the law has none
+    ),
+    "torques": ({"plant": "furuta", "law": "none", "actuator": MOTOR}, ["control u (N·m)"], ["(V)"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", PANELS)
+def test_a_figure_has_the_panels_that_its_mechanism_has_in_their_units_and_no_others(kind):
+    fields, labels, absent = PANELS[kind]
+    trace = made(smc.Scenario(**{"law": "classical", "duration": 0.2} | fields))
+    if "friction" not in fields and trace.scenario.plant.name != "furuta":
+        trace = dataclasses.replace(trace, reaction=0.0 * trace.reaction)
+    if trace.scenario.law.name == "none":
+        trace = dataclasses.replace(trace, s=0.0 * trace.s)
+    words = [ax.get_ylabel().replace("\n", " ") for ax in figure(trace).axes]
+    assert set(labels) <= set(words), words
+    assert not [part for part in absent if part in " ".join(words)]
+
+
 def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
     traces = machines()
     page, colours = figure(traces), style.law_colours([trace.scenario.law for trace in traces])
@@ -192,6 +238,8 @@ def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
             t, y = curve(shown(page, label), colour)
             t, y = t[t < end + 1e-6], y[t < end + 1e-6]
             truth = getattr(trace, values)[trace.t <= end + 1e-9, 0]
+            crosses = [places(line)[0].tolist() for line in shown(page, label).lines if line.get_marker() == "X"]
+            assert end == 1.2 or crosses == [pytest.approx([end, truth[-1]])]
             assert (t[0], t[-1]) == pytest.approx((0.0, end))
             assert (y[0], y[-1], y.min(), y.max()) == pytest.approx((truth[0], truth[-1], truth.min(), truth.max()))
     rows = shown(page, "control u (N)").child_axes
@@ -201,9 +249,9 @@ def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
         low, high = band.get_paths()[0].get_extents().intervaly
         assert (low, high) == pytest.approx((np.nanmin(trace.u), np.nanmax(trace.u)))
         assert np.abs(curve(row, row.lines[0].get_color())[1]).max() < 0.5  # the mean has no teeth
-    crosses = [line for ax in every(page) for line in ax.lines if line.get_marker() == "X"]
-    assert {to_hex(cross.get_color()) for cross in crosses} == {to_hex(colours[2])}
-    assert sum(places(cross)[0, 0] == pytest.approx(0.699) for cross in crosses) >= 5
+    marks = [line for ax in every(page) for line in ax.lines if line.get_marker() == "X"]
+    assert {to_hex(mark.get_color()) for mark in marks} == {to_hex(colours[2])}
+    assert sum(places(mark)[0, 0] == pytest.approx(0.699) for mark in marks) >= 5
     jumps = [line for line in shown(page, "position x (m)").lines if places(line)[:, 0].tolist() == [0.5, 0.5]]
     assert len(jumps) == 1
 
