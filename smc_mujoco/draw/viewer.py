@@ -21,7 +21,7 @@ from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.mechanisms.plant import compiled_for_runs, field_array
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.reference import Loop, PythonComponent
+from smc_mujoco.simulation.reference import Loop
 from smc_mujoco.simulation.scenario import Scenario, stepped_by_mujoco
 
 GAIN = "gain:"  # prefix of the sliders' names
@@ -69,7 +69,7 @@ def aim(model: mujoco.MjModel, data: mujoco.MjData, cam: mujoco.MjvCamera) -> No
 
 
 class Live:
-    """A run, `loop`, of which `step` physics steps are over; `model` and `data` are those on screen."""
+    """A run of a `scenario`, `loop`, of which `step` physics steps are over; `model` and `data` are those on screen."""
 
     def __init__(self, scenario: Scenario, say: Callable[[str], None] = print):
         self.model = model_with_sliders(scenario)
@@ -84,13 +84,13 @@ class Live:
     @property
     def law(self) -> Law:
         """The law with its present gains."""
-        return self.loop.scenario.law
+        return self.scenario.law
 
     def begin(self, scenario: Scenario) -> None:
         """Start the run again."""
         with installed():
-            scenario = stepped_by_mujoco(scenario)  # whose friction feels the push, too
-            self.loop = Pushed(scenario, models.mechanism(scenario))
+            self.scenario = stepped_by_mujoco(scenario)  # whose friction feels the push, too
+            self.loop = Pushed(self.scenario, models.mechanism(self.scenario))
         self.step, self.due, self.late = 0, 0.0, False
         self.build(0)
 
@@ -118,21 +118,20 @@ class Live:
     def listen(self) -> None:
         """Read the gains, the mouse's push and a reset from the viewer."""
         if self.data.time == 0.0 and self.step:  # a reset, which also puts the sliders to 0
-            self.begin(self.loop.scenario)
+            self.begin(self.scenario)
             return
         self.loop.push[:] = self.data.xfrc_applied
         values = np.clip(self.data.ctrl[self.sliders], *self.limits).tolist()
         gains = dict(self.law.gains) | dict(zip(slider_gains(self.law), values, strict=True))
         if gains != dict(self.law.gains):
-            law = dataclasses.replace(self.law, gains=gains)
-            self.loop.scenario = dataclasses.replace(self.loop.scenario, law=law)
-            self.loop.law.gains = PythonComponent(law, len(self.loop.law.memory)).gains  # the memory stays
+            self.scenario = dataclasses.replace(self.scenario, law=dataclasses.replace(self.law, gains=gains))
+            self.loop.controller.set_gains(self.law)
 
     def advance(self, seconds: float) -> None:
         """Simulate the time that is due, at most MAX_FRAME_TIME. Restart a finished run, pause a failed one."""
         if self.loop.failure or self.step > self.loop.total:
-            self.begin(self.loop.scenario)
-        loop, h = self.loop, self.loop.scenario.resolved.physics_step
+            self.begin(self.scenario)
+        loop, h = self.loop, self.loop.scenario.physics_step
         self.due += min(seconds, MAX_FRAME_TIME)
         until, self.late = time.perf_counter() + MAX_FRAME_TIME, seconds > MAX_FRAME_TIME
         with installed(loop.control), np.errstate(all="ignore"):

@@ -3,8 +3,8 @@
     act = smc.envs.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-The reference loop calls the law, so the law measures the same as in `smc.run`, and the episode equals the trace of that
-run.
+The law is called by the `Controller` of the reference loop, so it measures the same as in `smc.run`, and the episode
+equals the trace of that run.
 """
 
 import dataclasses
@@ -19,9 +19,9 @@ from smc_mujoco.control.estimator import Estimator
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.envs.episode import Episode
-from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.callback import installed
-from smc_mujoco.simulation.model import mechanism
+from smc_mujoco.simulation.python_controller import Controller, Failure
+from smc_mujoco.simulation.scenario import Scenario
 
 
 def agent(
@@ -49,35 +49,30 @@ def agent(
         surface=surface,  # pyright: ignore[reportArgumentType]
         velocity=velocity,  # pyright: ignore[reportArgumentType]
     )
-    with installed():
-        return Agent(episode, reference.Loop(scenario, mechanism(scenario)))
+    return Agent(episode, scenario)
 
 
 class Agent:
     """A law that acts in an environment."""
 
-    def __init__(self, episode: Episode, loop: reference.Loop):
-        self.episode, self.loop = episode, loop  # only the loop's controller is used
+    def __init__(self, episode: Episode, scenario: Scenario):
+        self.episode, self.scenario = episode, scenario
+        with installed():
+            self.controller = Controller(scenario)
         self.last_episode = 0  # number of the episode in which it acted last
 
     def __call__(self, observation: Any) -> np.ndarray:
         """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of gymnasium."""
-        loop, k, n = self.loop, self.episode.sample, self.loop.scenario.plant.n
+        k, plant = self.episode.sample, self.scenario.plant
         if k == 0 or self.last_episode != self.episode.episodes:
-            self.last_episode = self.episode.episodes
-            for component in filter(None, (loop.law, loop.surface, loop.estimator)):
-                component.memory[:] = 0.0
-            loop.last_u[:] = 0.0  # part of the nominal model of coupled channels
-        t = k * loop.scenario.control_period
-        x, v = _positions_and_velocities(observation, n)
-        loop.data.sensordata[loop.channels["x_sensor"]] = x
-        loop.data.sensordata[loop.channels["v_sensor"]] = v
+            self.last_episode, self.controller = self.episode.episodes, Controller(self.scenario)
+        t = k * self.scenario.control_period
         try:
             with np.errstate(all="ignore"):
-                u, loop.s = loop.update_law(*loop.measure(loop.data, k, t), t)
-        except reference.Failure as failure:
+                u, _ = self.controller(k, t, *_positions_and_velocities(observation, plant.n))
+        except Failure as failure:
             raise ScenarioError(f"{failure}, at t = {t:.6g} s") from failure
-        return u[: loop.scenario.plant.driven] / loop.scenario.limits
+        return u[: plant.driven] / self.scenario.limits
 
 
 def _episode(environment: Any) -> Episode:

@@ -29,6 +29,7 @@ from smc_mujoco.mechanisms.plant import field_array
 from smc_mujoco.simulation import callback, reference, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack, prepare
+from smc_mujoco.simulation.python_controller import Failure, NominalDynamics, PythonComponent
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.trace import Trace, from_log
 
@@ -323,18 +324,18 @@ def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     Compiled code keeps no text of an exception, so the law is called again in Python. Return None if that raises none.
     """
     n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
-    function = reference.PythonComponent(s.law, n)
-    function.memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
+    memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
+    function = PythonComponent(s.law, n, memory)
     try:
         if s.law.joint:
             dtype = joint_law.stored_dtype(n)
             numbers = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,))
             stored = numbers.copy().view(dtype)[0]
-            dynamics = reference.NominalDynamics(s, stored["x"], stored["v"])
+            dynamics = NominalDynamics(s, stored["x"], stored["v"])
             function.call_joint(joint_law.measurement_of(stored, dynamics))
         else:
             function(i, Measurement(*record["y"].tolist()))
-    except reference.Failure as failure:
+    except Failure as failure:
         return str(failure)
     if record["failure"] == state.LAW_RAISED:  # the law had changed its memory before it raised
         return None

@@ -13,7 +13,7 @@ import smc_mujoco as smc
 from smc_mujoco.control import design
 from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import reference as plain
+from smc_mujoco.simulation import python_controller
 
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network")
 FREE = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
@@ -30,7 +30,7 @@ def called(law, times=1, memory=None, **y):
     memory, u = np.zeros(law.memory) if memory is None else memory, math.nan
     assert law.function is not None
     for _ in range(times):
-        u, _ = law.function(measured(**y), plain.gains_of(law), memory)
+        u, _ = law.function(measured(**y), python_controller.gains_of(law), memory)
     return u
 
 

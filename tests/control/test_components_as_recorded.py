@@ -18,7 +18,7 @@ from smc_mujoco.control.component import gain_text
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
 
@@ -81,7 +81,7 @@ def computed(component, inputs):
     """Weighted sums of each result over all samples, and of the memory at the end."""
     function, joint = rebuild(component.function, lambda plain: plain), component.joint
     memory = np.zeros((JOINTS, component.memory) if joint else component.memory)
-    gains = reference.gains_of(component, JOINTS)
+    gains = python_controller.gains_of(component, JOINTS)
     results = np.array([function(y, gains, memory) for y in inputs]).reshape(COUNT, -1)
     weights, last = np.random.default_rng(8).uniform(0.5, 1.5, results.shape), memory.ravel()
     sums = [*(weights * results).sum(axis=0), last @ np.linspace(0.5, 1.5, last.size)]

@@ -10,7 +10,7 @@ from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.control.surface import surface
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import python_controller, reference
 
 PLANTS = ("van_der_pol", "duffing", "inverted_pendulum_network")
 FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")
@@ -26,7 +26,7 @@ def measured(e=0.0, de=0.0, **more):
 
 def forces(law, e, de):
     """u and s at many states, (N, 2)."""
-    gains, memory = reference.gains_of(law), np.zeros(law.memory)
+    gains, memory = python_controller.gains_of(law), np.zeros(law.memory)
     return np.array([law.function(measured(float(a), float(b)), gains, memory) for a, b in zip(e, de, strict=True)])
 
 

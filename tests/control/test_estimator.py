@@ -14,7 +14,7 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.estimator import Reading, catalogue
 from smc_mujoco.control.estimators.kalman import square_root
 from smc_mujoco.evidence.papers.gaber import scenarios
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
 
@@ -29,7 +29,7 @@ def both(estimator, x, v=None, h=H):
     """Velocities and accelerations on samples x and sensor readings v, (2, K)."""
     function, gains, memory = (
         rebuild(estimator.function, lambda f: f),
-        reference.gains_of(estimator),
+        python_controller.gains_of(estimator),
         np.zeros(estimator.memory),
     )
     x = np.asarray(x, float)

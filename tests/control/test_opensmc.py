@@ -15,7 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.control.estimator import Reading, estimator
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.surface import surface
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import python_controller
 
 opensmc = pytest.importorskip("opensmc")
 controllers, reaching, surfaces, estimators, metrics, utils, simulator, core, plants = (
@@ -39,7 +39,7 @@ class Ours:
     """A law, a surface or an estimator of this package with its memory, called like a function."""
 
     def __init__(self, component, **more):
-        self.function, self.gains, self.more = component.function, reference.gains_of(component), more
+        self.function, self.gains, self.more = component.function, python_controller.gains_of(component), more
         self.memory = np.zeros(component.memory)
 
     def __call__(self, e=0.0, de=0.0, **more):
@@ -188,7 +188,7 @@ def test_the_integral_of_a_pid_surface_agrees_but_for_one_sample():
 def estimated(ours, theirs, h, until):
     """Both estimates of the velocity of sin t: ours, theirs, (K,) each, from t = 0 on."""
     t = np.arange(0.0, until, h)
-    gains, memory, rows = reference.gains_of(ours), np.zeros(ours.memory), []
+    gains, memory, rows = python_controller.gains_of(ours), np.zeros(ours.memory), []
     for x in np.sin(t):
         out = ours.function(Reading(h, float(x), 0.0), gains, memory)
         theirs.estimate(0.0, [float(x)], 0.0)

@@ -75,7 +75,7 @@ def finish(view, viewer):
         if view.step > view.loop.total or view.loop.failure:
             break
     loop = view.loop
-    return from_log(loop.scenario, loop.log.copy(), loop.failed_step, loop.failure)
+    return from_log(view.scenario, loop.log.copy(), loop.failed_step, loop.failure)
 
 
 def slide(view, name, value):

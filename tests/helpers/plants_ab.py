@@ -21,7 +21,7 @@ from scipy.linalg import expm
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.law import Law, Measurement
-from smc_mujoco.simulation import cfunctions, reference
+from smc_mujoco.simulation import cfunctions, python_controller
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,7 +70,7 @@ def on_surface(s, dt=1e-3, eq=0.0, **y):
 def called(law: Law, y: Measurement, memory: np.ndarray):
     """u and s of a law that keeps its memory."""
     assert law.function is not None
-    return law.function(y, reference.gains_of(law), memory)
+    return law.function(y, python_controller.gains_of(law), memory)
 
 
 def one(law: Law, **y):

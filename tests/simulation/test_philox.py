@@ -10,7 +10,7 @@ from numba import njit
 from scipy import stats
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import philox, reference
+from smc_mujoco.simulation import philox, python_controller
 
 LARGEST_SEED = 2**53 - 1
 
@@ -98,7 +98,7 @@ def at_rest(law, **fields):
 
 
 def test_sensors_show_the_truth_plus_the_normals_of_the_sample():
-    expected = np.array([reference.normals(9, 0, philox.MEASUREMENT, k) for k in range(101)])
+    expected = np.array([python_controller.normals(9, 0, philox.MEASUREMENT, k) for k in range(101)])
     np.testing.assert_allclose(at_rest(show_position), 0.5 * expected[:, 0], rtol=1e-15)
     np.testing.assert_allclose(at_rest(show_velocity), 3.0 * expected[:, 1], rtol=1e-15)
 

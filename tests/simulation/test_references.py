@@ -9,7 +9,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import Measurement, catalogue
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import python_controller, reference
 from smc_mujoco.simulation.signals import MinimumJerk, Ramp, Sine, Step
 
 REFERENCES = [Ramp(0.7, 0.3), Ramp(-2.0), MinimumJerk(1.5, 0.2, 0.9), MinimumJerk(-0.4, -0.1, 2.0), Sine(0.5, 3.0, 0.2)]
@@ -99,7 +99,7 @@ def test_the_reference_s_acceleration_is_fed_forward_with_the_model_and_only_wit
             for ddr in (0.0, 3.0):
                 y = Measurement(t=0.0, dt=1e-3, x=0.3, v=-0.2, e=0.1, de=0.05, r=0.2, dr=-0.25, ddr=ddr, f=0.7, g=1.6,
                                 model=model)  # fmt: skip
-                u.append(law.function(y, reference.gains_of(law), np.zeros(law.memory))[0])
+                u.append(law.function(y, python_controller.gains_of(law), np.zeros(law.memory))[0])
             assert u[1] - u[0] == pytest.approx(expected, abs=1e-9), law
 
 

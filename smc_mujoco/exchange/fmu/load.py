@@ -44,7 +44,6 @@ CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
 _running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
 _numbers = itertools.count(1)
-_begun: dict[int, int] = {}  # address of a law's memory -> number of the last instance that it held
 
 
 class Running(NamedTuple):
@@ -99,8 +98,6 @@ class FmuLaw(Uncompiled):
         """Start an instance, which ends when the memory of the run is freed. Return its number."""
         place = next(_numbers)
         names = [theirs for _, theirs in self.inputs]
-        address = memory.ctypes.data
-        _end(_begun.get(address, 0))  # the instance of a run whose memory was set to 0, to begin again
         if self.once:
             gc.collect()  # ends the instances of runs that are over
             if any(other.law == self for other in _running.values()):
@@ -109,7 +106,7 @@ class FmuLaw(Uncompiled):
                     "give a plant of one channel"
                 )
         made = Slave(str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t)
-        _running[place], _begun[address] = Running(self, made, y.t, [0.0, 0.0]), place
+        _running[place] = Running(self, made, y.t, [0.0, 0.0])
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place

@@ -12,7 +12,7 @@ import smc_mujoco as smc
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs.controllers import state_feedback
 from smc_mujoco.evidence.rigs.machines import qube_servo
-from smc_mujoco.simulation import reference
+from smc_mujoco.simulation import python_controller, reference
 from smc_mujoco.simulation.trace import ARRAYS
 
 QUBE = smc.rig("qube_servo")
@@ -138,13 +138,13 @@ def test_the_replay_is_the_controllers_own_command(record):
     changed = record | {"theta": theta, "alpha": alpha, "target_alpha": target, "feedforward": feedforward}
     scenario = QUBE.replay(changed, start=start)
     memory, first = np.zeros(5), round(start / 2e-3)
-    gains = reference.Values(**scenario.law.gains)
+    gains = python_controller.Values(**scenario.law.gains)
     for k in range(400):
-        r = reference.evaluate(scenario.reference, k * 2e-3)[0]
-        y = reference.Measurement(
+        r = python_controller.evaluate(scenario.reference, k * 2e-3)[0]
+        y = python_controller.Measurement(
             0.0, 2e-3, theta[first + k], 0.0, theta[first + k] - r, 0.0, r, 0.0, 0.0, 0.0, 0.0, q=alpha[first + k]
         )
-        added = reference.evaluate(scenario.feedforward, k * 2e-3)[0]
+        added = python_controller.evaluate(scenario.feedforward, k * 2e-3)[0]
         assert state_feedback.function(y, gains, memory)[0] + added == pytest.approx(u[first + k], abs=1e-9)
 
 

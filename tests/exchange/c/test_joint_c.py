@@ -19,8 +19,8 @@ from smc_mujoco.cli import main as cli
 from smc_mujoco.control.joint_law import JointMeasurement, catalogue, coriolis, norm, product, saturate, solve, torque
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build, export, sandbox
-from smc_mujoco.simulation import reference
-from smc_mujoco.simulation.reference import gains_of
+from smc_mujoco.simulation import python_controller, reference
+from smc_mujoco.simulation.python_controller import gains_of
 
 pytestmark = needs_compiler
 
@@ -189,7 +189,7 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
     flags = (*STRICT, "-Wdouble-promotion")
     single, law = smc.exchange.law_from_c(path, flags=flags, timeout=60.0).function, LAWS[name]()
     rng, memory = np.random.default_rng(3), np.zeros((3, law.memory))
-    theirs = reference.PythonComponent(law, 3)
+    theirs = python_controller.PythonComponent(law, 3)
     for k in range(20):
         vectors = rng.normal(size=(9, 3)).astype(np.float32).astype(float)
         M, h, g = np.eye(3) + 0.1, rng.normal(size=3), rng.normal(size=3)

@@ -17,9 +17,9 @@ from numba import njit  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
-from smc_mujoco.control.joint_law import catalogue, product  # noqa: E402
+from smc_mujoco.control.joint_law import catalogue, coriolis, jacobian, product  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
-from smc_mujoco.simulation import reference  # noqa: E402
+from smc_mujoco.simulation.python_controller import Controller  # noqa: E402
 
 pytestmark = needs_compiler
 
@@ -53,17 +53,15 @@ def made(folder):
         return dict(zip(CASES, zip(paths, smc.run(scenarios), strict=True), strict=True))
 
 
-def seen(known, trace: smc.Trace, k: int) -> dict[str, float]:
-    """The inputs of an FMU at a sample of a trace without noise."""
-    x, v = trace.x[k], trace.v[k]
-    r, dr, ddr = type(REFERENCE).value(trace.t[k], REFERENCE)
-    M, h, g = reference.dynamics(trace.scenario, x, v)
-    asked = reference.NominalDynamics(trace.scenario, x, v)
-    vectors = {"x": x, "v": v, "r": [r] * 3, "dr": [dr] * 3, "ddr": [ddr] * 3, "h": h, "g": g}
+def seen(known, controller: Controller, trace: smc.Trace, k: int) -> dict[str, float]:
+    """The inputs of an FMU at a sample of a trace without noise: what the controller's law reads."""
+    motion = np.repeat(np.transpose([type(REFERENCE).value(trace.t[k], REFERENCE)]), 3, axis=1)
+    y = controller.joint_measurement(trace.x[k], trace.v[k], trace.t[k], motion)
+    vectors = {name: getattr(y, name) for name in ("x", "v", "r", "dr", "ddr", "h", "g")}
     values = {f"{name}[{i}]": float(each[i - 1]) for name, each in vectors.items() for i in JOINTS}
-    matrices = {"M": M, "C": np.column_stack([asked.coriolis(unit) for unit in np.eye(3)])}
+    matrices = {"M": y.M, "C": np.column_stack([coriolis(y, unit) for unit in np.eye(3)])}
     if "J[1,1]" in known:
-        matrices["J"] = asked.jacobian()
+        matrices["J"] = jacobian(y)
     values |= {
         f"{name}[{i},{j}]": float(m[i - 1, j - 1]) for name, m in matrices.items() for i in JOINTS for j in JOINTS
     }
@@ -76,9 +74,9 @@ def outputs(fmu: Importer) -> list[float]:
 
 def stepped(fmu: Importer, trace: smc.Trace, samples: int) -> np.ndarray:
     """u and s after each step, (samples, 6)."""
-    found = []
+    found, controller = [], Controller(trace.scenario)
     for k in range(samples):
-        fmu.set(**seen(fmu.at, trace, k))
+        fmu.set(**seen(fmu.at, controller, trace, k))
         fmu.fmu.doStep(trace.t[k], 1e-3)
         found.append(outputs(fmu))
     return np.array(found)
@@ -166,7 +164,8 @@ def test_each_joint_has_a_memory_of_its_own(made, folder):
 def test_fmpy_simulates_it_with_inputs_by_their_names(made):
     path, trace = made["computed_torque_sliding"]
     known = {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
-    every = [seen(known, trace, k) for k in range(len(trace.t))]
+    controller = Controller(trace.scenario)
+    every = [seen(known, controller, trace, k) for k in range(len(trace.t))]
     kinds = [("time", float), *((name, float) for name in every[0])]
     signals = np.array([(t, *one.values()) for t, one in zip(trace.t, every, strict=True)], kinds)
     outs = [f"u[{i}]" for i in JOINTS]

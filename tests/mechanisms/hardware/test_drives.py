@@ -14,8 +14,7 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit, drive
 from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
 from smc_mujoco.mechanisms.plant import field_array, plant, write
-from smc_mujoco.simulation import reference
-from smc_mujoco.simulation.model import mechanism
+from smc_mujoco.simulation.python_controller import Controller
 
 H = 2.5e-4  # s
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
@@ -296,7 +295,7 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
         data.qpos[:], data.qvel[:], data.ctrl[:] = x, v, u
         mujoco.mj_forward(model, data)
         for i in range(kind.n):
-            f, g = reference.Loop(scenario, mechanism(scenario)).model_at(x, v, i, 0)
+            f, g = Controller(scenario).model_at(x, v, i, 0)
             assert data.qacc[i] == pytest.approx(f + g * u, rel=1e-9, abs=1e-9)
 
 
