@@ -9,12 +9,13 @@ import pytest
 from scipy.signal import butter, freqz
 
 import smc_mujoco as smc
+from smc_mujoco.control.law import Measurement
 from smc_mujoco.evidence.rigs import identify as identification
 from smc_mujoco.evidence.rigs import inverse, records, replays, search, uncertainty
 from smc_mujoco.evidence.rigs.controllers import cascade, state_feedback
 from smc_mujoco.evidence.rigs.replays import Piece, Point, Replays, Slopes
 from smc_mujoco.evidence.rigs.rig import Fall, Quantity, fallen, percentages
-from smc_mujoco.simulation.reference import Measurement, Values
+from smc_mujoco.mechanisms.plant import Values
 
 pytestmark = pytest.mark.quick
 
