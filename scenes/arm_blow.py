@@ -6,17 +6,19 @@ identified on a real Panda; no law sees the blow coming.
 Look for: the arrow at 1 s, which is the blow; and how far the tip is thrown, and how it comes back.
 """
 
+import arms
+
 import smc_mujoco as smc
 
 LAWS = ("computed_torque_sliding", "unit_vector", "passivity_based", "observer_free_joint")
 
 
 def thrown(trace):
-    return 1e3 * smc.arms.off_path(trace, after=smc.arms.BLOW).max()
+    return 1e3 * arms.off_path(trace, after=arms.BLOW).max()
 
 
 def back(trace):
-    return smc.arms.back_within(trace, 2e-3, after=smc.arms.BLOW)
+    return arms.back_within(trace, 2e-3, after=arms.BLOW)
 
 
 def answer(runs):
@@ -28,7 +30,7 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A blow on the forearm",
-    conditions={"blow": {name: smc.arms.scenario("blow", smc.arms.gained(name)) for name in LAWS}},
+    conditions={"blow": {name: arms.scenario("blow", arms.gained(name)) for name in LAWS}},
     answer=answer,
 )
 

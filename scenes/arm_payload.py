@@ -7,6 +7,8 @@ Look for: the jump of the bars of joints 2 and 4 at 1 s, and the sag that a boun
 not.
 """
 
+import arms
+
 import smc_mujoco as smc
 
 LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "passivity_based", "time_delay_sliding")
@@ -29,7 +31,7 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A payload of 2 kg is picked up",
-    conditions={"pick and place": {name: smc.arms.scenario("payload", smc.arms.gained(name)) for name in LAWS}},
+    conditions={"pick and place": {name: arms.scenario("payload", arms.gained(name)) for name in LAWS}},
     answer=answer,
 )
 

@@ -1,10 +1,12 @@
 """Which law of many joints keeps a seven-joint arm's tip on its path, with friction and a payload that no law knows of?
 
 The arm swings every joint, with the friction identified on a real Panda, and carries 2 kg. The laws know the masses of
-the links and nothing else. Their gains come from equal searches at 1 kg, see smc_mujoco/studies/arms.py.
+the links and nothing else. Their gains come from equal searches at 1 kg, see arms/__init__.py.
 
 Look for: the bars, which show how much of each motor the swing takes; and who needs a rough torque to be exact.
 """
+
+import arms
 
 import smc_mujoco as smc
 
@@ -22,7 +24,7 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A seven-joint arm with 2 kg unknown to the laws",
-    conditions={"sway": {name: smc.arms.scenario("sway", smc.arms.gained(name), payload=2.0) for name in LAWS}},
+    conditions={"sway": {name: arms.scenario("sway", arms.gained(name), payload=2.0) for name in LAWS}},
     answer=answer,
 )
 

@@ -8,11 +8,13 @@ Look for: the force in the last panel, which a path behind the wall only meets i
 below it; and how deep the tip is in the wall.
 """
 
+import arms
+
 import smc_mujoco as smc
 
 
 def off(trace):
-    return abs(smc.metrics.tip_scores(trace, force=smc.arms.PRESS)["force_error"])
+    return abs(smc.metrics.tip_scores(trace, force=arms.PRESS)["force_error"])
 
 
 def varies(trace):
@@ -25,20 +27,18 @@ def stays(trace):
 
 
 def answer(runs):
-    return (
-        f"mean force off 20 N: least with {runs.least(off, unit='%')}, most with {runs.most(off, unit='%')}; it varies "
-        f"least with {runs.least(varies, unit='N')}, most with {runs.most(varies, unit='N')}; always on the wall and "
-        f"less than 1 mm in it: {runs.those(stays).named}"
-    )
+    force = f"mean force off 20 N: least with {runs.least(off, unit='%')}, most with {runs.most(off, unit='%')}"
+    varying = f"it varies least with {runs.least(varies, unit='N')}, most with {runs.most(varies, unit='N')}"
+    return f"{force}; {varying}; always on the wall and less than 1 mm in it: {runs.those(stays).named}"
 
 
 scene = smc.Scene(
     title="Pressing on a wall with 20 N",
     conditions={
         "wall": {
-            "hybrid": smc.arms.scenario("wall", smc.arms.hybrid()),
-            "hybrid, friction known": smc.arms.scenario("wall", smc.arms.hybrid(friction=True)),
-            "path behind the wall": smc.arms.scenario("behind", smc.arms.gained("computed_torque_sliding")),
+            "hybrid": arms.scenario("wall", arms.hybrid()),
+            "hybrid, friction known": arms.scenario("wall", arms.hybrid(friction=True)),
+            "path behind the wall": arms.scenario("behind", arms.gained("computed_torque_sliding")),
         }
     },
     camera=(60.0, -18.0),  # from the side: the tip is in sight between arm and wall

@@ -1,6 +1,5 @@
 import smc_mujoco.evidence.boards
 import smc_mujoco.evidence.papers.gaber.scenarios
-import smc_mujoco.studies.arms
 from smc_mujoco import design as design
 from smc_mujoco import envs as envs
 from smc_mujoco import errors as errors
@@ -79,6 +78,5 @@ from smc_mujoco.studies.table import Table as Table
 from smc_mujoco.studies.worst_case import worst_case as worst_case
 
 __version__: str
-arms = smc_mujoco.studies.arms
 boards = smc_mujoco.evidence.boards
 paper = smc_mujoco.evidence.papers.gaber.scenarios

@@ -48,12 +48,8 @@ OTHERS = {  # title -> names of modules that are no public names
     evidence.audit.audit.Audit
     evidence.audit.verdict.Claim
     """,
-    "Arms, boards, the paper, tests": """
+    "Boards, the paper, tests": """
     evidence.papers.gaber.scenarios
-    studies.arms
-    studies.arms.scenario
-    studies.arms.gained
-    studies.arms.hybrid
     evidence.boards
     evidence.boards.entries.entry
     evidence.boards.entries.on_board

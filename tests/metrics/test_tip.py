@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import arms as tasks
 import mujoco
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from helpers import arms
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.plant import Field
 from smc_mujoco.metrics import tip
-from smc_mujoco.studies import arms as tasks
 
 
 @pytest.fixture(scope="module")

@@ -2,14 +2,15 @@
 
 import re
 
+import arms
 import numpy as np
 import pytest
 from helpers.pages import ROOT
 
 import smc_mujoco as smc
+from benchmarks import arm_study
 from smc_mujoco.mechanisms.plants import panda
 from smc_mujoco.metrics.tip import tip_path
-from smc_mujoco.studies import arms
 
 LAW = arms.gained("computed_torque_sliding")
 
@@ -36,8 +37,8 @@ def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     start = smc.plant("panda").rest
     trace = smc.run(smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05))
     rms, rate = smc.metrics.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
-    assert arms.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
-    assert np.isfinite(arms.cost(trace))
+    assert arm_study.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
+    assert np.isfinite(arm_study.cost(trace))
 
 
 def test_a_run_that_fails_does_not_come_back_to_its_path():
@@ -56,7 +57,7 @@ def test_a_law_whose_error_depends_on_the_physics_step_is_called_unstable():
     """Time-delay control in the pick and place, 100, 177 or 129 mm by the step; computed torque is not."""
     for name, expected in (("time_delay_sliding", True), ("computed_torque_sliding", False)):
         runs = [arms.scenario("payload", arms.gained(name), seed=1)]
-        assert arms.unstable(runs, smc.run(runs)) is expected
+        assert arm_study.unstable(runs, smc.run(runs)) is expected
 
 
 @pytest.mark.slow
@@ -84,7 +85,7 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
     for name in arms.GAINS:
         runs = [arms.scenario(task, arms.gained(name), seed, payload) for seed in range(1, 13)]
         traces = smc.run(runs)
-        if arms.unstable(runs, traces):
+        if arm_study.unstable(runs, traces):
             assert told[name][column : column + 2] == ["unstable"] * 2, name
             continue
         rms = np.median([1e3 * smc.metrics.tip_scores(trace)["rms_error"] for trace in traces])

@@ -2,8 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,10 +13,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 
-from smc_mujoco.common.files import scratch
-from smc_mujoco.draw import dot_plot, region
 from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import region
 from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.films import WIDTH, picture
 from smc_mujoco.evidence.report.words import style
 from smc_mujoco.evidence.rigs.figure import residual_figure
 from smc_mujoco.mechanisms.plant import catalogue as known_plants
@@ -28,20 +27,11 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Field, Front
-    from smc_mujoco.studies.table import Table
 
-WIDTH = style.JOURNAL_WIDTH  # inches, of charts: their letters have 11 px at least, also on a phone, see style.css
 FALLS, RISES = "#DCEAF4", "#C05A21"  # where V falls, where it rises: different in lightness, not only in hue
 # Colours of the suite's style -> those of the page, which differ by day and by night. All others become lighter there.
 OF_PAGE = {style.INK: "ink", style.MUTED: "muted", style.GRID: "line", style.RULE: "edge", style.PAPER: "page"}
 OF_PAGE |= {style.RC["axes.edgecolor"]: "edge", style.DISTURBANCE: "soft", style.BAND: "rule", "#000000": "ink"}
-
-
-def picture(draw: Callable[[Path], object]) -> bytes:
-    """Return the SVG file that a function draws."""
-    with scratch() as folder:
-        draw(folder / "picture.svg")
-        return (folder / "picture.svg").read_bytes()
 
 
 def embedded(svg: bytes, name: str, maps: bool = False) -> str:
@@ -72,14 +62,6 @@ def _plants(plants: Sequence[str]) -> list[str]:
     """Return titles of panels, on two lines where there are several."""
     names = list(map(words.plant, plants))
     return [name.replace(" network", "\nnetwork") for name in names] if len(names) > 2 else names
-
-
-def medians(table: "Table", condition: str) -> bytes:
-    """Draw each law's median in one condition, with its interval: a row of panels per plant, a column per metric."""
-    title, some = f"Medians, {words.condition(condition)}", table.select(condition=condition)
-    plants, laws = (len(set(some.column(name).tolist())) for name in ("plant", "law"))
-    size = WIDTH, 1.1 + plants * (0.7 + dot_plot.LINE_HEIGHT * (laws + 1))
-    return picture(lambda path: dot_plot.plot(some, path, words.MAIN_METRICS, title, size, format="svg"))
 
 
 def fronts(drawn: "Sequence[Front]") -> bytes:

@@ -30,7 +30,7 @@ from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, charts, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -135,7 +135,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     with bars.stage("statistics"):
         boards = leaderboard(table, (SETTLES, *words.TABLE_METRICS), by=("plant",), relevant=plan.relevant)
         return Findings(
-            medians=charts.medians(table, plan.conditions[0]),
+            medians=films.medians(table, plan.conditions[0]),
             scores=scores.scores(table, boards),
             boards=boards,
             claims=claims,

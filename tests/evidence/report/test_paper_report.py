@@ -14,7 +14,7 @@ from smc_mujoco.evidence.audit import evidence
 from smc_mujoco.evidence.audit.figure import MAX_DECADES, figure, place
 from smc_mujoco.evidence.audit.verdict import check
 from smc_mujoco.evidence.report.paper import report
-from tests.evidence.report.test_page import said
+from tests.evidence.report.test_report_page import said
 
 DATA = """
 title = "A <small> paper"

@@ -30,7 +30,7 @@ from smc_mujoco.evidence.report import scores as scores_of
 from smc_mujoco.evidence.report.plan import QUICK, Bars, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.studies.leaderboard import leaderboard
-from tests.evidence.report.test_page import Place, boards_of
+from tests.evidence.report.test_report_page import Place, boards_of
 
 TINY = dataclasses.replace(
     QUICK,

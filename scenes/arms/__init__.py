@@ -1,14 +1,13 @@
-"""Tasks of a seven-joint arm, and laws of many joints with gains for them: what the scenes and the study of arms share.
+"""Tasks of a seven-joint arm, and laws of many joints with gains for them, which the scenes of arms share.
 
 The arm is `panda` with the friction that was identified on a real one. The laws know neither that friction nor the
-payload. Gains come from `search`: the same number of random draws for each law, on the task "sway" with 1 kg of payload
-and a seed that no figure uses. GAINS has the best draws.
+payload. Gains come from the search of benchmarks/arm_study.py: for each law the same number of random draws, on the
+task "sway" with 1 kg of payload and a seed that no figure uses. GAINS has the best draws.
 """
 
-import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,8 @@ from smc_mujoco.common.errors import find
 from smc_mujoco.control.law import Law, law
 from smc_mujoco.control.source import SHIPPED, Search
 from smc_mujoco.mechanisms.plant import Plant, Values, plant
-from smc_mujoco.metrics.catalogue import tv_rate
 from smc_mujoco.metrics.conventions import last_exit
-from smc_mujoco.metrics.tip import tip_error, tip_scores
-from smc_mujoco.simulation.run import run
+from smc_mujoco.metrics.tip import tip_error
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Jump, Noise, Push
 from smc_mujoco.simulation.time_series import Waypoints, cartesian_path
@@ -29,29 +26,17 @@ from smc_mujoco.simulation.trace import Trace
 NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, as of an encoder and a filtered difference
 SWAY = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5)  # rad: amplitude of each joint's sway, chosen for speeds up to 1 rad/s
 BEAT = 0.6  # s: time from one end of a sway to the other, chosen
-DRAWS, SEARCH_SEED = 32, 1000
-SEARCH_PAYLOAD = 1.0  # kg
-ROUGH_TV_RATE = 1000.0  # N m/s: TV rate of u that doubles the cost of a draw; chosen before any search
+DRAWS = 32  # of gains for each law, in the search of benchmarks/arm_study.py
 PATH_BEFORE, PATH_BEHIND = 0.0005, 0.004  # m: distances of paths from the wall's face; chosen
 PROBE = 0.012  # m: radius of the probe
 SPREAD = 0.05  # rad: largest distance of each joint's start from the task's own start; chosen
 BLOW = 1.0  # s: time of the blow in its task
-MAX_STEP_CHANGE = 0.1  # relative change of an error with half the physics step; more means unstable; chosen
 PRESS = 20.0  # N: wanted force of the tip on the wall; chosen
 WALL_POSE = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved
 
-# Law -> gain -> range of the search. For a gain in BY_LIMIT or BY_INERTIA, the range is that of its factor.
-RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "computed_torque_sliding": {"c": (3.0, 40.0), "k": (3.0, 300.0), "width": (0.03, 1.0)},
-    "super_twisting_computed_torque": {"c": (3.0, 40.0), "k1": (1.0, 40.0), "k2": (1.0, 400.0)},
-    "unit_vector": {"c": (3.0, 40.0), "rho": (3.0, 300.0), "eps": (0.03, 3.0)},
-    "passivity_based": {"c": (3.0, 40.0), "K": (0.01, 1.0), "k": (0.003, 0.3), "width": (0.03, 1.0)},
-    "time_delay_sliding": {"c": (3.0, 40.0), "k": (3.0, 300.0), "width": (0.03, 1.0), "m": (0.03, 1.0)},
-    "observer_free_joint": {"k1": (3.0, 40.0), "lam": (0.1, 1.0)},
-}
 BY_LIMIT = {"passivity_based": ("K", "k"), "observer_free_joint": ("lam",)}  # gains: factor times a motor's limit
 BY_INERTIA = {"time_delay_sliding": ("m",)}  # gains: factor times a joint's inertia in the ready pose
-GAINS: Mapping[str, Mapping[str, float]] = {  # law -> gain, or its factor, as `search` found them
+GAINS: Mapping[str, Mapping[str, float]] = {  # law -> gain, or its factor, as the search found them
     "computed_torque_sliding": {"c": 36.0, "k": 67.0, "width": 0.4},
     "super_twisting_computed_torque": {"c": 16.0, "k1": 28.0, "k2": 340.0},
     "unit_vector": {"c": 20.0, "rho": 280.0, "eps": 1.8},
@@ -171,34 +156,3 @@ def back_within(trace: Trace, distance: float, after: float) -> float:
     """Return how long after `after`, s, the tip stays within `distance`, m, of its path; inf if never or failed."""
     distances = np.nan_to_num(off_path(trace, after), nan=math.inf)  # NaN after a failure
     return last_exit(trace.t[trace.t >= after], distances, distance)
-
-
-def unstable(scenarios: Sequence[Scenario], traces: Sequence[Trace]) -> bool:
-    """Return whether half the physics step changes the tip's rms error by over MAX_STEP_CHANGE, in the median run."""
-    halves = [dataclasses.replace(s, physics_step=s.resolved.physics_step / 2.0) for s in scenarios]
-    errors, finer = (
-        np.array([tip_scores(trace)["rms_error"] if trace.failure is None else math.inf for trace in runs])
-        for runs in (traces, run(halves))
-    )
-    change = np.abs(finer / errors - 1.0)  # NaN where both fail, which counts as a change
-    return not np.median(change) <= MAX_STEP_CHANGE
-
-
-def cost(trace: Trace) -> float:
-    """Return the cost of the search: the tip's rms error, mm, times 1 + variation of u / ROUGH_TV_RATE."""
-    if trace.failure is not None:
-        return math.inf
-    return 1e3 * tip_scores(trace)["rms_error"] * (1.0 + tv_rate(trace) / ROUGH_TV_RATE)
-
-
-def search(name: str, draws: int = DRAWS) -> tuple[dict[str, float], float]:
-    """Return the best of random gains of a law, uniform in their logarithms, of two digits, and their cost."""
-    rng, ranges = np.random.default_rng(SEARCH_SEED), RANGES[name]
-    tried = [
-        {gain: float(f"{math.exp(rng.uniform(*np.log(bounds))):.2g}") for gain, bounds in ranges.items()}
-        for _ in range(draws)
-    ]
-    scenarios = [scenario("sway", gained(name, gains), SEARCH_SEED, SEARCH_PAYLOAD) for gains in tried]
-    costs = [cost(trace) for trace in run(scenarios)]
-    best = int(np.argmin(costs))
-    return tried[best], costs[best]
