@@ -20,7 +20,7 @@ from smc_mujoco.evidence.audit.runs import Runs
 from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import PARTLY, REFUTED, SUPPORTED, Beside, Check, verdict
 from smc_mujoco.evidence.papers.gaber import claims as measured
-from smc_mujoco.evidence.papers.gaber import lyapunov, timing
+from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import LAWS
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.scenario import Scenario
@@ -620,26 +620,26 @@ def test_a_broken_law_loses_its_claims():
 
 def test_the_timed_loop_calls_a_law_with_each_state_and_its_four_arrays(monkeypatch):
     monkeypatch.setattr("numba.njit", lambda loop: loop)
-    seen, calls = np.zeros(len(timing.FIELD_INDEX)), []
-    monkeypatch.setattr(timing, "call", lambda *given: calls.append([*given, *seen[[e, de]]]))
-    e, de = (timing.FIELD_INDEX[name] for name in ("e", "de"))
-    timing._loop.__wrapped__()(5, seen, np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([6, 7, 8, 9]))
+    seen, calls = np.zeros(len(measured.FIELD_INDEX)), []
+    monkeypatch.setattr(measured, "call", lambda *given: calls.append([*given, *seen[[e, de]]]))
+    e, de = (measured.FIELD_INDEX[name] for name in ("e", "de"))
+    measured._loop.__wrapped__()(5, seen, np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([6, 7, 8, 9]))
     assert calls == [[5, 6, 7, 8, 9, 0.1, 0.2], [5, 6, 7, 8, 9, 0.3, 0.4]]
 
 
 def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkeypatch):
     """A clock that ticks 3 s in the first round and 1 s from then on, and a law that is not called."""
     ticks, seen = itertools.accumulate([0.0, *[3.0] * 3, *[1.0] * 999]), []
-    monkeypatch.setattr(timing.time, "perf_counter", lambda: next(ticks))
-    monkeypatch.setattr(timing, "_loop", lambda: lambda *given: seen.append([np.copy(one) for one in given[1:3]]))
+    monkeypatch.setattr(measured, "perf_counter", lambda: next(ticks))
+    monkeypatch.setattr(measured, "_loop", lambda: lambda *given: seen.append([np.copy(one) for one in given[1:3]]))
     laws = {name: smc.law(name) for name in (OURS, CLASSICAL)}
     for quick, rounds in ((False, 60), (True, 20)):
-        assert timing.nanoseconds(laws, quick=quick) == {OURS: 5e4, CLASSICAL: 5e4}  # 1 s of 20,000 calls
+        assert measured.nanoseconds(laws, quick=quick) == {OURS: 5e4, CLASSICAL: 5e4}  # 1 s of 20,000 calls
         assert len(seen) == 2 * rounds
         seen.clear()
-    timing.nanoseconds(laws, quick=True)
+    measured.nanoseconds(laws, quick=True)
     sample, states = seen[0]
-    assert {name: sample[timing.FIELD_INDEX[name]] for name in ("dt", "g", "limit", "model")} == {
+    assert {name: sample[measured.FIELD_INDEX[name]] for name in ("dt", "g", "limit", "model")} == {
         "dt": 1e-3,
         "g": 8.0,
         "limit": 6.0,

@@ -6,8 +6,11 @@ Settling time, overshoot and ripple are those of `metrics`. Overshoot is what go
 pendulums are nor how strongly they are coupled: a claim on it is supported if it holds on both networks of the study.
 """
 
+import functools
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from time import perf_counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +18,9 @@ import numpy as np
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.margins import DELAYS, TOLERATED_ERROR, Search, find_boundaries
 from smc_mujoco.analysis.ranking import RELEVANT
+from smc_mujoco.common.jit import call
 from smc_mujoco.common.rebuild import rebuild
+from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import estimator
 from smc_mujoco.control.law import Measurement, catalogue, command, law_function, sliding
 from smc_mujoco.control.law import law as find_law
@@ -23,11 +28,11 @@ from smc_mujoco.evidence.audit.variants import variant, with_gains
 from smc_mujoco.evidence.audit.verdict import Beside, check, ratio
 from smc_mujoco.evidence.papers.gaber import lyapunov
 from smc_mujoco.evidence.papers.gaber.scenarios import CONTROL_PERIOD, LAWS, U_MAX
-from smc_mujoco.evidence.papers.gaber.timing import nanoseconds
 from smc_mujoco.mechanisms.hardware.drives import Lag
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import HIGH_FREQUENCY, settling_time
+from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.signals import Noise
 
 OURS, CLASSICAL, ADAPTIVE, HOSMC = LAWS  # the paper's law, and those that it compares
@@ -236,6 +241,9 @@ MEASURES = (  # sentence, name, metric, condition
     ("smoothness", "TV rate", "tv_rate", "nominal"),
     ("robustness", "steady error under d", "steady_error", "constant"),
 )
+CALLS, TIMED_ROUNDS, QUICK_TIMED_ROUNDS = 20_000, 60, 20  # of the law's C function alone
+FIELD_INDEX = {name: i for i, name in enumerate(Measurement._fields)}
+FIXED_FIELDS = {"dt": 1e-3, "g": 8.0, "limit": 6.0}  # what a pendulum's sample holds besides the state; no model
 GENERAL_LAWS = (CLASSICAL, ADAPTIVE, HOSMC, CONDITIONED, "boundary_layer")
 
 
@@ -298,6 +306,47 @@ def synchronises(runs):
         what = f"{plant}: the same without coupling, s, against that with it"
         checks.append(runs.check("without coupling", what, alone, joined))
     return checks
+
+
+def nanoseconds(laws: Mapping[str, Component], quick: bool = False) -> dict[str, float]:
+    """Return the least time per call of each law's C function, ns, on states that vary from call to call.
+
+    Rounds of the laws are interleaved, and the least time counts, since other processes can only add to it. Only ratios
+    within one call mean anything. benchmarks/laws.py measures the whole sample, with reading and logging.
+    """
+    t = np.arange(CALLS) * 1e-3
+    states = np.column_stack([0.3 * np.sin(7 * t), 2.1 * np.cos(7 * t)])
+    # kept alive while their addresses are used
+    functions = {name: cfunctions.compile_component(law) for name, law in laws.items()}
+    shortest, loop = dict.fromkeys(laws, np.inf), _loop()
+    for _ in range(QUICK_TIMED_ROUNDS if quick else TIMED_ROUNDS):
+        for name, law in laws.items():
+            seen, gains = np.zeros(len(FIELD_INDEX)), np.array([*law.gains.values(), 0.0])
+            for field, value in FIXED_FIELDS.items():
+                seen[FIELD_INDEX[field]] = value
+            arrays = seen, gains, np.zeros(law.memory), np.zeros(2)
+            addresses = np.array([a.ctypes.data for a in arrays])
+            start = perf_counter()
+            loop(functions[name].address, seen, states, addresses)
+            shortest[name] = min(shortest[name], perf_counter() - start)
+    return {name: 1e9 * seconds / CALLS for name, seconds in shortest.items()}
+
+
+@functools.cache
+def _loop() -> Callable:
+    """Return a compiled loop that calls a law once per state."""
+    from numba import njit
+
+    e, de = FIELD_INDEX["e"], FIELD_INDEX["de"]
+
+    @njit
+    def loop(function, seen, states, addresses):
+        for k in range(len(states)):
+            seen[e], seen[de] = states[k, 0], states[k, 1]
+            call(function, addresses[0], addresses[1], addresses[2], addresses[3])  # pyright: ignore[reportCallIssue] an intrinsic
+
+    loop(0, np.zeros(len(FIELD_INDEX)), np.zeros((0, 2)), np.zeros(4, np.int64))  # compiles, and calls nothing
+    return loop
 
 
 def simple(runs):
