@@ -287,6 +287,8 @@ def test_joints_of_an_arm_have_panels_in_their_own_units_that_hold_the_run_that_
 def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_runs_are_hollow():
     (ax,) = lags().axes
     assert [text.get_text() for text in ax.texts] == ["equal at 50 ms"]
+    (mark,) = [x for line in ax.lines for x in [places(line)[:, 0]] if len(x) == 2 and x[0] == x[1]]
+    assert mark[0] == pytest.approx(50.0)
     lines = [line for line in ax.lines if len(places(line)) == 3]
     expected = [(3.0 * 1e-3, 1.0), (60.0 * 1e-6, 2.0)]
     for line, (factor, power) in zip(lines, expected, strict=True):
