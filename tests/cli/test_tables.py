@@ -6,6 +6,7 @@ import re
 from types import SimpleNamespace
 from typing import Any
 
+import arms
 import pytest
 from rich.console import Console
 from rich.table import Column
@@ -53,7 +54,7 @@ def test_a_film_tells_the_arrow_of_the_control_in_volts():
 
 
 def test_a_table_of_tips_has_the_scores_in_its_units():
-    law, start = smc.arms.hybrid(), smc.arms.scenario("wall", smc.arms.hybrid()).x0
+    law, start = arms.hybrid(), arms.scenario("wall", arms.hybrid()).x0
     free, pressing = smc.run(
         [smc.Scenario(plant="panda", law=law, x0=start, duration=0.005, contact=one) for one in ("none", "wall")]
     )

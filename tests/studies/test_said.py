@@ -7,6 +7,7 @@ import sys
 import threading
 from pathlib import Path
 
+import arms
 import numpy as np
 import pytest
 from helpers.sketch import made
@@ -21,7 +22,6 @@ from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, Run, Setup
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import (
-    arms,
     executors,
     pickling,
     run_key,
