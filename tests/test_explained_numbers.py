@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import gains_for, ranking, step_halving
+from smc_mujoco.analysis import apart, gains_for, ranking
 from smc_mujoco.analysis import region_of_attraction as region
 from smc_mujoco.analysis.tuning import objective, search, search_space, stages
 from smc_mujoco.analysis.worst_case import search as attack
@@ -85,7 +85,7 @@ SAID = {
         f"costs {objective.Objective().weight * 2.0 / conditions.CONTROL_PERIOD:g} s^2",
     ],
     gains_for.gains_for: [f"of {len(gains_for.SPEEDS)} from a {part(gains_for.SPEEDS[0])} to ten times"],
-    step_halving: [f"by more than {percent(step_halving.TOLERANCE)}"],
+    apart: [f"are more than {percent(apart.MAX_CHANGE)} apart"],
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
     scaling.Scaling.as_promised: [f"within {scaling.ORDER_BAND:g} of theory's"],

@@ -54,6 +54,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smc_mujoco.analysis.apart import apart
 from smc_mujoco.analysis.bootstrap import LEVEL, middle
 from smc_mujoco.common.constraints import Number, constrained
 
@@ -63,7 +64,6 @@ Relevant = Annotated[float, Number(low=0.0, high=0.5)]
 TREND_POWER = 5  # the last part is a fifth of a run: a trend that lasts as long again goes on for 5 of them
 LEVEL_SHARE = 0.1  # laws are level if the interval of their ratio lies within this share; chosen
 MIN_LEVEL_UNITS = 12  # with fewer units no laws are called level; chosen
-MAX_STEP_CHANGE = 0.25  # a median that half the physics step moves by more is marked; chosen
 MAX_WIDENING = 1e3  # of a logarithm: more than the range of floating-point numbers, but finite
 MAX_RISE = 60.0  # of log rho: a value that has vanished within the last fifth of a run has fallen enough
 POWER = 0.8  # with which the least visible lead is seen
@@ -273,16 +273,14 @@ class Comparison:
     def step_change(self, block: int, law: str) -> tuple[float, float] | None:
         """Return the medians of a law's runs that were repeated at half the physics step, before and after; else None.
 
-        They are returned where half the step moves the median by more than a quarter, see MAX_STEP_CHANGE.
+        They are returned where they are `apart`, as for any other number.
         """
         a = self.laws.index(law)
         whole, half = self.cells[a, block], self.halves[a, block]
         if self.shares or not (again := ~np.isnan(half)).any():
             return None
         before, after = (float(middle(values[again][None, None])[0, 0]) for values in (whole, half))
-        q = float(self.floors[block])
-        moved = exceeds(max(before, after), min(before, after), q, MAX_STEP_CHANGE / (1.0 + MAX_STEP_CHANGE))
-        return (before, after) if moved else None
+        return (before, after) if apart((before, after), float(self.floors[block])) else None
 
     def _by_unit(self, by_run: np.ndarray, block: int, a: int, b: int) -> np.ndarray:
         """Return values by run, (seeds,), as values by unit of two laws."""

@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from smc_mujoco.analysis.step_halving import NUDGE, apart, halved, nudged
+from smc_mujoco.analysis.apart import apart
+from smc_mujoco.analysis.step_halving import NUDGE, halved, nudged
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
@@ -47,8 +48,8 @@ def perform(
     with clock("repeating"):
         again = repeat(scene, threads) if repeated else {}
     for condition, runs in traces.items():
-        title = _title(scene, condition)
-        for table in [*tables.scores(title, runs, again.get(condition)), *tables.tips(title, runs)]:
+        title, others = _title(scene, condition), again.get(condition)
+        for table in [*tables.scores(title, runs, others), *tables.tips(title, runs, others)]:
             terminal.print(table)
         for label, trace in runs.items():
             if trace.failure:

@@ -10,8 +10,9 @@ from rich import box
 from rich.table import Column, Table
 from rich.text import Text
 
+from smc_mujoco.analysis.apart import apart
 from smc_mujoco.analysis.paired_runs import floor
-from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, apart
+from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
@@ -77,54 +78,82 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     """
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
-    values = {label: _several(trace, again, label) for label, trace in traces.items() if trace.diverged_at is None}
-    tables, marked = [], False
+    values, tables = _several(metric_scores, traces, again), []
     for group, heading in headings(scenario).items():
         units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
         shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
         rows = {
             label: [
-                _marked(name, [one[group.name][name] for one in its], traces[label].scenario) for name in shown.values()
+                _score([None if one is None else one[group.name][name] for one in its], name, traces[label].scenario)
+                for name in shown.values()
             ]
             for label, its in values.items()
         }
-        marked |= any(MARK in text.plain for row in rows.values() for text in row)
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
-    caption = "; ".join(filter(None, (in_words(gains), SCORE_NOTE * marked)))
-    tables[-1].caption, tables[-1].caption_justify = caption or None, "left"
+    return _noted(tables, in_words(gains))
+
+
+def _noted(tables: list[Table], *words: str) -> list[Table]:
+    """Return tables with words below the last one, and with what a mark means, if a cell has one."""
+    cells = (cell for table in tables for column in table.columns for cell in column.cells)
+    marked = any(MARK in cell.plain for cell in cells if isinstance(cell, Text))
+    for table in tables[-1:]:
+        table.caption, table.caption_justify = "; ".join(filter(None, (*words, SCORE_NOTE * marked))) or None, "left"
     return tables
 
 
-def _several(trace: Trace, again: Again | None, label: str) -> list[dict[str, dict[str, float]]]:
-    """Return the scores of a run, then those of the same runs again that did not fail."""
-    others = [other for other in (again or {}).get(label, ()) if other.diverged_at is None]
-    return [metric_scores(one) for one in (trace, *others)]
+def _several(
+    scored: Callable[[Trace], T], traces: Mapping[str, Trace], again: Again | None
+) -> dict[str, list[T | None]]:
+    """Return label -> scores of a run, then of the same run again; None for one that failed. Not if all failed."""
+    runs = {label: (trace, *(again or {}).get(label, ())) for label, trace in traces.items()}
+    values = {label: [None if _failed(one) else scored(one) for one in its] for label, its in runs.items()}
+    return {label: its for label, its in values.items() if its != [None] * len(its)}
 
 
-def _marked(metric: str, values: Sequence[float], scenario: Scenario) -> Text:
-    """Return a score as text; with its range, marked, if the values of the same run are apart."""
-    if not apart(values, floor(scenario, metric)):
-        return Text(_score_text(metric, values[0]))
-    known = [value for value in values if not math.isnan(value)]
-    low, high = (_score_text(metric, end(known)) for end in (min, max))
+def _failed(trace: Trace) -> bool:
+    return trace.diverged_at is not None
+
+
+def _score(values: Sequence[float | None], metric: str, scenario: Scenario) -> Text:
+    """Return a metric of the same run several times as text, see `_marked`."""
+    return _marked(values, lambda value: _score_text(metric, value), floor(scenario, metric))
+
+
+def _marked(values: Sequence[float | None], text: Callable[[float], str], least: float = 0.0) -> Text:
+    """Return a number as text; with its range, marked, if its values in the same run again are apart.
+
+    None is a run that failed, which counts as the largest value.
+    """
+
+    def size(value: float | None) -> float:
+        return math.inf if value is None else -math.inf if math.isnan(value) else value
+
+    texts = {value: FAILED.plain if value is None else text(value) for value in values}
+    low, high = (texts[end(values, key=size)] for end in (min, max))
+    if low == high or not apart([math.inf if value is None else value for value in values], least):
+        return FAILED if values[0] is None else Text(texts[values[0]])
     return Text(f"{low}{MARK}").append(f"\nto {high}", "dim")
 
 
-def tips(title: str, traces: Mapping[str, Trace]) -> list[Table]:
-    """Return a table of the tips of arms; [] for other plants."""
+def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
+    """Return a table of the tips of arms, with scores marked as in `scores`; [] for other plants."""
     if not next(iter(traces.values())).scenario.plant.tip:
         return []
-    values = {label: tip_scores(trace) for label, trace in traces.items() if trace.diverged_at is None}
-    known = {name for its in values.values() for name in its}
+    values = _several(tip_scores, traces, again)
+    known = {name for its in values.values() for one in its if one for name in one}
     shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
     rows = {
-        label: [number(factor * its.get(name, math.nan)) for name, _, factor in shown.values()]
+        label: [
+            _marked([None if one is None else factor * one.get(name, math.nan) for one in its], number)
+            for name, _, factor in shown.values()
+        ]
         for label, its in values.items()
     }
-    return [_by_label(f"{title}, tip", heads, traces, rows)]
+    return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
 
 
 def headings(scenario: Scenario) -> dict[Group, str]:
@@ -157,11 +186,10 @@ def answers(
     if len(traces) == 1:
         ((condition, runs),) = traces.items()
         others = (again or {}).get(condition, {})
-        return [_answer("", [(head, metric, runs, others) for head, metric in shown.items()])]
+        return _noted([_answer("", [(head, metric, runs, others) for head, metric in shown.items()])])
     every = [(name, runs, (again or {}).get(name, {})) for name, runs in traces.items()]
-    return [
-        _answer(head, [(name, metric, runs, others) for name, runs, others in every]) for head, metric in shown.items()
-    ]
+    columns = {head: [(name, metric, runs, others) for name, runs, others in every] for head, metric in shown.items()}
+    return _noted([_answer(head, of_metric) for head, of_metric in columns.items()])
 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]) -> Table:
@@ -180,10 +208,8 @@ def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> T
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    if trace.diverged_at is not None:
-        return FAILED
-    others = [metric.of(other) for other in again if other.diverged_at is None]
-    return _marked(metric.name, [metric.of(trace), *others], trace.scenario)
+    values = [None if _failed(one) else metric.of(one) for one in (trace, *again)]
+    return _score(values, metric.name, trace.scenario)
 
 
 def _score_text(metric: str, value: float) -> str:

@@ -2,7 +2,8 @@
 
     amplitudes({"lag 1 ms": {"relay": trace, "super-twisting": other}, "lag 10 ms": {...}}, "chattering.svg")
 
-Each run is repeated with half its physics step. Where that changes its cycle by more than 10 %, the dot is hollow.
+Each run is repeated at half its physics step, and from a nudged start. Where that changes its cycle by more than 5 %,
+the dot is hollow.
 """
 
 import itertools
@@ -14,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
+from smc_mujoco.analysis.apart import MAX_CHANGE
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.draw import page as pages
@@ -73,7 +75,7 @@ def amplitudes(
         handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
         if hollow:
-            label = "run that half the step changes by > 10 %"
+            label = f"run that half the step changes by > {100 * MAX_CHANGE:g} %"
             handles.append(Line2D([], [], color=style.PAPER, mec=style.MUTED, marker="o", lw=0, label=label))
         unit = next(iter(runs.values()))[0].scenario.plant.unit
         ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")

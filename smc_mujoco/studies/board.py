@@ -5,9 +5,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from smc_mujoco.analysis.apart import MAX_CHANGE
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES, UNITS
-from smc_mujoco.analysis.ranking import LEVEL_SHARE, MAX_STEP_CHANGE, POWER, Effect, Rank, min_p
+from smc_mujoco.analysis.ranking import LEVEL_SHARE, POWER, Effect, Rank, min_p
 from smc_mujoco.analysis.step_halving import UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -112,7 +113,7 @@ class Board(Tables):
     family: int  # number of blocks of the table for which winners are corrected
     relevant: float  # share of a value that is relevant
     resolution: float  # the largest lower bound on the least relevant difference, in the unit of the board
-    by_step: bool  # whether halving the physics step may change the metric: chattering without RK4
+    by_step: bool  # whether halving the physics step may change its numbers, and no run was repeated with it
 
     @property
     def best(self) -> tuple[str, ...]:
@@ -416,7 +417,7 @@ def key(boards: Sequence[Board]) -> str:
     if any(block.by_step for board in boards for block in board.blocks):
         words += (
             " 'by the step': the medians at the physics step and at half of it, which differ by more than "
-            f"{100 * MAX_STEP_CHANGE:g} %."
+            f"{100 * MAX_CHANGE:g} %."
         )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     if any(not entry.checked for board in boards for entry in board.entries):

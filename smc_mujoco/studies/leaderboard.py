@@ -15,7 +15,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of, share_interval
 from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, ByRow, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
-from smc_mujoco.analysis.step_halving import depends_on_step
+from smc_mujoco.analysis.step_halving import repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, Source
@@ -176,9 +176,7 @@ def _board(
         family=family,
         relevant=comparison.relevant,
         resolution=float(comparison.floors.max()),
-        by_step=metric.startswith("chattering")
-        and bool(np.isnan(comparison.halves).all())
-        and any(map(depends_on_step, filter(None, ran))),
+        by_step=bool(np.isnan(comparison.halves).all()) and any(map(repeats_all, filter(None, ran))),
     )
 
 

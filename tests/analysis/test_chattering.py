@@ -1,7 +1,6 @@
 """Predicted chattering: describing functions against closed forms, limit cycles against formulas and against runs."""
 
 import dataclasses
-import importlib
 import itertools
 import json
 import math
@@ -12,6 +11,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco import chattering
+from smc_mujoco.analysis.apart import relative_range
 from smc_mujoco.analysis.chattering import Chattering, _assumptions, _other_cycles, cycles, save, switches
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
@@ -427,9 +427,9 @@ def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_res
 
 
 def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lost():
-    change = importlib.import_module("smc_mujoco.analysis.step_halving")._change
-    pairs = (0.2, 0.25), (0.2, 0.15), (math.nan, math.nan), (math.nan, 0.2), (0.2, math.nan)
-    assert [change(*pair) for pair in pairs] == pytest.approx([0.25, 0.25, 0.0, math.inf, math.inf])
+    runs = (0.2, 0.25, 0.2), (0.2, 0.2, 0.16), (math.nan,) * 3, (math.nan, 0.2), (0.2, math.nan), (-0.2, 0.2)
+    assert [relative_range(values) for values in runs] == pytest.approx([0.25, 0.25, 0.0, math.inf, math.inf, 2.0])
+    assert [relative_range(values, 0.2) for values in ((0.0, 0.25), (0.1, -0.2))] == pytest.approx([0.25, 0.0])
 
 
 @pytest.mark.slow

@@ -1,14 +1,21 @@
 """What a scene prints is the same at half the physics step and from a nudged start, or it is marked."""
 
+import contextlib
 import dataclasses
 import math
 
+import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.step_halving import MARK, apart, halved, nudged
+from smc_mujoco.analysis.apart import apart
+from smc_mujoco.analysis.step_halving import MARK, SCORE_NOTE, halved, nudged
 from smc_mujoco.cli import scene as show
 from smc_mujoco.cli import tables
+from smc_mujoco.cli.terminal import Terminal
+from smc_mujoco.metrics.limit_cycle import channel_cycle
+from smc_mujoco.metrics.tip import tip_scores
+from smc_mujoco.studies import arms
 
 pytestmark = pytest.mark.quick
 
@@ -22,7 +29,11 @@ pytestmark = pytest.mark.quick
         ([1e-9, 1e-7], 1e-6, False),  # below what the problem can show
         ([1.0, math.inf], 0.0, True),
         ([math.inf, math.inf], 0.0, False),
-        ([math.nan, 1.0], 0.0, False),
+        ([math.nan, 1.0], 0.0, True),  # a limit cycle that only one of the runs has
+        ([math.nan, math.nan], 0.0, False),
+        ([1.0, -1.0, 1.0], 0.0, True),
+        ([-1.0, -1.04], 0.0, False),
+        ([-0.5, 0.5], 1.0, False),
         ([0.0, 0.0], 0.0, False),
     ],
 )
@@ -62,6 +73,61 @@ def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
     bound = smc.score(trace)["ultimate_bound"]
     assert f"to {tables.number(1.5 * bound)}" in lines[0]
     assert "half the physics step" in str(table.caption)
+
+
+def cells(table) -> list[str]:
+    """The rows of a table as text."""
+    return [" ".join(map(str, row)) for row in zip(*(column.cells for column in table.columns), strict=True)]
+
+
+def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
+    fine = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.1))
+    lost = dataclasses.replace(fine, diverged_at=0.05)
+    runs, again = {"a": fine, "b": lost, "c": lost}, {"a": [fine, lost], "b": [fine, fine], "c": [lost, lost]}
+    (table,) = tables.scores("t", runs, again)
+    shown = tables.number(smc.score(fine)["tv_rate"])
+    for said in (cells(table), cells(*tables.answers(["tv_rate"], {"nominal": runs}, {"nominal": again}))):
+        assert [f"{shown}{MARK}\nto failed" in row for row in said] == [True, True, False]
+        assert "failed" in said[2]
+
+
+def test_a_limit_cycle_that_half_the_step_loses_is_marked_and_the_mark_explained():
+    swing = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0))
+    swing = dataclasses.replace(swing, s=np.sin(400.0 * swing.t)[:, None])
+    runs, again = {"nominal": {"a": swing}}, {"nominal": {"a": [dataclasses.replace(swing, s=0.0 * swing.s), swing]}}
+    (table,) = tables.answers(["chattering_amplitude", "chattering_frequency"], runs, again)
+    amplitude, frequency = map(tables.number, channel_cycle(swing))
+    assert f"none{MARK}\nto {amplitude}" in cells(table)[0]
+    assert f"none{MARK}\nto {frequency}" in cells(table)[0]
+    assert table.caption == SCORE_NOTE
+
+
+def arm(duration: float) -> smc.Scenario:
+    return dataclasses.replace(arms.scenario("sway", arms.gained("passivity_based")), duration=duration)
+
+
+def test_scores_of_a_tip_are_marked_like_all_others():
+    swung = smc.run(arm(0.02))
+    off = dataclasses.replace(swung, x=swung.x + 0.01 * (swung.t > 0.015)[:, None])
+    (table,) = tables.tips("t", {"a": swung, "b": swung}, {"a": [swung, off], "b": [swung, swung]})
+    largest, other = (tables.number(1e3 * tip_scores(one)["max_error"]) for one in (swung, off))
+    assert [f"{largest}{MARK}\nto {other}" in row for row in cells(table)] == [True, False]
+    assert table.caption == SCORE_NOTE
+
+
+def test_every_number_of_a_scene_is_compared_with_its_runs_again(monkeypatch, tmp_path):
+    """Whatever tables print, a scene hands them the runs at half the step: scores, tips and answers."""
+    runs = {"wall": {"a": arm(0.01)}}
+    scene = smc.Scene(title="t", conditions=runs, answers=("tv_rate",), answer=lambda outcome: "said")
+    given = []
+    for name in ("scores", "tips"):
+        monkeypatch.setattr(tables, name, lambda title, runs, again: given.append(again) or [])
+    monkeypatch.setattr(tables, "answers", lambda names, runs, again: given.append(again["wall"]) or [])
+    monkeypatch.setattr(show, "figures", lambda *_: [])
+    show.perform(scene, tmp_path, False, 1, contextlib.nullcontext, Terminal(), (), "")
+    steps = [[trace.scenario.resolved.physics_step for trace in again["a"]] for again in given]
+    whole = runs["wall"]["a"].resolved.physics_step
+    assert steps == [[whole / 2, whole]] * 3
 
 
 def test_an_answer_that_half_the_step_changes_is_printed_too():

@@ -98,7 +98,7 @@ def balance():
     lag = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 1.2}
     scenarios = [smc.Scenario(law=law, **lag) for law in ("super_twisting", "observer_free")]
     cycle = Chattering(amplitude=0.2, amplitude_x=0.01, frequency=8.0, response=complex(-0.02, 0.003))
-    changes = [StepChange(0.11, 0.0), StepChange(0.09, 0.05)]
+    changes = [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
     return nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
 
 

@@ -14,7 +14,7 @@ def page():
     fields = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 2.0, "x0": 0.05}
     scenarios = [smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")]
     cycles = [predict(scenario, ranges=False) for scenario in scenarios]
-    return nyquist(scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.11, 0.0), StepChange(0.09, 0.05)])
+    return nyquist(scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.06, 0.0), StepChange(0.04, 0.05)])
 
 
 def test_both_curves_pass_minus_one_where_the_mark_is(page):
@@ -40,5 +40,5 @@ def test_a_calm_law_has_no_crossing_and_no_band(page):
 
 def test_a_run_that_half_the_step_changes_says_so(page):
     titles = [page.axes[i].get_title(loc="left") for i in (1, 3)]
-    assert "more than 10 %" in titles[0]
+    assert "more than 5 %" in titles[0]
     assert titles[1] == ""

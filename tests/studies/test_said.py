@@ -146,11 +146,11 @@ def test_bounds_that_are_reached_and_steps_that_matter_are_reasons_from_their_th
         for share in (0.0499, 0.05, 0.5)
     }
     assert told == {0.0499: [], 0.05: ["saturated"], 0.5: ["saturated"]}
-    changes = [(1.0, 1.25), (1.0, 1.26), (1.0, 0.74), (1e-9, 2e-9), (math.inf, 1.0), (1.0, math.inf)]
+    changes = [(1.0, 1.04), (1.0, 1.06), (1.0, 0.94), (1e-9, 2e-9), (math.inf, 1.0), (1.0, math.inf)]
     found = [accuracies._step_change(error, halved, 2e-9) for error, halved in changes]
     assert [bool(words) for words in found] == [False, True, True, False, False, False]
-    assert "+26 %" in found[1]
-    assert "-26 %" in found[2]
+    assert "+6 %" in found[1]
+    assert "-6 %" in found[2]
 
 
 def test_an_order_is_of_periods_at_which_no_run_failed_and_a_failure_is_its_reason():

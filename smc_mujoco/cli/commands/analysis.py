@@ -285,9 +285,9 @@ def chatter(
 
     If a law switches and the actuator lags, the loop oscillates without end, where the law's describing function N and
     the response L of the linearised mechanism have N L = 1. The column "±" is how far the prediction may be off. A star
-    marks a run that changes by more than 10 % with half the physics step. The column "third" is the third harmonic over
-    the first. With several driven channels, "coupling" is how far this channel's command moves another one, over how
-    far it moves this one: if that is not small, the prediction fails.
+    marks a run that changes by more than 5 % at half the physics step, or from a start moved by 1e-9 of itself. The
+    column "third" is the third harmonic over the first. With several driven channels, "coupling" is how far this
+    channel's command moves another one, over how far it moves this one: if that is not small, the prediction fails.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """

@@ -94,7 +94,7 @@ def show(
     Example: smc-mujoco show videos/duffing/nominal-classical.npz --figure classical
     """
     with delay_ctrl_c():
-        from smc_mujoco.analysis.step_halving import UNTRIED, depends_on_step
+        from smc_mujoco.analysis.step_halving import UNTRIED, repeats_all
         from smc_mujoco.cli import tables
         from smc_mujoco.common.text import capital
         from smc_mujoco.simulation.trace import formats, load
@@ -116,7 +116,7 @@ def show(
     else:
         for table in tables.trace_summary(loaded):
             terminal.print(table)
-        if depends_on_step(s):
+        if repeats_all(s):
             terminal.note(f"{capital(UNTRIED)}.", "dim", wrap=True)
     terminal.wrote(*written)
 

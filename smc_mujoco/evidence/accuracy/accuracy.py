@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.analysis.apart import apart
 from smc_mujoco.common.constraints import constrained
 from smc_mujoco.common.errors import ScenarioError, items_of, number, one_line, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
@@ -55,7 +56,6 @@ DEFAULT_CONDITION = "constant"  # chosen: a disturbance that every law can bear,
 DEFAULT_SEEDS = 3  # initial states of each law at each period; chosen
 MIN_STEPS = 16  # physics steps in a control period of a mechanism with friction, contacts or other parts
 RESOLUTION = 1e-11  # of the initial error; chosen, above rounding and the creep of stuck joints
-MAX_STEP_CHANGE = 0.25  # of an error with half the physics step; a larger one is remarked; chosen
 MIN_SATURATED = 0.05  # share of the last samples at the bound on u; it is remarked from there on; chosen
 PARTS = 3  # of a run, each as long as its last part, in which errors are compared
 MAX_SEEDS = 10_000
@@ -311,4 +311,4 @@ def _step_change(error: float, halved: float, floor: float) -> str:
     if not (math.isfinite(error) and math.isfinite(halved)) or max(error, halved) <= floor:
         return ""
     change = halved / max(error, floor) - 1.0
-    return f"with half the physics step it is {100 * change:+.0f} %" if abs(change) > MAX_STEP_CHANGE else ""
+    return f"with half the physics step it is {100 * change:+.0f} %" if apart((error, halved), floor) else ""

@@ -31,7 +31,7 @@ class Oscillation:
     measured_frequency: float
     third_harmonic: float  # like `uncertainty`, how good the prediction is; see `Chattering`
     uncertainty: float
-    marked: bool  # whether half the physics step changes the run's numbers by more than 10 %
+    marked: bool  # whether the run's numbers depend on the physics step, see `step_halving`
 
     @property
     def error(self) -> float:

@@ -33,6 +33,7 @@ class Score(NamedTuple):
     runs: int  # distinct ones
     sample: str  # its size in words
     floor: float  # see `paired_runs.floor`
+    by_step: tuple[float, float] | None = None  # medians at the physics step and at half of it, where they are apart
 
 
 def scores(table: "Table", boards: Sequence[Board]) -> tuple[Score, ...]:
@@ -69,6 +70,7 @@ def scores(table: "Table", boards: Sequence[Board]) -> tuple[Score, ...]:
                     runs=block.runs,
                     sample=block.sample,
                     floor=paired_runs.floor(ran, metric),
+                    by_step=block.by_step.get(law),
                 )
                 rows.append(score)
     return tuple(rows)

@@ -1,0 +1,66 @@
+"""Which parts of mechanisms have scores that are right at the default physics step, and which scores the marks find.
+
+    python benchmarks/steps.py [PART ...]
+
+Three plants x the four laws of the paper's study x five scores make 60 scores a part, of runs of 4 s. A score is off if
+it is apart from that at an eighth of the step, by the rule of `smc_mujoco/analysis/apart.py`; it is marked if it is
+apart from that at half the step or from a nudged start, as in scenes; it wanders if the nudge alone does that. The
+script prints the table of docs/design.md. It takes about two minutes of processor time.
+"""
+
+import dataclasses
+import sys
+
+from smc_mujoco.analysis.apart import apart, relative_range
+from smc_mujoco.analysis.paired_runs import floor
+from smc_mujoco.analysis.step_halving import halved, nudged
+from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.metrics.catalogue import score
+from smc_mujoco.simulation.grid import grid
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+
+PARTS = ("nominal", "lag_20ms", "dc_motor", "coulomb", "encoder", "friction", "contact", "lugre", "backlash")
+PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")
+SCORES = ("settling_time", "rms_error", "ultimate_bound", "steady_error", "tv_rate")
+DURATION = 4.0  # s
+
+
+def finest(scenario: Scenario) -> Scenario:
+    """Return the same scenario at an eighth of its physics step."""
+    return halved(halved(halved(scenario)))
+
+
+def row(part: str) -> str:
+    """Return the line of a part in the table."""
+    made = [dataclasses.replace(one, duration=DURATION) for one in grid(PLANTS, paper.LAWS, part, 1, gains="study")]
+    same, halves, moved, fine = (
+        [score(trace) for trace in run([change(one) for one in made])]
+        for change in (lambda one: one, halved, nudged, finest)
+    )
+    off, marked, wandering, found, errors, laws = 0, 0, 0, 0, [0.0], set()
+    for scenario, *its in zip(made, same, halves, moved, fine, strict=True):
+        for name in SCORES:
+            (value, half, nudge, truth), least = (one[name] for one in its), floor(scenario, name)
+            wrong, mark = apart((value, truth), least), apart((value, half, nudge), least)
+            off, marked, found = off + wrong, marked + mark, found + (wrong and mark)
+            wandering += apart((value, nudge), least)
+            errors.append(relative_range((value, truth), least))
+            laws |= {scenario.law.name} if wrong else set()
+    resolved, count = made[0].resolved, len(made) * len(SCORES)
+    step = f"{resolved.integrator}, {1e3 * resolved.physics_step:g} ms"
+    worst = f"{100 * max(errors):.2g} %" if max(errors) <= 10.0 else "> 1000 %"
+    counts = f"{off} of {count} | {found} | {marked} | {wandering}"
+    return f"| {part} | {step} | {counts} | {worst} | {', '.join(sorted(laws))} |"
+
+
+def main() -> None:
+    """Print the table."""
+    print("| part | step | off | of them marked | marked | wander | largest change | laws with scores that are off |")
+    print("|---|---|---|---|---|---|---|---|")
+    for part in sys.argv[1:] or PARTS:
+        print(row(part), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,28 @@
+"""When a number of a run and of the same run again count as different: the rule by which all numbers are marked.
+
+They do where they are more than 5 % apart, or where only some of the runs have the number, such as a limit cycle.
+Values below what matters in the problem count as equal.
+"""
+
+import math
+from collections.abc import Sequence
+
+MAX_CHANGE = 0.05  # relative change of a number above which it is marked: chosen
+
+
+def relative_range(values: Sequence[float], least: float = 0.0) -> float:
+    """Return the range of a number in several runs over its smallest magnitude; inf if only some of them have it.
+
+    What lies within `least` of 0 matters in no problem, see `paired_runs.floor`. NaN is a run without the number.
+    """
+    missing = [math.isnan(value) for value in values]
+    if any(missing):
+        return 0.0 if all(missing) else math.inf
+    beyond = [math.copysign(max(abs(value) - least, 0.0), value) for value in values]
+    smallest, width = max(min(map(abs, values)), least), max(beyond) - min(beyond)
+    return 0.0 if not width > 0.0 else width / smallest if smallest else math.inf  # inf - inf is no change
+
+
+def apart(values: Sequence[float], least: float = 0.0) -> bool:
+    """Return whether a number of a run and of the same run again are more than 5 % apart, see `relative_range`."""
+    return relative_range(values, least) > MAX_CHANGE
