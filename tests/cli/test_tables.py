@@ -95,7 +95,7 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
     assert cells[0][-4:-1] == ["duffing pid 0.500 0.0200 0.250 s", "lqr >= 1.00 any s", "furuta lqr 0 0.100 s"]
     assert "pid 0.100 0.125 5.00 4.50 100 % 4 %" in cells[1]
     assert "classical none none* none none* > 100 %" in cells[1]
-    assert ["physics_step" in text for text in tables_of] == [False, True, False]  # the cure, where one is marked
+    assert ["half the physics step" in text for text in tables_of] == [False, True, False]  # what a mark means
     assert "pid 0.100 0.125 5.00 4.50 100 % 25 %" in cells[2]
     assert ["s (m/s)" in tables_of[1], "s (rad/s)" in tables_of[2]] == [True, True]
 
