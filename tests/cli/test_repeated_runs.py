@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import math
 
+import arms
 import numpy as np
 import pytest
 
@@ -15,7 +16,6 @@ from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.metrics.tip import tip_scores
-from smc_mujoco.studies import arms
 
 pytestmark = pytest.mark.quick
 
