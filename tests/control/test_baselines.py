@@ -251,8 +251,3 @@ def test_the_catch_holds_all_that_its_torque_can_hold_and_nothing_more(side):
         law = smc.law("swing_up", part=0.99)
         trace = smc.run(smc.Scenario(plant="inverted_pendulum", law=law, x0=0.0, v0=v0, u_max=0.3, duration=3.0))
         assert (np.abs(trace.x).max() < 1.0) == holds
-
-
-def test_swing_up_warns_of_a_catch_that_gravity_outweighs():
-    with pytest.warns(GainWarning, match="q > J w"):
-        smc.law("swing_up", q=0.5)

@@ -119,3 +119,23 @@ def test_a_condition_holds_exactly_where_its_words_say():
                 assert said == [holds(SimpleNamespace(**gains)) for gains in every], (template.name, words)
                 both += {False, True} == set(said)
     assert both >= 30
+
+
+@pytest.mark.parametrize("template", TEMPLATES, ids=lambda one: f"{one.kind} {one.name}")
+def test_a_component_names_its_equation_and_source_and_refuses_gains_that_are_no_numbers(template):
+    assert template.doc[0].isupper()
+    assert template.name == "measured" or re.search(r":\s", template.doc)
+    assert template.name == "measured" or "=" in template.doc
+    assert template.name in ("none", "filtered_difference", "measured") or "Source" in template.doc
+    for name, gain in template.gains.items():
+        assert gain.unit is not None or gain.held
+        for value in [math.nan, *[-1.0] * (gain.positive or gain.nonnegative)]:
+            with pytest.raises(smc.ScenarioError, match=name):
+                template(**{name: value})
+
+
+def test_gains_that_miss_a_condition_are_warned_of_in_its_words():
+    with pytest.warns(smc.errors.GainWarning, match="r1 > r2"):
+        smc.law("twisting", r1=2.0, r2=3.0)
+    with pytest.warns(smc.errors.GainWarning, match="1/2 < p < 1"):
+        smc.surface("terminal", p=0.3)

@@ -71,12 +71,6 @@ def test_run_i_of_a_law_has_gain_set_i():
         assert all(law[gain] == value for k, law in enumerate(ran) for gain, value in sets[k % len(sets)].items())
 
 
-def test_forms_of_a_law_take_its_gains():
-    exact, single = (gains.law("duffing", name) for name in ("observer_free", "observer_free_single"))
-    assert dict(exact.gains) == dict(single.gains)
-    assert gains.tuned("duffing", "observer_free_single") is gains.tuned("duffing", "observer_free")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")])
 def test_shipped_gains_cost_what_their_record_says(gain_set, law):
@@ -123,3 +117,5 @@ def test_what_has_no_gains_gets_a_sentence(refused):
     for arguments in wrong:
         refused(lambda arguments=arguments: gains.law(*arguments))
     refused(lambda: gains.paper_plant(3))
+    for plant, gain_set in (("duffing", "best"), ("pendubot", "tracking")):
+        refused(lambda plant=plant, gain_set=gain_set: gains.general_laws([plant], gain_set))

@@ -26,16 +26,6 @@ def inertia(x):
     return plant.nominal.dynamics(np.array(x), np.zeros(3), Values(**plant.parameters)).M
 
 
-@pytest.mark.parametrize("name", smc.laws(kind="joint"))
-def test_every_joint_law_names_gains_units_and_source(name):
-    template = joint_law.catalogue()[name]
-    assert template.joint
-    assert "Gains:" in template.doc
-    assert "Source" in template.doc
-    for gain in template.gains.values():
-        assert gain.unit is not None or gain.held
-
-
 def test_computed_torque_sliding_reaches_its_layer_at_the_predicted_time():
     k, width = 5.0, 0.05
     trace = run(smc.law("computed_torque_sliding", k=k, c=4.0, width=width), control_period=2e-4, duration=0.8)

@@ -236,11 +236,6 @@ def test_integral_has_no_reaching_phase_and_runs_the_nominal_loop(f, g, model):
     assert np.abs(classical.s - nominal_loop(run.t, c, q, 1.0)).max() > 0.02
 
 
-def test_integral_below_the_disturbance_leaves_its_surface():
-    run = plant_b(smc.law("integral", M=1.0), wave, x=(1.0, 0.0))
-    assert np.abs(run.sigma).max() > 0.1
-
-
 def test_integral_residual_is_first_order_in_the_control_period():
     sizes = [np.abs(plant_b(smc.law("integral"), wave, h=h).sigma).max() for h in (1e-2, 1e-3)]
     assert math.log10(sizes[0] / sizes[1]) == pytest.approx(1.0, abs=0.1)
@@ -385,24 +380,6 @@ def test_observer_free_adaptive_does_not_grow_without_end_under_noise():
 
 
 EXACT = ("exponential_reaching", "implicit_first_order", "fixed_time", "discrete_time", "barrier_adaptive", "dynamic")
-
-
-@pytest.mark.parametrize("name", EXACT)
-def test_a_turned_sign_is_seen(name):
-    law = smc.law(name)
-    assert plant_a(law, wave, duration=3.0).residual() < 0.1
-    assert plant_a(law, wave, duration=3.0, sign=-1.0, limit=100.0).residual() > 1.0
-
-
-@pytest.mark.parametrize(
-    ("name", "gains", "factor"),
-    [("implicit_first_order", {"k": 2.0}, 3.0), ("discrete_time", {"k": 2.0}, 0.5), ("discrete_time", {"k": 2.0}, 3.0)],
-)
-def test_a_wrong_period_is_seen(name, gains, factor):
-    """A law that is told another dt than that of its loop chatters or lags."""
-    h, law = 1e-3, smc.law(name, **gains)
-    right, wrong = (plant_a(law, wave, h=h, dt=dt) for dt in (h, factor * h))
-    assert wrong.residual() > 1.5 * right.residual()
 
 
 def test_surface_and_own_sliding_variable_give_the_same_first_order_law():

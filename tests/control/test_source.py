@@ -105,22 +105,6 @@ def test_laws_with_equal_gains_are_equal():
     assert default.source != same.source
 
 
-def test_words_name_each_source_once_with_its_laws():
-    laws = {"a": [sets()["default"].source], "b": [sets()["study"].source], "c": [sets()["default"].source]}
-    assert source.in_words(laws) == "gains: a and c default, b study"
-    assert source.in_words({"a": laws["a"], "none": [source.Source()]}) == "gains: default"
-    assert source.in_words({"none": [source.Source()]}) == ""
-    search = source.Search(rule="CMA-ES (as published), in logarithms", evaluations=288)
-    assert str(smc.law("pid").sourced("shipped", search).source) == "shipped (CMA-ES, 288 evaluations, 1 search)"
-
-
-@pytest.mark.parametrize(
-    ("spread", "words"), [(0.0, "0 % above the least"), (0.0412, "4.1 % above the least"), (2.0, "3 times the least")]
-)
-def test_the_spread_of_searches_is_told(spread, words):
-    assert source.spread_in_words(12, spread) == f"12 searches, J up to {words}"
-
-
 def test_searches_of_several_laws_are_one_phrase():
     first, other = (source.Search(rule="CMA-ES", evaluations=30 * n, searches=n, spread=n / 100) for n in (3, 12))
     laws = {

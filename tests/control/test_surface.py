@@ -12,9 +12,8 @@ from helpers.plants_ab import measured
 from scipy.integrate import quad
 
 import smc_mujoco as smc
-from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import laws
-from smc_mujoco.control.surface import catalogue, surface
+from smc_mujoco.control.surface import surface
 from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
@@ -262,30 +261,3 @@ def test_dt_of_a_surface_is_the_control_period(period):
     np.testing.assert_allclose(pid.s[:, 0], -(3.0 + 2.0 * pid.t), rtol=1e-6)
     np.testing.assert_allclose(integral.s[:, 0], -2.0 * integral.t, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(decaying.s[:, 0], -2.0 * (1 - np.exp(-1.5 * decaying.t)), rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("name", "gains", "words"),
-    [
-        ("terminal", {"p": 0.3}, "1/2 < p < 1"),
-        ("fast_terminal", {"p": 1.2}, "1/2 < p < 1"),
-        ("nonsingular_terminal", {"p": 1.0}, "1 < p < 2"),
-        ("nonsingular_fast_terminal", {"q": 1.5}, "q > p"),
-        ("predefined_time", {"p": 0.5}, "0 < p < 1/2"),
-    ],
-)
-def test_gains_that_miss_a_condition_are_warned_of_in_its_words(name, gains, words):
-    with pytest.warns(GainWarning, match=words):
-        surface(name, **gains)
-
-
-@SURFACES
-def test_every_surface_names_its_equation_and_its_source(name):
-    text = catalogue()[name].doc
-    assert "s = " in text
-    assert "Source" in text
-    for gain in catalogue()[name].defaults:
-        with pytest.raises(smc.ScenarioError, match=gain):
-            surface(name, **{gain: math.nan})
-        with pytest.raises(smc.ScenarioError, match=gain):
-            surface(name, **{gain: -1.0})
