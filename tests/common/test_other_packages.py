@@ -12,13 +12,11 @@ from numpy.testing import assert_array_equal
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.cli.main import main
 from smc_mujoco.common import catalogue
 from smc_mujoco.common.errors import find
 from smc_mujoco.control import estimator, gain_sets, joint_law, law, surface
 from smc_mujoco.evidence.audit import paper
 from smc_mujoco.mechanisms import plant
-from smc_mujoco.simulation import codes
 from smc_mujoco.studies import run_key, scene
 
 ROOT = Path(__file__).parents[2]
@@ -117,24 +115,6 @@ def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
     assert "lazy_laws" in sys.modules
 
 
-def test_a_command_that_needs_no_package_imports_none(tmp_path):
-    """In a separate process, where nothing is imported yet."""
-    about = tmp_path / "unasked-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: unasked\nVersion: 1.0\n")
-    points = "".join(f"[smc_mujoco.{kind}]\nunasked = unasked:x\n" for kind in ("laws", "plants", "scenes", "papers"))
-    (about / "entry_points.txt").write_text(points)
-    (tmp_path / "unasked.py").write_text("raise SystemExit('imported')")
-    code = "from smc_mujoco.cli import scene; scene.figures = lambda *_: []; from smc_mujoco.cli.main import main; "
-    code += "main(['run', 'inverted_pendulum', '--no-film', '--out', 'out'])"
-    paths = os.pathsep.join(map(str, (tmp_path, ROOT)))
-    command = [sys.executable, "-W", "error", "-c", code]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-
-
 def test_a_package_may_use_the_catalogue_while_it_is_imported(install):
     """Also where it is imported first, and not by the catalogue."""
     install(
@@ -192,11 +172,6 @@ def many_estimator(y, gains, memory):
     assert "many_scene" not in sys.modules
 
 
-def test_entries_are_listed_by_name_whatever_their_modules(install):
-    install("zoo", {"laws": {"b": "a:b", "c": "b:c", "a": "c:a"}})
-    assert [point.name for point in catalogue.points("smc_mujoco.laws")] == ["a", "b", "c"]
-
-
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_a_package_brings_the_gains_of_its_law(install):
     units = "from smc_mujoco.control.units import FORCE_PER_POSITION, Gain"
@@ -234,22 +209,6 @@ def test_a_plant_of_a_package_may_be_a_model_s_file(install, tmp_path):
     assert smc.load(trace.save(tmp_path / "a.npz")).scenario.plant.name == "gantry"
     with pytest.raises(smc.ScenarioError, match="name is 'gantry': give one that is none"):
         smc.plant_from(folder / "gantry.xml", channels=["slide"], name="gantry")
-
-
-def test_a_study_hashes_a_package_s_plant_once(install, tmp_path, monkeypatch):
-    """Writing its model as XML takes longer than a short run."""
-    install(
-        "hashed",
-        {"plants": {"hashed_plant": "hashed_plants:hashed_plant"}},
-        hashed_plants=PLANT.replace("NAME", "hashed_plant")
-        + "build = hashed_plant.build\nhashed_plant = dataclasses.replace(hashed_plant, build=lambda n: build(n))\n",
-    )
-    hashed, real = [], codes.digest_of
-    monkeypatch.setattr(codes, "digest_of", lambda spec: hashed.append(spec) or real(spec))
-    runs = smc.grid(["hashed_plant"], ["classical", "pid"], ["nominal"], seeds=4, duration=0.02, gains="default")
-    smc.study(runs, tmp_path / "study")
-    assert len(hashed) == 1
-    assert len({*map(run_key.key, runs)}) == len(runs)
 
 
 def test_a_run_s_key_has_the_mjcf_that_a_plant_reads(install):
@@ -311,16 +270,6 @@ def test_a_broken_entry_is_one_sentence_where_it_is_asked_for(broken, name):
     assert "\n" not in sentence
 
 
-@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PackageWarning")
-def test_the_page_of_a_broken_law_says_what_is_wrong_with_it(broken, capsys):
-    with pytest.raises(SystemExit, match="2"):
-        main(["list", "raises"])
-    assert "its law 'raises' (bad_raises:raises) cannot be loaded (ZeroDivisionError" in capsys.readouterr().err
-    with pytest.raises(SystemExit, match="2"):
-        main(["list", "riases"])
-    assert "unknown law, surface or velocity estimator 'riases'" in capsys.readouterr().err
-
-
 def test_a_broken_entry_is_a_warning_where_all_are_listed_and_said_once(broken):
     first = said(smc.laws)
     assert len(first) == len(BROKEN)
@@ -355,12 +304,6 @@ def test_a_name_of_the_library_is_not_taken_over(install):
     )
     assert smc.law("classical").function is law.catalogue().own["classical"].function
     assert "grab_laws" not in sys.modules
-
-
-def test_a_name_of_the_library_s_laws_of_many_joints_is_not_taken_over(install):
-    install("grab", {"laws": {"unit_vector": "grab_laws:unit_vector"}}, grab_laws=LAW.replace("NAME", "unit_vector"))
-    assert len(said(lambda: smc.law("unit_vector"))) == 1
-    assert smc.law("unit_vector").joint
 
 
 def test_one_name_in_two_packages_is_one_sentence(install):

@@ -49,16 +49,6 @@ def test_a_notebook_gets_a_bar_that_moves_and_vanishes_without_a_warning(cell, m
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_bar_of_unknown_length_and_one_that_counts(cell):
-    with progress.bar("looking") as bar:
-        bar.says("<looking>")
-    assert "<progress></progress> &lt;looking&gt;" in cell[1]
-    del cell[:]
-    with progress.bar("claims", 4, counted=True) as bar:
-        bar.advance(1)
-    assert "claims 1/4" in cell[1]
-
-
 def test_the_bar_vanishes_when_the_work_fails(cell):
     with pytest.raises(ZeroDivisionError), progress.bar("runs", 2.0) as bar:
         bar.advance(1 / 0)
@@ -92,12 +82,6 @@ def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monk
     assert shown.mock_calls[-4:] == [call.add_task("runs", total=8.0), *drawn]
 
 
-def test_a_terminal_gets_no_html(capsys):
-    with progress.bar("runs", 2.0) as bar:
-        bar.advance(1.0)
-    assert "<progress" not in "".join(capsys.readouterr())
-
-
 def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
     now = [0.0]
     monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
@@ -108,15 +92,6 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
     out, err = capsys.readouterr()
     assert (out, err.splitlines()[:2]) == ("", ["duffing 25 %, 30 s left", "duffing 50 %, 20 s left"])
     assert len(err.splitlines()) == 4
-
-
-def test_the_count_of_a_study_is_that_of_its_bar(monkeypatch, capsys):
-    monkeypatch.setattr(progress, "LINE_PERIOD", 0.0)
-    with progress.counter(8, 800, shown=True) as stepped:
-        stepped(799)
-        stepped(1)
-    last = [re.sub(", .* second", "", line) for line in capsys.readouterr().err.splitlines()[-2:]]
-    assert last == ["7 of 8 runs 100 %, 0 s left", "8 of 8 runs 100 %, 0 s left"]
 
 
 def test_a_bar_says_its_share_its_count_and_the_time_left(monkeypatch):

@@ -10,7 +10,7 @@ from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.laws import observer_free_q15 as q15
 from smc_mujoco.control.surface import surface
-from smc_mujoco.simulation import python_controller, reference
+from smc_mujoco.simulation import python_controller
 
 PLANTS = ("van_der_pol", "duffing", "inverted_pendulum_network")
 FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", "observer_free_q15")

@@ -9,7 +9,6 @@ import pickle
 import platform
 import sys
 import types
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +25,6 @@ pytestmark = [
     pytest.mark.quick,
     pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning"),
 ]
-
-
-Y = Measurement(t=0.0, dt=0.001, x=0.5, v=0.0, e=0.5, de=0.0, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)
 
 
 def proportional(observation):
@@ -386,34 +382,6 @@ def test_what_is_no_action_ends_the_run_with_a_sentence(torch):
         assert "t = 0 s" in str(ends[name])
 
 
-class Broken:
-    """What does not say whether it has a method."""
-
-    def __getattr__(self, name):
-        raise ZeroDivisionError(name)
-
-
-def test_a_controller_of_python_control_is_told_its_own_door():
-    control = pytest.importorskip("control", reason="python-control is not installed")
-    with pytest.raises(
-        smc.ScenarioError, match=r"policy is a StateSpace of python-control: give smc.exchange.law_from_control"
-    ):
-        smc.policy(control.ss([[0.0]], [[1.0]], [[1.0]], [[0.0]]))
-
-
-def test_what_does_not_say_whether_it_can_be_called_is_no_policy():
-    with pytest.raises(smc.ScenarioError, match=r"policy is .*: give a callable from an observation"):
-        smc.policy(Broken())
-
-
-@pytest.mark.parametrize(("file", "library"), [("a.onnx", "onnxruntime"), ("a.pt2", "torch")])
-def test_a_library_that_is_missing_is_named(file, library, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, library, None)
-    (tmp_path / file).write_bytes(b"x")
-    with pytest.raises(smc.ScenarioError, match=f"pip install {library}"):
-        smc.policy(tmp_path / file)
-
-
 def test_a_file_that_is_no_network_is_one_sentence(tmp_path, monkeypatch):
     onnx(monkeypatch)
     (tmp_path / "bad.onnx").write_bytes(b"bad")
@@ -422,70 +390,3 @@ def test_a_file_that_is_no_network_is_one_sentence(tmp_path, monkeypatch):
 
 
 # the libraries themselves
-
-
-@pytest.fixture
-def network():
-    """(torch, a small module with dropout in training, what it gives for 0.5, 0 in evaluation)."""
-    torch = pytest.importorskip("torch", reason="torch is not installed")
-    torch.manual_seed(0)
-    module = torch.nn.Sequential(
-        torch.nn.Linear(2, 8), torch.nn.Tanh(), torch.nn.Dropout(0.5), torch.nn.Linear(8, 1), torch.nn.Tanh()
-    )
-    with torch.no_grad():
-        expected = module.eval()(torch.tensor([[0.5, 0.0]])).item()
-    return torch, module.train(), expected
-
-
-def test_torch_s_modules_control_and_are_told_apart(network):
-    torch, module, expected = network
-    law, double = smc.policy(module), smc.policy(torch.nn.Sequential(torch.nn.Linear(2, 1)).double())
-    key = run_key.key(smc.Scenario(plant="duffing", law=law))
-    assert briefly(double).failure is None
-    with torch.no_grad():
-        module[0].weight.add_(1.0)
-    assert briefly(law).u[0, 0] == pytest.approx(6.0 * expected, rel=1e-6)
-    assert run_key.key(smc.Scenario(plant="duffing", law=law)) == key
-    assert run_key.key(smc.Scenario(plant="duffing", law=smc.policy(module))) != key
-
-
-@pytest.mark.parametrize("kind", [".pt2", ".onnx"])
-def test_what_torch_writes_is_read(kind, network, tmp_path):
-    torch, module, expected = network
-    path, given = tmp_path / f"net{kind}", (torch.zeros(1, 2),)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        if kind == ".pt2":
-            torch.export.save(torch.export.export(module.eval(), given), path)
-        else:
-            for library in ("onnx", "onnxruntime"):
-                pytest.importorskip(library, reason=f"{library} is not installed")
-            torch.onnx.export(module.eval(), given, path, dynamo=False)
-    assert briefly(smc.policy(path)).u[0, 0] == pytest.approx(6.0 * expected, rel=1e-6)
-
-
-def test_torch_s_weights_alone_are_no_policy(network, tmp_path):
-    torch, module, _ = network
-    torch.save(module.state_dict(), tmp_path / "weights.pt")
-    with pytest.raises(smc.ScenarioError, match=r"'weights\.pt': give a callable, or a file of \.onnx, \.pt2"):
-        smc.policy(tmp_path / "weights.pt")
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_models_of_stable_baselines3_learn_here_and_are_laws():
-    library = pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed")
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    gymnasium = pytest.importorskip("gymnasium")
-    changes = {"duration": 0.2, "control_period": 0.01, "u_max": 6.0}
-    environment = gymnasium.make("smc_mujoco:Duffing-v0", changes=changes)
-    checker.check_env(environment.unwrapped)
-    model = library.PPO("MlpPolicy", environment, n_steps=32, batch_size=16, device="cpu", seed=0).learn(64)
-    law = smc.policy(model)
-    expected = 6.0 * float(model.predict(np.array([0.5, 0.0]), deterministic=True)[0][0])
-    assert law.name == "PPO"
-    assert pickle.loads(pickle.dumps(law.function))(Y, None, np.zeros(1))[0] == pytest.approx(expected, rel=1e-6)
-    model.learn(64)
-    assert briefly(law).u[0, 0] == pytest.approx(expected, rel=1e-6)
-    assert run_key.key(smc.Scenario(plant="duffing", law=law)) != run_key.key(
-        smc.Scenario(plant="duffing", law=smc.policy(model))
-    )

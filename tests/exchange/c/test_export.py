@@ -263,12 +263,6 @@ def test_names_that_c_has_for_something_else_are_other_names_in_it(folder, diale
     assert function(y, (), np.zeros(1)) == taken.function(y, (), np.zeros(1))
 
 
-def test_a_law_of_one_s_own_runs_alike_in_both(folder):
-    (folder / "turns.c").write_text(smc.exchange.law_to_c(turns))
-    first, second = smc.run([scenario(law) for law in (turns, smc.exchange.law_from_c(folder / "turns.c"))])
-    np.testing.assert_array_equal(first.u, second.u)
-
-
 @smc.law_function
 def signs(y, gains, memory):
     return np.sign(y.e), np.sign(y.de)

@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from helpers import arms
-from helpers.commands import assert_refused
 from helpers.compiler import needs_compiler
 from helpers.runs import assert_same
 from helpers.sources import strange
@@ -296,18 +295,6 @@ def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
         smc.exchange.law_from_c(library)
 
 
-def test_a_mistake_in_the_command_is_one_sentence(capsys):
-    for words, said in (
-        (["unit_vector"], "law 'unit_vector' is of many joints: give their number, such as --joints 7"),
-        (["unit_vector", "--gains", "c=1 2", "--joints", "3"], "gain c of unit_vector has 2 values, (1, 2), for 3 j"),
-        (["unit_vector", "--joints", "1"], "joints is 1: give a whole number from 2 to 100"),
-        (["unit_vector", "--joints", "2", "--type", "q15"], "law 'unit_vector' has no Q15 form"),
-        (["pid", "--joints", "3"], "law 'pid' is of one channel: leave --joints 3 out"),
-        (["unit_vector", "--gains", "c=1 a"], "--gains is 'c=1 a': give names and numbers"),
-    ):
-        assert_refused(capsys, ["export", *words, "nowhere/a.c"], said)
-
-
 REFUSED = {
     "u = memory[:, 0]\n    memory[:, 0] = s": "an array, which shares its numbers with another name: write .copy()",
     "u = torque(y, s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
@@ -362,15 +349,3 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
         smc.exchange.law_to_c(law, joints=3)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
-
-
-def test_the_file_says_how_many_joints_it_is_for_and_what_it_reads():
-    text = smc.exchange.law_to_c(smc.law("hybrid_sliding", c=[1.0, 2.0, 3.0]))
-    head, _, rest = text.partition("*/")
-    assert head.startswith("/* hybrid_sliding: a control law of 3 joints in C99, written out by smc_mujoco ")
-    for words in ("c = (1, 2, 3)", "3 numbers each", "reads    jacobian, M, de, e, ddr, v, h\n", "0 bytes a joint"):
-        assert words in head
-    assert "#define SMC_JOINTS 3\n" in rest
-    assert "c=1.0 2.0 3.0," in rest
-    assert build.HEADER.read_text() in rest
-    assert max(map(len, text.splitlines())) <= 123

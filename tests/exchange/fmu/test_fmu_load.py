@@ -4,9 +4,7 @@ import gc
 import math
 import os
 import pickle
-import re
 import shutil
-import sys
 import time
 import zipfile
 from pathlib import Path
@@ -89,23 +87,6 @@ def test_gains_are_the_fmu_s_parameters(folder):
     np.testing.assert_array_equal(first.u, second.u)
 
 
-def test_an_input_that_only_the_model_needs_is_listed_with_the_model(folder):
-    for model, more in (("none", set()), ("nominal", {"ddr", "f", "g"})):
-        path = smc.exchange.law_to_fmu("classical", folder / f"{model}.fmu", model=model, binary=False)
-        with zipfile.ZipFile(path) as archive:
-            text = archive.read("modelDescription.xml").decode()
-        assert set(re.findall(r'name="(\w+)"[^>]*causality="input"', text)) == {"x", "v", "r", "dr"} | more
-
-
-@pytest.mark.slow
-def test_an_unbounded_parameter_is_infinite_and_comes_back(folder):
-    path = smc.exchange.law_to_fmu("super_twisting", folder / "free.fmu")
-    template = smc.exchange.law_from_fmu(path, isolate=False)
-    assert (template.defaults["u_max"], template.defaults["law_w_max"]) == (np.inf, np.inf)
-    first, second = smc.run([scenario("super_twisting"), scenario(template())])
-    np.testing.assert_array_equal(first.u, second.u)
-
-
 @pytest.mark.slow
 def test_runs_have_instances_of_their_own_which_end_with_them(folder):
     path = smc.exchange.law_to_fmu("super_twisting", folder / "own.fmu")
@@ -130,15 +111,6 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
     assert len(load._running) == 1
     del memory
     assert load._running == {}
-
-
-def test_an_fmu_that_has_one_instance_in_a_process_runs_one_channel(foreign, tmp_path):
-    path = changed(foreign, tmp_path, ("<CoSimulation", '<CoSimulation canBeInstantiatedOnlyOncePerProcess="true"'))
-    law = smc.exchange.law_from_fmu(path, **RENAMED, isolate=False)()
-    fine = smc.run([scenario(law), scenario(law)])
-    assert [trace.failure for trace in fine] == [None, None]
-    network = smc.run(scenario(law, "pendulum_network"))
-    assert "FMU 'changed.fmu' can have only one instance in a process" in str(network.failure)
 
 
 def test_another_process_takes_the_law_from_the_file(folder):
@@ -401,12 +373,6 @@ def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path
     source = smc.exchange.law_to_fmu("pid", tmp_path / "source.fmu", binary=False)
     with pytest.raises(smc.ScenarioError, match=r"source\.fmu has a binary for no machine, .*, or compile its sources"):
         smc.exchange.law_from_fmu(source)
-
-
-def test_without_fmpy_the_cure_is_said(foreign, monkeypatch):
-    monkeypatch.setitem(sys.modules, "fmpy", None)
-    with pytest.raises(smc.ScenarioError, match=r"law_from_fmu needs an optional package .*smc-mujoco\[fmu\]"):
-        smc.exchange.law_from_fmu(foreign, **RENAMED)
 
 
 @pytest.mark.parametrize(("step", "h"), [(None, 1e-3), (0.02, 0.02)])

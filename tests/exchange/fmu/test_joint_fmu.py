@@ -1,7 +1,5 @@
 """Laws of many joints as FMUs: valid by FMPy, and step by step what smc.run computes."""
 
-import subprocess
-import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -159,31 +157,6 @@ def test_each_joint_has_a_memory_of_its_own(made, folder):
     estimates = fmu.get(*(f"v_estimated[{i}]" for i in JOINTS))
     assert [one[1] for one in slots] == estimates
     assert len(set(estimates)) == 3
-
-
-def test_fmpy_simulates_it_with_inputs_by_their_names(made):
-    path, trace = made["computed_torque_sliding"]
-    known = {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
-    controller = Controller(trace.scenario)
-    every = [seen(known, controller, trace, k) for k in range(len(trace.t))]
-    kinds = [("time", float), *((name, float) for name in every[0])]
-    signals = np.array([(t, *one.values()) for t, one in zip(trace.t, every, strict=True)], kinds)
-    outs = [f"u[{i}]" for i in JOINTS]
-    found = fmpy.simulate_fmu(
-        str(path), stop_time=0.05, step_size=1e-3, output_interval=1e-3, input=signals, output=outs
-    )
-    np.testing.assert_array_equal(np.array([[row[name] for name in outs] for row in found])[1:50], trace.u[:49])
-
-
-@pytest.mark.slow
-def test_the_sources_compile_without_a_warning(made, folder):
-    for name in ("passivity_based", "observer_free_joint"):
-        with zipfile.ZipFile(made[name][0]) as archive:
-            archive.extractall(folder / f"{name}-sources")
-        sources = sorted((folder / f"{name}-sources" / "sources").glob("*.c"))
-        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", "-c", *map(str, sources)]
-        done = subprocess.run([*build.compiler(), *flags], cwd=folder, capture_output=True, text=True, check=False)
-        assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_units_are_left_out_where_joints_differ(made, folder):
