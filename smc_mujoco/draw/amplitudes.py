@@ -24,7 +24,7 @@ from smc_mujoco.metrics.limit_cycle import channel_cycle
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-PAGE_HEIGHT = 5.6  # inches
+PAGE_HEIGHT = 4.6  # inches
 
 
 def lag(scenario: Scenario) -> float:

@@ -33,7 +33,8 @@ ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
 LABEL_SIZE = 10.5  # points on a full page, of a small panel's label that has room
 SMALL_ROW = 0.62  # relative height of a row of small panels
 LINE_ROW, LINES_ROW = 0.32, 0.45  # relative height of a row with one line, and with several
-ROW_FILLED = 0.6  # part of a row below its name
+ROW_FILLED, BELOW_NAME = 0.82, 0.6  # part of a row that its axes fill, with its name in them or above
+SLIDE_PANELS = "x", "u", "settling"
 SIGNALS_HEIGHT = 5.6  # inches, of a page of `signals`
 
 
@@ -77,11 +78,12 @@ def figure(
       path: file to write; default: none. Without an ending, or with .svg or .png, an SVG and a PNG are written; with
         .pdf, a PDF.
       labels: one label per trace; default: the laws' labels, with the differences between runs of one law.
-      title: default: the plant's label.
+      title: default: the plant's label, and the condition if all traces have one.
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "tip", "contact", "s",
         "channels" (small panels of every channel), "phase", "settling" (|x - r|), "end" (close-up of u). Default: those
         that suit the plant and the size.
-      size: "ieee-column" (3.5 in wide), "ieee-page" (7.16 in), or (width, height) in inches. Default: 12.8 in wide.
+      size: "ieee-column" (3.5 in wide), "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large letters), or
+        (width, height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
 
@@ -96,6 +98,7 @@ def figure(
     traces = [finite(trace) for trace in traces]
     if panels is None:
         chosen = _default(traces, width)
+        chosen = [name for name in chosen if size != "slide" or name in SLIDE_PANELS] or chosen
     else:
         chosen = [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
     runs = Runs(traces, names, colours, style.marks(traces, names), (drawing.horizon(traces), end(traces)))
@@ -161,9 +164,15 @@ def _composed_page(
     words = drawing.titles(overview, [pitch * part for part in blocks[1]])
     _draw_over_time(page, cells[1], list(zip(overview, words, strict=True)), runs)
     _draw_beside(page, cells[2], beside, (groups[0], *places), runs)
-    pages.set_head(page, width, title or style.plant_name(traces[0].scenario.plant), key, gains)
+    pages.set_head(page, width, title or _head(traces), key, gains)
     pages.space_ticks(page)
     return page
+
+
+def _head(traces: Sequence[Trace]) -> str:
+    """Return the plant of traces, and their condition if they have it in common."""
+    heads = {style.head(trace.scenario) for trace in traces}
+    return heads.pop() if len(heads) == 1 else style.plant_name(traces[0].scenario.plant)
 
 
 def _cells(
@@ -229,34 +238,45 @@ def _draw_over_time(page, cells: Sequence[SubplotSpec], overview: Sequence[tuple
 
 
 def _rows(
-    page, cell: SubplotSpec, panel: Panel, runs: Runs, share: Axes | None = None
+    page, cell: SubplotSpec, panel: Panel, runs: Runs, share: Axes | None = None, above: bool = False
 ) -> tuple[Axes, list[tuple[Axes, Panel, Sequence[str]]]]:
     """Return the axes that have the label of a panel, and its rows: axes, the panel they show, and its colours.
 
-    A crowded panel has a row for each trace, under the trace's name. Others have one row.
+    A crowded panel has a row for each trace, with the trace's name in it, or `above`. Others have one row.
     """
     if not drawing.crowded(panel):
         ax = page.add_subplot(cell, sharex=share)
         return ax, [(ax, panel, runs.colours)]
     frame = page.add_subplot(cell, frameon=False, xticks=[])
     pitch, size, rows = 1.0 / len(panel.traces), style.points(8.5), []
+    filled = BELOW_NAME if above else ROW_FILLED
     for i, (trace, name, colour) in enumerate(zip(panel.traces, runs.names, runs.colours, strict=True)):
-        ax = frame.inset_axes((0.0, 1.0 - (i + 1) * pitch, 1.0, ROW_FILLED * pitch), sharex=share)
-        words = style.cropped(name, 72 * cell.get_position(page).width * page.bbox.width / page.dpi, size)
-        ax.set_title(words, fontsize=size, fontweight="normal", color=colour, pad=1.0, parse_math=False)
+        ax = frame.inset_axes((0.0, 1.0 - (i + 1) * pitch, 1.0, filled * pitch), sharex=share)
+        room = 72 * cell.get_position(page).width * page.bbox.width / page.dpi - 4.0 * size
+        look = {"fontsize": size, "frameon": not above, "framealpha": 0.75, "edgecolor": "none", "borderaxespad": 0.2}
+        look |= {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)} if above else {"loc": "upper right"}
+        key = ax.legend(
+            [Line2D([], [], color=colour, lw=style.points(3))], ["."], handlelength=1.0, borderpad=0.0, **look
+        )
+        key.get_texts()[0].set_text(style.cropped(name, room, size))
+        key.get_texts()[0].set_parse_math(False)
+        key.set_in_layout(False)
         rows.append((ax, panel._replace(traces=[trace]), [colour]))
         share = ax
     return frame, rows
 
 
 def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]) -> None:
-    """Give several rows of a panel the range of the runs that last, and ticks near its ends."""
+    """Give several rows of a panel the range of the runs that last, and ticks near its ends: of u, at its bounds."""
     if len(rows) == 1:
         return
     lasting = [ax for ax, part, _ in rows if part.traces[0].diverged_at is None]
     ranges = [ax.get_ylim() for ax in lasting or [ax for ax, *_ in rows]]
     low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
     places = [tick for tick in np.asarray(MaxNLocator(3).tick_values(low, high)).tolist() if low <= tick <= high]
+    bound = max(max(part.traces[0].scenario.limits) for _, part, _ in rows)
+    if rows[0][1].quantity == "u" and low <= -bound and bound <= high:
+        places = [-bound, bound]
     for ax in (frame, *(ax for ax, *_ in rows)):
         ax.set(ylim=(low, high), yticks=[places[0], places[-1]])
     for ax, *_ in rows[:-1]:
@@ -309,7 +329,7 @@ def _draw_beside(
 
 def _draw_end(page, cell: SubplotSpec, panel: Panel, runs: Runs) -> None:
     """Draw the close-up of the last samples of u."""
-    frame, rows = _rows(page, cell, panel, runs)
+    frame, rows = _rows(page, cell, panel, runs, above=True)
     for ax, part, colours in rows:
         drawing.last_samples(ax, part, colours, panel.traces, runs.names)
     _equal_ranges(frame, rows)

@@ -57,12 +57,18 @@ def nyquist(
         page = pages.blank(style.FULL_WIDTH, whole)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
         for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, traces, colours, strict=True):
-            plane(row[0], scenario, cycle, channel, colour)
+            if cycle:
+                plane(row[0], scenario, cycle, channel, colour)
+            else:  # nothing crosses: s has the whole row
+                row[0].remove()
+                grid = row[1].get_subplotspec()
+                row[1].set_subplotspec(grid.get_gridspec()[grid.rowspan.start, :])
             last_periods(row[1], trace, cycle, channel, colour)
         for ax, change in zip(axes[:, 1], changes, strict=True):
             if change.marked:
-                ax.set_title(NOTE, loc="left", fontsize=style.points(9.5))
-        title = f"Chattering of {style.plant_name(scenarios[0].plant)}"
+                words = style.wrapped(NOTE, 72 * 0.5 * style.FULL_WIDTH, style.points(9.5), lines=2)
+                ax.set_title(words, loc="left", fontsize=style.points(9.5), fontweight="normal")
+        title = f"Chattering: {style.head(scenarios[0])}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         pages.write(page, pages.files(path))
     return page
@@ -72,8 +78,8 @@ def _legend(scenario: Scenario, cycle: Chattering) -> str:
     """Return a law's entry in the legend."""
     name = style.law_name(scenario.law)
     if not cycle:
-        return f"{name}: no limit cycle predicted"
-    return f"{name}: {style.short(cycle.amplitude)} at {cycle.frequency:.3g} Hz predicted"
+        return f"{name}: no limit cycle predicted, L and 1/N do not cross"
+    return f"{name}: amplitude {style.short(cycle.amplitude)} at {cycle.frequency:.3g} Hz predicted"
 
 
 def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:
@@ -82,9 +88,6 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     ax.set(xlim=(-PLANE_EDGE, 0.2 * PLANE_EDGE), ylim=(-0.6 * PLANE_EDGE, 0.6 * PLANE_EDGE))
     ax.axhline(0.0, color=style.RULE, lw=style.points(0.8))
     ax.axvline(0.0, color=style.RULE, lw=style.points(0.8))
-    if not cycle:
-        ax.text(0.5, 0.5, "no crossing", ha="center", va="center", transform=ax.transAxes)
-        return
     loop, omega, unit = Loop(scenario, channel), math.tau * cycle.frequency, -cycle.response
     fastest = math.pi / scenario.control_period
     omegas = np.geomspace(omega / SPAN_FACTOR, min(omega * SPAN_FACTOR, fastest), 400)
@@ -102,19 +105,20 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
     """Draw s in the last periods of a run, the predicted amplitude as a band and an unstable one as lines."""
     start = trace.t[-1] - SHOWN_PERIODS / cycle.frequency if cycle else trace.t[0]
     part = trace.t >= start
-    t, s = trace.t[part] - trace.t[part][0], trace.s[part, channel]
+    factor, unit = style.prefixed(
+        float(np.abs(trace.s[part, channel]).max()), f"{trace.scenario.plant.units[channel]}/s"
+    )
+    t, s = trace.t[part] - trace.t[part][0], factor * trace.s[part, channel]
     ax.plot(1e3 * t if cycle else t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
-    unit = f"{trace.scenario.plant.units[channel]}/s"
     ax.set(xlabel=f"last {SHOWN_PERIODS} periods predicted (ms)" if cycle else "time (s)", ylabel=f"s ({unit})")
-    ax.ticklabel_format(axis="y", scilimits=(-3, 3))
     if cycle:
-        mean = float(s.mean())
-        ax.axhspan(mean - cycle.amplitude, mean + cycle.amplitude, color=colour, alpha=0.15, lw=0)
+        mean, amplitude = float(s.mean()), factor * cycle.amplitude
+        ax.axhspan(mean - amplitude, mean + amplitude, color=colour, alpha=0.15, lw=0)
         low, high = ax.get_ylim()
         ax.set_ylim(low, high + 0.18 * (high - low))
-        words = f"band: ±{style.short(cycle.amplitude)} {unit}, predicted"
+        words = f"band: ±{style.short(amplitude)} {unit}, predicted"
         if cycle.threshold_x:
-            unstable = cycle.threshold_x * cycle.amplitude / cycle.amplitude_x
+            unstable = cycle.threshold_x * amplitude / cycle.amplitude_x
             for level in (mean - unstable, mean + unstable):
                 ax.axhline(level, color=colour, lw=style.points(1.2), ls="dotted")
             words += f"; dotted: about ±{style.short(unstable)}, unstable, within it a run rests"

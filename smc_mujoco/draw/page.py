@@ -1,7 +1,7 @@
 """A page of figures: its size, title, legend, ticks and files.
 
 A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. It is as wide as a page of this package
-(12.8 in), an IEEE page or column, or has any size in inches.
+(8.8 in), an IEEE page or column, a slide, or has any size in inches.
 """
 
 import io
@@ -29,9 +29,9 @@ from smc_mujoco.control.source import NONE, Source, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.simulation.trace import Trace
 
-DPI = 150
+DPI, PRINT_DPI = 200, 400  # of a PNG: of a full page or a slide, and of a journal's page or column
 FORMATS = ("svg", "png", "pdf")
-NAMED_WIDTHS = {"ieee-column": 3.5, "ieee-page": 7.16}  # inches
+NAMED = {"ieee-column": (3.5, None), "ieee-page": (7.16, None), "slide": (style.SLIDE_WIDTH, 7.5)}  # inches
 SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 TEXT_SIZE, TITLE_SIZE = 11.0, 17.0  # points on a full page
@@ -54,8 +54,13 @@ class Page(Figure):
 def png(page: Figure | SubFigure) -> bytes:
     """Return the whole figure as a PNG."""
     content = io.BytesIO()
-    page.get_figure(root=True).savefig(content, format="png", dpi=DPI)
+    page.get_figure(root=True).savefig(content, format="png", dpi=resolution(page))
     return content.getvalue()
+
+
+def resolution(page: Figure | SubFigure) -> float:
+    """Return the dots per inch of the PNG of the whole figure."""
+    return DPI if page.get_figure(root=True).get_figwidth() >= style.JOURNAL_WIDTH else PRINT_DPI
 
 
 def css_width(page: Figure | SubFigure) -> float:
@@ -73,9 +78,9 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
     if size is None:
         return style.FULL_WIDTH, None
     if isinstance(size, str):
-        if size not in NAMED_WIDTHS:
-            raise unknown("size", size, NAMED_WIDTHS)
-        return NAMED_WIDTHS[size], None
+        if size not in NAMED:
+            raise unknown("size", size, NAMED)
+        return NAMED[size]
     try:
         width, height = (float(side) for side in size)
     except (TypeError, ValueError):
@@ -218,7 +223,7 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
     whole.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
     for path in paths:
         with replacing(path) as part:
-            whole.savefig(part, format=path.suffix[1:], dpi=DPI, metadata=dates[path.suffix])
+            whole.savefig(part, format=path.suffix[1:], dpi=resolution(whole), metadata=dates[path.suffix])
             if path.suffix == ".svg":
                 text = Path(part).read_text(encoding="utf-8")
                 Path(part).write_text(re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8")
@@ -230,7 +235,7 @@ def lay_out(whole: Figure, format: str) -> None:
     canvas, dpi, layout = whole.canvas, whole.dpi, whole.get_layout_engine()
     if layout is not None:
         get_registered_canvas_class(format)(whole)  # texts are as large as this canvas draws them
-        whole.dpi = DPI
+        whole.dpi = resolution(whole)
         layout.execute(whole)
         whole.set_canvas(canvas)
         whole.dpi = dpi

@@ -21,7 +21,7 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
 
-PAGE_HEIGHT = 6.4  # inches on a full page
+PAGE_HEIGHT = 4.8  # inches on a full page
 MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis may be logarithmic
 MARKS = "osD^vPX"  # one for each law, for readers who see no colours
 
@@ -59,7 +59,7 @@ def pareto(
         ax.tick_params(which="both", length=0)
         ax.margins(0.04, 0.06)
         handles.append(Line2D([], [], color=style.MUTED, marker="o", label="large: chosen gains", **_ring()))
-        pages.set_head(page, width, title or f"{style.plant_name(best[0].plant)}: tracking against variation", handles)
+        pages.set_head(page, width, title or f"Tuning: {style.plant_name(best[0].plant)}", handles)
         pages.write(page, paths)
     return page
 

@@ -50,7 +50,9 @@ SIGHTS = np.array([  # linear sRGB -> as it looks with all cones, no red, no gre
 ])  # fmt: skip
 XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]])
 
-FULL_WIDTH, JOURNAL_WIDTH = 12.8, 10.0  # inches: 1280 px of SVG, 1920 of PNG; narrower pages have smaller letters
+# Inches. A full page is 845 px of SVG, so that its least letters have 11 px in 800 px, as in a README; narrower pages
+# than a journal's have letters of 8 points, slides such of 16.
+FULL_WIDTH, JOURNAL_WIDTH, SLIDE_WIDTH = 8.8, 8.5, 13.3
 RC = {
     "font.family": "DejaVu Sans",
     "font.size": 10.5,
@@ -89,11 +91,12 @@ def page(width: float = FULL_WIDTH):
     """Return a context in which matplotlib draws in this style, on a page of this width in inches.
 
     A full page has the letters and lines of RC. On journal pages and columns they are smaller, with letters of 8
-    points.
+    points, on slides larger, with letters of 16.
     """
     from matplotlib import rc_context
 
-    scale = 1.0 if width >= JOURNAL_WIDTH else 8.0 / RC["font.size"]
+    letters = 8.0 if width < JOURNAL_WIDTH else 16.0 if width >= SLIDE_WIDTH else RC["font.size"]
+    scale = letters / RC["font.size"]
     keys = ("size", "linewidth", "markersize")
     return rc_context({key: value * scale if key.endswith(keys) else value for key, value in RC.items()})  # pyright: ignore[reportArgumentType]
 
@@ -428,6 +431,18 @@ def plant_name(plant: Plant | str, short: bool = False) -> str:
         known = catalogue().get(plant)
         return plant_name(known, short) if known else plant
     return (short and plant.short) or plant.label or (plant.name if plant.own else in_words(plant.name))
+
+
+def head(scenario: Scenario) -> str:
+    """Return what a picture of runs is about: the plant, and the condition if it has a name."""
+    condition = "" if scenario.condition in (None, "", "nominal") else f", {scenario.condition.replace('_', ' ')}"
+    return plant_name(scenario.plant) + condition
+
+
+def prefixed(largest: float, unit: str) -> tuple[float, str]:
+    """Return a factor and the unit with a prefix, with which values up to `largest` need no exponent."""
+    power = min(max(-math.floor(math.log10(largest) / 3.0), 0), 3) if 0.0 < largest < 0.1 else 0
+    return 1e3**power, ("", "m", "µ", "n")[power] + unit
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

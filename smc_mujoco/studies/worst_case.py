@@ -23,7 +23,7 @@ from smc_mujoco.common.files import read_json, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.control.source import untuned_laws
-from smc_mujoco.draw.style import law_colour
+from smc_mujoco.draw.style import law_colour, law_name, plant_name
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.run import run
@@ -75,7 +75,7 @@ class WorstCase(Tables):
     @property
     def heading(self) -> str:
         """The plant and the class. A picture crops it where it is too long."""
-        return f"{self.nominal.plant.name}: the worst found within {self.class_words}"
+        return f"Worst found: {plant_name(self.nominal.plant)}, {self.class_words}"
 
     @property
     def class_words(self) -> str:
@@ -159,9 +159,10 @@ class WorstCases(Tables, list[WorstCase]):
         from smc_mujoco.draw.figure import figure
 
         first = self[0]
-        runs = {f"{case.nominal.law.name}: {case.words}": case.scenario for case in self}
+        metric = CATALOGUE[first.metric].label
+        runs = {f"{law_name(case.nominal.law)}: {metric} {case.words}": case.scenario for case in self}
         if len(self) == 1:
-            worst = f"worst found, {CATALOGUE[first.metric].label} {first.words}"
+            worst = f"worst found, {metric} {first.words}"
             runs = {"as given": first.nominal, worst: first.scenario}
         options = {"title": first.heading, "panels": PANELS} | options
         return figure(run([*runs.values()]), path, [*runs], **options)

@@ -106,7 +106,7 @@ def test_words_are_apart_and_on_the_page(kind, size, one, arm):
         "arm": arm,
     }[kind]
     page = figure(traces, size=size)
-    assert page.get_figwidth() == (12.8 if size is None else pages.NAMED_WIDTHS[size])
+    assert page.get_figwidth() == (8.8 if size is None else pages.NAMED[size][0])
     check(page)
 
 
@@ -143,10 +143,13 @@ def test_every_curve_has_one_width_and_a_colour_of_its_own(one):
 def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
     three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u) for k, trace in enumerate(ten(one)[:3])]
     assert [len(rows(ax)) for ax in figure([*map(calm, three[:2]), three[2]], panels=["u", "end"]).axes] == [1, 1]
+    bang = [dataclasses.replace(trace, u=6.0 * np.sign(trace.u + 1e-9)) for trace in three]
+    (ax,) = figure(bang, panels=["u"]).axes
+    assert {tuple(row.get_yticks()) for row in rows(ax)} == {(-6.0, 6.0)}, "the bound"
     page = figure(three, size=COLUMN, panels=["x", "u", "s", "end"])
     assert [len(rows(ax)) for ax in page.axes] == [1, 3, 1, 3]
     for ax in (page.axes[1], page.axes[3]):
-        names = [row.get_title(loc="left") for row in rows(ax)]
+        names = [row.get_legend().get_texts()[0].get_text() for row in rows(ax)]
         assert names == ["Observer-free", "Classical", "Adaptive"]
         assert len({row.get_ylim() for row in rows(ax)}) == 1
         assert [to_hex(curves(row)[0].get_color()) for row in rows(ax)] == [
@@ -416,7 +419,9 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
     page = smc.plot(rows, metrics=["tv_rate"])
     boards = smc.leaderboard(rows, ["tv_rate"], by=("plant", "condition"))
     assert "of fewer than 6 samples the interval is their range" in " ".join(repr(boards).split())
-    assert "a median's is the range of fewer than 6 samples" in " ".join(text.get_text() for text in texts(page))
+    assert "a median's is the range of fewer than 6 samples" in " ".join(
+        " ".join(text.get_text().split()) for text in texts(page)
+    )
     drawn = {tuple(line.get_xdata()) for ax in page.axes for line in ax.lines if len(line.get_xdata()) == 2}
     for board in boards:
         for entry in board.entries:

@@ -243,7 +243,9 @@ def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
             assert (t[0], t[-1]) == pytest.approx((0.0, end))
             assert (y[0], y[-1], y.min(), y.max()) == pytest.approx((truth[0], truth[-1], truth.min(), truth.max()))
     rows = shown(page, "control u (N)").child_axes
-    assert [row.get_title(loc="left") for row in rows] == ["Classical", "Super-twisting", "Adaptive"]
+    keys = [row.get_legend() for row in rows]
+    names = [(text.get_text(), text.get_color()) for key in keys if key for text in key.get_texts()]
+    assert names == [(name, style.INK) for name in ("Classical", "Super-twisting", "Adaptive")]
     for trace, row in zip(traces, rows, strict=True):
         (band,) = row.collections
         low, high = band.get_paths()[0].get_extents().intervaly

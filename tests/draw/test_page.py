@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from PIL import Image
 
+import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw import page, style
 
@@ -36,3 +39,18 @@ def test_the_ends_of_the_range_of_a_side_are_sizes_and_what_lies_beyond_is_none(
     beyond = np.nextafter(side, 0.0 if side < 5.0 else np.inf)
     with pytest.raises(ScenarioError, match="inches"):
         page.measure((5.0, float(beyond)))
+
+
+def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letters_of_16_points(tmp_path):
+    """At 800 px ticks had 8 px. A column's PNG had 150 dots an inch."""
+    trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2))
+    whole = smc.figure(trace)
+    sizes = [text.get_fontsize() for text in whole.findobj(Text) if text.get_text().strip()]
+    assert min(sizes) / 72 * 800 / whole.get_figwidth() > 10.7
+    slide = smc.figure(trace, size="slide")
+    assert slide.get_size_inches().tolist() == [13.3, 7.5]
+    assert len(slide.axes) == 3
+    assert {label.get_fontsize() for ax in slide.axes for label in (ax.xaxis.label, ax.yaxis.label)} == {16.0}
+    smc.figure(trace, tmp_path / "a.png", size="ieee-column")
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.width == 1400

@@ -68,7 +68,7 @@ def test_writes_svg_and_png(pair, tmp_path):
     svg, png = pareto(pair, tmp_path / "fronts.png")
     assert [svg.name, png.name] == ["fronts.svg", "fronts.png"]
     with Image.open(png) as image:
-        assert image.size == (1920, 960)
+        assert image.size == (1760, 960)
 
 
 def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pair, page, tmp_path):

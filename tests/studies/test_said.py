@@ -68,7 +68,7 @@ def test_worst_cases_stand_from_the_least_with_their_places_by_median_their_clas
         assert "classical: the law is for |d| <= 0.1 N" in said
     for case, sets in ((cases[0], True), (cases[1], False)):
         assert ("any of 3 parameter sets" in case.heading) is sets
-        assert all(part in case.heading for part in ("duffing", "|d| <= 0.5 N", "mass x 0.8 to 1.2"))
+        assert all(part in case.heading for part in ("Duffing oscillator", "|d| <= 0.5 N", "mass x 0.8 to 1.2"))
     assert all(part in repr(cases[1]) for part in ("pid on duffing", "rms error fails", "0.0400 m", "|d| <= 0.5 N"))
     names = "value median unit found_by tried metric outside seed sets within scenario"
     assert list(cases[0].about()) == names.split()
@@ -254,7 +254,7 @@ def test_the_figures_of_worst_cases_are_of_their_runs_with_their_names(monkeypat
     for page, labels in (
         (one.figure(), ["as given", "worst found, rms error 0.200 m"]),
         (WorstCases([one]).figure(), ["as given", "worst found, rms error 0.200 m"]),
-        (WorstCases([one, other]).figure(), ["classical: 0.200 m", "adaptive: 0.300 m"]),
+        (WorstCases([one, other]).figure(), ["Classical: rms error 0.200 m", "Adaptive: rms error 0.300 m"]),
     ):
         assert [text.get_text() for text in page.legends[0].get_texts()][:2] == labels
         assert page.legends[0].get_title().get_text() == one.heading

@@ -16,7 +16,7 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation.trace import Trace
 
-FIGURE_SIZE = (11.0, 5.6)  # inches
+FIGURE_SIZE = (8.8, 4.8)  # inches
 ZOOM_BOUNDS = 2.5  # half-width of the second panel as a multiple of the bound: chosen
 AXIS_POINTS = 801  # points of the plane in each direction
 LIGHTEST, FADED = (
