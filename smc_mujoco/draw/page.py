@@ -54,7 +54,7 @@ class Page(Figure):
 def png(page: Figure | SubFigure) -> bytes:
     """Return the whole figure as a PNG."""
     content = io.BytesIO()
-    page.get_figure(root=True).savefig(content, format="png", dpi=resolution(page))
+    page.get_figure(root=True).savefig(content, format="png", dpi=DPI)
     return content.getvalue()
 
 

@@ -51,7 +51,7 @@ def content(shown: str) -> bytes:
 def test_a_notebook_shows_a_figure_that_pyplot_does_not_know_of(trace):
     figure = smc.figure(trace, size="ieee-column")
     picture, metadata = figure._repr_png_()
-    assert Image.open(io.BytesIO(picture)).width == pytest.approx(3.5 * 150, abs=1)
+    assert Image.open(io.BytesIO(picture)).width == pytest.approx(3.5 * 200, abs=1)
     assert metadata == {"width": pytest.approx(3.5 * 96)}
     formatters = pytest.importorskip("IPython.core.formatters")
     told, about = formatters.DisplayFormatter().format(figure)
@@ -63,7 +63,7 @@ def test_show_takes_any_figure(cell, trace):
     smc.show(matplotlib.figure.Figure(figsize=(2.0, 1.0)))
     smc.show(smc.figure(trace, size=(6.0, 4.0)))
     sizes = [Image.open(io.BytesIO(content(shown))).size for shown in cell]
-    assert sizes == [(300, 150), (900, 600)]
+    assert sizes == [(400, 200), (1200, 800)]
     assert 'width="192"' in cell[0]
     assert all(shown.startswith("<img ") and "max-width:100%" in shown for shown in cell)
 
