@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from smc_mujoco.common.files import scratch
-from smc_mujoco.draw import dot_plot, style
+from smc_mujoco.draw import dot_plot
 from smc_mujoco.draw.figure import figure
 from smc_mujoco.draw.film import film as video
 from smc_mujoco.draw.film import pace
@@ -18,7 +18,7 @@ from smc_mujoco.simulation.trace import Trace
 if TYPE_CHECKING:
     from smc_mujoco.studies.table import Table
 
-WIDTH = style.JOURNAL_WIDTH  # inches, of charts: their letters have 11 px at least, also on a phone, see style.css
+WIDTH = 10.0  # inches, of charts: their letters have 11 px at least, also on a phone, see style.css
 SIZE, FPS = (960, 540), 20  # px; 1/s
 
 
