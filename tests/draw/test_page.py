@@ -45,7 +45,7 @@ def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letter
     """At 800 px ticks had 8 px. A column's PNG had 150 dots an inch."""
     trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2))
     whole = smc.figure(trace)
-    sizes = [text.get_fontsize() for text in whole.findobj(Text) if text.get_text().strip()]
+    sizes = [float(text.get_fontsize()) for text in whole.findobj(Text) if text.get_text().strip()]
     assert min(sizes) / 72 * 800 / whole.get_figwidth() > 10.7
     slide = smc.figure(trace, size="slide")
     assert slide.get_size_inches().tolist() == [13.3, 7.5]
