@@ -804,7 +804,7 @@ class Function:
         if index.kind != "int":
             raise refuse(node, "an index that is not an integer")
         if dimension == SLOTS:
-            if constant is None and component.kind == "estimator":  # a ring of readings, as long as its memory
+            if constant is None:  # a ring of readings or a matrix, as long as its memory
                 constant = component.memory - 1
             if constant is None or constant < 0:
                 why = "at an index that is not constant" if constant is None else "at a negative index"

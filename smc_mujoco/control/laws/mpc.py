@@ -1,0 +1,219 @@
+"""Model-predictive control without offset: u = v + us, the first move of the best plan of N moves of H each.
+
+    minimise  sum of (q1 e^2 + q2 de^2 + r v^2) over the moves, + x' P x at the end,  with  |v + us| <= u_max
+
+on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of the observer of `adrc`, which knows a1 e +
+a2 de, and us = -d / b, so a constant disturbance leaves no error. P is the solution of the discrete Riccati equation, so
+that without bounds the law is the linear quadratic regulator with d taken away. It differs from that regulator, clipped,
+only where a later move is at the bound: real gains need bounds on states or rates, or a reference known ahead. The plan
+is solved at every control sample, by projected Newton steps from the last plan, until the gradient of the moves that
+are free is 1e-13 of the linear term; every plan keeps the bounds. H must be long against the control period, and N H
+as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates e'' = v, so
+a1, a2, b are 0, 0, 1. The trace's s is q1 e^2 + q2 de^2, the cost of the state.
+Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N, number of moves, at most 20; H,
+time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], of the plant.
+Sources: D. P. Bertsekas, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
+Optim. 20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin & C.-S. Wang, "Structure-preserving algorithms
+for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004 (doubling, for P); U. Maeder, F.
+Borrelli & M. Morari, "Linear offset-free model predictive control", Automatica 45(10):2214, 2009; J. A. De Dona, G. C.
+Goodwin & M. M. Seron, "Anti-windup and model predictive control: reflections and connections", Eur. J. Control
+6(5):467, 2000 (where it is the clipped regulator).
+"""
+
+import math
+
+from numba import njit
+
+from smc_mujoco.control.law import command, law_function
+from smc_mujoco.control.laws.extended_state import observe
+from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
+
+# The memory: 0 to 4 the observer; 5, 1 once the matrices are there; then the plan, the gradient, the step, the linear
+# term by e and by de, the Hessian and its Cholesky factor, 20 x 20, by rows.
+MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = 20, 30, 40, 40  # chosen
+PLAN, GRADIENT, STEP, BY_E, BY_DE, HESSIAN, FACTOR, SLOTS = 8, 28, 48, 68, 88, 108, 508, 908
+ENOUGH = 1e-13  # gradient of the free moves, of the largest linear term
+SUFFICIENT = 1e-4  # share of the decrease that the gradient promises, L. Armijo's
+
+
+@njit
+def sampled(a1, a2, b, H):
+    """Return the matrix A, by rows, and the vector B of e'' = a1 e + a2 de + b v over the time H, v constant."""
+    # the series of the exponential: T_k = (M H)^k / k!, A = sum of T_k, and the integral is H sum of T_k / (k + 1)
+    t11, t12, t21, t22 = 1.0, 0.0, 0.0, 1.0
+    A11, A12, A21, A22, B1, B2 = 1.0, 0.0, 0.0, 1.0, 0.0, b * H
+    for k in range(1, TERMS):
+        n11, n12 = t21 * H / k, t22 * H / k
+        t21, t22 = (a1 * t11 + a2 * t21) * H / k, (a1 * t12 + a2 * t22) * H / k
+        t11, t12 = n11, n12
+        A11, A12, A21, A22 = A11 + t11, A12 + t12, A21 + t21, A22 + t22
+        B1, B2 = B1 + b * H * t12 / (k + 1), B2 + b * H * t22 / (k + 1)
+    return A11, A12, A21, A22, B1, B2
+
+
+@njit
+def riccati(A11, A12, A21, A22, B1, B2, q1, q2):
+    """Return P11, P12, P22 of the discrete Riccati equation with the weights q1, q2 and 1, by doubling."""
+    g11, g12, g22, p11, p12, p22 = B1 * B1, B1 * B2, B2 * B2, q1, 0.0, q2
+    a11, a12, a21, a22 = A11, A12, A21, A22
+    for _ in range(TERMS):
+        # W = (1 + G P)^-1
+        m11, m12 = 1.0 + g11 * p11 + g12 * p12, g11 * p12 + g12 * p22
+        m21, m22 = g12 * p11 + g22 * p12, 1.0 + g12 * p12 + g22 * p22
+        det = m11 * m22 - m12 * m21
+        w11, w12, w21, w22 = m22 / det, -m12 / det, -m21 / det, m11 / det
+        # P grows by a' P W a, G by a W G a', and a becomes a W a
+        c11, c12, c21, c22 = w11 * a11 + w12 * a21, w11 * a12 + w12 * a22, w21 * a11 + w22 * a21, w21 * a12 + w22 * a22
+        r11, r12 = p11 * c11 + p12 * c21, p11 * c12 + p12 * c22
+        r21, r22 = p12 * c11 + p22 * c21, p12 * c12 + p22 * c22
+        h11, h12 = w11 * g11 + w12 * g12, w11 * g12 + w12 * g22
+        h21, h22 = w21 * g11 + w22 * g12, w21 * g12 + w22 * g22
+        s11, s12 = a11 * h11 + a12 * h21, a11 * h12 + a12 * h22
+        s21, s22 = a21 * h11 + a22 * h21, a21 * h12 + a22 * h22
+        more11, more12, more22 = a11 * r11 + a21 * r21, a11 * r12 + a21 * r22, a12 * r12 + a22 * r22
+        p11, p12, p22 = p11 + more11, p12 + more12, p22 + more22
+        g11, g12, g22 = g11 + s11 * a11 + s12 * a12, g12 + s11 * a21 + s12 * a22, g22 + s21 * a21 + s22 * a22
+        a11, a12, a21, a22 = a11 * c11 + a12 * c21, a11 * c12 + a12 * c22, a21 * c11 + a22 * c21, a21 * c12 + a22 * c22
+        if abs(more11) + abs(more22) <= 1e-16 * (p11 + p22):
+            break
+    return p11, p12, p22
+
+
+@njit
+def prepare(n, a1, a2, b, H, q1, q2, memory):
+    """Write the Hessian and the linear terms of the plan's cost, halved, into the memory. Return 1."""
+    A11, A12, A21, A22, B1, B2 = sampled(a1, a2, b, H)
+    s11, s12, s22 = riccati(A11, A12, A21, A22, B1, B2, q1, q2)
+    for k in range(n):
+        i = n - 1 - k
+        # B' S of the cost from move i + 1 on without control; then back through A, one move earlier each
+        v1, v2 = B1 * s11 + B2 * s12, B1 * s12 + B2 * s22
+        memory[HESSIAN + MOVES * i + i] = 1.0 + v1 * B1 + v2 * B2
+        for m in range(i):
+            j = i - 1 - m
+            v1, v2 = v1 * A11 + v2 * A21, v1 * A12 + v2 * A22
+            memory[HESSIAN + MOVES * i + j] = v1 * B1 + v2 * B2
+            memory[HESSIAN + MOVES * j + i] = v1 * B1 + v2 * B2
+        memory[BY_E + i], memory[BY_DE + i] = v1 * A11 + v2 * A21, v1 * A12 + v2 * A22
+        r11, r12, r21, r22 = s11 * A11 + s12 * A21, s11 * A12 + s12 * A22, s12 * A11 + s22 * A21, s12 * A12 + s22 * A22
+        s11, s12, s22 = q1 + A11 * r11 + A21 * r21, A11 * r12 + A21 * r22, q2 + A12 * r12 + A22 * r22
+    return 1.0
+
+
+@njit
+def residual(n, e, de, low, high, memory):
+    """Write the gradient of the plan into the memory. Return the largest of the free moves, over the linear term."""
+    largest, size = 0.0, 0.0
+    for i in range(n):
+        linear = memory[BY_E + i] * e + memory[BY_DE + i] * de
+        total = linear
+        for j in range(n):
+            total += memory[HESSIAN + MOVES * i + j] * memory[PLAN + j]
+        memory[GRADIENT + i] = total
+        size = max(size, abs(linear))
+        if not held(i, low, high, memory):
+            largest = max(largest, abs(total))
+    return largest / size if size > 0.0 else largest
+
+
+@njit
+def held(i, low, high, memory):
+    """Return whether a move is at a bound, and its gradient keeps it there."""
+    v, slope = memory[PLAN + i], memory[GRADIENT + i]
+    return (v <= low and slope > 0.0) or (v >= high and slope < 0.0)
+
+
+@njit
+def newton(n, low, high, memory):
+    """Write Newton's step of the free moves into the memory; those that are held stay. Return 1."""
+    for i in range(n):
+        free_i = not held(i, low, high, memory)
+        memory[STEP + i] = -memory[GRADIENT + i] if free_i else 0.0
+        for j in range(i + 1):
+            free = free_i and not held(j, low, high, memory)
+            total = memory[HESSIAN + MOVES * i + j] if free else (1.0 if i == j else 0.0)
+            for k in range(j):
+                total -= memory[FACTOR + MOVES * i + k] * memory[FACTOR + MOVES * j + k]
+            memory[FACTOR + MOVES * i + j] = math.sqrt(total) if i == j else total / memory[FACTOR + MOVES * j + j]
+    for i in range(n):
+        for j in range(i):
+            memory[STEP + i] -= memory[FACTOR + MOVES * i + j] * memory[STEP + j]
+        memory[STEP + i] /= memory[FACTOR + MOVES * i + i]
+    for k in range(n):
+        i = n - 1 - k
+        for m in range(k):
+            j = n - 1 - m
+            memory[STEP + i] -= memory[FACTOR + MOVES * j + i] * memory[STEP + j]
+        memory[STEP + i] /= memory[FACTOR + MOVES * i + i]
+    return 1.0
+
+
+@njit
+def change(share, low, high, memory, i):
+    """Return how a share of the step changes a move that is clipped to its bounds."""
+    v = memory[PLAN + i]
+    return min(max(v + share * memory[STEP + i], low), high) - v
+
+
+@njit
+def advance(n, low, high, memory):
+    """Move the plan by the largest share of the step, halved, that lowers the cost enough. Return it, 0 if none does."""
+    share = 1.0
+    for _ in range(MOST_HALVINGS):
+        promised, curved = 0.0, 0.0
+        for i in range(n):
+            moved = change(share, low, high, memory, i)
+            promised += memory[GRADIENT + i] * moved
+            for j in range(n):
+                curved += moved * memory[HESSIAN + MOVES * i + j] * change(share, low, high, memory, j)
+        if promised + curved / 2.0 <= SUFFICIENT * promised:
+            for i in range(n):
+                memory[PLAN + i] += change(share, low, high, memory, i)
+            return share
+        share /= 2.0
+    return 0.0
+
+
+@law_function(
+    family="predictive",
+    continuous=True,
+    accuracy={"s": 0, "e": 0},
+    label="MPC",
+    short="MP",
+    gains={
+        "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
+        "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
+        "r": Gain(1.0, positive=True, held=True),  # only the ratios of the weights matter
+        "w": Gain(20.0, RATE, positive=True),
+        "N": Gain(20.0, positive=True, held=True),
+        "H": Gain(0.03, TIME, positive=True, held=True),
+        "a1": Gain(0.0, RATE2, held=True),
+        "a2": Gain(0.0, RATE, held=True),
+        "b": Gain(1.0, INPUT_GAIN, positive=True, held=True),
+    },
+    memory=SLOTS,
+    relative_degree=2,
+    conditions={"N is 1 to 20": lambda g: 1.0 <= g.N <= MOVES},
+)
+def mpc(y, gains, memory):
+    n = min(max(int(gains.N), 1), MOVES)
+    a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)
+    # with the model the law's own input is the acceleration g u + f - r''
+    g, f = (y.g, y.f - y.ddr) if y.model != 0.0 else (1.0, 0.0)
+    if memory[5] == 0.0:
+        memory[5] = prepare(n, a1, a2, b, gains.H, gains.q1 / gains.r, gains.q2 / gains.r, memory)
+    us = -observe(y, gains.w, memory) / b
+    reach = abs(g) * y.limit
+    low, high = f - reach - us, f + reach - us
+    for i in range(n):
+        memory[PLAN + i] = min(max(memory[PLAN + i], low), high)
+    for _ in range(MOST_STEPS):
+        left = residual(n, y.e, y.de, low, high, memory)
+        if left <= ENOUGH:
+            break
+        solved = newton(n, low, high, memory)
+        if solved * advance(n, low, high, memory) == 0.0:
+            break
+    v = memory[PLAN] + us
+    memory[4] = a1 * y.e + a2 * y.de + b * min(max(v, f - reach), f + reach)
+    return command(y, v), gains.q1 * y.e * y.e + gains.q2 * y.de * y.de
