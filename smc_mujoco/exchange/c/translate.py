@@ -1110,8 +1110,8 @@ def names_in(nodes: Iterable[ast.AST]) -> set[str]:
 
 def changed(nodes: Iterable[ast.AST]) -> set[str]:
     """Return the names of variables and arrays that some code changes."""
-    inside = [n for node in nodes for n in ast.walk(node) if isinstance(getattr(n, "ctx", None), ast.Store)]
-    return names_in(n.value if isinstance(n, ast.Subscript) else n for n in inside)
+    inside = [n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name | ast.Subscript)]
+    return names_in(n.value if isinstance(n, ast.Subscript) else n for n in inside if isinstance(n.ctx, ast.Store))
 
 
 def returns(body: Sequence[ast.stmt]) -> bool:
