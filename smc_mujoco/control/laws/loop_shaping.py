@@ -1,4 +1,4 @@
-"""H-infinity loop shaping: u = k v + k wi w, w' = v, where v = F x^ stabilises the shaped plant with the largest margin.
+"""H-infinity loop shaping: u = k v + k wi w, w' = v, where v = F x^ keeps a guaranteed margin of the shaped plant.
 
 The shaped plant is k (s + wi) / s times the plant e'' = a1 e + a2 de + b u. Of all errors of its normalised coprime
 factors that are smaller than 1 / gamma none makes the loop unstable. The least gamma is known in closed form, gamma_min
@@ -96,7 +96,7 @@ def design(a1, a2, b, k, wi):
 
 @njit
 def start(y, a1, a2, b, k, wi, memory):
-    """Write F, Hs and the observer's matrices over one period into the memory, and the state at the reading. Return 1."""
+    """Write F, Hs, the observer's matrices over one period and x^ at the reading into the memory. Return 1."""
     # 0, started; 1, w; 2 to 4, x^; 5 to 7, F; 8 to 10, Hs; then exp(M h) and its integral, M = A + Hs C
     memory[5], memory[6], memory[7], memory[8], memory[9], memory[10], _ = design(a1, a2, b, k, wi)
     p0, p1, p2 = -memory[8], -a1 - memory[9], -a2 - memory[10]
@@ -115,7 +115,7 @@ def start(y, a1, a2, b, k, wi, memory):
 
 @njit
 def observe(v, e, n0, n1, memory):
-    """Bring x^ to the next sample under v and the reading e. Return the error that it predicts."""
+    """Bring x^ to the next sample under v and the reading e. Return its last state, the error that it predicts."""
     q1, q2, q3 = n0 * v - memory[8] * e, n1 * v - memory[9] * e, -memory[10] * e
     x1, x2, x3 = memory[2], memory[3], memory[4]
     for i in range(3):
@@ -150,7 +150,6 @@ def loop_shaping(y, gains, memory):
     u = command(y, k * v + k * wi * memory[1])
     lost = input_gain(y) * (min(max(u, -y.limit), y.limit) - u)
     acted = v + lost / k
-    s = v / memory[7]
-    predicted = observe(acted, y.e, b * k * wi, b * k, memory)
+    memory[4] = observe(acted, y.e, b * k * wi, b * k, memory)
     memory[1] += y.dt * acted
-    return u, s + 0.0 * predicted
+    return u, v / memory[7]

@@ -3,20 +3,20 @@
     minimise  sum of (q1 e^2 + q2 de^2 + r v^2) over the moves, + x' P x at the end,  with  |v + us| <= u_max
 
 on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of the observer of `adrc`, which knows a1 e +
-a2 de, and us = -d / b, so a constant disturbance leaves no error. P is the solution of the discrete Riccati equation, so
-that without bounds the law is the linear quadratic regulator with d taken away. It differs from that regulator, clipped,
-only where a later move is at the bound: real gains need bounds on states or rates, or a reference known ahead. The plan
-is solved at every control sample, by projected Newton steps from the last plan, until the gradient of the moves that
-are free is 1e-13 of the linear term; every plan keeps the bounds. H must be long against the control period, and N H
-as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates e'' = v, so
-a1, a2, b are 0, 0, 1. The trace's s is q1 e^2 + q2 de^2, the cost of the state.
-Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N, number of moves, at most 20; H,
-time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], of the plant.
+a2 de, and us = -d / b, so a constant disturbance leaves no error. P is the solution of the discrete Riccati equation,
+so that without bounds the law is the linear quadratic regulator with d taken away. It differs from that regulator,
+clipped, only where a later move is at the bound: real gains need bounds on states or rates, or a reference known ahead.
+The plan is solved at every control sample, by projected Newton steps from the last plan, until the gradient of the
+moves that are free is 1e-13 of the linear term; every plan keeps the bounds. H must be long against the control period,
+and N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates
+e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is q1 e^2 + q2 de^2, the cost of the state.
+Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N,
+number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], of the plant.
 Sources: D. P. Bertsekas, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
 Optim. 20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin & C.-S. Wang, "Structure-preserving algorithms
-for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004 (doubling, for P); U. Maeder, F.
-Borrelli & M. Morari, "Linear offset-free model predictive control", Automatica 45(10):2214, 2009; J. A. De Dona, G. C.
-Goodwin & M. M. Seron, "Anti-windup and model predictive control: reflections and connections", Eur. J. Control
+for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004 (doubling, for P); U. Maeder,
+F. Borrelli & M. Morari, "Linear offset-free model predictive control", Automatica 45(10):2214, 2009; J. A. De Dona, G.
+C. Goodwin & M. M. Seron, "Anti-windup and model predictive control: reflections and connections", Eur. J. Control
 6(5):467, 2000 (where it is the clipped regulator).
 """
 
@@ -125,7 +125,7 @@ def held(i, low, high, memory):
 
 @njit
 def newton(n, low, high, memory):
-    """Write Newton's step of the free moves into the memory; those that are held stay. Return 1."""
+    """Write Newton's step of the free moves into the memory; those that are held stay. Return the whole share, 1."""
     for i in range(n):
         free_i = not held(i, low, high, memory)
         memory[STEP + i] = -memory[GRADIENT + i] if free_i else 0.0
@@ -157,8 +157,8 @@ def change(share, low, high, memory, i):
 
 @njit
 def advance(n, low, high, memory):
-    """Move the plan by the largest share of the step, halved, that lowers the cost enough. Return it, 0 if none does."""
-    share = 1.0
+    """Move the plan by a share of Newton's step that lowers the cost enough. Return it: 1, halved, or 0 if none does."""
+    share = newton(n, low, high, memory)
     for _ in range(MOST_HALVINGS):
         promised, curved = 0.0, 0.0
         for i in range(n):
@@ -211,8 +211,7 @@ def mpc(y, gains, memory):
         left = residual(n, y.e, y.de, low, high, memory)
         if left <= ENOUGH:
             break
-        solved = newton(n, low, high, memory)
-        if solved * advance(n, low, high, memory) == 0.0:
+        if advance(n, low, high, memory) == 0.0:
             break
     v = memory[PLAN] + us
     memory[4] = a1 * y.e + a2 * y.de + b * min(max(v, f - reach), f + reach)
