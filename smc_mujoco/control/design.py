@@ -1,5 +1,7 @@
 """Gains from a plant's nominal f and g, by textbook formulas."""
 
+import dataclasses
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,6 +33,20 @@ def linearised(plant: Plant) -> tuple[float, float, float]:
         slopes = (f[0] - f[1]) / (2.0 * DIFFERENCE_STEP), (f[2] - f[3]) / (2.0 * DIFFERENCE_STEP)
         rows.append((*slopes, plant.nominal(rest, rest, i, p)[1]))
     return max(rows)
+
+
+def at_plant(law: Law, plant: Plant) -> Law:
+    """Return a law whose gains that are the plant's, and were not given, have the values of `linearised`."""
+    if law.each:
+        return dataclasses.replace(law, each=tuple(at_plant(one, plant) for one in law.each))
+    known = law.template.gains if law.template else {}
+    missing = {name: known[name].plant for name, value in law.gains.items()
+               if name in known and known[name].plant and value == math.inf}  # fmt: skip
+    if not missing:
+        return law
+    values = dict(zip(("a1", "a2", "b"), linearised(plant), strict=True))
+    gains = dict(law.gains) | {name: values[of_plant] for name, of_plant in missing.items()}
+    return dataclasses.replace(law, gains=gains).sourced(law.source.kind, law.source.search)
 
 
 def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:

@@ -84,6 +84,17 @@ def input_gain(y):
 
 
 @njit
+def linear_plant(y, gains):
+    """Return a1, a2, b of the plant e'' = a1 e + a2 de + b u that a law of the linear theory takes.
+
+    They are the gains of these names; 0, 0, 1 with the model, which cancels f and g, and where no plant gave them.
+    """
+    if y.model != 0.0 or math.isinf(gains.b):
+        return 0.0, 0.0, 1.0
+    return gains.a1, gains.a2, gains.b
+
+
+@njit
 def sgn(a):
     """Return the sign of a, with sgn(0) = 0."""
     return math.copysign(1.0, a) if a != 0.0 else 0.0

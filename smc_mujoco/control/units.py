@@ -62,6 +62,8 @@ class Gain:
     nonnegative: bool = False  # whether it must be at least 0
     held: bool = False  # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
     over: str | None = None  # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
+    # "a1", "a2" or "b" of x'' = a1 x + a2 x' + b u near the plant's origin, which a scenario puts in place of inf
+    plant: str = ""
     shared: bool = False  # whether it is one number for all joints in a law of many joints, instead of a vector
 
     @property

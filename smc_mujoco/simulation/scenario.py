@@ -22,6 +22,7 @@ from smc_mujoco.common import html
 from smc_mujoco.common.constraints import MAX_SEED, Number, OneOf, Seed, of_fields
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
+from smc_mujoco.control import design
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, fits
@@ -417,7 +418,7 @@ class Resolved(Scenario):
 
 
 def _defaults(s: Scenario) -> dict[str, Any]:
-    """Return the defaults of the fields that are None."""
+    """Return the defaults of the fields that are None, and the law with what it takes from the plant."""
     in_order = s.contact.kind == "bobs"  # pendulums in a row must not start beyond each other
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
@@ -429,7 +430,8 @@ def _defaults(s: Scenario) -> dict[str, Any]:
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
         "integrator": "RK4" if s.plain_equation or s.exact_friction else "implicitfast",
     }
-    return {name: value for name, value in defaults.items() if getattr(s, name) is None}
+    missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
+    return missing | {"law": design.at_plant(s.law, s.plant)}
 
 
 def longest_step(s: Scenario) -> float:

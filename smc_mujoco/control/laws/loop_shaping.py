@@ -12,7 +12,8 @@ observer and w, and x^ starts at the reading: without both, the same controller 
 disturbance leaves no error. It is a linear law with a guarantee, and loses where signals are large. The observer is
 discretised exactly for v and e constant over the period. With the nominal model f and g are cancelled and the law
 regulates e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the v asked for, over F's factor of e.
-Gains: k, of the shaped loop [N/m]; wi, of the integral [1/s]; a1 [1/s^2], a2 [1/s] and b [1/kg], of the plant.
+Gains: k, of the shaped loop [N/m]; wi, of the integral [1/s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of
+the plant at its origin.
 Sources: D. McFarlane & K. Glover, "A loop shaping design procedure using H-infinity synthesis", IEEE Trans. Automat.
 Contr. 37(6):759, 1992; K. Glover & D. McFarlane, "Robust stabilization of normalized coprime factor plant descriptions
 with H-infinity-bounded uncertainty", IEEE Trans. Automat. Contr. 34(8):821, 1989.
@@ -22,7 +23,7 @@ import math
 
 from numba import njit
 
-from smc_mujoco.control.law import command, input_gain, law_function
+from smc_mujoco.control.law import command, input_gain, law_function, linear_plant
 from smc_mujoco.control.laws.lqi import monic
 from smc_mujoco.control.units import FORCE_PER_POSITION, INPUT_GAIN, RATE, RATE2, Gain
 
@@ -134,15 +135,15 @@ def observe(v, e, n0, n1, memory):
     gains={
         "k": Gain(20.0, FORCE_PER_POSITION, positive=True),
         "wi": Gain(0.5, RATE, positive=True),
-        "a1": Gain(0.0, RATE2, held=True),
-        "a2": Gain(0.0, RATE, held=True),
-        "b": Gain(1.0, INPUT_GAIN, positive=True, held=True),
+        "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
+        "a2": Gain(math.inf, RATE, held=True, plant="a2"),
+        "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
     },
     memory=SLOTS,
     relative_degree=2,
 )
 def loop_shaping(y, gains, memory):
-    a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)
+    a1, a2, b = linear_plant(y, gains)
     k, wi = gains.k, gains.wi
     if memory[0] == 0.0:
         memory[0] = start(y, a1, a2, b, k, wi, memory)

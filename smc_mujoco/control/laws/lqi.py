@@ -6,12 +6,12 @@ s^2 + beta s + gamma has
     gamma = b sqrt(q0), alpha^2 = 2 beta + a2^2 + 2 a1 + b^2 q2, beta^2 = 2 gamma alpha + a1^2 + b^2 q1
 
 (spectral factorisation, worked out here), with ki = gamma / b, k1 = (beta + a1) / b and k2 = (alpha + a2) / b. A
-constant disturbance leaves no error, and q0 = 0 gives the gains of `lqr`. Back-calculation prevents wind-up: while u is beyond
-the bound, w tends with the time constant tt to the value that brings u back to it. As a PID controller it overshoots
-after saturation. With the nominal model f and g are cancelled and the law regulates e'' = v, so a1, a2, b are 0, 0, 1.
-The trace's s is k1 e + k2 de.
+constant disturbance leaves no error, and q0 = 0 gives the gains of `lqr`. Back-calculation prevents wind-up: while u is
+beyond the bound, w tends with the time constant tt to the value that brings u back to it. As a PID controller it
+overshoots after saturation. With the nominal model f and g are cancelled and the law regulates e'' = v, so a1, a2, b
+are 0, 0, 1. The trace's s is k1 e + k2 de.
 Gains: q0 [N^2/(m^2 s^2)], q1 [N^2/m^2] and q2 [N^2 s^2/m^2], weights of the integral, the error and the rate; tt, of
-the anti-windup [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], of the plant.
+the anti-windup [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the plant at its origin.
 Source: P. C. Young & J. C. Willems, "An approach to the linear multivariable servomechanism problem", Int. J. Control
 15(5):961, 1972.
 """
@@ -20,7 +20,7 @@ import math
 
 from numba import njit
 
-from smc_mujoco.control.law import command, input_gain, law_function
+from smc_mujoco.control.law import command, input_gain, law_function, linear_plant
 from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 
 MOST_ROUNDS = 1000  # of a fixed point that gains about a digit in a round, and fewer where the plant is hardly damped
@@ -58,9 +58,9 @@ def feedback(a1, a2, b, q0, q1, q2):
         "q1": Gain(100.0, Unit(force=2, position=-2), positive=True),
         "q2": Gain(16.0, Unit(force=2, position=-2, time=2), nonnegative=True),
         "tt": Gain(0.5, TIME, positive=True),
-        "a1": Gain(0.0, RATE2, held=True),
-        "a2": Gain(0.0, RATE, held=True),
-        "b": Gain(1.0, INPUT_GAIN, positive=True, held=True),
+        "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
+        "a2": Gain(math.inf, RATE, held=True, plant="a2"),
+        "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
     },
     memory=5,
     relative_degree=2,
@@ -68,7 +68,7 @@ def feedback(a1, a2, b, q0, q1, q2):
 def lqi(y, gains, memory):
     # memory: started, w times ki, k1, k2, ki
     if memory[0] == 0.0:
-        a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)
+        a1, a2, b = linear_plant(y, gains)
         memory[0] = 1.0
         memory[2], memory[3], memory[4] = feedback(a1, a2, b, gains.q0, gains.q1, gains.q2)
     s = memory[2] * y.e + memory[3] * y.de

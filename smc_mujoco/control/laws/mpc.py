@@ -11,7 +11,8 @@ moves that are free is 1e-13 of the linear term; every plan keeps the bounds. H 
 and N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates
 e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is q1 e^2 + q2 de^2, the cost of the state.
 Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N,
-number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], of the plant.
+number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the plant at
+its origin.
 Sources: D. P. Bertsekas, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
 Optim. 20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin & C.-S. Wang, "Structure-preserving algorithms
 for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004 (doubling, for P); U. Maeder,
@@ -24,7 +25,7 @@ import math
 
 from numba import njit
 
-from smc_mujoco.control.law import command, law_function
+from smc_mujoco.control.law import command, law_function, linear_plant
 from smc_mujoco.control.laws.extended_state import observe
 from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 
@@ -157,7 +158,7 @@ def change(share, low, high, memory, i):
 
 @njit
 def advance(n, low, high, memory):
-    """Move the plan by a share of Newton's step that lowers the cost enough. Return it: 1, halved, or 0 if none does."""
+    """Move the plan by a share of Newton's step that lowers the cost enough, 1 or less. Return it; 0 for none."""
     share = newton(n, low, high, memory)
     for _ in range(MOST_HALVINGS):
         promised, curved = 0.0, 0.0
@@ -187,9 +188,9 @@ def advance(n, low, high, memory):
         "w": Gain(20.0, RATE, positive=True),
         "N": Gain(20.0, positive=True, held=True),
         "H": Gain(0.03, TIME, positive=True, held=True),
-        "a1": Gain(0.0, RATE2, held=True),
-        "a2": Gain(0.0, RATE, held=True),
-        "b": Gain(1.0, INPUT_GAIN, positive=True, held=True),
+        "a1": Gain(math.inf, RATE2, held=True, plant="a1"),
+        "a2": Gain(math.inf, RATE, held=True, plant="a2"),
+        "b": Gain(math.inf, INPUT_GAIN, positive=True, held=True, plant="b"),
     },
     memory=SLOTS,
     relative_degree=2,
@@ -197,7 +198,7 @@ def advance(n, low, high, memory):
 )
 def mpc(y, gains, memory):
     n = min(max(int(gains.N), 1), MOVES)
-    a1, a2, b = (0.0, 0.0, 1.0) if y.model != 0.0 else (gains.a1, gains.a2, gains.b)
+    a1, a2, b = linear_plant(y, gains)
     # with the model the law's own input is the acceleration g u + f - r''
     g, f = (y.g, y.f - y.ddr) if y.model != 0.0 else (1.0, 0.0)
     if memory[5] == 0.0:

@@ -1,0 +1,247 @@
+"""Laws without a sliding mode that want to win are what their textbooks say, with foreign solvers as judges."""
+
+import json
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from helpers.plants_ab import constant, plant_b
+from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
+
+import smc_mujoco as smc
+from smc_mujoco.control import design
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.laws import loop_shaping, lqi, mpc
+from smc_mujoco.simulation import reference as plain
+
+pytestmark = pytest.mark.quick
+
+VECTORS = Path(__file__).parents[2].parent / "shared" / "rivals.json"  # of foreign implementations
+RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
+UNIT = {"a1": 0.0, "a2": 0.0, "b": 1.0}  # the plant e'' = u
+PLANTS = ((0.0, 0.0, 1.0), (18.0, 0.7, 0.9), (-23.6, -0.16, 8.0), (5.0, -1.0, 0.4))  # a1, a2, b
+
+
+@pytest.fixture(scope="module")
+def vectors():
+    if not VECTORS.exists():
+        pytest.skip("the test vectors are not here")
+    return json.loads(VECTORS.read_text())
+
+
+def measured(**fields):
+    zero = dict.fromkeys(("t", "x", "v", "r", "dr", "ddr", "f"), 0.0)
+    return Measurement(**(zero | {"dt": 1e-3, "g": 1.0} | fields))
+
+
+def call(law, memory, **fields):
+    """The law's u, clipped to its limit."""
+    y = measured(**fields)
+    u, _ = law.function(y, plain.gains_of(law), memory)
+    return min(max(u, -y.limit), y.limit)
+
+
+def answer(law, memory, omega, h, samples=80_000):
+    """The complex factor from e = cos(omega t) to the law's u, once it has settled."""
+    t, gains = h * np.arange(samples), plain.gains_of(law)
+    u = np.array([law.function(measured(e=math.cos(omega * one), de=0.0, dt=h), gains, memory)[0] for one in t])
+    last = t > t[-1] - 4.0 * math.pi / omega
+    basis = np.stack([np.cos(omega * t[last]), -np.sin(omega * t[last]), np.ones(last.sum())], axis=1)
+    real, imaginary, _ = np.linalg.lstsq(basis, u[last], rcond=None)[0]
+    return complex(real, imaginary)
+
+
+def bounded(name):
+    """The law with b = 1, and on e'' = u where it knows a plant."""
+    gains = {} if name in ("adrc", "pd_observer") else UNIT
+    return smc.law(name, **({"b": 1.0} | gains))
+
+
+# what holds of all
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_a_constant_disturbance_leaves_no_error(name):
+    run = plant_b(bounded(name), constant(2.0), duration=40.0)
+    assert abs(run.x[-1, 0]) < 1e-5
+    assert run.u[-1] == pytest.approx(-2.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_what_the_bound_takes_away_does_not_wind_up(name):
+    """A start far away holds u at its bound for long. The loop swings back by less each time, and comes to rest."""
+    trace = smc.run(smc.Scenario(plant=smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0), law=bounded(name),
+                                 x0=5.0, u_max=1.0, duration=40.0))  # fmt: skip
+    assert (np.abs(trace.u) == 1.0).sum() > 1000
+    assert trace.x.min() > -4.0
+    assert np.abs(trace.x[-100:]).max() < 0.02
+
+
+@pytest.mark.parametrize("name", ["lqi", "mpc", "loop_shaping"])
+def test_a_scenario_gives_the_law_the_plant_that_it_runs_on(name):
+    given = smc.Scenario(plant="inverted_pendulum", law=name).resolved.law.gains
+    assert tuple(given[key] for key in UNIT) == design.linearised(smc.plant("inverted_pendulum"))
+    own = smc.Scenario(plant="inverted_pendulum", law=smc.law(name, **UNIT)).resolved.law.gains
+    assert {key: own[key] for key in UNIT} == UNIT
+
+
+# ADRC
+
+
+def test_adrc_gives_the_control_of_a_foreign_implementation(vectors):
+    for case in vectors["adrc"]:
+        law, memory = smc.law("adrc", wc=case["wc"], w=case["w"], b=case["b"]), np.zeros(5)
+        for k, (e, u) in enumerate(zip(case["e"], case["u"], strict=True)):
+            got = call(law, memory, e=e, de=case["de0"] if k == 0 else 0.0, dt=case["dt"], limit=case["limit"])
+            assert abs(got - u) <= 1e-12 * case["limit"]
+        np.testing.assert_allclose(memory[1:4], case["z_end"], rtol=1e-12, atol=1e-12)
+
+
+def test_adrc_is_a_pid_controller_with_a_filter_of_second_order():
+    """Its answer to e = cos(omega t), at a short period, is that of the transfer function in its docstring."""
+    wc, w, b, omega, h = 3.0, 8.0, 0.7, 5.0, 1e-4
+    law, memory = smc.law("adrc", wc=wc, w=w, b=b), np.zeros(5)
+    got, p = answer(law, memory, omega, h), 1j * omega
+    top = wc**2 * w**3 + (3 * wc**2 * w**2 + 2 * wc * w**3) * p + (3 * w * wc**2 + 6 * wc * w**2 + w**3) * p**2
+    exact = -top / (b * p * (p**2 + (3 * w + 2 * wc) * p + 3 * w**2 + 6 * w * wc + wc**2))
+    assert got == pytest.approx(exact, rel=5e-3)
+
+
+# PD with an observer
+
+
+def test_pd_observer_is_incremental_dynamic_inversion():
+    """u = F(u) + (v - F(e'')) / b, one filter F of first order on both."""
+    wc, l, b, h = 4.0, 30.0, 0.6, 1e-3
+    law, memory = smc.law("pd_observer", wc=wc, l=l, b=b), np.zeros(4)
+    share, rng = 1.0 - math.exp(-l * h), np.random.default_rng(0)
+    of_u = of_a = last = u = 0.0
+    for k in range(300):
+        e, de = rng.normal(size=2)
+        if k:
+            of_u, of_a = of_u + share * (u - of_u), of_a + share * ((de - last) / h - of_a)
+        v = -(wc**2) * e - 2.0 * wc * de
+        u = min(max(of_u + (v - of_a) / b, -5.0), 5.0)
+        assert call(law, memory, e=e, de=de, limit=5.0) == pytest.approx(u, abs=1e-9)
+        last = de
+
+
+# LQR with an integral
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("q", [(1.0, 10.0, 2.0), (300.0, 5.0, 0.0), (1e-3, 100.0, 16.0)])
+def test_lqi_solves_its_riccati_equation(plant, q):
+    a1, a2, b = plant
+    A, B = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]]), np.array([[0.0], [0.0], [b]])
+    ki, k1, k2 = (B.T @ solve_continuous_are(A, B, np.diag(q), np.eye(1)))[0]
+    np.testing.assert_allclose(lqi.feedback(a1, a2, b, *q), (k1, k2, ki), rtol=1e-7)
+
+
+def test_lqi_gives_foreign_gains(vectors):
+    for case in vectors["lq"]:
+        weights = [case[name] / case["r"] for name in ("q0", "q1", "q2")]
+        k1, k2, ki = lqi.feedback(case["a1"], case["a2"], case["b"], *weights)
+        np.testing.assert_allclose((ki, k1, k2), case["lqi"], rtol=1e-9)
+        np.testing.assert_allclose(lqi.feedback(case["a1"], case["a2"], case["b"], 0.0, *weights[1:])[:2], case["lqr"],
+                                   rtol=1e-9)  # fmt: skip
+
+
+# model-predictive control
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+def test_the_end_s_weight_of_mpc_solves_the_discrete_riccati_equation(plant):
+    a1, a2, b = plant
+    whole = expm(0.03 * np.array([[0.0, 1.0, 0.0], [a1, a2, b], [0.0, 0.0, 0.0]]))
+    A11, A12, A21, A22, B1, B2 = mpc.sampled(a1, a2, b, 0.03)
+    np.testing.assert_allclose([[A11, A12, B1], [A21, A22, B2]], whole[:2], rtol=1e-12, atol=1e-15)
+    P = solve_discrete_are(whole[:2, :2], whole[:2, 2:], np.diag([100.0, 16.0]), np.eye(1))
+    got = mpc.riccati(A11, A12, A21, A22, B1, B2, 100.0, 16.0)
+    np.testing.assert_allclose(got, (P[0, 0], P[0, 1], P[1, 1]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("seed", range(3))
+def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, seed):
+    """From the last plan or from none: the problem has one solution."""
+    rng, n = np.random.default_rng(seed), mpc.MOVES
+    law, memory = smc.law("mpc", **dict(zip(("a1", "a2", "b"), plant, strict=True))), np.zeros(mpc.SLOTS)
+    for _ in range(20):
+        e, de, d, limit = *rng.normal(size=2), rng.normal(), 10.0 ** rng.uniform(-1, 1.5)
+        memory[:5] = 1.0, e, de, d, 0.0
+        u = call(law, memory, e=e, de=de, dt=1e-12, limit=limit)
+        us = -d / plant[2]
+        H = memory[mpc.HESSIAN : mpc.FACTOR].reshape(n, n)
+        g = memory[mpc.BY_E : mpc.BY_E + n] * e + memory[mpc.BY_DE : mpc.BY_DE + n] * de
+        v, factor, index = np.zeros(n), np.zeros((n, n + 7)), np.zeros(n, np.int32)
+        rank = mujoco.mju_boxQP(v, factor, index, np.ascontiguousarray(H), g, np.full(n, -limit - us),
+                                np.full(n, limit - us))  # fmt: skip
+        assert rank >= 0
+        assert abs(u - min(max(v[0] + us, -limit), limit)) <= 1e-6 * max(limit, abs(u))
+
+
+def test_mpc_gives_the_control_of_a_foreign_solver(vectors):
+    for case in vectors["mpc"]:
+        law = smc.law("mpc", **{name: case[name] for name in ("a1", "a2", "b", "H", "N", "q1", "q2", "r")})
+        memory = np.zeros(mpc.SLOTS)
+        memory[:4] = 1.0, case["e"], case["de"], case["d"]
+        u = call(law, memory, e=case["e"], de=case["de"], dt=1e-12, limit=case["limit"])
+        assert abs(u - case["u"]) <= 1e-9 * case["limit"]
+
+
+def test_mpc_keeps_to_bounds_that_the_nominal_model_moves():
+    """With f = 3 and g = 2 the law's own input, the acceleration, lies in 3 +- 2 u_max."""
+    law, memory = smc.law("mpc", **UNIT), np.zeros(mpc.SLOTS)
+    assert call(law, memory, e=50.0, de=0.0, f=3.0, g=2.0, model=1.0, limit=1.5) == -1.5
+    plan = memory[mpc.PLAN : mpc.PLAN + mpc.MOVES]
+    assert plan.min() >= 3.0 - 3.0 - 1e-12
+    assert plan.max() <= 3.0 + 3.0 + 1e-12
+
+
+# loop shaping
+
+
+def shaped(a1, a2, b, k, wi):
+    """The shaped plant in observable form."""
+    A = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, a1], [0.0, 1.0, a2]])
+    return A, np.array([[b * k * wi], [b * k], [0.0]]), np.array([[0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize(("k", "wi"), [(20.0, 0.5), (4.0, 2.0), (100.0, 5.0)])
+def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
+    A, B, C = shaped(*plant, k, wi)
+    X, Z = solve_continuous_are(A, B, C.T @ C, np.eye(1)), solve_continuous_are(A.T, C.T, B @ B.T, np.eye(1))
+    gamma = 1.1 * math.sqrt(1.0 + np.linalg.eigvals(Z @ X).real.max())
+    F = -np.linalg.solve((1.0 - gamma**-2) * np.eye(3) - gamma**-2 * X @ Z, np.eye(3)).T @ B
+    got = loop_shaping.design(*plant, k, wi)
+    assert got[6] == pytest.approx(gamma, rel=1e-6)
+    np.testing.assert_allclose(got[:3], (F.T @ X)[0], rtol=1e-5)
+    np.testing.assert_allclose(got[3:6], (-Z @ C.T)[:, 0], rtol=1e-6)
+
+
+def test_loop_shaping_has_the_frequency_response_of_a_foreign_design(vectors):
+    for case in vectors["loop_shaping"]:
+        A, B, C = shaped(*case["plant"], case["k"], case["wi"])
+        *FH, gamma = loop_shaping.design(*case["plant"], case["k"], case["wi"])
+        assert gamma == pytest.approx(case["gamma"], rel=1e-6)
+        F, Hs = np.array([FH[:3]]), np.array([FH[3:]]).T
+        for omega, Ks in zip(case["frequency"], case["Ks"], strict=True):
+            got = (F @ np.linalg.solve(1j * omega * np.eye(3) - A - B @ F - Hs @ C, -Hs)).item()
+            assert got == pytest.approx(complex(*Ks), rel=1e-8)
+
+
+def test_loop_shaping_s_law_answers_as_its_controller():
+    """Sampled shortly and unsaturated, u over e is k (1 + wi / p) times the design's controller."""
+    h, omega = 1e-4, 6.0
+    k, wi, plant = 20.0, 0.5, (1.0, -0.2, 1.0)
+    law = smc.law("loop_shaping", k=k, wi=wi, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
+    got = answer(law, np.zeros(loop_shaping.SLOTS), omega, h)
+    A, B, C = shaped(*plant, k, wi)
+    FH = loop_shaping.design(*plant, k, wi)
+    F, Hs, p = np.array([FH[:3]]), np.array([FH[3:6]]).T, 1j * omega
+    Ks = (F @ np.linalg.solve(p * np.eye(3) - A - B @ F - Hs @ C, -Hs)).item()
+    assert got == pytest.approx(k * (1.0 + wi / p) * Ks, rel=5e-3)
