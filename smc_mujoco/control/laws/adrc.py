@@ -35,7 +35,7 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
     short="AD",
     gains={
         "wc": Gain(5.0, RATE, positive=True),
-        "w": Gain(20.0, RATE, positive=True),
+        "w": Gain(40.0, RATE, positive=True),
         "b": Gain(3.0, INPUT_GAIN, positive=True),
     },
     memory=5,

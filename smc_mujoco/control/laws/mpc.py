@@ -9,7 +9,7 @@ clipped, only where a later move is at the bound: real gains need bounds on stat
 The plan is solved at every control sample, by projected Newton steps from the last plan, until the gradient of the
 moves that are free is 1e-13 of the linear term; every plan keeps the bounds. H must be long against the control period,
 and N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates
-e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is q1 e^2 + q2 de^2, the cost of the state.
+e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the first move.
 Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N,
 number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the plant at
 its origin.
@@ -216,4 +216,4 @@ def mpc(y, gains, memory):
             break
     v = memory[PLAN] + us
     memory[4] = a1 * y.e + a2 * y.de + b * min(max(v, f - reach), f + reach)
-    return command(y, v), gains.q1 * y.e * y.e + gains.q2 * y.de * y.de
+    return command(y, v), memory[BY_E] * y.e + memory[BY_DE] * y.de
