@@ -14,7 +14,7 @@ import smc_mujoco as smc
 from smc_mujoco.control import design
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.laws import loop_shaping, lqi, mpc
-from smc_mujoco.simulation import reference as plain
+from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
 
@@ -39,13 +39,13 @@ def measured(**fields):
 def call(law, memory, **fields):
     """The law's u, clipped to its limit."""
     y = measured(**fields)
-    u, _ = law.function(y, plain.gains_of(law), memory)
+    u, _ = law.function(y, python_controller.gains_of(law), memory)
     return min(max(u, -y.limit), y.limit)
 
 
 def answer(law, memory, omega, h, samples=80_000):
     """The complex factor from e = cos(omega t) to the law's u, once it has settled."""
-    t, gains = h * np.arange(samples), plain.gains_of(law)
+    t, gains = h * np.arange(samples), python_controller.gains_of(law)
     u = np.array([law.function(measured(e=math.cos(omega * one), de=0.0, dt=h), gains, memory)[0] for one in t])
     last = t > t[-1] - 4.0 * math.pi / omega
     basis = np.stack([np.cos(omega * t[last]), -np.sin(omega * t[last]), np.ones(last.sum())], axis=1)
