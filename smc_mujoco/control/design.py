@@ -44,8 +44,8 @@ def at_plant(law: Law, plant: Plant) -> Law:
                if name in known and known[name].plant and value == math.inf}  # fmt: skip
     if not missing:
         return law
-    values = dict(zip(("a1", "a2", "b"), linearised(plant), strict=True))
-    gains = dict(law.gains) | {name: values[of_plant] for name, of_plant in missing.items()}
+    values, order = linearised(plant), ("a1", "a2", "b")
+    gains = dict(law.gains) | {name: values[order.index(of_plant)] for name, of_plant in missing.items()}
     return dataclasses.replace(law, gains=gains).sourced(law.source.kind, law.source.search)
 
 
