@@ -30,7 +30,7 @@ SHELVES = {  # module of public names -> title of its page
 OTHERS = {  # title -> names of modules that are no public names
     "Types that are returned": """
     studies.compare.Compared
-    studies.outcome.Outcome
+    studies.scene.Outcome
     draw.film.film.Frames
     evidence.certificates.certificate.Certificate
     evidence.rigs.rig.Rig

@@ -19,7 +19,7 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.studies import executors, pickling, run_key
+from smc_mujoco.studies import executors, run_key
 from smc_mujoco.studies.study import study
 
 ROOT = Path(__file__).parents[2]
@@ -209,7 +209,7 @@ def test_a_law_without_a_module_is_sent_by_value(monkeypatch):
     assert found == [executors.result_columns(smc.run(scenario))]
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
     with pytest.raises(smc.ScenarioError, match="put it into a module, or pip install cloudpickle"):
-        pickling.packed(scenario)
+        executors.packed(scenario)
 
 
 # a cluster
@@ -220,7 +220,7 @@ from pathlib import Path
 import smc_mujoco as smc
 from smc_mujoco.studies import executors
 from smc_mujoco.simulation.grid import grid
-from smc_mujoco.studies.store import Store
+from smc_mujoco.studies.study import Store
 from smc_mujoco.studies.study import study
 
 out, address, executors.MAX_WORK_PER_THREAD, executors.TIMEOUT = Path(sys.argv[1]), sys.argv[2], 400, float(sys.argv[3])

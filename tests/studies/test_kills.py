@@ -19,10 +19,10 @@ ROOT = Path(__file__).parents[2]
 LOADED = """
 import os, random, signal, sys, time
 from pathlib import Path
-from smc_mujoco.studies import executors, store
+from smc_mujoco.studies import executors
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.run_key import key
-from smc_mujoco.studies.study import study
+from smc_mujoco.studies.study import Store, study
 from smc_mujoco.simulation.callback import callback as compiled_callback, silence
 from smc_mujoco.simulation.prepare import prepare
 import pyarrow.parquet
@@ -42,7 +42,7 @@ def told(pipe):
     # what a life does, as it does it: "run", "write", "wrote <hashes>", "collect"
     def tell(*words):
         os.write(pipe, " ".join(words).encode() + b"\\n")
-    run, add, collect = executors.run_batch, store.Store.add, store.Store.collect
+    run, add, collect = executors.run_batch, Store.add, Store.collect
     def simulated(*rest):
         tell("run")
         return run(*rest)
@@ -53,7 +53,7 @@ def told(pipe):
     def collecting(self, *given):
         tell("collect")
         collect(self, *given)
-    executors.run_batch, store.Store.add, store.Store.collect = simulated, adding, collecting
+    executors.run_batch, Store.add, Store.collect = simulated, adding, collecting
 
 def live(folder, doomed):
     # one life of the study; doomed(line) says whether it dies there
@@ -104,13 +104,13 @@ FULL = """
 import resource
 from smc_mujoco.cli.main import main
 
-def filling(self, rows, add=store.Store.add, parts=[]):
+def filling(self, rows, add=Store.add, parts=[]):
     parts.append(rows)
     if len(parts) == 3:  # no file may be longer: what the kernel then says is what a full disk says
         resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
     add(self, rows)
 
-store.Store.add = filling
+Store.add = filling
 words = "compare duffing --law classical --condition noise --seeds 20 --gains study --duration 0.05 --out"
 main([*words.split(), str(out)])
 """

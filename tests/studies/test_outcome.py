@@ -10,9 +10,9 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.simulation.state import LOGGED
-from smc_mujoco.studies import outcome as words
 from smc_mujoco.studies import scene as scenes
-from smc_mujoco.studies.outcome import Outcome, summary
+from smc_mujoco.studies import scene as words
+from smc_mujoco.studies.scene import Outcome, summary
 
 pytestmark = pytest.mark.quick
 

@@ -23,9 +23,7 @@ from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies import (
     executors,
-    pickling,
     run_key,
-    store,
     study,
     worst_case,
 )
@@ -283,14 +281,14 @@ def test_an_accuracy_has_three_starts_at_five_periods_and_one_run_at_half_the_st
 
 
 def test_what_cannot_be_sent_is_refused_with_the_cure_for_each_side(monkeypatch, refused):
-    refused(lambda: pickling.packed(threading.Lock()), "plain functions")
+    refused(lambda: executors.packed(threading.Lock()), "plain functions")
     refused(lambda: executors.run_on_worker(b"cnot_there\nf\n.", []), "not_there", "install there")
     monkeypatch.setattr(run_key, "description", lambda one: {"versions": {"mujoco": "1", "numba": "2"}})
     monkeypatch.setattr(run_key, "key", lambda *_, **__: "other")
     monkeypatch.setattr(executors.platform, "python_version", lambda: "3")
     refused(lambda: executors.run_on_worker(pickle.dumps([RUN]), ["key"]), "classical", "Python 3, mujoco 1, numba 2")
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
-    refused(lambda: pickling.packed(threading.Lock()), "pip install cloudpickle")
+    refused(lambda: executors.packed(threading.Lock()), "pip install cloudpickle")
 
 
 def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):
@@ -298,20 +296,20 @@ def test_what_a_script_defines_is_sent_with_its_code(monkeypatch):
     names = {"__name__": "__main__"}
     exec("def doubled(x):\n    return 2.0 * x", names)
     monkeypatch.setattr(sys.modules["__main__"], "doubled", names["doubled"], raising=False)
-    sent = pickling.packed(names["doubled"])
+    sent = executors.packed(names["doubled"])
     monkeypatch.delattr(sys.modules["__main__"], "doubled")
     assert pickle.loads(sent)(3.0) == 6.0
-    assert pickling.packed(math.hypot) == pickle.dumps(math.hypot)
+    assert executors.packed(math.hypot) == pickle.dumps(math.hypot)
 
 
 def test_a_part_with_scores_by_other_code_counts_as_not_done(tmp_path, monkeypatch):
-    kept = store.Store(tmp_path)
+    kept = study.Store(tmp_path)
     kept.open(resume=True)
     kept.add([run_key.row(RUN)])
-    again = store.Store(tmp_path)
+    again = study.Store(tmp_path)
     again.open(resume=True)
     assert list(again.where) == [run_key.key(RUN)]
-    monkeypatch.setattr(store.fingerprint, "of", lambda thing: "other")
-    other = store.Store(tmp_path)
+    monkeypatch.setattr(study.fingerprint, "of", lambda thing: "other")
+    other = study.Store(tmp_path)
     other.open(resume=True)
     assert not other.where

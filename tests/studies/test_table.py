@@ -17,8 +17,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.text import number
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.run_key import condition, key
-from smc_mujoco.studies.store import Store
-from smc_mujoco.studies.study import study
+from smc_mujoco.studies.study import Store, study
 from smc_mujoco.studies.table import MAX_ROWS, Table, content
 
 
