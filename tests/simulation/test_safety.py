@@ -271,17 +271,6 @@ def test_every_gain_of_the_study_is_among_these():
     assert {gain for name in STUDIED for gain in catalogue()[name].defaults} <= TURNING
 
 
-def test_a_gain_that_must_have_a_sign_is_refused_without_it():
-    for name in smc.laws():
-        gains = catalogue()[name].gains
-        for gain in [gain for gain, one in gains.items() if one.positive or one.nonnegative]:
-            with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -1"):
-                smc.law(name, **{gain: -1.0})
-        for gain in [gain for gain, one in gains.items() if one.positive]:
-            with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is 0"):
-                smc.law(name, **{gain: 0.0})
-
-
 def test_a_negative_gain_that_would_turn_a_law_round_is_refused():
     for (name, gain), value in zip(SIGNED, itertools.cycle([-1.0, -1e-300, -1e9])):
         with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -"):

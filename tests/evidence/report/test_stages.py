@@ -86,9 +86,6 @@ def test_a_report_is_of_its_plan_and_its_changes(tmp_path, monkeypatch):
     assert (plan, folder, threads, bars.shown, records) == (FULL, tmp_path, None, True, Path("there"))
     make(tmp_path, plan=QUICK, quick=False)
     assert found[-1][0][0] is QUICK
-    for wrong, said in (({"seeds": 0}, "seeds is 0"), ({"seeds": 10_001}, "10000")):
-        with pytest.raises(smc.ScenarioError, match=said):
-            make(tmp_path, **wrong)
 
 
 def names(folder):
