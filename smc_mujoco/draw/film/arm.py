@@ -18,10 +18,10 @@ from smc_mujoco.simulation.trace import Trace
 PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
 WANTED_OPACITY = 0.5  # of the wanted path
 OUTSIDE = 100  # px beyond the picture up to which a path is followed
-BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 13, 5, 42  # px, of a bar, between bars, and from one limit to the other
-BAR_LETTERS, NUMBER_SIZE = 10, 13  # px
+BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 15, 6, 32  # px, of a bar, between bars, and from one limit to the other
+BAR_LETTERS, NUMBER_SIZE = 18, 18  # px
 LABEL_GAP = 5  # px, from a label to its bars
-BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.6 * BAR_LETTERS  # px, of bars with their numbers
+BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.25 * BAR_LETTERS  # px, of bars with their numbers
 MAX_TIP_ERROR = 0.015  # m: only a tip farther off its path has a ghost at its reference; a nearer one hides it; chosen
 FORCE_ARROW = 0.6  # m, length of the arrow for the largest force
 BLOW_ARROW = 0.4  # m, length of the arrow of a blow
@@ -52,7 +52,7 @@ def key(traces: Sequence[Trace]) -> list[str]:
     if style.pushes(traces):
         words.append("violet arrow: the blow")
     if any(tip.tip_error(trace).max() > MAX_TIP_ERROR for trace in traces):
-        words.append("translucent machine: where the reference wants it")
+        words.append("translucent: reference")
     return words
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFilter
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
@@ -30,14 +30,18 @@ LAYER_DISTANCE = 2.6  # thicknesses between two arrows
 SLIDE_THICKNESS, MAX_RAIL_SHARE = 0.035, 0.008  # m, and largest share of the rail, of an arrow's thickness
 USER_LENGTH, USER_THICKNESS = 0.25, 0.012  # at slides of a user's model, of its extent
 USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its extent
-MAX_SWEEP = 1.3  # rad, of the longest bent arrow
-BENT_WIDTH, BENT_DISTANCE = 0.12, 0.3  # of a bent arrow, and to the next one, in radii
+BENT_SIZE = 0.1  # largest radius of a bent arrow, of the size of what moves
+MAX_BENT_SHARE = 0.08  # the same, of the picture's height
+RIM = 2.0  # px, of paper around an arrow that lies over a link, of a film of full size
+MIN_SHAFT = 8.0  # px, of a film of full size; of an arrow that is long enough
+MAX_SWEEP = 2.0  # rad, of the longest bent arrow
+BENT_WIDTH, BENT_DISTANCE = 0.2, 0.35  # of a bent arrow, and to the next one, in radii
 BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direction to the camera
 HEAD_WIDTH, HEAD_LENGTH = 2.25, 2.2  # of a flat arrow: half the head's width in shafts, its length in such halves
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
 NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
-MAX_THICKNESS = 0.2  # of the shaft of a short arrow, of its length
+MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
 COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
@@ -209,12 +213,15 @@ def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
     return np.concatenate([shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]])
 
 
-def paint(image: Image.Image, rim: np.ndarray, rgba: Sequence[float]) -> None:
-    """Fill an outline, (points, 2) px, with smooth edges."""
-    corner, far = np.floor(rim.min(axis=0)).astype(int), np.ceil(rim.max(axis=0)).astype(int) + 1
+def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int = 0) -> None:
+    """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
+    corner, far = np.floor(edge.min(axis=0)).astype(int) - rim, np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
     size = tuple((far - corner).tolist())
     mask = Image.new("L", tuple(SUPERSAMPLING * side for side in size))
-    ImageDraw.Draw(mask).polygon([tuple(SUPERSAMPLING * point) for point in rim - corner], round(255 * rgba[3]))
+    ImageDraw.Draw(mask).polygon([tuple(SUPERSAMPLING * point) for point in edge - corner], round(255 * rgba[3]))
+    if rim:
+        wide = mask.resize(size, Image.Resampling.BOX).filter(ImageFilter.MaxFilter(2 * rim + 1))
+        image.paste(style.rgb(style.PAPER), tuple(corner.tolist()), wide)
     colour = tuple(round(255 * part) for part in rgba[:3])
     image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
 

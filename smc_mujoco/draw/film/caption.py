@@ -18,9 +18,12 @@ from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-LABEL_SIZE, TITLE_SIZE, KEY_SIZE, BADGE_SIZE = 15, 24, 13, 13  # px, height of letters in a film of full size
+LABEL_SIZE, TITLE_SIZE, KEY_SIZE, BADGE_SIZE = 18, 24, 18, 18  # px, height of letters in a film of full size
 EDGE = 24  # px, from the picture's edge to text
 MAX_LABEL_SHARE = 0.3  # of the picture's width, for a label beside its machine
+KEY_TOP, KEY_PITCH = 46, 24  # px, of the key's first line, and from line to line
+KEY_TIME, FADE_TIME = 2.0, 0.4  # s of a film for which the key is shown, and in which it fades
+MIN_ROOM = 0.73  # of the picture's height, for machines: a longer key lies over them while it is shown; chosen
 STRIP_WIDTH, STRIP_COUNTS = 110, 6  # of an encoder's strip, px and counts
 
 
@@ -50,15 +53,17 @@ class Caption:
         inside = size[0] - 2 * EDGE * scale
         clock = style.width("00.000 s", TITLE_SIZE * scale, bold=True) + EDGE * scale
         clock += style.width("8× slower", KEY_SIZE * scale, bold=True) + 2 * KEY_SIZE * scale
+        self.clock = clock  # width of the clock and of the playback speed, px
         title = title or style.plant_name(traces[0].scenario.plant)
         self.title = style.cropped(title, inside - clock, TITLE_SIZE * scale, bold=True)
         notes = [f"{words} since {time:g} s" for time, words in self.jumps.items()]
         longest = max((style.width(note, KEY_SIZE * scale, bold=True) for note in notes), default=0.0)
         self.note_room = min(longest + EDGE * scale, 0.4 * inside)
-        gains = in_words({name: [t.scenario.law.source] for name, t in zip(names, traces, strict=True)}, short=True)
-        parts = [*(key(traces, scales) if parts is None else parts), *filter(None, [gains])]
-        self.key = wrapped(parts, inside - self.note_room, KEY_SIZE * scale)
-        self.beside = not row  # machines behind each other have their labels at the left
+        self.source = in_words(
+            {name: [t.scenario.law.source] for name, t in zip(names, traces, strict=True)}, short=True
+        )
+        self.key = wrapped(key(traces, scales) if parts is None else parts, inside - self.note_room, KEY_SIZE * scale)
+        self.beside, self.in_line = not row, False  # machines behind each other have their labels at the left
         words = [{state.words for state in of_machine if state} for of_machine in states] or [set()] * len(traces)
         letters, margin = BADGE_SIZE * scale, 1.2 * BADGE_SIZE * scale  # px, of a badge, which shows a machine's state
         badges = [max((style.width(text, letters, bold=True) + margin for text in its), default=0.0) for its in words]
@@ -66,27 +71,35 @@ class Caption:
         badges = [max(wide, STRIP_WIDTH * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
         height = 1.6 * BADGE_SIZE * scale * any(badges)
         self.badge = np.array([(width, height) for width in badges])  # px
-        top = (106 + 1.4 * KEY_SIZE * (len(self.key) - 1)) * scale
         if below is not None:
             self.badge[:] = np.array(below) * scale
-            top -= 26 * scale
-        side, below_row = 40 * scale, 52 * scale
+        side, below_row, pill = 40 * scale, 12 * scale, 1.75 * LABEL_SIZE * scale
         self.max_label = (size[0] - side) / len(traces) - 0.8 * LABEL_SIZE * scale  # width of a label
         if self.beside:
             self.max_label = MAX_LABEL_SHARE * size[0]
             widths = [self.width(text) for text in self.texts()] + self.badge[:, 0]
             side, below_row = max(widths) + 30 * scale, 20 * scale
         else:
-            below_row += self.badge[:, 1].max()
             if max(self.width(name) for name in names) > self.max_label:
                 self.names = style.distinct(names)
-        self.room = Room(side, top, size[0] - 40 * scale, size[1] - below_row)
+            both = [self.width(text) for text in self.texts()] + self.badge[:, 0] + 0.4 * pill
+            self.in_line = bool((both < self.max_label).all())  # labels with their badges
+            high = self.badge[:, 1].max()
+            below_row += max(pill, high) if self.in_line else pill + high
+        bottom = size[1] - below_row
+        top = (KEY_TOP + KEY_PITCH * len(self.key) + 6) * scale
+        if below is None:
+            top = min(top, bottom - MIN_ROOM * size[1])
+        self.room = Room(side, max(top, (KEY_TOP + 4) * scale), size[0] - 40 * scale, bottom)
+        self.keys = self._keys()
         self.sheet = functools.lru_cache(maxsize=16)(self._sheet)
 
     @property
     def apart(self) -> float:
         """The width, px, that a machine in a row needs for its label and what is below it."""
-        return max(*(self.width(text) for text in self.texts()), *self.badge[:, 0]) + 0.8 * LABEL_SIZE * self.scale
+        widths = np.array([self.width(text) for text in self.texts()])
+        both = widths + self.badge[:, 0] if self.in_line else np.maximum(widths, self.badge[:, 0])
+        return float(both.max()) + 1.2 * LABEL_SIZE * self.scale
 
     def texts(self, failed: Sequence[bool] | None = None) -> list[str]:
         """Return the labels, with the time of failure of machines that have failed; default: of all that will fail."""
@@ -100,7 +113,7 @@ class Caption:
 
     def width(self, text: str) -> float:
         """Return the width of a label, px."""
-        return style.width(text, LABEL_SIZE * self.scale, bold=True) + 1.4 * LABEL_SIZE * self.scale
+        return style.width(text, LABEL_SIZE * self.scale, bold=True) + 2.5 * LABEL_SIZE * self.scale
 
     def place(self, boxes: np.ndarray) -> None:
         """Place the labels under machines in a row, else at the left of each; `boxes` are their places, (n, 4) px.
@@ -109,9 +122,15 @@ class Caption:
         """
         widths, height = np.array([self.width(text) for text in self.texts()]), 1.75 * LABEL_SIZE * self.scale
         gap, middle, (wide, high) = 0.4 * height, (boxes[:, :2] + boxes[:, 2:]) / 2, self.badge.T
-        if not self.beside:
+        if self.in_line:
+            whole = widths + np.where(wide > 0, wide + 0.3 * height, 0.0)
+            x = spread(middle[:, 0], whole + gap, self.size[0]) - (whole - widths) / 2
+            tall = max(height, high.max())
+            y = np.full(len(x), min(boxes[:, 3].max() + 0.35 * height + tall / 2, self.size[1] - tall / 2 - gap / 2))
+            across, down = x + widths / 2 + 0.3 * height + wide / 2, y
+        elif not self.beside:
             x = spread(middle[:, 0], np.maximum(widths, wide) + gap, self.size[0])
-            y = np.full(len(x), min(boxes[:, 3].max() + 0.9 * height, self.size[1] - 0.7 * height - high.max()))
+            y = np.full(len(x), min(boxes[:, 3].max() + 0.85 * height, self.size[1] - 0.6 * height - high.max()))
             across, down = x, y + (height + high) / 2 + 0.1 * height * (high > 0)
         else:
             x = np.maximum(boxes[:, 0] - gap, widths + wide + gap) - wide - widths / 2
@@ -127,12 +146,18 @@ class Caption:
         failed: tuple[bool, ...],
         states: tuple[State | None, ...] = (),
         speed: float = 1.0,
+        shown: float = 0.0,
     ) -> np.ndarray:
-        """Return the picture with the text on it: machines that have failed, their states, and the playback speed."""
+        """Return the picture with the text on it: machines that have failed, their states, and the playback speed.
+
+        The picture is `shown` so long after the film's beginning, s.
+        """
         past = max((start for start in self.jumps if start <= time), default=None)
         image = Image.fromarray(picture)
         sheet = self.sheet(failed, states, past)
         image.paste(sheet, mask=sheet)
+        if (ink := min(1.0, (KEY_TIME + FADE_TIME - shown) / FADE_TIME)) > 0.0:
+            image.paste(self.keys, mask=self.keys.getchannel("A").point(lambda alpha: alpha * ink))
         for k in np.flatnonzero(self.gauges):
             if not failed[k]:
                 self._strip(ImageDraw.Draw(image), int(k), time)
@@ -159,8 +184,11 @@ class Caption:
         sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
         draw, s = ImageDraw.Draw(sheet), self.scale
         draw.text((EDGE * s, 16 * s), self.title, style.INK, style.font(TITLE_SIZE * s, bold=True))
-        for i, text in enumerate(self.key):
-            draw.text((EDGE * s, (48 + 1.4 * KEY_SIZE * i) * s), text, style.DISTURBANCE, style.font(KEY_SIZE * s))
+        left = EDGE * s + style.width(self.title, TITLE_SIZE * s, bold=True) + EDGE * s
+        room = self.size[0] - self.clock - EDGE * s - left
+        if room > 4 * TITLE_SIZE * s:
+            words = style.cropped(self.source, room, KEY_SIZE * s)
+            draw.text((left, 21 * s), words, style.DISTURBANCE, style.font(KEY_SIZE * s))
         if change is not None:
             font, right, y = style.font(KEY_SIZE * s, bold=True), self.size[0] - EDGE * s, 56 * s
             words = f"{self.jumps[change]} since {change:g} s"
@@ -169,13 +197,27 @@ class Caption:
             draw.rounded_rectangle(box, radius=5 * s, fill=style.INK)
             draw.text((right, y), words, style.PAPER, font, anchor="rm")
         for text, colour, box, gone in zip(self.texts(failed), self.colours, self.pills, failed, strict=True):
-            fill = style.FAILED if gone else colour
-            draw.rounded_rectangle(tuple(box), radius=(box[3] - box[1]) / 2, fill=fill)
-            middle = (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
-            draw.text(middle, text, style.letters_on(fill), style.font(LABEL_SIZE * s, bold=True), anchor="mm")
+            fill, half = style.FAILED if gone else colour, (box[3] - box[1]) / 2
+            draw.rounded_rectangle(tuple(box), half, style.PAPER, style.RULE, max(1, round(s)))
+            x, y = box[0] + 1.3 * half, box[1] + half
+            draw.ellipse((x - 0.6 * half, y - 0.6 * half, x + 0.6 * half, y + 0.6 * half), fill)
+            place = box[0] + half + 1.1 * LABEL_SIZE * s, y
+            draw.text(place, text, style.INK, style.font(LABEL_SIZE * s, bold=True), anchor="lm")
         for state, box in zip(states, self.badges, strict=False):
             if state:
                 self._badge(draw, state, box)
+        return sheet
+
+    def _keys(self) -> Image.Image:
+        """Draw the key, on paper where it lies over the machines."""
+        sheet = Image.new("RGBA", self.size, (255, 255, 255, 0))
+        draw, s = ImageDraw.Draw(sheet), self.scale
+        for i, text in enumerate(self.key):
+            y = (KEY_TOP + KEY_PITCH * i) * s
+            if y + KEY_PITCH * s > self.room.top:
+                right = (EDGE + 4) * s + style.width(text, KEY_SIZE * s)
+                draw.rectangle(((EDGE - 4) * s, y - 1, right, y + KEY_PITCH * s), (*style.rgb(style.PAPER), 190))
+            draw.text((EDGE * s, y), text, style.DISTURBANCE, style.font(KEY_SIZE * s))
         return sheet
 
     def _badge(self, draw: ImageDraw.ImageDraw, state: State, box: np.ndarray) -> None:
@@ -221,13 +263,13 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     if sizes := longest("control"):
         drive = any(scale.drive for scale in scales.values())
         what = "force of the drive" if drive else "mean control"
-        words += [f"coloured arrow: {what}, longest {sizes}", "bar: range over which it switches"]
+        words += [f"arrow: {what}, longest {sizes}", "bar: its range"]
         words += ["pale arrow: command"] * drive
     if sizes := longest("disturbance"):
         words.append(f"dark arrow: disturbance, longest {sizes}")
     if sizes := longest("reaction"):
         words.append(f"violet arrow: {reaction_words(traces)}, longest {sizes}")
-    words += filter(None, ["translucent machine: where the reference wants it", traces[0].scenario.plant.scenery])
+    words += filter(None, ["translucent: reference", traces[0].scenario.plant.scenery])
     if any(gauges(trace.scenario) for trace in traces):
         words.append("strip: counts of the encoder, the line is the position, the dot what is read")
     count = max(trace.scenario.plant.n for trace in traces)

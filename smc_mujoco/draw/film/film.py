@@ -29,7 +29,7 @@ from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder, mediapy
 from smc_mujoco.draw.film.pace import Clock
-from smc_mujoco.draw.film.puppet import Motion, motion
+from smc_mujoco.draw.film.puppet import Motion, Push, motion
 from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.simulation.trace import Trace
 
@@ -270,7 +270,24 @@ def pictures(
     caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row, below, words)
     charts = Charts(traces, names, colours, (size[0], low), scale)
     motions = [motion(trace, times) for trace in traces]
-    with framed(traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0) as stage:
+    shown_of = [scene.first_channels(trace.scenario).plant.n for trace in traces]
+    drawn = [
+        [
+            Push(
+                float(time),
+                [
+                    (i, arrow)
+                    for i, longest in enumerate([] if arms else by_channel[k][: shown_of[k]])
+                    for arrow in arrows.arrows(loads[k], frame, i, longest, colour)
+                ],
+            )
+            for frame, time in enumerate(times)
+        ]
+        for k, colour in enumerate(colours)
+    ]
+    with framed(
+        traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0, drawn, scale
+    ) as stage:
         caption.place(stage.boxes)
         overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
         over = arm.Overlay(*overlaid) if arms else None
@@ -279,20 +296,19 @@ def pictures(
         ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
-            drawn = []
+            pushes = []
             for k, colour in enumerate(colours):
                 stage.set_shape(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame], time)
                 lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
                 stage.aim(k, wanted[k][frame] if lost and not failed[k] else None)
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
-                for i, longest in enumerate([] if failed[k] or arms else by_channel[k][: stage.shown[k]]):
-                    drawn += [(k, i, arrow) for arrow in arrows.arrows(loads[k], frame, i, longest, colour)]
-            picture = stage.render(drawn)
+                pushes += [(k, i, arrow) for i, arrow in drawn[k][frame].arrows if not failed[k]]
+            picture = stage.render(pushes)
             if over:
                 picture = over.over(picture, frame, stage.find)
             moods = tuple(timeline[frame] for timeline in timelines)
-            picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]))
+            picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame]))
             yield np.concatenate([picture, charts.at(time)])
 
 
@@ -304,6 +320,8 @@ def framed(
     chosen: Camera | None,
     motions: Sequence[Motion | None],
     apart: float,
+    pushes: Sequence[Sequence[Push]],
+    scale: float,
 ) -> Stage:
     """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
 
@@ -312,7 +330,7 @@ def framed(
     """
     name = traces[0].scenario.plant.name
     for view in (chosen, *scene.OTHER_VIEWS):
-        stage = Stage(traces, colours, size, room, view, motions, apart)
+        stage = Stage(traces, colours, size, room, view, motions, apart, pushes, scale)
         if (chosen is None and not stage.is_users) or stage.shows():
             if view != chosen is not None:
                 fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
@@ -323,7 +341,7 @@ def framed(
             break
         stage.canvas.close()
     else:
-        stage = Stage(traces, colours, size, room, chosen, motions, apart)
+        stage = Stage(traces, colours, size, room, chosen, motions, apart, pushes, scale)
         fact = "shows nothing from any side: give another camera, such as camera=(60, -20)"
     warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_stacklevel())
     return stage

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from smc_mujoco.draw.film import scene
+from smc_mujoco.draw.film import arrows, furniture, scene
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.simulation import callback, state
@@ -16,10 +16,18 @@ from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-SLIDE = mujoco.mjtJoint.mjJNT_SLIDE
-POSES = 24  # poses of a trace that must be in the picture
+SLIDE, FREE = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_FREE
+POSES = 96  # poses of a trace that must be in the picture
 MAX_FIXED_SIZE = 4.0  # of what moves: larger fixed things of a user's model may leave the picture; chosen
-STAND_SHARE = 0.6  # height of a stand that must be in the picture, in sizes of what moves; chosen
+NEAR_SHARE = 0.3  # how far beside what moves fixed things must be in the picture, in its sizes; chosen
+STAND_SHARE = 0.8  # height of a stand that must be in the picture, in sizes of what moves; chosen
+
+
+class Push(NamedTuple):
+    """The arrows of a machine at a time, s: each with its channel."""
+
+    time: float
+    arrows: Sequence[tuple[int, arrows.Arrow]]
 
 
 class Motion(NamedTuple):
@@ -48,6 +56,8 @@ class Puppet:
     def __init__(self, scenario: Scenario):
         self.scenario = scene.first_channels(scenario)
         self.shapes = shapes(self.scenario)  # at the start of the run, and after its jump
+        for shape in self.shapes if self.scenario.plant.on_stage else ():
+            furniture.restyle(shape.model)
         model = self.shapes[0].model
         ids = joint_ids(model)
         rotors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(i).name) for i in ids]
@@ -57,6 +67,9 @@ class Puppet:
         self._rotors = [(k, model.jnt_qposadr[rotor]) for k, rotor in enumerate(rotors) if rotor >= 0]
         self.links = moved_bodies(model, ids)
         off_stage = not self.scenario.plant.on_stage
+        self.free = model.jnt_qposadr[model.jnt_type == FREE]
+        self.place = np.zeros(3)  # m, of the machine in the film, which free bodies are not fixed to
+        self.ids, self.mounts, self.lowered = ids, list[arrows.Mount](), 0.0
         self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
         self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0
 
@@ -76,17 +89,22 @@ class Puppet:
         pose[self._joints] = x
         for k, place in self._rotors:
             pose[place] = x[k] if ahead is None else x[k] + ahead[k]
+        for first in self.free.tolist():
+            pose[first : first + 3] += self.place
         return pose
 
-    def reach(self, trace: Trace, motion: Motion | None = None) -> np.ndarray:
+    def reach(
+        self, trace: Trace, motion: Motion | None = None, pushes: Sequence[Push] = (), cut: bool = False
+    ) -> np.ndarray:
         """Return what must be in the picture, (points, 3) m from the machine's place.
 
-        These are the corners of the boxes of all that the channels move, over the poses of its trace. Of other things
-        only the part close to these counts, such as the upper half of a stand. Joints without a channel
-        move as in `motion`, or stay where they start.
+        These are the corners of the boxes of all that the channels move, over the poses of its trace and its reference,
+        and the arrows of `pushes` at `mounts`. Of other things only the part close to these counts, such as the upper
+        half of a stand; with `cut`, rails and columns end there. Joints without a channel move as in `motion`, or stay
+        where they start.
         """
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
-        model, moved, others, world = self.shapes[0].model, [], [], np.empty((0, 8, 3))
+        model, moved, others = self.shapes[0].model, [], []
         plane, fixed = model.geom_type == scene.PLANE, model.body_weldid[model.geom_bodyid] == 0
         links = np.isin(model.geom_bodyid, self.links) & ~plane
         for part in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
@@ -94,13 +112,23 @@ class Puppet:
             time = float(trace.t[sample])
             now = self.shape(time)
             rest = None if motion is None else motion.at(time)
-            data[now].qpos[:] = self.qpos(trace.x[sample, : self.shown], rest=rest)
-            scene.forward(self.shapes[now].model, data[now])
-            world = scene.boxes(self.shapes[now].model, data[now])
-            moved.append(world[links].reshape(-1, 3))
+            goal = trace.r[sample, : self.shown]
+            for x in ([goal] if np.isfinite(goal).all() else []) + [trace.x[sample, : self.shown]]:
+                data[now].qpos[:] = self.qpos(x, rest=rest)
+                scene.forward(self.shapes[now].model, data[now])
+                world = scene.boxes(self.shapes[now].model, data[now])
+                moved.append(world[links].reshape(-1, 3))
             others.append(world[~links & ~plane & ~fixed])
-        points, near = np.concatenate(moved), np.concatenate([*others, world[~plane & fixed]])
-        still = np.repeat([False, True], [len(near) - (~plane & fixed).sum(), (~plane & fixed).sum()])
+        points = np.concatenate([*moved, *self.pushed(trace, motion, pushes, np.ptp(np.concatenate(moved), axis=0))])
+        if cut and len(points):
+            axes = data[0].xaxis[self.ids][self.slides]
+            its = [shape.model for shape in self.shapes]
+            self.lowered = furniture.cut(its, points, axes, self.scenario.plant.on_stage)
+            scene.forward(model, data[0])
+        world = scene.boxes(model, data[0])  # fixed things
+        fixed &= ~plane & (model.geom_group != scene.HIDDEN_GROUP)
+        near = np.concatenate([*others, world[fixed]])
+        still = np.repeat([False, True], [len(near) - fixed.sum(), fixed.sum()])
         if not len(points):
             return near.reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -109,8 +137,25 @@ class Puppet:
             close = np.ptp(near, axis=1).max(axis=1) < MAX_FIXED_SIZE * size
             close &= ((near < high + MAX_FIXED_SIZE * size) & (near > low - MAX_FIXED_SIZE * size)).all(axis=(1, 2))
             near, still = near[close], still[close]
+            near[still, :, :2] = near[still, :, :2].clip(low[:2] - NEAR_SHARE * size, high[:2] + NEAR_SHARE * size)
         near[still, :, 2] = near[still, :, 2].clip(low[2] - STAND_SHARE * size, high[2] + STAND_SHARE * size)
         return np.concatenate([points, near.reshape(-1, 3)])
+
+    def pushed(
+        self, trace: Trace, motion: Motion | None, pushes: Sequence[Push], sides: np.ndarray
+    ) -> list[np.ndarray]:
+        """Return the lines of arrows on a machine, (m, 3) m each; those that bend suit the `sides` of what moves, m."""
+        radius, lines = arrows.BENT_SIZE * float(sides.max(initial=0.0)), []
+        self.mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
+        data = [mujoco.MjData(shape.model) for shape in self.shapes]
+        for time, drawn in pushes:
+            now, sample = self.shape(time), min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 1)
+            rest = None if motion is None else motion.at(time)
+            data[now].qpos[:] = self.qpos(trace.x[sample, : self.shown], rest=rest)
+            scene.forward(self.shapes[now].model, data[now])
+            found = (arrows.path(self.shapes[now].model, data[now], self.mounts[i], arrow) for i, arrow in drawn)
+            lines += [line for line, _ in filter(None, found)]
+        return lines
 
     def shape(self, time: float) -> int:
         """Return the index of the shape at a time, s."""
@@ -158,6 +203,7 @@ def standing_places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], tu
     scenarios = [puppet.scenario for puppet in puppets]
     step = scene.lane(scenarios, reaches, turn)
     middles = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
+    middles[:, 2] -= [puppet.lowered for puppet in puppets]
     if not scenarios[0].plant.on_stage:  # the floor hides what is below it
         middles[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
     return middles

@@ -9,17 +9,17 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arm, arrows, camera, scene
+from smc_mujoco.draw.film import arm, arrows, camera, furniture, scene
 from smc_mujoco.draw.film.canvas import Canvas
-from smc_mujoco.draw.film.puppet import Motion, Puppet, moved_bodies, standing_places
+from smc_mujoco.draw.film.puppet import Motion, Puppet, Push, moved_bodies, standing_places
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import Trace
 
-ROW_SHARE = 0.7  # of the width, which the places of machines in a row take at least; chosen
+ROW_SHARE = 0.95  # of the width, which the places of machines in a row take at least; chosen
 DISTANCE_ROUNDING = 1e-9  # of a camera's distance
 LAW_SHARE = 0.75  # of the law's colour in that of a user's model, where several laws are shown; chosen
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
@@ -28,6 +28,7 @@ MIN_PICTURE_SHARE = 2e-4  # of a picture that shows something, such as 120 px of
 GROUPS = 3  # groups of geoms that MuJoCo draws by default
 GHOST_RGBA = np.array([0.12, 0.14, 0.16, 0.22], np.float32)  # ink, translucent
 GHOST_SIZE = 0.97  # of its machine's, so that a machine at its reference hides it
+SHAPE_FIELDS = ("geom_pos", "geom_size", "geom_group", "geom_sameframe")
 OTHER = mujoco.mjtObj.mjOBJ_UNKNOWN
 
 
@@ -46,16 +47,26 @@ class Stage:
         chosen: camera.Camera | None = None,
         motions: Sequence[Motion | None] = (),
         apart: float = 0.0,
+        pushes: Sequence[Sequence[Push]] = (),
+        scale: float = 1.0,
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
         self.shown, self.is_users = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
         turn = scene.turn(scenarios[0], chosen)
         self.motions = motions or [None] * len(traces)
-        runs = zip(self.puppets, traces, self.motions, strict=True)
-        reaches = [puppet.reach(trace, motion) for puppet, trace, motion in runs]
+        pushes, cut = pushes or [()] * len(traces), scene.in_a_row(scenarios[0], turn)
+        for puppet in self.puppets:
+            puppet.mounts = arrows.mounts(puppet.scenario, puppet.ids, puppet.slides, puppet.rail, turn[:, 2])
+        runs = zip(self.puppets, traces, self.motions, pushes, strict=True)
+        reaches = [puppet.reach(trace, motion, its, cut) for puppet, trace, motion, its in runs]
         where, seen, place = placed(traces, self.puppets, reaches, turn, size, room, apart)
+        for puppet, there in zip(self.puppets, where, strict=True):
+            puppet.place = there
         self.model = scene.compose(scenarios, where, size)
+        self.where = where
+        if not self.is_users:
+            furniture.restyle(self.model)
         self.data, self.goal = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.aimed = np.zeros(len(traces), bool)
         self.rest: list[np.ndarray | None] = [None] * len(traces)
@@ -72,8 +83,14 @@ class Stage:
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
             self.pose(k, traces[k].x[0, : self.shown[k]])
-        machines = zip(scenarios, self.joints, self.puppets, strict=True)
-        self.mounts = [arrows.mounts(s, ids, puppet.slides, puppet.rail, turn[:, 2]) for s, ids, puppet in machines]
+        layers = [arrow.layer for its in pushes for push in its for _, arrow in push.arrows]
+        most = arrows.MAX_BENT_SHARE * size[1] / (1.0 + arrows.BENT_DISTANCE * max(layers, default=0))  # px
+        most *= camera.pixel(size) * float((place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2])  # m
+        self.mounts = [
+            [mount._replace(joint=i, radius=min(mount.radius, most)) for i, mount in zip(ids, its.mounts, strict=True)]
+            for ids, its in zip(self.joints, self.puppets, strict=True)
+        ]
+        self.scale = scale
         film = self.model.camera("film")
         film.pos = place
         mujoco.mju_mat2Quat(self.model.cam_quat[film.id], turn.ravel())
@@ -81,7 +98,7 @@ class Stage:
         self.boxes = np.array([[*points.min(axis=0), *points.max(axis=0)] for points in flat])
         scene.forward(self.model, self.data)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
-        self.turn, self.place, self.size, self.where = turn, place, size, where
+        self.turn, self.place, self.size = turn, place, size
         self.canvas = Canvas(self.model, self.data, size, arms=arm.is_arm(traces))
 
     def __enter__(self) -> "Stage":
@@ -109,9 +126,11 @@ class Stage:
         self.shape[k], single = now, self.puppets[k].shapes[now].model
         for geom in range(single.ngeom):
             name = single.geom(geom).name
-            if name and name != "floor" and not self.is_users:
-                copy = self.model.geom(f"m{k}/{name}")
-                copy.pos, copy.size = single.geom_pos[geom], single.geom_size[geom]
+            copy = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_GEOM, f"m{k}/{name}")
+            if name and copy >= 0:
+                for field in SHAPE_FIELDS:
+                    getattr(self.model, field)[copy] = getattr(single, field)[geom]
+                self.model.geom_pos[copy] += self.where[k] * (single.geom_bodyid[geom] == 0)
         self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
@@ -170,8 +189,14 @@ class Stage:
                 points, width = found
                 line, sizes = map(self.project, (points, np.array([points[0], points[0] + width * self.turn[:, 1]])))
                 if np.ptp(line, axis=0).max() > 1.0:  # else it points at the camera
-                    outline = arrows.outline(line, float(np.ptp(sizes[:, 1])), arrow.head)
-                    arrows.paint(image, outline, arrow.rgba)
+                    if self.mounts[k][i].radius:
+                        anchor = self.project(self.data.xanchor[self.mounts[k][i].joint][None])[0]
+                        leader = [tuple(point.tolist()) for point in (anchor, line[0])]
+                        ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
+                    least = arrows.MIN_SHAFT * self.scale * arrow.size
+                    outline = arrows.outline(line, max(float(np.ptp(sizes[:, 1])), least), arrow.head)
+                    bent = self.mounts[k][i].radius > 0.0  # it lies over a link of its colour
+                    arrows.paint(image, outline, arrow.rgba, rim=round(arrows.RIM * self.scale) if bent else 0)
         return np.asarray(image)
 
     def project(self, points: np.ndarray) -> np.ndarray:
