@@ -17,6 +17,7 @@ MEAN_WINDOW = 0.01, 40  # of a mean: share of the run, and smallest number of sa
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
 TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
+MAX_GAP = 0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence; chosen
 LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest value
 
 
@@ -59,7 +60,7 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
 
 
 def columns(t: np.ndarray, y: np.ndarray, max_parts: int) -> Envelope:
-    """Return range and mean of y in at most `max_parts` windows of equally many samples.
+    """Return range and mean of y in at most `max_parts` windows of equally many samples; short gaps are closed.
 
     That number is even, so that a control which switches at every sample has the correct mean.
     """
@@ -67,7 +68,15 @@ def columns(t: np.ndarray, y: np.ndarray, max_parts: int) -> Envelope:
     if count <= max_parts:
         return Envelope(t, y, y, y)
     edges = t[:: 2 * -(-count // (2 * max_parts))]
-    return windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
+    return closed(windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1])))
+
+
+def closed(ranges: Envelope) -> Envelope:
+    """Return the ranges with gaps of less than MAX_GAP closed."""
+    from scipy.ndimage import grey_closing, grey_opening
+
+    size = 1 + int(MAX_GAP / (ranges.t[1] - ranges.t[0])), 1
+    return ranges._replace(low=grey_opening(ranges.low, size), high=grey_closing(ranges.high, size))
 
 
 def window(trace: Trace) -> int:

@@ -165,7 +165,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels below a film, from left to right: x of each group of channels, the error, u of driven ones.
 
     Of arms: how far the tip is off its path, and the force of its contact, or else the error. Of a network: how far its
-    channels are apart, and the error. Of two joints of your own model: x and u of each; of more: the error and the
+    channels are apart, the error and u. Of two joints of your own model: x and u of each; of more: the error and the
     largest u of a joint.
     """
     groups, plant = list(style.split(traces).items()), traces[0].scenario.plant
@@ -178,7 +178,7 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
         return [*(Panel("x", *each) for each in groups), *errors, *(Panel("u", *each) for each in driven)]
     if plant.direct and plant.n == plant.driven == 2:
         return [panel for group, parts in groups for row in small(parts, group) for panel in (row[0], row[-1])]
-    names = ("settling", "largest") if plant.direct else ("spread", "settling")
+    names = ("settling", "largest") if plant.direct else ("spread", "settling", "u")
     return [Panel(name, *each) for each in driven for name in names]
 
 

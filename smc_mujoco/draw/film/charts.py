@@ -1,24 +1,33 @@
 """Charts below a film: x of each group of channels, and u, drawn once and uncovered as the clock runs.
 
 Two pictures are drawn: the panels with every curve, and the panels with faint curves. A frame takes the columns up to
-the clock from the first and the rest from the second, so that it costs one copy.
+the clock from the first and the rest from the second, so that it costs one copy. The time until all rest has most of
+the width, and what follows a grey strip.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import end
 from smc_mujoco.draw.panels import Panel
+from smc_mujoco.metrics.conventions import SETTLING_BAND, last_exit, scale
 from smc_mujoco.simulation.trace import Trace
 
 DPI = 100
+LETTERS, TITLE_LETTERS = 13.0, 13.5  # points of a chart 1280 px wide: 18 px and more
+WINDOW_WIDTH = 0.82  # of a chart's width, of the time until all rest; chosen
+TIME_TICKS = 5  # at most, until all rest
 FUTURE_LINE, FUTURE_BAND = 0.45, 0.12  # opacity of what is still to come
 LANE_BAND = 0.45  # opacity of a band in a lane of its own
 LANE_WIDTH, LANE_HEIGHT = 0.82, 0.84  # of a panel's width and of a lane's pitch; beside a lane is how far u swings
@@ -26,6 +35,10 @@ END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 LEFT, RIGHT = 0.062, 0.985  # of the width: where the charts begin and end
 CHART_GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one if there are two
+TITLES = {"axes.titlesize": TITLE_LETTERS}
+SIZES = ("font.size", "xtick.labelsize", "ytick.labelsize")
+SAME_PLACE = 0.5  # of a dot's radius: all dots no farther apart are one, in ink
+AGREED = np.array(style.rgb(style.INK))
 CURSOR = np.array(style.rgb(style.MUTED))
 
 
@@ -35,27 +48,28 @@ class Charts:
     def __init__(
         self, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], size: tuple[int, int], scale: float
     ):
-        self.end = end(traces)
+        self.end, self.window = end(traces), panels.horizon(traces)
         self.dot = max(2, round(4.5 * scale))
         self.colours = [np.array(style.rgb(colour)) for colour in colours]
         strip = panels.strip(traces)
-        with style.page():
+        larger = LETTERS / style.RC["xtick.labelsize"]
+        with style.page(), rc_context({size: larger * style.RC[size] for size in SIZES} | TITLES):
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
             wide = (RIGHT - LEFT + CHART_GAP) / len(strip) - CHART_GAP
-            figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.2, top=0.855, wspace=CHART_GAP / wide)
+            figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=0.13, top=0.85, wspace=CHART_GAP / wide)
             artists, rows = [], []
             for ax, panel in zip(axes, strip, strict=True):
                 set_titles(ax, panel, DPI * scale / 72)
                 rows.append(lanes(ax, panel, colours) if in_lanes(panel) else [(ax, panel, colours)])
                 for row, part, shades in rows[-1]:
-                    row.set_xlim(0.0, self.end)
+                    self.set_time(row, ax.get_window_extent().width * (LANE_WIDTH if in_lanes(panel) else 1.0))
                     row.tick_params(length=0)
                     panels.mark(row, style.marks(traces, names), named=False)
                     bands = in_lanes(panel) or not panels.crowded(panel)
                     artists += panels.over_time(row, part, shades, among=panel.traces, bands=bands)
-                rows[-1][-1][0].set_xlabel("time (s)", labelpad=2)
+                    artists += settled(row, part, shades)
                 if in_lanes(panel):
                     swings(rows[-1])
             bands = [artist for artist in artists if isinstance(artist, PolyCollection)]
@@ -70,17 +84,47 @@ class Charts:
             [path(ax, trace, part.quantity, height) for ax, part, _ in row for trace in part.traces] for row in rows
         ]
 
+    def share(self, time: Any) -> Any:
+        """Return where a time, s, is in a chart, as a share of its width."""
+        return np.interp(time, *self.places)
+
+    @property
+    def places(self) -> tuple[list[float], list[float]]:
+        """Times, s, and where they are in a chart, as shares of its width."""
+        if self.window >= self.end:
+            return [0.0, self.end], [0.0, 1.0]
+        return [0.0, self.window, self.end], [0.0, WINDOW_WIDTH, 1.0]
+
+    def set_time(self, ax: Axes, wide: float) -> None:
+        """Set the time axis of axes so wide, px, with the grey strip after the time until all rest."""
+        ax.set_xscale("function", functions=(self.share, lambda share: np.interp(share, *reversed(self.places))))
+        ax.set_xlim(0.0, self.end)
+        letters = LETTERS * ax.figure.dpi / 72 / wide  # shares of the width
+        last = 1.0 - style.width(f"0{self.end:g} s", letters)
+        ticks = [t for t in MaxNLocator(TIME_TICKS).tick_values(0.0, self.window) if self.share(t) < last]
+        ticks = [t for t in ticks if t < min(1.01 * self.window, self.end)]
+        ax.set_xticks([*ticks, self.end], [*(f"{t:g}" for t in ticks), f"{self.end:g} s"])
+        for label in ax.get_xticklabels()[-1:]:
+            label.set_horizontalalignment("right")
+        if self.window < self.end:
+            ax.axvspan(self.window, self.end, color=style.BAND, lw=0, zorder=0.5)
+
     def at(self, time: float) -> np.ndarray:
         """Return the charts at a time in s, (height, width, 3) uint8."""
         image = self.faint.copy()
         for (left, top, right, bottom), paths in zip(self.frames, self.paths, strict=True):
-            now = round(left + (right - left) * min(time / self.end, 1.0))
+            now = round(left + (right - left) * float(self.share(time)))
             rows, past = slice(top - 3 * self.dot, bottom + 1), slice(left - self.dot, now + 1)
             image[rows, past] = self.full[rows, past]
             image[top : bottom + 1, now] = CURSOR
-            for (t, y), colour in reversed(list(zip(paths, self.colours, strict=True))):  # the first on top
-                if time <= t[-1] + 1e-9 and np.isfinite(y[0]):  # a run that failed has no place on the cursor
-                    self.disc(image, now, np.interp(time, t, y), colour)
+            lasting = [  # a run that failed has no place on the cursor
+                (float(np.interp(time, t, y)), colour)
+                for (t, y), colour in zip(paths, self.colours, strict=True)
+                if time <= t[-1] + 1e-9 and np.isfinite(y[0])
+            ]
+            together = len(lasting) > 1 and np.ptp([y for y, _ in lasting]) < SAME_PLACE * self.dot
+            for y, colour in reversed(lasting):  # the first on top
+                self.disc(image, now, y, AGREED if together else colour)
         return image
 
     def disc(self, image: np.ndarray, x: float, y: float, colour: np.ndarray) -> None:
@@ -100,6 +144,18 @@ Row = tuple[Axes, Panel, Sequence[str]]  # axes, what they show, its colours
 def in_lanes(panel: Panel) -> bool:
     """Return whether each law's u has a lane: else bands of several laws would hide each other."""
     return panel.quantity == "u" and len(panel.traces) > 1 and panels.crowded(panel)
+
+
+def settled(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Artist]:
+    """Mark when each run's x has settled for good, where it does after the start, and return the marks."""
+    marks: list[Artist] = []
+    for trace, colour in zip(panel.traces, colours, strict=True) if panel.quantity == "x" else ():
+        time = last_exit(trace.t, np.abs(trace.x - trace.r).max(axis=1), SETTLING_BAND * scale(trace))
+        if trace.diverged_at is None and 0.0 < time < trace.t[-1]:
+            y = float(np.interp(time, trace.t, trace.x.mean(axis=1)))
+            look = {"ms": style.points(7), "mec": style.PAPER, "mew": style.points(0.7), "zorder": 6, "clip_on": False}
+            marks += ax.plot(time, y, "v", color=colour, **look)
+    return marks
 
 
 def lanes(ax: Axes, panel: Panel, colours: Sequence[str]) -> list[Row]:
@@ -127,7 +183,7 @@ def swings(rows: Sequence[Row]) -> None:
         if words.startswith("±"):
             ends = lane.transLimits.transform([(0.0, least), (0.0, most)])[:, 1]
             lane.plot([1.012, 1.012], ends, color=colour, lw=style.points(5), transform=lane.transAxes, clip_on=False)
-        size = style.points(9.5)
+        size = LETTERS
         lane.text(1.035, 0.5, words, transform=lane.transAxes, va="center", fontsize=size, color=style.INK)
 
 
@@ -138,9 +194,12 @@ def set_titles(ax: Axes, panel: Panel, point: float) -> None:
         for name, text in panels.meaning([panel]).items()
         if not (name == "band" and panels.crowded(panel))
     ]
-    room = ax.get_window_extent().width - style.width(panel.label, 11 * point, bold=True) - 15 * point
-    while words and style.width(", ".join(words), 9.5 * point) > room:
+    room = ax.get_window_extent().width - style.width(panel.label, TITLE_LETTERS * point, bold=True)
+    while words and style.width(", ".join(words), LETTERS * point) > room - 10 * point:
         words.pop()
+    if panel.quantity == "x":
+        marks = [f"▼ {to}{100 * SETTLING_BAND:g} %" for to in ("settled to ", "")]
+        words = [mark for mark in marks if style.width(mark, LETTERS * point) < room - 10 * point][:1]
     ax.set_title(panel.label)
     panels.note(ax, ", ".join(words))
 

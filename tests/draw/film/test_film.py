@@ -572,7 +572,7 @@ def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples,
     scale = found[driven([trace])]
     assert (scale.control, scale.disturbance) == (longest, longest)
     said = key([trace], found)
-    assert {f"coloured arrow: mean control, longest {words}", f"dark arrow: disturbance, longest {words}"} <= {*said}
+    assert {f"arrow: mean control, longest {words}", f"dark arrow: disturbance, longest {words}"} <= {*said}
 
 
 @pytest.mark.slow
