@@ -200,7 +200,7 @@ class Caption:
             fill, half = style.FAILED if gone else colour, (box[3] - box[1]) / 2
             draw.rounded_rectangle(tuple(box), half, style.PAPER, style.RULE, max(1, round(s)))
             x, y = box[0] + 1.3 * half, box[1] + half
-            draw.ellipse((x - 0.6 * half, y - 0.6 * half, x + 0.6 * half, y + 0.6 * half), fill)
+            draw.ellipse((x - 0.6 * half, y - 0.6 * half, x + 0.6 * half, y + 0.6 * half), fill=fill)
             place = box[0] + half + 1.1 * LABEL_SIZE * s, y
             draw.text(place, text, style.INK, style.font(LABEL_SIZE * s, bold=True), anchor="lm")
         for state, box in zip(states, self.badges, strict=False):

@@ -176,7 +176,8 @@ def swings(rows: Sequence[Row]) -> None:
         for band in lane.collections:
             band.set_alpha(LANE_BAND)
         u = trace.u[-max(2, round(END_SHARE * len(trace.t))) :]
-        least, most = float(np.nanmin(u)), float(np.nanmax(u))
+        u = u[np.isfinite(u)]
+        least, most = float(u.min(initial=np.inf)), float(u.max(initial=-np.inf))
         swing = 0.5 * (most - least)
         words = f"±{swing:.2g}" if swing > SMOOTH_SHARE * (high - low) else "smooth"
         words = "fails" if trace.diverged_at is not None else words

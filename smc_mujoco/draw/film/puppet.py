@@ -120,13 +120,14 @@ class Puppet:
                 moved.append(world[links].reshape(-1, 3))
             others.append(world[~links & ~plane & ~fixed])
         points = np.concatenate([*moved, *self.pushed(trace, motion, pushes, np.ptp(np.concatenate(moved), axis=0))])
+        groups = model.geom_group.copy()
         if cut and len(points):
             axes = data[0].xaxis[self.ids][self.slides]
             its = [shape.model for shape in self.shapes]
             self.lowered = furniture.cut(its, points, axes, self.scenario.plant.on_stage)
             scene.forward(model, data[0])
         world = scene.boxes(model, data[0])  # fixed things
-        fixed &= ~plane & (model.geom_group != scene.HIDDEN_GROUP)
+        fixed &= ~plane & (model.geom_group == groups)
         near = np.concatenate([*others, world[fixed]])
         still = np.repeat([False, True], [len(near) - fixed.sum(), fixed.sum()])
         if not len(points):

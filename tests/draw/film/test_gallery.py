@@ -37,7 +37,8 @@ def test_a_clip_is_what_the_code_would_make(name):
     with Image.open(gallery.FOLDER / f"{name}.webp") as kept:
         assert (kept.n_frames, kept.size) == (len(frames), frames.size)
         for k in (len(frames) // 3, 2 * len(frames) // 3):
-            clock = type(frames.clock)(frames.clock.times[k - 1 : k + 1], frames.clock.speeds[k - 1 : k + 1])
+            part = slice(k - 1, k + 1)
+            clock = type(frames.clock)(frames.clock.times[part], frames.clock.speeds[part], (k - 1) / frames.fps)
             *_, new = pictures(frames.traces, clock, None, frames.title, frames.size)
             kept.seek(k)
             old = np.asarray(kept.convert("RGB"), float)

@@ -1,0 +1,83 @@
+"""Charts of films: the time until all rest has most of the width, and settling and agreement are said."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from helpers.sketch import made
+
+import smc_mujoco as smc
+from smc_mujoco.draw import style
+from smc_mujoco.draw.decimate import MAX_GAP, columns
+from smc_mujoco.draw.film.charts import WINDOW_WIDTH, Charts
+from smc_mujoco.draw.panels import horizon
+
+LAWS = ("classical", "pid")
+SIZE = (1280, 260)
+
+
+def resting(law, rate):
+    """A run of 4 s whose x decays from 0.5."""
+    trace = made(smc.Scenario(plant="inverted_pendulum", law=law, duration=4.0, x0=0.5))
+    zero = np.zeros_like(trace.x)
+    return dataclasses.replace(trace, x=0.5 * np.exp(-rate * trace.t)[:, None], r=zero, d=zero, u=zero)
+
+
+@pytest.fixture(scope="module")
+def charts():
+    traces = [resting(law, rate) for law, rate in zip(LAWS, (8.0, 16.0), strict=True)]
+    return Charts(traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0), traces
+
+
+def test_the_time_until_all_rest_has_most_of_the_width_and_the_rest_is_grey(charts):
+    drawn, traces = charts
+    window = horizon(traces)
+    assert window < 1.0
+    assert [float(drawn.share(time)) for time in (0.0, window / 2, window, 4.0)] == pytest.approx(
+        [0.0, WINDOW_WIDTH / 2, WINDOW_WIDTH, 1.0]
+    )
+    left, top, right, _ = drawn.frames[0]
+    picture = drawn.at(0.0)
+    for share, colour in ((0.75, style.PAPER), (0.95, style.BAND)):
+        column = picture[top + 2 : top + 60, round(left + share * (right - left))]
+        assert (np.abs(column.astype(int) - style.rgb(colour)).max(axis=1) < 3).mean() > 0.8
+    now = drawn.at(window / 2)
+    cursor = np.flatnonzero((now[top + 5, left:right] == style.rgb(style.MUTED)).all(axis=1))
+    assert 0.5 * WINDOW_WIDTH * (right - left) == pytest.approx(cursor.mean(), abs=2.0)
+
+
+def test_a_mark_says_when_each_law_has_settled(charts):
+    """e falls to 2 % of 0.5 after ln 50 / rate."""
+    drawn, traces = charts
+    left, top, right, bottom = drawn.frames[0]
+    picture = drawn.at(4.0)[top:bottom].astype(int)
+    for trace, rate, colour in zip(traces, (8.0, 16.0), drawn.colours, strict=True):
+        middle = round(left + (right - left) * float(drawn.share(np.log(50.0) / rate)))
+        alike = np.abs(picture[:, middle - 6 : middle + 7] - colour).max(axis=2) < 12
+        beside = np.abs(picture[:, middle + 20 : middle + 33] - colour).max(axis=2) < 12
+        assert alike.sum() > beside.sum() + 20, trace.scenario.law.name
+
+
+def test_dots_in_one_place_are_one_in_ink(charts):
+    drawn, traces = charts
+    same = Charts([traces[0], dataclasses.replace(traces[1], x=traces[0].x)], LAWS, style_of(traces), SIZE, 1.0)
+    for made_of, ink in ((drawn, False), (same, True)):
+        left, _, right, _ = made_of.frames[0]
+        now = round(left + (right - left) * float(made_of.share(0.1)))
+        t, y = made_of.paths[0][1 - ink]
+        dot = made_of.at(0.1)[round(np.interp(0.1, t, y)), now]
+        assert (np.abs(dot.astype(int) - style.rgb(style.INK)).max() < 3) == ink
+
+
+def style_of(traces):
+    return style.law_colours([trace.scenario.law for trace in traces])
+
+
+def test_short_gaps_of_a_band_are_closed_and_long_ones_are_not():
+    t = np.arange(4001) * 1e-3
+    u = np.where(np.arange(4001) % 2, 1.0, -1.0)
+    for start, width in ((1.0, 0.8 * MAX_GAP), (2.0, 0.2)):
+        u[(t >= start) & (t < start + width)] = 0.0
+    band = columns(t, u[:, None], 360)
+    high = np.interp([1.008, 2.1, 3.0], band.t, (band.high - band.low)[:, 0])
+    assert high == pytest.approx([2.0, 0.0, 2.0])
