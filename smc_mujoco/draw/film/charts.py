@@ -99,8 +99,7 @@ class Charts:
         """Set the time axis of axes so wide, px, with the grey strip after the time until all rest."""
         ax.set_xscale("function", functions=(self.share, lambda share: np.interp(share, *reversed(self.places))))
         ax.set_xlim(0.0, self.end)
-        letters = LETTERS * ax.figure.dpi / 72 / wide  # shares of the width
-        last = 1.0 - style.width(f"0{self.end:g} s", letters)
+        last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * ax.figure.dpi / 72) / wide
         ticks = [t for t in MaxNLocator(TIME_TICKS).tick_values(0.0, self.window) if self.share(t) < last]
         ticks = [t for t in ticks if t < min(1.01 * self.window, self.end)]
         ax.set_xticks([*ticks, self.end], [*(f"{t:g}" for t in ticks), f"{self.end:g} s"])
