@@ -391,13 +391,17 @@ def tell_agreements(
         words = ALL.get(len(who), f"all {len(who)}") if len(who) == len(lines) else few
         words += f" agree until {stop:.3g} {unit}" if parts else " agree"
         room = 72 * ax.get_window_extent().width / ax.figure.dpi
-        words = style.cropped(words, room - size, size)
-        left = style.width(words, size) > room * (stop - first) / (last - first)
-        at, down = (stop, 1.0 if top else 0.0), (-1 if top else 1) * size * (0.4 + 1.3 * k)
-        look = {"ha": "left" if left else "right", "va": "top" if top else "bottom", "fontsize": size}
+        words = words if style.width(words, size) < room else words.replace(" agree", "")
+        words = style.cropped(words, room, size)
+        wide, gap = style.width(words, size), 0.4 * size
+        ends = float(ax.transLimits.transform(ax.transScale.transform(np.array([stop, middle])))[0]) * room - gap
+        left = ends > wide  # of where they part
+        x = ends if left else min(ends + 2.0 * gap, room - wide)
+        down = (-1 if top else 1) * size * (0.4 + 1.3 * k)
+        look = {"ha": "right" if left else "left", "va": "top" if top else "bottom", "fontsize": size}
         look |= {"bbox": {"facecolor": style.PAPER, "edgecolor": "none", "alpha": 0.7, "pad": 0.5}, "in_layout": False}
-        place = (0.4 * (size if left else -size), down)
-        ax.annotate(words, at, place, ("data", "axes fraction"), "offset points", parse_math=False, **look)
+        place = (x / room, 1.0 if top else 0.0), (0.0, down), "axes fraction", "offset points"
+        ax.annotate(words, *place, parse_math=False, **look)
         if parts:
             ax.axvline(stop, color=style.RULE, lw=style.points(0.9), zorder=1.5)
 

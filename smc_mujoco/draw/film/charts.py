@@ -68,7 +68,7 @@ class Charts:
                     row.tick_params(length=0)
                     panels.mark(row, style.marks(traces, names), named=False)
                     bands = in_lanes(panel) or not panels.crowded(panel)
-                    artists += panels.over_time(row, part, shades, among=panel.traces, bands=bands)
+                    artists += panels.over_time(row, part, shades, panel.traces, bands, names)
                     artists += settled(row, part, shades)
                 if in_lanes(panel):
                     swings(rows[-1])
