@@ -394,7 +394,8 @@ def tell_agreements(
         words = words if style.width(words, size) < room else words.replace(" agree", "")
         words = style.cropped(words, room, size)
         wide, gap = style.width(words, size), 0.4 * size
-        ends = float(ax.transLimits.transform(ax.transScale.transform(np.array([stop, middle])))[0]) * room - gap
+        start, parting, whole = ax.xaxis.get_transform().transform(np.array([first, stop, last]))
+        ends = room * float((parting - start) / (whole - start)) - gap
         left = ends > wide  # of where they part
         x = ends if left else min(ends + 2.0 * gap, room - wide)
         down = (-1 if top else 1) * size * (0.4 + 1.3 * k)
