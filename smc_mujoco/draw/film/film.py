@@ -10,7 +10,7 @@ import dataclasses
 import itertools
 import os
 import warnings
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -22,7 +22,7 @@ from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, items_of, n
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.decimate import finite, windows
+from smc_mujoco.draw.decimate import Envelope, end, finite, windows
 from smc_mujoco.draw.film import arm, arrows, pace, scene
 from smc_mujoco.draw.film.camera import Camera, Room, checked
 from smc_mujoco.draw.film.caption import Caption
@@ -42,6 +42,7 @@ MAX_MACHINES = 8  # more are too small to tell apart
 MIN_SIZE, MAX_SIZE = (320, 180), (1920, 1080)  # px
 FULL_WIDTH = 1280  # px, for which sizes of letters are stated
 CHARTS_SHARE = 0.36  # of the film's height
+MAX_GRID = 120  # times of a run that set the place of all; chosen
 LAST_FRAME_TIME = 1200  # ms for which a clip's last picture stays before the clip repeats
 
 
@@ -261,33 +262,26 @@ def pictures(
     hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
     traces = [finite(trace) for trace in traces]
     scales = arrows.scales(traces)
-    by_channel = [arrows.scales_by_channel(trace, scales) for trace in traces]
-    loads = [arrows.loads(trace, edges) for trace in traces]
     arms = arm.is_arm(traces)
+    counts = [0 if arms else scene.first_channels(trace.scenario).plant.n for trace in traces]
+    scaled = [arrows.scales_by_channel(trace, scales)[:n] for trace, n in zip(traces, counts, strict=True)]
+    acting = [
+        pushes(arrows.loads(trace, edges), edges, sizes, colour)
+        for trace, sizes, colour in zip(traces, scaled, colours, strict=True)
+    ]
     timelines = [[None] * len(times) if arms else states.timeline(trace, times, hold) for trace in traces]
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
     below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces)) if arms else (None, None)
-    caption = Caption(traces, names, colours, title, above, scale, scales, timelines, row, below, words)
+    grid = np.linspace(0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1)  # also for a still
+    told = [[None] if arms else states.timeline(trace, grid, hold) for trace in traces]
+    caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
     charts = Charts(traces, names, colours, (size[0], low), scale)
     motions = [motion(trace, times) for trace in traces]
-    shown_of = [scene.first_channels(trace.scenario).plant.n for trace in traces]
-    drawn = [
-        [
-            Push(
-                float(time),
-                [
-                    (i, arrow)
-                    for i, longest in enumerate([] if arms else by_channel[k][: shown_of[k]])
-                    for arrow in arrows.arrows(loads[k], frame, i, longest, colour)
-                ],
-            )
-            for frame, time in enumerate(times)
-        ]
-        for k, colour in enumerate(colours)
+    framing = [
+        pushes(arrows.loads(t, grid), grid, sizes, c) for t, sizes, c in zip(traces, scaled, colours, strict=True)
     ]
-    with framed(
-        traces, colours, above, caption.room, chosen, motions, caption.apart if arms else 0.0, drawn, scale
-    ) as stage:
+    apart = caption.apart if arms else 0.0
+    with framed(traces, colours, above, caption.room, chosen, motions, apart, framing, scale) as stage:
         caption.place(stage.boxes)
         overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
         over = arm.Overlay(*overlaid) if arms else None
@@ -296,20 +290,28 @@ def pictures(
         ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         for frame, time in enumerate(times.tolist()):
             failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
-            pushes = []
+            drawn = []
             for k, colour in enumerate(colours):
                 stage.set_shape(k, time)
                 stage.pose(k, places[k][frame], ahead[k][frame], time)
                 lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
                 stage.aim(k, wanted[k][frame] if lost and not failed[k] else None)
                 stage.set_colour(k, style.FAILED if failed[k] else colour)
-                pushes += [(k, i, arrow) for i, arrow in drawn[k][frame].arrows if not failed[k]]
-            picture = stage.render(pushes)
+                drawn += [] if failed[k] else [(k, *each) for each in acting[k][frame].arrows]
+            picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame, stage.find)
             moods = tuple(timeline[frame] for timeline in timelines)
             picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame]))
             yield np.concatenate([picture, charts.at(time)])
+
+
+def pushes(acting: Mapping[str, Envelope], edges: np.ndarray, sizes: Sequence[arrows.Scale], colour: str) -> list[Push]:
+    """Return the arrows of a machine in each frame between `edges`, s, for what acts on its channels."""
+    return [
+        Push(float(time), [(i, a) for i, size in enumerate(sizes) for a in arrows.arrows(acting, k, i, size, colour)])
+        for k, time in enumerate(edges[1:])
+    ]
 
 
 def framed(
