@@ -71,6 +71,7 @@ class Caption:
         badges = [max(wide, STRIP_WIDTH * scale * on) for wide, on in zip(badges, self.gauges, strict=True)]
         height = 1.6 * BADGE_SIZE * scale * any(badges)
         self.badge = np.array([(width, height) for width in badges])  # px
+        self.below = below is not None
         if below is not None:
             self.badge[:] = np.array(below) * scale
         side, below_row, pill = 40 * scale, 12 * scale, 1.75 * LABEL_SIZE * scale
@@ -96,7 +97,9 @@ class Caption:
 
     @property
     def apart(self) -> float:
-        """The width, px, that a machine in a row needs for its label and what is below it."""
+        """The width, px, that an arm in a row needs for its label and what is below it; 0 for other machines."""
+        if not self.below:
+            return 0.0
         widths = np.array([self.width(text) for text in self.texts()])
         both = widths + self.badge[:, 0] if self.in_line else np.maximum(widths, self.badge[:, 0])
         return float(both.max()) + 1.2 * LABEL_SIZE * self.scale

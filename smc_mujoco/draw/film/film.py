@@ -280,8 +280,7 @@ def pictures(
     framing = [
         pushes(arrows.loads(t, grid), grid, sizes, c) for t, sizes, c in zip(traces, scaled, colours, strict=True)
     ]
-    apart = caption.apart if arms else 0.0
-    with framed(traces, colours, above, caption.room, chosen, motions, apart, framing, scale) as stage:
+    with framed(traces, colours, above, caption.room, chosen, motions, caption.apart, framing, scale) as stage:
         caption.place(stage.boxes)
         overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
         over = arm.Overlay(*overlaid) if arms else None
