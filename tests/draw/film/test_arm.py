@@ -152,8 +152,8 @@ def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace, monkeypatch):
 def test_a_film_of_arms_tells_of_the_tip(trace):
     now = film.Clock(np.array([0.1, 0.4]), np.ones(2))
     labels = ["one with a long label", "another with a long label"]
-    early, late = film.pictures([trace, trace], now, labels, None, (640, 360), (90.0, -70.0))
-    assert early.shape == (360, 640, 3)
+    early, late = film.pictures([trace, trace], now, labels, None, (960, 540), (90.0, -70.0))
+    assert early.shape == (540, 960, 3)
     (colour, _) = style.law_colours([trace.scenario.law] * 2)
-    inks = [np.abs(picture[:155].astype(int) - style.rgb(colour)).sum(axis=2) < 12 for picture in (early, late)]
+    inks = [np.abs(picture[:220].astype(int) - style.rgb(colour)).sum(axis=2) < 12 for picture in (early, late)]
     assert inks[1].sum() > inks[0].sum() + 5  # the path, without the links, which shade, and the bars below
