@@ -35,7 +35,7 @@ END_SHARE = 0.1  # of the run: its end, over which a lane says how far u swings
 SMOOTH_SHARE = 0.02  # of a panel's range: a swing below it is none
 LEFT, RIGHT = 0.062, 0.985  # of the width: where the charts begin and end
 CHART_GAP = 0.155 / 2.155 * (RIGHT - LEFT)  # of the width, between two charts: 0.155 of one if there are two
-TITLES = {"axes.titlesize": TITLE_LETTERS}
+TITLES: dict[Any, float] = {"axes.titlesize": TITLE_LETTERS}
 SIZES = ("font.size", "xtick.labelsize", "ytick.labelsize")
 SAME_PLACE = 0.5  # of a dot's radius: all dots no farther apart are one, in ink
 AGREED = np.array(style.rgb(style.INK))
@@ -49,11 +49,14 @@ class Charts:
         self, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], size: tuple[int, int], scale: float
     ):
         self.end, self.window = end(traces), panels.horizon(traces)
+        rests = self.window < self.end
+        self.times, self.shares = [0.0, *[self.window] * rests, self.end], [0.0, *[WINDOW_WIDTH] * rests, 1.0]
         self.dot = max(2, round(4.5 * scale))
         self.colours = [np.array(style.rgb(colour)) for colour in colours]
         strip = panels.strip(traces)
         larger = LETTERS / style.RC["xtick.labelsize"]
-        with style.page(), rc_context({size: larger * style.RC[size] for size in SIZES} | TITLES):
+        sizes: dict[Any, float] = {size: larger * float(style.RC[size]) for size in SIZES}
+        with style.page(), rc_context(sizes | TITLES):
             figure = Figure(figsize=(size[0] / DPI / scale, size[1] / DPI / scale), dpi=DPI * scale)
             canvas = FigureCanvasAgg(figure)
             axes = figure.subplots(1, len(strip))
@@ -86,18 +89,11 @@ class Charts:
 
     def share(self, time: Any) -> Any:
         """Return where a time, s, is in a chart, as a share of its width."""
-        return np.interp(time, *self.places)
-
-    @property
-    def places(self) -> tuple[list[float], list[float]]:
-        """Times, s, and where they are in a chart, as shares of its width."""
-        if self.window >= self.end:
-            return [0.0, self.end], [0.0, 1.0]
-        return [0.0, self.window, self.end], [0.0, WINDOW_WIDTH, 1.0]
+        return np.interp(time, self.times, self.shares)
 
     def set_time(self, ax: Axes, wide: float) -> None:
         """Set the time axis of axes so wide, px, with the grey strip after the time until all rest."""
-        ax.set_xscale("function", functions=(self.share, lambda share: np.interp(share, *reversed(self.places))))
+        ax.set_xscale("function", functions=(self.share, lambda share: np.interp(share, self.shares, self.times)))
         ax.set_xlim(0.0, self.end)
         last = 1.0 - style.width(f"0{self.end:g} s", LETTERS * ax.figure.dpi / 72) / wide
         ticks = [t for t in MaxNLocator(TIME_TICKS).tick_values(0.0, self.window) if self.share(t) < last]

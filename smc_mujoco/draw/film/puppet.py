@@ -69,7 +69,7 @@ class Puppet:
         off_stage = not self.scenario.plant.on_stage
         self.free = model.jnt_qposadr[model.jnt_type == FREE]
         self.place = np.zeros(3)  # m, of the machine in the film, which free bodies are not fixed to
-        self.ids, self.mounts, self.lowered = ids, list[arrows.Mount](), 0.0
+        self.ids, self.mounts, self.lowered = ids.tolist(), list[arrows.Mount](), 0.0
         self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
         self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0
 
@@ -104,7 +104,7 @@ class Puppet:
         where they start.
         """
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
-        model, moved, others = self.shapes[0].model, [], []
+        model, moved, others, world = self.shapes[0].model, [], [], np.empty((0, 8, 3))
         plane, fixed = model.geom_type == scene.PLANE, model.body_weldid[model.geom_bodyid] == 0
         links = np.isin(model.geom_bodyid, self.links) & ~plane
         for part in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
