@@ -344,7 +344,6 @@ def said(text):
     text = re.sub(r'<a [^>]*?href="(.*?)".*?>(.*?)</a>', r"\2 [\1]", text, flags=re.S)
     text = re.sub(r'<video [^>]*?aria-label="(.*?)" src="(.*?)">', r"video: \1 (\2)", text)
     text = re.sub(r"<select.*?</select>", "", text, flags=re.S)
-    text = re.sub(r"--law: (#\w+)[^>]*?>", r">\1 ", text)
     text = re.sub(r"</t[dh]>", " | ", text)
     return re.sub(r"\n\s+", "\n", html.unescape(re.sub(r"<[^>]*?>", "", text)))
 
