@@ -38,6 +38,7 @@ COINCIDENT_SHARE = 0.99  # of agreeing curves' samples, so that controls that sw
 MIN_AGREEMENT = 0.15  # of the time that a panel shows: curves that agree for less have their colours there; chosen
 ALL = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six"}
 MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's, and how many share a row; chosen
+MAX_GAP = 0.02  # s: a band with shorter gaps looks like a fence
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
 ZOOM, MAX_ZOOMED = 1.3, 0.5  # panels show ZOOM times the time until all rest, if that is less than this part of a run
@@ -299,8 +300,7 @@ def over_time(
     ):
         y, steps = QUANTITIES[name](trace), "default" if smoothed(trace) or name != "u" else "steps-post"
         if bands and name not in UNBANDED:
-            e = columns(trace.t, y, COLUMNS)
-            artists.append(ax.fill_between(e.t, e.low.min(axis=1), e.high.max(axis=1), color=colour, alpha=0.22, lw=0))
+            artists.append(ax.fill_between(*band(trace.t, y), color=colour, alpha=0.22, lw=0))
         look: dict[str, Any] = {"color": colour, "drawstyle": steps}
         if y.shape[1] > 1:
             slowest = {int(np.nansum(np.abs(y - trace.r), axis=0).argmax())} if name == "x" else set()
@@ -319,6 +319,16 @@ def over_time(
         artists += ax.plot(*between(lines[who[0]], start, stop), **look)
     tell_agreements(ax, shared, lines, names)
     return artists
+
+
+def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP between swings."""
+    from scipy.ndimage import grey_closing, grey_opening
+
+    e = columns(t, y, COLUMNS)
+    low, high = e.low.min(axis=1), e.high.max(axis=1)
+    size = 1 + int(MAX_GAP / (e.t[1] - e.t[0])) if len(e.t) > 1 and len(t) > COLUMNS else 1
+    return e.t, grey_opening(low, size, mode="nearest"), grey_closing(high, size, mode="nearest")
 
 
 def cross() -> dict[str, Any]:

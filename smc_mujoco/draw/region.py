@@ -1,4 +1,4 @@
-"""Maps of regions of attraction: blue where a law brings the plant to rest, darker if it does so sooner."""
+"""Maps of regions of attraction: in a law's hue where it brings the plant to rest, darker if sooner; else grey."""
 
 import os
 from collections.abc import Sequence
@@ -16,10 +16,10 @@ from smc_mujoco.draw.page import Size
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-# From early to late, then undecided, then not. All differ in lightness, so also with colour blindness and in grey. Blue
-# and orange are those of Okabe and Ito.
-BLUES, UNDECIDED_COLOUR, LEAVING_COLOUR = ("#00466B", "#0072B2", "#7CC0E8"), "#F4F4F4", "#F2B84B"
-COLOURS = (*BLUES, UNDECIDED_COLOUR, LEAVING_COLOUR)
+# From early to late, then undecided, then not. All differ in lightness, so also with colour blindness and in grey. Maps
+# of several laws in one key are blue.
+BLUES, OTHERS, LIGHTEST = ("#00466B", "#0072B2", "#7CC0E8"), ("#F4F4F4", style.FAILED), 82.0
+COLOURS = (*BLUES, *OTHERS)
 MAP_SIZE = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
@@ -53,15 +53,16 @@ def draw_map(ax, region: Basin, after: Sequence[float]) -> None:
     from matplotlib.patches import Patch
 
     classes = colour_indices(region, after)
-    ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(COLOURS), vmin=-0.5, vmax=4.5, rasterized=True)
+    colours = (*reversed(style.ramp(style.law_colour(region.law), len(BLUES), LIGHTEST)), *OTHERS)
+    ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(colours), vmin=-0.5, vmax=4.5, rasterized=True)
     ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
     ax.grid(visible=False)
     gains = f"\ngains: {region.source}" * (region.source != NONE)
-    ax.set_title(f"{style.law_name(region.law)} on {style.plant_name(region.plant, short=True)}{gains}")
+    ax.set_title(f"{style.law_name(region.law)}, {style.plant_name(region.plant, short=True)}{gains}")
     ax.set_xlabel(f"initial position ({region.unit})")
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [
-        Patch(facecolor=COLOURS[k], edgecolor=style.RULE, label=f"{words}: {100 * share:.3g} %")
+        Patch(facecolor=colours[k], edgecolor=style.RULE, label=f"{words}: {100 * share:.3g} %")
         for k, words in meanings(after, "comes to rest, by {:.3g} s", f"not within {region.duration:g} s").items()
         if (share := (classes == k).mean())
     ]

@@ -327,6 +327,9 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
         assert [re.findall(r"[\d.]+ s", words) for words in shares] == [["2 s"], ["4 s"], ["8 s"], [], ["16 s"]]
         (mesh,) = ax.collections
         assert np.ravel(mesh.get_array()).tolist() == [0, 1, 4, 2, 3, 4]
+        colours = [to_hex(colour) for colour in mesh.get_cmap()(range(5))]
+        assert colours[0] == style.ramp(style.law_colour(its.law), 3, region.LIGHTEST)[2].lower()
+        assert colours[4] == style.FAILED.lower(), "grey, not another law's orange"
         assert ("gains: tuned" in ax.get_title(loc="left")) == (its.source == "tuned")
 
 

@@ -32,3 +32,13 @@ def test_no_drawn_range_is_smaller_than_the_data_s(n):
     assert len(curves) >= min(n, panels.MAX_DRAWN_CHANNELS)
     thick = max(ax.lines, key=lambda line: line.get_linewidth())
     assert np.asarray(thick.get_ydata(), float)[-1] == pytest.approx(trace.x[-1, n - 2])
+
+
+def test_a_band_has_no_gaps_of_20_ms_between_swings_and_keeps_longer_ones():
+    t = np.linspace(0.0, 3.0, 3001)
+    pauses = (t % 0.1 < 0.015) | ((t > 1.0) & (t < 1.2))
+    at, low, high = panels.band(t, np.where(pauses, 0.0, (-1.0) ** np.arange(3001))[:, None])
+    rest = (at > 1.02) & (at < 1.18)
+    assert high[rest].max() == 0.0 == low[rest].min()
+    assert (high[(at > 0.05) & (at < 0.95)] == 1.0).all()
+    assert (low[(at > 1.25) & (at < 2.95)] == -1.0).all()
