@@ -198,6 +198,11 @@ def test_other_files_and_flags_come_along(file, tmp_path):
     assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
 
 
+def test_set_up_is_called_before_the_first_run(file):
+    text = law("out[0] = table[3];", "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }")
+    assert (smc.run(scenario(smc.exchange.law_from_c(file(text)))).u == 0.25).all()
+
+
 def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
     mine = smc.exchange.law_from_c(file(MINE), name="squash")
     trace = smc.load(smc.run(scenario(mine(lam=4.0))).save(tmp_path / "a.npz"))
