@@ -2,7 +2,8 @@
 
 A plant's file describes the mechanism in three ways, and tests check that they agree: its MJCF (what MuJoCo simulates),
 `fields` (which model fields a parameter sets) and `nominal` (the f and g that a model-based law uses). A channel is one
-actuated degree of freedom. Its actuator, its two sensors and its body are found in the compiled model.
+measured degree of freedom: first those with an actuator, then the free joints, which have none. Its actuator, its two
+sensors and its body are found in the compiled model.
 """
 
 import dataclasses
