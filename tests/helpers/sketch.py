@@ -4,11 +4,9 @@ Data that a formula makes are the same on all processors, so a record of them ha
 """
 
 import dataclasses
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar
 
-import mujoco
 import numpy as np
 from matplotlib import colors
 from matplotlib.axes import Axes
@@ -33,11 +31,6 @@ def number(value: float) -> str:
 def numbers(values: Iterable) -> str:
     """Return numbers in brackets."""
     return f"({', '.join(map(number, np.ravel(np.asarray(values, float))))})"
-
-
-def counted(notes: Iterable[str]) -> str:
-    """Return each note once, in the order in which they come first, with how often it came."""
-    return "\n".join(f"{count} x {note}" if count > 1 else note for note, count in Counter(notes).items())
 
 
 def made(scenario: smc.Scenario) -> smc.Trace:
@@ -212,15 +205,3 @@ def _plain(part: object) -> str:
 
 for _name in ("text", "line", "rectangle", "rounded_rectangle", "ellipse", "polygon"):
     setattr(Pen, _name, _noted(_name))
-
-
-def shapes(scene: mujoco.MjvScene, singly: int) -> str:
-    """Return what a scene has beside its model's geoms: `singly` one by one, then the means of all others."""
-    parts = ("type", "size", "pos", "mat", "rgba")
-    rows = [
-        np.concatenate([np.ravel(np.array(getattr(one, part), float)) for part in parts])
-        for one in scene.geoms[: scene.ngeom]
-        if one.objtype not in (mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SKIN)
-    ]
-    rest = rows[singly:]
-    return "\n".join([*map(numbers, rows[:singly]), f"{len(rest)} {numbers(np.mean(rest, axis=0)) if rest else ''}"])
