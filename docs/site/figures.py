@@ -96,22 +96,30 @@ def _case(plant: str, law: str, condition: str):
 
 
 def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
-    """Return the panels of x and u, one below the other; ink and grid have the colours of the page."""
+    """Return the panels of x and u, one below the other; ink and grid have the colours of the page.
+
+    Where bands of u would hide each other, each has a panel.
+    """
     from matplotlib.figure import Figure
 
     from smc_mujoco.draw import panels, style
     from smc_mujoco.draw.decimate import end, finite
 
     traces = [finite(trace) for trace in traces]
-    shown = [panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)]
+    shown = []
+    for panel in (panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)):
+        lanes = [
+            (panel._replace(traces=[trace]), [colour]) for trace, colour in zip(panel.traces, colours, strict=True)
+        ]
+        shown += lanes if panel.quantity == "u" and panels.crowded(panel) else [(panel, colours)]
     with style.page():
         import matplotlib
 
         matplotlib.rcParams["svg.fonttype"] = "none"  # letters of the page
         figure = Figure(figsize=(WIDTH, HEIGHT * (0.5 + len(shown) / 4)), layout="constrained")
         axes = figure.subplots(len(shown), sharex=True, squeeze=False)[:, 0]
-        for ax, panel in zip(axes, shown, strict=True):
-            panels.over_time(ax, panel, colours)
+        for ax, (panel, shades) in zip(axes, shown, strict=True):
+            panels.over_time(ax, panel, shades)
             ax.set(ylabel=panel.label, xlim=(0.0, end(traces)))
             ax.locator_params(axis="y", nbins=5)
         axes[-1].set_xlabel("time (s)")
@@ -122,6 +130,7 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
     text = text[text.index("<svg") :]
     for old, new in PAGE_COLOURS.items():
         text = re.sub(rf"{getattr(style, old)}\b", f"var(--md-default-fg-color{new})", text, flags=re.IGNORECASE)
+    text = re.sub(rf"{style.PAPER}\b", "var(--md-default-bg-color)", text, flags=re.IGNORECASE)
     text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
     text = re.sub(r' d="[^"]+"', _rounded, text)
     text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", text, flags=re.DOTALL)
