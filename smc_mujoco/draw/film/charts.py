@@ -49,7 +49,7 @@ class Charts:
         self, traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str], size: tuple[int, int], scale: float
     ):
         self.end, self.window = end(traces), panels.horizon(traces)
-        rests = self.window < self.end
+        rests = bool(self.window < self.end)
         self.times, self.shares = [0.0, *[self.window] * rests, self.end], [0.0, *[WINDOW_WIDTH] * rests, 1.0]
         self.dot = max(2, round(4.5 * scale))
         self.colours = [np.array(style.rgb(colour)) for colour in colours]
