@@ -89,7 +89,7 @@ def linear_plant(y, gains):
 
     They are the gains of these names; 0, 0, 1 with the model, which cancels f and g, and where no plant gave them.
     """
-    if y.model != 0.0 or math.isinf(gains.b):
+    if y.model != 0.0 or gains.b == math.inf:
         return 0.0, 0.0, 1.0
     return gains.a1, gains.a2, gains.b
 
