@@ -14,7 +14,7 @@ import numpy as np
 T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
-MAX_LISTED = 950  # characters of the names to choose from; chosen: all laws, and the sentence stays below 1100
+MAX_LISTED = 1100  # characters of the names to choose from; chosen: all laws, and the sentence stays below 1250
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path: chosen
 END_OF_MESSAGE = 500  # characters of a longer message that are kept at its end, where the cure is: chosen
 MAX_SHOWN = 60  # characters of a value in a message: chosen

@@ -84,14 +84,14 @@ def input_gain(y):
 
 
 @njit
-def linear_plant(y, gains):
+def linear_plant(y, a1, a2, b):
     """Return a1, a2, b of the plant e'' = a1 e + a2 de + b u that a law of the linear theory takes.
 
-    They are the gains of these names; 0, 0, 1 with the model, which cancels f and g, and where no plant gave them.
+    They are the law's gains; 0, 0, 1 with the model, which cancels f and g, and where no plant gave them.
     """
-    if y.model != 0.0 or gains.b == math.inf:
+    if y.model != 0.0 or b == math.inf:
         return 0.0, 0.0, 1.0
-    return gains.a1, gains.a2, gains.b
+    return a1, a2, b
 
 
 @njit

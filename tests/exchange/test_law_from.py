@@ -74,7 +74,7 @@ def test_an_object_that_keeps_state_is_fresh_in_each_run():
         ("mine.m", {}, r"unknown ending of a law's file '\.m': did you mean '\.fmu'"),
         ("none.c", {}, r"none\.c"),
         (LEAD, {"units": "SI"}, "units are of a policy's action: .* leave units out"),
-        (print, {"units": "V"}, "units is 'V': give 'u_max' or 'SI'"),
+        (print, {"units": "V"}, "unknown units 'V': choose from SI, u_max"),
         (None, {}, "give a callable"),
     ],
 )

@@ -606,5 +606,5 @@ def test_a_free_joint_has_the_goal_of_its_plant_as_reference():
 def test_what_is_no_path_is_refused_in_a_sentence(path):
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
     for write in (trace.save, trace.export):
-        with pytest.raises(smc.ScenarioError, match=r"^the path is .*: give the name of a file as a text$"):
+        with pytest.raises(smc.ScenarioError, match=r"^the path is .*: give the name of a file or folder as a text$"):
             write(path)

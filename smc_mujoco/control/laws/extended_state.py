@@ -33,14 +33,15 @@ def observe(y, w, memory):
     The memory has started, z1, z2, z3, and the known acceleration of the last period, which the law writes.
     """
     h, p = y.dt, math.exp(-w * y.dt)
+    q = 1.0 - p
     if memory[0] == 0.0:
         memory[0], memory[1], memory[2] = 1.0, y.e - h * y.de, y.de  # the first prediction is the reading
     push = memory[3] + memory[4]
     z1, z2 = memory[1] + h * memory[2] + h * h / 2.0 * push, memory[2] + h * push
     miss = y.e - z1
-    memory[1] = z1 + (1.0 - p**3) * miss
-    memory[2] = z2 + 1.5 * (1.0 - p) ** 2 * (1.0 + p) / h * miss
-    memory[3] += (1.0 - p) ** 3 / (h * h) * miss
+    memory[1] = z1 + (1.0 - p * p * p) * miss
+    memory[2] = z2 + 1.5 * q * q * (1.0 + p) / h * miss
+    memory[3] += q * q * q / (h * h) * miss
     return memory[3]
 
 

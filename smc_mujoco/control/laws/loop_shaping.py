@@ -143,7 +143,7 @@ def observe(v, e, n0, n1, memory):
     relative_degree=2,
 )
 def loop_shaping(y, gains, memory):
-    a1, a2, b = linear_plant(y, gains)
+    a1, a2, b = linear_plant(y, gains.a1, gains.a2, gains.b)
     k, wi = gains.k, gains.wi
     if memory[0] == 0.0:
         memory[0] = start(y, a1, a2, b, k, wi, memory)

@@ -68,7 +68,7 @@ def feedback(a1, a2, b, q0, q1, q2):
 def lqi(y, gains, memory):
     # memory: started, w times ki, k1, k2, ki
     if memory[0] == 0.0:
-        a1, a2, b = linear_plant(y, gains)
+        a1, a2, b = linear_plant(y, gains.a1, gains.a2, gains.b)
         memory[0] = 1.0
         memory[2], memory[3], memory[4] = feedback(a1, a2, b, gains.q0, gains.q1, gains.q2)
     s = memory[2] * y.e + memory[3] * y.de

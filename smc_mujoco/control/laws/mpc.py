@@ -194,11 +194,11 @@ def advance(n, low, high, memory):
     },
     memory=SLOTS,
     relative_degree=2,
-    conditions={"N is 1 to 20": lambda g: 1.0 <= g.N <= MOVES},
+    conditions={"1 <= N <= 20": lambda g: 1.0 <= g.N <= MOVES},
 )
 def mpc(y, gains, memory):
     n = min(max(int(gains.N), 1), MOVES)
-    a1, a2, b = linear_plant(y, gains)
+    a1, a2, b = linear_plant(y, gains.a1, gains.a2, gains.b)
     # with the model the law's own input is the acceleration g u + f - r''
     g, f = (y.g, y.f - y.ddr) if y.model != 0.0 else (1.0, 0.0)
     if memory[5] == 0.0:

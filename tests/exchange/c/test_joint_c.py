@@ -309,7 +309,6 @@ REFUSED = {
     "u = s[1:]": "a part of an array",
     "u = memory[0] * s": "a part of an array",
     "u = s * s[3]": "an index outside -3 to 2",
-    "u = s * memory[0, int(y.t)]": "memory at an index that is not constant",
     "u = s * memory[:, 8]": "it uses memory[:, 8], and its memory has 8 numbers: give memory=9",
     "u = np.zeros(int(y.t))": "a length that is not known before the law runs",
     "u = 0.0": "a result other than two vectors, u and s,",
