@@ -82,7 +82,7 @@ def refused() -> Callable[..., str]:
         sentence = str(caught.value)
         assert CURE.search(sentence), sentence
         assert "\n" not in sentence
-        assert len(sentence) < 1100
+        assert len(sentence) < 1250
         for part in parts:
             assert str(part) in sentence
         return sentence
