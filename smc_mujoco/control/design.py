@@ -14,16 +14,19 @@ from smc_mujoco.mechanisms.plant import Plant
 DIFFERENCE_STEP = 1e-6  # rad or m, and per second, of central differences: about the cube root of the rounding error
 
 
-def linearised(plant: Plant) -> tuple[float, float, float]:
-    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin.
+def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
+    """Return a1, a2, b of x'' = a1 x + a2 x' + b u at the origin, for the law of that name.
 
     For a network they are those of its least stable channel, with the neighbours at rest.
     """
     if plant.unmodelled:
-        raise ScenarioError(f"{plant.name} has no nominal model: {plant.unmodelled}")
+        raise ScenarioError(
+            f"{plant.name} has no nominal model to take {law}'s a1, a2 and b from: {plant.unmodelled}, "
+            f'or give the three, as in smc.law("{law}", a1=0.0, a2=0.0, b=1.0)'
+        )
     if plant.underactuated:
         raise ScenarioError(
-            f"{plant.name}'s channel {plant.driven} has no actuator, and lqr does not see such a joint: "
+            f"{plant.name}'s channel {plant.driven} has no actuator, and {law} does not see such a joint: "
             "take the law 'hierarchical', which does"
         )
     p, rest, rows = SimpleNamespace(**plant.parameters), np.zeros(plant.n), []
@@ -44,7 +47,7 @@ def at_plant(law: Law, plant: Plant) -> Law:
                if name in known and known[name].plant and value == math.inf}  # fmt: skip
     if not missing:
         return law
-    values, order = linearised(plant), ("a1", "a2", "b")
+    values, order = linearised(plant, law.name), ("a1", "a2", "b")
     gains = dict(law.gains) | {name: values[order.index(of_plant)] for name, of_plant in missing.items()}
     return dataclasses.replace(law, gains=gains).sourced(law.source.kind, law.source.search)
 
@@ -60,7 +63,7 @@ def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0)
     Raises:
       ScenarioError: a weight out of range, or a joint without an actuator.
     """
-    a1, a2, b = linearised(as_plant(of))
+    a1, a2, b = linearised(as_plant(of), "lqr")
     if len(weights := items_of("q", q)) != 2:
         raise ScenarioError(f"q is {shown(q)}: give two weights, of error and rate")
     return law("lqr", q1=weights[0], q2=weights[1], r=r, a1=a1, a2=a2, b=b)

@@ -604,9 +604,13 @@ def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
         smc.ScenarioError, match=r"acrobot\.xml's channel 1 has no actuator, and lqr does not see such a joint"
     ):
         design.lqr(acrobot())
-    for of in (design.lqr, linear_theory.linear):
-        with pytest.raises(smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"):
-            of(arm(["elbow"]))
+    with pytest.raises(smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"):
+        linear_theory.linear(arm(["elbow"]))
+    for law in ("lqr", "mpc"):
+        with pytest.raises(smc.ScenarioError, match=rf"to take {law}'s a1, .*: joint 'shoulder.* or give the three"):
+            design.linearised(arm(["elbow"]), law)
+    given = smc.Scenario(plant=arm(["elbow"]), law=smc.law("lqi", a1=0.0, a2=0.0, b=1.0))
+    assert given.resolved.law.gains["b"] == 1.0
 
 
 # starts
