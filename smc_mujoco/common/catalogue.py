@@ -20,6 +20,7 @@ import operator
 import pkgutil
 import sys
 import warnings
+from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from importlib.machinery import ModuleSpec
 from importlib.metadata import EntryPoint
@@ -104,7 +105,7 @@ class Catalogue(Mapping[str, T_co]):
     """
 
     def __init__(self, own: Mapping[str, T_co], added: Mapping[str, tuple[Added[T_co], ...]] | None = None):
-        self.own = dict(own)
+        self.own = own
         self.added = dict(added or {})  # entries of other packages
 
     def __getitem__(self, name: str) -> T_co:
@@ -154,7 +155,8 @@ class Catalogue(Mapping[str, T_co]):
         other = other if isinstance(other, Catalogue) else Catalogue(other)
         names = {*self.added, *other.added}
         both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
-        return Catalogue({**self.own, **other.own}, both)
+        own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]  # it is only read
+        return Catalogue(own, both)
 
     def taken(self, name: str) -> bool:
         """Return whether an entry has this name. An entry whose module is being imported does not count."""
@@ -244,11 +246,34 @@ def discover(package: str, kind: type[T]) -> dict[str, T]:
     return {NAME(value): value for value in sorted(values, key=NAME)}
 
 
+class Files(Mapping[str, T_co]):
+    """The objects of a kind in a package's modules, one in each and named as it, imported when it is asked for."""
+
+    def __init__(self, package: str, kind: type[T_co]):
+        self.package, self.kind = package, kind
+        self.names = sorted(info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__))
+
+    def __getitem__(self, name: str) -> T_co:
+        if name not in self.names:
+            raise KeyError(name)
+        module = importlib.import_module(f"{self.package}.{name}")
+        for value in vars(module).values():
+            if isinstance(value, self.kind) and NAME(value) == name:
+                return value
+        raise ScenarioError(f"{module.__file__} has no {self.kind.__name__} {name!r}: name the file as what it adds")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
 def catalogue_of(
     package: str, kind: type[T], group: str, fits: Callable[[T], bool] = lambda value: True
 ) -> Catalogue[T]:
     """Return the objects of a kind in a package's modules, and those of other packages in a group of entry points."""
-    return Catalogue(discover(package, kind), added(group, imported(kind, fits)))
+    return Catalogue(Files(package, kind), added(group, imported(kind, fits)))
 
 
 def subclasses(base: type[T]) -> list[type[T]]:

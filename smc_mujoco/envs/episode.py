@@ -14,9 +14,8 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
 from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
-from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.named import as_plant
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.controller import MAX_STATE

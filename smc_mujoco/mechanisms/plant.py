@@ -8,7 +8,7 @@ sensors and its body are found in the compiled model.
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
@@ -25,9 +25,11 @@ from smc_mujoco.common.mjcb import compiled
 
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
+MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
+Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
 
 class Field(NamedTuple):
@@ -109,7 +111,7 @@ class Plant:
     unmodelled: str = ""  # why there is no nominal model; "" if there is one
     friction: Any = None  # hardware.part.Friction of its joints according to its source, for a scenario; or None
     limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
-    ranges: tuple[tuple[str, float, float], ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
+    ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
     scenery: str = ""  # what a film shows beside the machine, such as "rail: a mark each 0.5 m"
@@ -246,6 +248,14 @@ def field_array(model: mujoco.MjModel, name: str) -> np.ndarray:
     """Return the array of a model or option field that a Field names."""
     owner = model.opt if name.startswith("opt.") else model
     return getattr(owner, name.removeprefix("opt."))
+
+
+def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
+    """Raise ScenarioError for a start outside a joint's range."""
+    for (joint, low, high), x in zip(ranges, x0, strict=False):
+        if not low - MAX_EXCESS <= x <= high + MAX_EXCESS:
+            outside = f"outside its range from {low:g} to {high:g}"
+            raise ScenarioError(f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0")
 
 
 def model_path(name: str) -> Path:

@@ -3,7 +3,6 @@
 from typing import Any
 
 from smc_mujoco.common import fingerprint
-from smc_mujoco.mechanisms.custom.mjcf import digest_of
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 
@@ -29,6 +28,8 @@ def _plant_codes(plant: Plant) -> list[str]:
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):
         return [fingerprint.of(thing) for thing in (plant.fields, plant.nominal, *builds) if _of_a_user(thing)]
+    from smc_mujoco.mechanisms.custom.mjcf import digest_of
+
     functions = plant.build, plant.fields, plant.nominal, builds
     return [*(fingerprint.of(thing) for thing in functions), digest_of(plant.spec())]
 

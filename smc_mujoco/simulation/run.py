@@ -26,7 +26,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.plant import field_array
-from smc_mujoco.simulation import callback, reference, state
+from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack, prepare
 from smc_mujoco.simulation.python_controller import Failure, NominalDynamics, PythonComponent
@@ -108,6 +108,8 @@ def stream(
                 return_freed_memory()
             yield from zip((index for index, _ in batch), traces, strict=True)
     for index, prepared in uncompiled:
+        from smc_mujoco.simulation import reference
+
         with memory_for([prepared]):
             trace = reference.run(prepared.scenario, prepared.mechanism)
         yield index, trace
@@ -306,6 +308,8 @@ class ScenarioBatch:
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""
+        from smc_mujoco.simulation import reference
+
         if code == state.DIVERGED:
             return self.errors.get(i, reference.PLANT_DIVERGED)
         if code == state.INTERRUPTED:

@@ -27,7 +27,6 @@ from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
 from smc_mujoco.control.law import Law, fits
 from smc_mujoco.control.surface import Surface
-from smc_mujoco.mechanisms.custom.channels import check_ranges
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.contact import Contact
@@ -36,7 +35,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, joint_names, moves_alone
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.philox import PROCESS

@@ -14,7 +14,6 @@ from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.custom.plant_from import UserModel, restored
 from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
@@ -42,7 +41,8 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
     match value:
         case Plant():
             data = {"name": value.name, "n": value.n, "module": value.build.__module__} | dict(value.parameters)
-            return data | ({"mjcf": value.build.about()} if isinstance(value.build, UserModel) else {})
+            about = getattr(value.build, "about", None)  # of a user's model
+            return data | ({"mjcf": about()} if about else {})
         case Component():
             return components.describe(value)
         case PerChannel():
@@ -97,6 +97,8 @@ def _restore_plant(data: dict) -> Plant:
     plant = dict(data)
     name, module = plant.pop("name"), plant.pop("module")
     if mjcf := plant.pop("mjcf", None):
+        from smc_mujoco.mechanisms.custom.plant_from import restored
+
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
     if module != find_plant(name).build.__module__:

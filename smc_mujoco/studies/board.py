@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from smc_mujoco.analysis.apart import MAX_CHANGE
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
@@ -17,7 +17,9 @@ from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
 from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.studies.worst_case import WorstCase
+
+if TYPE_CHECKING:
+    from smc_mujoco.studies.worst_case import WorstCase
 
 MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
 MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
@@ -307,7 +309,7 @@ def first_of(names: Iterable[str]) -> str:
 class Boards(Tables, list[Board]):
     """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
 
-    worst: Mapping[str, Mapping[str, WorstCase]] = frozen({})  # plant -> law -> its worst case, for a last column
+    worst: Mapping[str, Mapping[str, "WorstCase"]] = frozen({})  # plant -> law -> its worst case, for a last column
     failures: Sequence[str] = ()  # a sentence for each law with failed runs, below the last table
 
     @property
@@ -355,7 +357,7 @@ def heading(board: Board) -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def _table(name: str, boards: Sequence[Board], worst: Mapping[str, WorstCase]) -> Tabular:
+def _table(name: str, boards: Sequence[Board], worst: Mapping[str, "WorstCase"]) -> Tabular:
     """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
     sources_of = sources(boards)
     cells = {(i, entry.law): _cell(board, entry) for i, board in enumerate(boards) for entry in board.entries}

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning import search
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.errors import number as checked
@@ -39,11 +38,13 @@ from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_board
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, Extent, Traces
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import DURATION, WorstCase, WorstCases
 
 if TYPE_CHECKING:
     import pandas  # pyright: ignore[reportMissingImports]
     from matplotlib.figure import Figure, SubFigure
+
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.studies.worst_case import WorstCase
 
 QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
 MAX_BLOCKS = 12  # plants times conditions that have a table each; if there are more, each plant has one table
@@ -58,7 +59,7 @@ class Compared(Tables):
     candidates: Mapping[str, Sequence[Candidate]]
     # A board for each metric on each plant in each condition; on each plant, if that makes more than 12 blocks
     leaderboard: Boards
-    worst: Mapping[str, Mapping[str, WorstCase]]  # plant -> law -> its `worst_case`; empty if it was not searched
+    worst: Mapping[str, Mapping[str, "WorstCase"]]  # plant -> law -> its `worst_case`; empty if it was not searched
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -102,6 +103,10 @@ class Compared(Tables):
 
     @property
     def _worst_tables(self) -> list[Tabular]:
+        if not self.worst:
+            return []
+        from smc_mujoco.studies.worst_case import WorstCases
+
         return [table for worst_cases in self.worst.values() for table in WorstCases(worst_cases.values()).tables]
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
@@ -174,7 +179,7 @@ def compare(
     conditions: str | Condition | Sequence[str | Condition] | None = None,
     seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = search.SEARCHES,
     tune: bool = True,
-    worst: bool | Uncertainty = False,
+    worst: "bool | Uncertainty" = False,
     executor: "executors.Workers | None" = None,
     *,
     out: Annotated[str | os.PathLike[str], FilePath()] = "compared",
@@ -225,8 +230,7 @@ def compare(
     workers = executors.as_executor("local" if executor is None else executor)
     for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
-    if not isinstance(worst, bool | Uncertainty):
-        raise ScenarioError(f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)")
+    _check_worst(worst)
     trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
     number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
     candidates = _candidates(trial, laws, tune, gains, number, budget)
@@ -266,12 +270,23 @@ def _candidates(
     return trial.gains(_checked(trial, laws), searches=searches, budget=budget, **options)
 
 
-def _worst_cases(
-    trial: Trial, candidates: Mapping[str, Sequence[Candidate]], within: Uncertainty | None, duration: float | None
-) -> dict[str, dict[str, WorstCase]]:
-    """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
+def _check_worst(worst: object) -> None:
+    """Refuse what is neither a flag nor a class of disturbances."""
+    if isinstance(worst, bool):
+        return
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 
-    def attacked(plant: Plant, law: Law) -> WorstCase:
+    if not isinstance(worst, Uncertainty):
+        raise ScenarioError(f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)")
+
+
+def _worst_cases(
+    trial: Trial, candidates: Mapping[str, Sequence[Candidate]], within: "Uncertainty | None", duration: float | None
+) -> "dict[str, dict[str, WorstCase]]":
+    """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
+    from smc_mujoco.studies.worst_case import DURATION
+
+    def attacked(plant: Plant, law: Law) -> "WorstCase":
         scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts)
         return trial.attack(f"{plant.name}-{law.name}", scenario, within)
 

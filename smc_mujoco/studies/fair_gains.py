@@ -12,14 +12,13 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from smc_mujoco.analysis.tuning import result, search, search_space
 from smc_mujoco.analysis.tuning.evaluator import objectives
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
@@ -38,7 +37,10 @@ from smc_mujoco.studies import run_key
 from smc_mujoco.studies.leaderboard import Unseen
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
-from smc_mujoco.studies.worst_case import WorstCase, cached_worst_case
+
+if TYPE_CHECKING:
+    from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.studies.worst_case import WorstCase
 
 NOT_TUNED, UNTUNABLE = "not tuned: ", "tuning is not possible here: "  # at the start of a remark
 
@@ -250,7 +252,11 @@ class Trial(NamedTuple):
                     found[plant.name] = Unseen(values, halves, sets, len(goal.conditions) * goal.duration**2 / 2.0)
         return found
 
-    def attack(self, name: str, scenario: Scenario, within: Uncertainty | None, budget: int | None = None) -> WorstCase:
+    def attack(
+        self, name: str, scenario: Scenario, within: "Uncertainty | None", budget: int | None = None
+    ) -> "WorstCase":
         """Return the worst case of a scenario, which the folder keeps under a name."""
+        from smc_mujoco.studies.worst_case import cached_worst_case
+
         file = self.folder / "worst" / f"{name}.json"
         return cached_worst_case(file, scenario, within, budget, self.threads, self.progress)

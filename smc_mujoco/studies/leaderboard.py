@@ -7,7 +7,7 @@ for the plants and conditions of the table, over initial states and noise, and o
 """
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,9 @@ from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
-from smc_mujoco.studies.worst_case import WorstCase
+
+if TYPE_CHECKING:
+    from smc_mujoco.studies.worst_case import WorstCase
 
 METRICS = (SETTLES, "settling_time", "ultimate_bound", "itae", "tv_rate")
 
@@ -41,7 +43,7 @@ def leaderboard(
     by: Sequence[str] = ("plant",),
     defaults: bool = False,
     relevant: float = RELEVANT,
-    worst: Mapping[str, Mapping[str, WorstCase]] | None = None,
+    worst: "Mapping[str, Mapping[str, WorstCase]] | None" = None,
     unchecked: bool = False,
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
@@ -138,7 +140,7 @@ def objective_boards(
     return boards
 
 
-def _check_worst(table: Columns, worst: Mapping[str, Mapping[str, WorstCase]]) -> None:
+def _check_worst(table: Columns, worst: Mapping[str, Mapping[str, "WorstCase"]]) -> None:
     """Raise ScenarioError for the worst case of a law that has no run on the plant."""
     ran = set(zip(table.column("plant").tolist(), table.column("law").tolist(), strict=True)) if worst else set()
     for plant, cases in worst.items():

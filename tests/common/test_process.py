@@ -8,7 +8,8 @@ import time
 
 import pytest
 
-from smc_mujoco.common.catalogue import discover, modules, subclasses
+from smc_mujoco.common.catalogue import Files, discover, modules, subclasses
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.process import TimedOut, timed
 
@@ -82,6 +83,12 @@ def test_objects_of_a_package_are_found_by_their_names(tmp_path, monkeypatch):
     )
     (package / "b.py").write_text("from found_here.a import Named\nb, again = Named('b'), None\n")
     monkeypatch.syspath_prepend(tmp_path)
+    files = Files("found_here", object)
+    assert list(files) == ["a", "b"]
+    assert "found_here.a" not in sys.modules
     assert [module.__name__ for module in modules("found_here")] == ["found_here.a", "found_here.b"]
     kind = sys.modules["found_here.a"].Named
     assert [(name, value.name) for name, value in discover("found_here", kind).items()] == [("b", "b"), ("z", "z")]
+    assert Files("found_here", kind)["b"].name == "b"
+    with pytest.raises(ScenarioError, match=r"a\.py has no Named 'a': name the file as what it adds"):
+        Files("found_here", kind)["a"]

@@ -6,7 +6,7 @@ from helpers.arguments import told
 import smc_mujoco as smc
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.conditions import Condition
-from smc_mujoco.studies import adviser, fair_gains, scene
+from smc_mujoco.studies import adviser, fair_gains, scene, worst_case
 from smc_mujoco.studies.fair_gains import Candidate
 
 pytestmark = pytest.mark.quick
@@ -100,7 +100,7 @@ def test_robust_has_an_adversary_for_each_law_in_each_condition_with_the_bound_o
     asked = []
     monkeypatch.setattr(fair_gains, "study", lambda runs, folder, **options: None)
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
-    monkeypatch.setattr(fair_gains, "cached_worst_case", lambda *given, **options: asked.append((given, options)))
+    monkeypatch.setattr(worst_case, "cached_worst_case", lambda *given, **options: asked.append((given, options)))
 
     def contest(table, worst, candidates, plant, needs, relevant):
         asked.append((sorted(worst), needs, relevant))

@@ -225,7 +225,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     again = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
     attacked = []
-    monkeypatch.setattr(fair_gains, "cached_worst_case", lambda path, scenario, *_: attacked.append(scenario.duration))
+    monkeypatch.setattr(worst_case, "cached_worst_case", lambda path, scenario, *_: attacked.append(scenario.duration))
     smc.compare(laws, "duffing", "nominal", 1, worst=True, quick=True, out=tmp_path / "other")
     assert attacked == [8.0, 8.0]  # s, where no duration is given, whatever that of the other runs
 

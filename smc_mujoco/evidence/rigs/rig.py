@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.catalogue import Catalogue, catalogue_of
+from smc_mujoco.common.catalogue import Catalogue, added, discover, imported
 from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
@@ -451,7 +451,8 @@ def fallen(predicted: Record, measured: Record, t: np.ndarray) -> Fall | None:
 @functools.cache
 def catalogue() -> Catalogue[Rig]:
     """Return every rig of smc_mujoco.evidence.rigs.machines and of other packages, by name."""
-    return catalogue_of("smc_mujoco.evidence.rigs.machines", Rig, "smc_mujoco.rigs")
+    machines = discover("smc_mujoco.evidence.rigs.machines", Rig)
+    return Catalogue(machines, added("smc_mujoco.rigs", imported(Rig, lambda rig: True)))
 
 
 def rig(name: str, **values: float) -> Rig:

@@ -14,12 +14,11 @@ from smc_mujoco.common.constraints import Bound, Flag, Number, constrain
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE
+from smc_mujoco.mechanisms.plant import Range
 
-MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
 UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Place = Annotated[float, Number(low=-1e6, high=1e6)]  # rad or m
-Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
 ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # transmissions to one joint
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
@@ -139,14 +138,6 @@ def starts(
     chosen |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
     x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | chosen
     return x0, [row for row in ranges(model, joints) if keyframe is not None or row[0] in chosen]
-
-
-def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> None:
-    """Raise ScenarioError for a start outside a joint's range."""
-    for (joint, low, high), x in zip(ranges, x0, strict=False):
-        if not low - MAX_EXCESS <= x <= high + MAX_EXCESS:
-            outside = f"outside its range from {low:g} to {high:g}"
-            raise ScenarioError(f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0")
 
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:

@@ -31,7 +31,7 @@ from smc_mujoco.mechanisms.custom.channels import Channel, Motor, Pairs
 from smc_mujoco.mechanisms.custom.mjcf import Source
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.part import ROTOR, START
-from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Field, Plant, catalogue, check_ranges
 
 if TYPE_CHECKING:
     from dm_control.mjcf import RootElement
@@ -166,7 +166,7 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
     file = label if catalogue().taken(file) else file  # a plant of the library has this name
     plant_name = file if name is None else name
     x0, checked = own.starts(model, joints, pairs, keyframe)
-    own.check_ranges(plant_name, checked, [x0[joint] for joint, _, _ in checked])
+    check_ranges(plant_name, checked, [x0[joint] for joint, _, _ in checked])
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
