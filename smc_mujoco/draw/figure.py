@@ -28,13 +28,16 @@ TIME_PANELS = {  # panel -> quantity, from top to bottom
 }  # fmt: skip
 SIDE_PANELS = {"phase": 1.5, "settling": 1.0, "end": 1.0}  # panel -> its relative height
 PANEL_NAMES = {name: name for name in (*TIME_PANELS, "channels", *SIDE_PANELS)}  # of panels
-BLOCK_WIDTHS = (2.6, 1.7, 1.0)  # relative: of small panels, of those over time, and of those beside
+BLOCK_WIDTHS = (1.7, 1.4, 1.0)  # relative: of panels over time, of sparklines, and of those beside
 ROW_HEIGHT = 1.5  # inches on a full page, height of a panel over time
-LABEL_SIZE = 10.5  # points on a full page, of a small panel's label that has room
-SMALL_ROW = 0.62  # relative height of a row of small panels
+OWN_SHARE = 0.625  # height of a figure of many joints, of its width: 1,100 px of 1,760
+SPARK_ROW, SPARK_ENDS = 0.25, 0.3  # relative heights: of a row of sparklines, and of what is above and below all
+SPARK_SIZE = 9.5  # points on a full page, of the letters beside a sparkline
+SPARK_NAME = 0.4  # of the width of a block of sparklines, of a channel's name
+MAX_SPARKS = 10  # rows of sparklines: of more channels, those with the largest errors
 LINE_ROW, LINES_ROW = 0.32, 0.45  # relative height of a row with one line, and with several
 ROW_FILLED, BELOW_NAME = 0.82, 0.6  # part of a row that its axes fill, with its name in them or above
-SLIDE_PANELS = "x", "u", "settling"
+SLIDE_PANELS = "x", "u", "settling", "channels"
 SIGNALS_HEIGHT = 5.6  # inches, of a page of `signals`
 
 
@@ -67,11 +70,12 @@ def figure(
     """Draw traces of one plant: x, u and s over time, the phase portrait, |x - r|, and a close-up of the end of u.
 
     x, u and s are drawn until all comes to rest, |x - r| over the whole run on a logarithmic axis. Each run of a
-    network has a row with a line for each channel, and there is the spread max x - min x. Each driven joint of your own
-    model has small panels of x and its reference, of u, and of the error if a reference moves. Joints without an
-    actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the actuator's
-    force and of the reaction of friction and contacts, arms of their tip. The end of a failed run and the instant at
-    which a plant changes are marked. Curves that agree from the start are drawn once, in ink, until they part.
+    network has a row with a line for each channel, and there is the spread max x - min x. Of a robot with several
+    joints e and u of the worst one are large, and each other one has sparklines beside its largest |e| and |u|. Joints
+    without an actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the
+    actuator's force and of the reaction of friction and contacts, arms of their tip. The end of a failed run and the
+    instant at which a plant changes are marked. Curves that agree from the start are drawn once, in ink, until they
+    part.
 
     Args:
       traces: one or several traces.
@@ -80,8 +84,8 @@ def figure(
       labels: one label per trace; default: the laws' labels, with the differences between runs of one law.
       title: default: the plant's label, and the condition if all traces have one.
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "tip", "contact", "s",
-        "channels" (small panels of every channel), "phase", "settling" (|x - r|), "end" (close-up of u). Default: those
-        that suit the plant and the size.
+        "channels" (e and u of the worst channel, sparklines of the others), "phase", "settling" (|x - r|), "end"
+        (close-up of u). Default: those that suit the plant and the size.
       size: "ieee-column" (3.5 in wide), "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large letters), or
         (width, height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
@@ -98,6 +102,8 @@ def figure(
     traces = [finite(trace) for trace in traces]
     if panels is None:
         chosen = _default(traces, width)
+        if "channels" in chosen and width >= pages.NARROW and height is None:
+            height = OWN_SHARE * width
         chosen = [name for name in chosen if size != "slide" or name in SLIDE_PANELS] or chosen
     else:
         chosen = [find("panel", name, PANEL_NAMES) for name in items_of("panels", panels)]
@@ -134,21 +140,22 @@ def _composed_page(
     early = [drawing.until(trace, runs.span[0]) for trace in traces]
     shown = (quantity for name, quantity in TIME_PANELS.items() if name in chosen)
     overview = _by_joint([panel for quantity in shown for panel in drawing.over_groups(early, quantity)])
-    by_group = style.split(early) if "channels" in chosen else {}
-    small = [row for group, parts in by_group.items() for row in drawing.small(parts, group)]
-    small.sort(key=lambda row: row[0].channel or 0)
+    errors = drawing.worst_first(early) if "channels" in chosen else []
+    worst, *others = [*map(_spark_row, errors)] or [[]]
+    overview, sparks = [*worst, *overview], others[:MAX_SPARKS]
+    sparks.sort(key=lambda row: row[0].channel or 0)
     groups = [Panel("x", *each) for each in style.split(traces).items()]
     places = _by_joint(groups)
     beside = [name for name in chosen if name in SIDE_PANELS for _ in (places if name == "phase" else "x")]
-    key, gains = _key(runs, [*overview, *(panel for row in small for panel in row)])
+    key, gains = _key(runs, [*overview, *(panel for row in sparks for panel in row)])
     last = _height(groups[0]._replace(quantity="u"))
     blocks = (
-        [SMALL_ROW * len(small)] * bool(small),
         [*map(_height, overview)],
+        [SPARK_ROW * len(sparks) + SPARK_ENDS] * bool(sparks),
         [last if n == "end" else SIDE_PANELS[n] for n in beside],
     )
     narrow = width < pages.NARROW
-    columns = [(0, 1, 2)] if narrow else [(0,), (1, 2)] if small else [(1,), (2,)]  # of blocks
+    columns = [(0, 1, 2)] if narrow else [(0,), (1, 2)]  # of blocks
     parts = {column: sum(sum(blocks[k]) for k in column) for column in columns}
     if not any(parts.values()):
         raise ScenarioError(f"panels is {list(chosen)}: give a panel that the plant has, or leave panels out")
@@ -156,13 +163,12 @@ def _composed_page(
     space = pages.head_height(width, key)
     tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW_HEIGHT) * rows + 0.5)
     page = pages.blank(width, tall, fig)
-    over_time = next(part for column, part in parts.items() if 1 in column)
-    pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / max(over_time, 1.0)
+    pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / max(parts[columns[0]], 1.0)
     cells = _cells(page, [column for column in columns if parts[column]], blocks)
-    if small:
-        _draw_small(page, cells[0][0], small, runs, named=not overview)
-    words = drawing.titles(overview, [pitch * part for part in blocks[1]])
-    _draw_over_time(page, cells[1], list(zip(overview, words, strict=True)), runs)
+    words = drawing.titles(overview, [pitch * part for part in blocks[0]])
+    _draw_over_time(page, cells[0], list(zip(overview, words, strict=True)), runs)
+    if sparks:
+        _draw_sparks(page, cells[1][0], sparks, runs, len(others))
     _draw_beside(page, cells[2], beside, (groups[0], *places), runs)
     pages.set_head(page, width, title or _head(traces), key, gains)
     pages.space_ticks(page)
@@ -284,26 +290,35 @@ def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]
     frame.tick_params(labelcolor="none", length=0)  # invisible numbers, which keep its label beside those of the rows
 
 
-def _draw_small(page, cell: SubplotSpec, small: Sequence[Sequence[Panel]], runs: Runs, named: bool) -> None:
-    """Draw a row of small panels for each channel; `named`: whether changes are told above the first."""
-    rows = cell.subgridspec(len(small), max(map(len, small)))
-    for i, row in enumerate(small):
+def _spark_row(error: Panel) -> list[Panel]:
+    """Return the panels of a channel: its error, and its u if it is driven."""
+    return [error, *[error._replace(quantity="u")] * error.group.driven]
+
+
+def _draw_sparks(page, cell: SubplotSpec, sparks: Sequence[Sequence[Panel]], runs: Runs, channels: int) -> None:
+    """Draw a row of sparklines for each of the worst of so many channels, with the largest magnitude beside each."""
+    rows, size, frames = cell.subgridspec(len(sparks), 2), style.points(SPARK_SIZE), []
+    room = SPARK_NAME * 72 * cell.get_position(page).width * page.bbox.width / page.dpi
+    for i, row in enumerate(sparks):
         for k, panel in enumerate(row):
-            ax = page.add_subplot(rows[i, k])
-            ax.set_ylabel(panel.label, fontsize=_fitting(panel.label, cell, len(small), page))
-            ax.set_xlim(0.0, runs.span[0])
-            ax.locator_params(axis="y", nbins=3)
+            ax, (factor, unit) = page.add_subplot(rows[i, k]), panel.scale
+            beside = {"fontsize": size, "va": "center", "parse_math": False}
             drawing.over_time(ax, panel, runs.colours, names=runs.names)
-            drawing.mark(ax, runs.changes, named=named and i == k == 0)
-            ax.tick_params(labelbottom=i == len(small) - 1)
-            if i == len(small) - 1:
-                ax.set_xlabel(runs.time)
-
-
-def _fitting(label: str, cell: SubplotSpec, rows: int, page) -> float:
-    """Return the size, points, at which a label is no longer than one of the equal rows of a cell is high."""
-    high = 72 * cell.get_position(page).height * page.bbox.height / page.dpi / rows
-    return min(style.points(LABEL_SIZE), high / style.width(label, 1.0))
+            ax.set(xlim=(0.0, runs.span[0]), yticks=[], frame_on=False)
+            ax.set_xticks([0.0, runs.span[0]], ["0", f"{runs.span[0]:.2g} s"] if i == len(sparks) - 1 else ["", ""])
+            ax.tick_params(length=0)
+            name = style.cropped(panel.label.removesuffix(f" e{unit}"), room, size) if k == 0 else ""
+            ax.set_ylabel(f"{name} {panel.quantity}".strip(), rotation=0, ha="right", **beside)
+            largest = factor * max(map(abs, drawing.span(panel.traces, panel.quantity)))
+            words = f"{style.short(largest, 3)} {unit.strip(' ()')}"
+            ax.text(1.03, 0.5, words, transform=ax.transAxes, **beside)
+            frames += [ax] * (k == 0)
+            if i == 0:
+                above = {"xytext": (0.0, 0.75 * size), "textcoords": "offset points", "va": "bottom"}
+                ax.annotate("largest", (1.03, 0.5), xycoords="axes fraction", fontsize=size, color=style.MUTED, **above)
+    if len(sparks) < channels:
+        frames[-1].set_xlabel(f"the worst {len(sparks)} of {channels} other channels", fontsize=size, loc="left")
+    page.align_ylabels(frames)
 
 
 def _draw_beside(
@@ -318,8 +333,7 @@ def _draw_beside(
         ax = page.add_subplot(cell)
         if name == "phase":
             panel = next(portraits)
-            drawing.phase(ax, panel.traces, runs.colours)
-            ax.set(xlabel=panel.label, ylabel=panel._replace(quantity="v").label)
+            drawing.phase(ax, panel, runs.colours)
         else:
             panel = places[0]._replace(quantity="settling")
             drawing.over_time(ax, panel, runs.colours, names=runs.names)
@@ -335,14 +349,14 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, runs: Runs) -> None:
     _equal_ranges(frame, rows)
     plant = panel.traces[0].scenario.plant
     letter = f"{joint_names(plant)[0]} u" if plant.driven > 1 or plant.direct else "control u"
-    frame.set_ylabel(f"{letter} ({style.units(panel.group)['u']})")
+    frame.set_ylabel(letter + panel.scale[1])
     rows[-1][0].set_xlabel("time before the end (ms)")
 
 
 def _key(runs: Runs, shown: Sequence[Panel]) -> tuple[list[Handle], str]:
     """Return a legend's entries for the traces, the reference, and lines and bands; and where all gains come from."""
     handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
-    if any(panel.quantity == "x" and np.isfinite(trace.r).any() for panel in shown for trace in panel.traces):
+    if any(panel.quantity in ("x", "e") and np.isfinite(trace.r).any() for panel in shown for trace in panel.traces):
         look = {"color": style.INK, "lw": style.points(0.8), "ls": (0, (4, 4))}
         handles += [Line2D([], [], **look, label="reference"), Patch(color=style.BAND, label="reference ± 2 %")]
     looks = {

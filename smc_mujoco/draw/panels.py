@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.ticker import NullFormatter
+from matplotlib.axis import Axis
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from smc_mujoco.common.text import joined
 from smc_mujoco.control.law import Law
@@ -29,7 +30,7 @@ LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
 MAX_DRAWN_CHANNELS = 40  # channels of a network that are drawn one by one; of more, those between which all lie
 LASTING_QUANTILE = 0.98  # of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
-MAX_SMALL = 12  # channels that each have small panels
+MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words; chosen
 CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
@@ -92,30 +93,37 @@ class Panel(NamedTuple):
     channel: int | None = None  # of a small panel
 
     @property
-    def unit(self) -> str:
-        """The unit of the vertical axis in brackets; "" where the words have it, or where it depends on the law.
+    def scale(self) -> tuple[float, str]:
+        """The factor of the numbers at the vertical axis and their unit in brackets, so that none needs an exponent.
 
-        The unit of s does: the s of twisting is e, and that of PID is a force.
+        The unit is "" where the words have it; or where it depends on the law, as that of s does: the s of twisting is
+        e, and that of PID is a force.
         """
         plant, laws = self.traces[0].scenario.plant, [trace.scenario.law for trace in self.traces]
         rates = plant.free == 0 and all(law.relative_degree == 1 and not _is_baseline(law) for law in laws)
-        if self.quantity in ("tip", "contact") or (self.quantity == "s" and not rates):
-            return ""
-        return f" ({style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]})"
+        if self.quantity in ("tip", "contact"):
+            return 1.0, ""
+        unit = style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]
+        if self.quantity in PEAKS:
+            return 1.0, f" ({unit})"
+        factor, prefixed = style.prefixed(max(map(abs, limits(self.traces, self.quantity))), unit)
+        if self.quantity != "s" or rates:
+            return factor, f" ({prefixed})"
+        return factor, "" if factor == 1.0 else f" / {1.0 / factor:g}"
 
     @property
     def label(self) -> str:
         """The label of the vertical axis, with its unit. A joint of a robot has its name in it."""
-        name, group, plant = self.quantity, self.group, self.traces[0].scenario.plant
+        name, group, plant, unit = self.quantity, self.group, self.traces[0].scenario.plant, self.scale[1]
         if name in WHOLE_LABELS:
-            return WHOLE_LABELS[name] + self.unit
+            return WHOLE_LABELS[name] + unit
         letter = WORDS.get(name, name) if group.driven else {"x": "q", "v": "q′"}.get(name, WORDS.get(name, name))
         if len(group.channels) == 1 and (plant.direct or self.channel is not None):
-            return f"{joint_names(plant)[group.channels[0]]} {letter}{self.unit}"
+            return f"{joint_names(plant)[group.channels[0]]} {letter}{unit}"
         if name in WORDS or (name == "s" and plant.mixed):  # short: mixed plants have many panels, and low ones
-            return f"{letter}{' on q' * (not group.driven)}{self.unit}"
+            return f"{letter}{' on q' * (not group.driven)}{unit}"
         kind = {"rad": "angle", "m": "position"}[group.unit]
-        return f"{KINDS.get(name, kind if group.driven else f'free {kind}')} {letter}{self.unit}"
+        return f"{KINDS.get(name, kind if group.driven else f'free {kind}')} {letter}{unit}"
 
 
 def _is_baseline(law: Law) -> bool:
@@ -140,15 +148,14 @@ def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:
     return [panel for panel in panels if panel.group.driven and len(panel.group.channels) >= several]
 
 
-def small(traces: Sequence[Trace], group: Group) -> list[tuple[Panel, ...]]:
-    """Return small panels for each channel of a group: x with its reference, e if a reference moves, u if driven.
-
-    The traces are of the group.
-    """
-    chosen = np.linspace(0, len(group.channels) - 1, min(len(group.channels), MAX_SMALL)).round().astype(int)
-    moving = any(np.ptp(trace.r, axis=0).any() for trace in traces)
-    columns = [by_channel(Panel(name, group, traces)) for name in ["x", *["e"] * moving, *["u"] * group.driven]]
-    return [tuple(column[k] for column in columns) for k in chosen]
+def worst_first(traces: Sequence[Trace]) -> list[Panel]:
+    """Return a panel of the error of each channel, first that of the largest mean |e|, in scales of its group."""
+    found = []
+    for group, parts in style.split(traces).items():
+        runs = [part for part in parts if part.diverged_at is None] or parts
+        means = np.max([np.nanmean(np.abs(part.x - part.r), axis=0) / scale(part) for part in runs], axis=0)
+        found += zip(means.tolist(), by_channel(Panel("e", group, parts)), strict=True)
+    return [panel for _, panel in sorted(found, key=lambda one: -one[0])]
 
 
 def by_channel(panel: Panel) -> list[Panel]:
@@ -178,7 +185,8 @@ def strip(traces: Sequence[Trace]) -> list[Panel]:
         errors = errors[: len(groups) < CROWDED_STRIP]
         return [*(Panel("x", *each) for each in groups), *errors, *(Panel("u", *each) for each in driven)]
     if plant.direct and plant.n == plant.driven == 2:
-        return [panel for group, parts in groups for row in small(parts, group) for panel in (row[0], row[-1])]
+        pairs = [zip(*(by_channel(Panel(name, *each)) for name in "xu"), strict=True) for each in groups]
+        return [panel for joints in pairs for pair in joints for panel in pair]
     names = ("settling", "largest") if plant.direct else ("spread", "settling", "u")
     return [Panel(name, *each) for each in driven for name in names]
 
@@ -284,6 +292,7 @@ def over_time(
         ax.set_yscale("log")
         ax.yaxis.set_minor_formatter(NullFormatter())
     ax.set_ylim(limits(among or panel.traces, name))
+    set_numbers(ax.yaxis, panel._replace(traces=among or panel.traces))
     if name == "reaction":
         clip_impacts(ax, panel, colours)
     if name in ("x", "e"):
@@ -319,6 +328,12 @@ def over_time(
         artists += ax.plot(*between(lines[who[0]], start, stop), **look)
     tell_agreements(ax, shared, lines, names)
     return artists
+
+
+def set_numbers(axis: Axis, panel: Panel) -> None:
+    """Give an axis that shows a panel's quantity numbers in the panel's unit."""
+    if (factor := panel.scale[0]) != 1.0:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.6g}".replace("-", "−")))
 
 
 def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -393,6 +408,8 @@ def tell_agreements(
 ) -> None:
     """Write which traces each line in ink shows, and until when, in rows where fewer of the curves are."""
     (first, last), size = span_of(lines), style.points(9.0)
+    if 72 * ax.get_window_extent().height / ax.figure.dpi < MIN_WORDS * size:
+        return
     middle = float(np.mean([np.interp(0.5 * (first + last), *path) for path in lines if len(path[0])] or [0.0]))
     top = ax.transLimits.transform(ax.transScale.transform(np.array([last, middle])))[1] < 0.5
     for k, (who, _, stop) in enumerate(shared):
@@ -480,8 +497,12 @@ def mark(ax: Axes, changes: Mapping[float, str], named: bool) -> None:
         ax.annotate(words, (time, 1.0), place, ("data", "axes fraction"), "offset points", **look)
 
 
-def phase(ax: Axes, traces: Sequence[Trace], colours: Sequence[str]) -> None:
-    """Draw v over x of traces, and of a reference that moves. A ring marks the start of a trace."""
+def phase(ax: Axes, panel: Panel, colours: Sequence[str]) -> None:
+    """Draw v over x of a panel's traces, and of a reference that moves. A ring marks the start of a trace."""
+    traces, speed = panel.traces, panel._replace(quantity="v")
+    for axis, words in ((ax.xaxis, panel), (ax.yaxis, speed)):
+        set_numbers(axis, words)
+        axis.set_label_text(words.label)
     (left, right), (low, high) = limits(traces, "x"), limits(traces, "v")
     ax.set_xlim(left, right)
     one = traces[0].x.shape[1] == 1
@@ -514,6 +535,7 @@ def last_samples(
 ) -> None:
     """Draw the last samples of u of the first channel, each held until the next, of the longest run of `among`."""
     traces, stop = panel.traces, end(among)
+    set_numbers(ax.yaxis, panel._replace(traces=among))
     begin = max(0.0, stop - LAST_SAMPLES * max(trace.scenario.control_period for trace in among))
     lines = []
     for trace in traces:

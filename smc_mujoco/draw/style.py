@@ -39,6 +39,8 @@ DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
 # and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
 REACTION = "#9018F0"
 LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
+MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
+PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}  # of units, by the power of 1000 that a number is given
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST, DARKEST = 61.0, 21.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper; of a ramp
@@ -441,8 +443,9 @@ def head(scenario: Scenario) -> str:
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
     """Return a factor and the unit with a prefix, with which values up to `largest` need no exponent."""
-    power = min(max(-math.floor(math.log10(largest) / 3.0), 0), 3) if 0.0 < largest < 0.1 else 0
-    return 1e3**power, ("", "m", "µ", "n")[power] + unit
+    power = -math.floor(math.log10(largest) / 3.0) if 0.0 < largest < 0.1 or largest >= MANY_DIGITS else 0
+    power = min(max(power, min(PREFIXES)), max(PREFIXES))
+    return 1e3**power, PREFIXES[power] + unit
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

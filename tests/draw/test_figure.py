@@ -456,14 +456,3 @@ def test_where_a_joint_is_is_drawn_as_it_is(pair):
         _, y = panels.curve(pair[0], x, name)
         assert (y[0], y.max(), y.min()) == (x[0], x.max(), x.min())
     assert panels.curve(pair[0], ripple, "u")[1].max() < 1e-9
-
-
-def test_small_panels_show_the_error_only_where_a_reference_moves():
-    still, moving = (
-        smc.run(smc.Scenario(plant="double_pendulum", law="none", reference=reference, duration=0.05))
-        for reference in (smc.Constant(0.1), smc.Sine(0.1, 3.0))
-    )
-    group = next(iter(style.split([still])))
-    parts = style.split([still, moving])[group]
-    assert {"".join(panel.quantity for panel in row) for row in panels.small(parts[:1], group)} == {"xu"}
-    assert {"".join(panel.quantity for panel in row) for row in panels.small(parts, group)} == {"xeu"}

@@ -20,6 +20,7 @@ from smc_mujoco.analysis.step_halving import StepChange
 from smc_mujoco.draw import amplitudes, panels, region, style
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.draw.nyquist import nyquist
+from smc_mujoco.draw.page import DPI
 from smc_mujoco.draw.pareto import pareto
 from smc_mujoco.evidence.accuracy.orders import orders
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
@@ -30,6 +31,7 @@ SINE = smc.Sine(0.3, 4.0)
 ALL = ("x", "error", "spread", "v", "u", "delivered", "reaction", "d", "s", "channels", "phase", "settling", "end")
 NEUTRAL = {to_hex(colour) for colour in (style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID)}
 UNIT = re.compile(r"\((?:s|ms|1/s|s²|unit of s|[µm]?(?:m|rad|N|N·m|V)(?:/s)?)\)")
+SPARK = re.compile(r"[\d.]+ [µm]?(?:m|rad|N|N·m|V)")  # beside a sparkline
 UNITLESS = re.compile(r"share of .*|(real|imaginary) part|.*\bs")  # also s, whose unit is the law's
 
 
@@ -156,7 +158,8 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
     page.draw_without_rendering()
     outer = [ax for ax in page.axes if ax.get_visible()]
     words = {axis.get_label_text() for ax in outer for axis in (ax.xaxis, ax.yaxis)} - {""}
-    assert not [label for label in words if not UNIT.search(label) and not UNITLESS.fullmatch(label)]
+    beside = {ax.get_ylabel() for ax in outer if any(SPARK.fullmatch(text.get_text()) for text in ax.texts)}
+    assert not [label for label in words - beside if not UNIT.search(label) and not UNITLESS.fullmatch(label)]
     assert all(ax.get_ylabel() for ax in outer)
     labelled = [ax for ax in every(page) if ax.get_xlabel()]
     for ax in every(page):
@@ -170,8 +173,13 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
     assert drawn <= entries
 
 
+def unprefixed(label: str) -> str:
+    """The label with its unit, whatever the prefix of the unit."""
+    return re.sub(r"\([mµ](?=[mrNV])", "(", label)
+
+
 def shown(page, label: str) -> Axes:
-    return next(ax for ax in page.axes if ax.get_ylabel() == label)
+    return next(ax for ax in page.axes if label in (ax.get_ylabel(), unprefixed(ax.get_ylabel())))
 
 
 def curve(ax: Axes, colour: str) -> np.ndarray:
@@ -224,7 +232,7 @@ def test_a_figure_has_the_panels_that_its_mechanism_has_in_their_units_and_no_ot
         trace = dataclasses.replace(trace, reaction=0.0 * trace.reaction)
     if trace.scenario.law.name == "none":
         trace = dataclasses.replace(trace, s=0.0 * trace.s)
-    words = [ax.get_ylabel().replace("\n", " ") for ax in figure(trace).axes]
+    words = [unprefixed(ax.get_ylabel().replace("\n", " ")) for ax in figure(trace).axes]
     assert set(labels) <= set(words), words
     assert not [part for part in absent if part in " ".join(words)]
 
@@ -276,14 +284,33 @@ def test_the_slowest_channel_of_a_network_is_thick_and_none_is_left_out():
         np.testing.assert_allclose(thick.get_ydata(), trace.x[:, np.abs(trace.x - trace.r).sum(axis=0).argmax()])
 
 
-def test_joints_of_an_arm_have_panels_in_their_own_units_that_hold_the_run_that_is_far_off():
+def test_the_worst_joint_of_an_arm_is_large_and_others_are_sparklines_beside_their_largest_values():
+    """The run that is far off counts. The page is no higher than 1,100 px."""
     traces = arm()
     page = figure(traces, labels=["near", "far"])
-    labels = [ax.get_ylabel() for ax in page.axes]
-    units = {"reach": ("m", "N"), "turn": ("rad", "N·m"), "lift": ("rad", "N·m")}
-    assert labels[:9] == [f"{j} {k} ({u})" for j, (m, n) in units.items() for k, u in (("x", m), ("e", m), ("u", n))]
-    low, high = shown(page, "reach x (m)").get_ylim()
-    assert low <= traces[1].x[:, 0].min() < traces[1].x[:, 0].max() <= high
+    assert page.bbox.height / page.dpi * DPI <= 1100
+    error = np.abs(traces[1].x - traces[1].r)
+    assert error[:, 0].mean() > error[:, 2].mean(), "but lift's is the largest of all scales: 1 m and 0.6 rad"
+    assert [ax.get_ylabel() for ax in page.axes[:2]] == ["lift e (rad)", "lift u (N·m)"]
+    sparks = [ax for ax in page.axes if any(SPARK.fullmatch(text.get_text()) for text in ax.texts)]
+    assert [ax.get_ylabel() for ax in sparks] == ["reach e", "u", "turn e", "u"]
+    told = [text.get_text() for ax in sparks for text in ax.texts if SPARK.fullmatch(text.get_text())]
+    u = np.max([np.abs(trace.u).max(axis=0) for trace in traces], axis=0)
+    sizes = [(error[:, 0], "m"), (u[0], "N"), (error[:, 1], "rad"), (u[1], "N·m")]
+    assert told == [f"{np.max(size):.3g} {unit}" for size, unit in sizes]
+
+
+@pytest.mark.parametrize(("size", "unit", "factor"), [(3e-6, "µm", 1e6), (0.02, "mm", 1e3), (0.3, "m", 1.0)])
+def test_no_axis_has_an_exponent_and_its_numbers_are_in_its_unit(size, unit, factor):
+    trace = duffing("classical")
+    small = dataclasses.replace(trace, **{name: size * getattr(trace, name) for name in ("x", "r", "v", "s", "u")})
+    page = figure(small)
+    page.draw_without_rendering()
+    ax = shown(page, f"position x ({unit})")
+    numbers = {float(text.get_text().replace("−", "-")): float(text.get_position()[1]) for text in ax.get_yticklabels()}
+    assert [value * factor for value in numbers.values()] == pytest.approx([*numbers])
+    linear = [axis for each in every(page) for axis in (each.xaxis, each.yaxis) if axis.get_scale() == "linear"]
+    assert not [axis.offsetText.get_text() for axis in linear if axis.offsetText.get_text()]
 
 
 def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_runs_are_hollow():
