@@ -86,7 +86,7 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     plant, start = traces[0].scenario.plant, traces[0].scenario.x0
     labels = [ax.get_ylabel() for ax in smc.figure(traces, tmp_path / "a.png").axes]
     for joint in joints:
-        assert any(label.startswith(f"{joint} u (") for label in labels), labels
+        assert any(label.startswith(f"{joint} e") for label in labels), labels
     assert not any("mean" in label for label in labels)
     if gl.missing() is None:
         picture = np.asarray(Image.open(smc.film(traces, tmp_path / "b.png", at=0.2, size=(640, 360)))).astype(int)
