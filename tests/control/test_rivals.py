@@ -54,9 +54,9 @@ def answer(law, memory, omega, h, samples=80_000):
 
 
 def bounded(name):
-    """The law with b = 1, and on e'' = u where it knows a plant."""
+    """The law with b = 1, on e'' = u where it knows a plant, and with an integral of a rate of 1 / s or more."""
     gains = {} if name in ("adrc", "pd_observer") else UNIT
-    return smc.law(name, **({"b": 1.0} | gains))
+    return smc.law(name, **({"b": 1.0} | gains | ({"wi": 1.0} if name == "loop_shaping" else {})))
 
 
 # what holds of all
@@ -64,19 +64,58 @@ def bounded(name):
 
 @pytest.mark.parametrize("name", RIVALS)
 def test_a_constant_disturbance_leaves_no_error(name):
-    run = plant_b(bounded(name), constant(2.0), duration=40.0)
+    run = plant_b(bounded(name), constant(2.0), duration=20.0)
     assert abs(run.x[-1, 0]) < 1e-5
     assert run.u[-1] == pytest.approx(-2.0, abs=1e-4)
 
 
 @pytest.mark.parametrize("name", RIVALS)
-def test_what_the_bound_takes_away_does_not_wind_up(name):
-    """A start far away holds u at its bound for long. The loop swings back by less each time, and comes to rest."""
-    trace = smc.run(smc.Scenario(plant=smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0), law=bounded(name),
-                                 x0=5.0, u_max=1.0, duration=40.0))  # fmt: skip
-    assert (np.abs(trace.u) == 1.0).sum() > 1000
-    assert trace.x.min() > -4.0
-    assert np.abs(trace.x[-100:]).max() < 0.02
+def test_a_law_that_does_not_see_its_bound_swings_up_and_one_that_does_comes_to_rest(name):
+    """From a start that holds u at its bound for seconds. A law that is told of no bound has no anti-windup."""
+    own, blind = (plant_b(bounded(name), x=(5.0, 0.0), limit=1.0, told=told, duration=30.0) for told in (None, 1e9))
+    assert (np.abs(own.u) == 1.0).sum() > 2000
+    assert own.residual() < 0.05
+    assert own.x.min() > -5.0
+    assert blind.residual() > 10.0
+
+
+@pytest.mark.parametrize("name", ["adrc", "pd_observer", "mpc"])
+def test_an_observer_does_not_take_the_bound_for_a_disturbance(name):
+    """Where there is no disturbance the estimate is 0, at the bound too."""
+    run = plant_b(bounded(name), x=(5.0, 0.0), limit=1.0, duration=5.0)
+    assert (np.abs(run.u) == 1.0).sum() > 1000
+    assert np.abs(run.memory[:, 3]).max() < 1e-10
+
+
+@pytest.mark.parametrize(("name", "cell", "truth"), [("mpc", 3, 0.0), ("loop_shaping", 4, 1.0)])
+def test_an_observer_that_knows_the_plant_is_right_about_it(name, cell, truth):
+    """The estimate of no disturbance, and the prediction of e, are wrong by what changes within a sample."""
+    a1, a2, b = 5.0, -4.0, 0.4
+    law, wrong = smc.law(name, a1=a1, a2=a2, b=b), []
+    for h in (1e-3, 1e-4):
+        run = plant_b(law, x=(0.1, 0.0), g=b, rates=(a1, a2), limit=2.0, h=h, duration=2.0)
+        wrong.append(np.abs(run.memory[1:, cell] - truth * run.x[1:, 0]).max() / 0.1)
+    assert (np.abs(run.u) == 2.0).any()
+    assert wrong[0] < 0.01
+    assert wrong[1] < wrong[0] / 8.0
+
+
+@pytest.mark.parametrize("name", RIVALS)
+@pytest.mark.parametrize("limit", [math.inf, 3.0])
+def test_with_the_model_the_law_controls_the_acceleration(name, limit):
+    """g u + f - r'' is the v of the law without the model on e'' = v, whatever f, g and r'' are at a sample.
+
+    Where u has a bound, f is r'', so that the bound on v is symmetric and g times as large.
+    """
+    plain, rng = bounded(name), np.random.default_rng(0)
+    informed = smc.law(name, **{key: value for key, value in plain.gains.items() if key not in UNIT})
+    own, other, g = np.zeros(plain.memory), np.zeros(plain.memory), -2.0
+    for _ in range(200):
+        e, de, f = rng.normal(size=3)
+        ddr = rng.normal() if limit == math.inf else f
+        v = call(plain, own, e=e, de=de, limit=abs(g) * limit)
+        u = call(informed, other, e=e, de=de, f=f, g=g, ddr=ddr, model=1.0, limit=limit)
+        assert g * u + f - ddr == pytest.approx(v, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["lqi", "mpc", "loop_shaping"])
@@ -149,6 +188,17 @@ def test_lqi_gives_foreign_gains(vectors):
                                    rtol=1e-9)  # fmt: skip
 
 
+def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
+    """At a constant reading u - sat(u) tends to -ki e tt, by Euler's factor 1 - dt / tt a sample."""
+    q0, tt, e, h = 9.0, 0.4, 2.0, 1e-3
+    law, memory = smc.law("lqi", q0=q0, tt=tt, **UNIT), np.zeros(5)
+    asked = [law.function(measured(e=e, de=0.0, dt=h, limit=1.0), python_controller.gains_of(law), memory)[0]
+             for _ in range(3000)]  # fmt: skip
+    end, k = -math.sqrt(q0) * e * tt, np.arange(3000)
+    beyond = np.array(asked) + 1.0
+    np.testing.assert_allclose(beyond, end + (beyond[0] - end) * (1.0 - h / tt) ** k, rtol=1e-9)
+
+
 # model-predictive control
 
 
@@ -190,6 +240,13 @@ def test_mpc_gives_the_control_of_a_foreign_solver(vectors):
         memory[:4] = 1.0, case["e"], case["de"], case["d"]
         u = call(law, memory, e=case["e"], de=case["de"], dt=1e-12, limit=case["limit"])
         assert abs(u - case["u"]) <= 1e-9 * case["limit"]
+
+
+def test_only_the_ratios_of_mpc_s_weights_matter():
+    one, other = (smc.law("mpc", q1=share * 90.0, q2=share * 7.0, r=share, **UNIT) for share in (1.0, 5.0))
+    for e, de in ((0.1, -0.3), (1.0, 2.0)):
+        u, again = (call(law, np.zeros(law.memory), e=e, de=de, limit=6.0) for law in (one, other))
+        assert u == pytest.approx(again, rel=1e-12)
 
 
 def test_mpc_keeps_to_bounds_that_the_nominal_model_moves():

@@ -122,6 +122,7 @@ def chain(
     model=0.0,
     limit=math.inf,
     dt=None,
+    told=None,
     rates=None,
     memory=(),
 ):
@@ -134,13 +135,13 @@ def chain(
       sign: -1 turns the control round.
       noise: (K,) or (K, n), added to the state that the law sees.
       f, g: constants of the plant; model: 1 where the law may use them.
-      limit: bound on |u|.
+      limit: bound on |u|; told: what the law is told of it, limit unless given.
       rates: of the last state by each state, (n,): with them a linear plant, without d.
       memory: the first cells of the law's memory at the start.
     """
     count, n = round(duration / h), len(x)
     function = cfunctions.compile_component(law)  # as the callback calls it
-    y = np.array(measured(dt=h if dt is None else dt, f=f, g=g, limit=limit, model=model))
+    y = np.array(measured(dt=h if dt is None else dt, f=f, g=g, limit=limit if told is None else told, model=model))
     y[HAS_SURFACE] = float(n == 1)
     gains, out, cells = np.array([*law.gains.values(), 0.0]), np.zeros(2), np.zeros(law.memory + 1)
     cells[: len(memory)] = memory
