@@ -29,10 +29,11 @@ from smc_mujoco.control.law import command, law_function, linear_plant
 from smc_mujoco.control.laws.extended_state import observe
 from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 
-# The memory: 0 to 4 the observer; 5, 1 once the matrices are there; then the plan, the gradient, the step, the linear
-# term by e and by de, the Hessian and its Cholesky factor, 20 x 20, by rows.
+# The memory: 0 to 4 the observer; 5, 1 once the matrices are there; 6, the held moves of the Cholesky factor, as bits;
+# then the plan, the gradient, the step, the linear term by e and by de, the Hessian and the factor, 20 x 20, by rows,
+# and what a share of the step changes.
 MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = 20, 30, 40, 40  # chosen
-PLAN, GRADIENT, STEP, BY_E, BY_DE, HESSIAN, FACTOR, SLOTS = 8, 28, 48, 68, 88, 108, 508, 908
+PLAN, GRADIENT, STEP, BY_E, BY_DE, HESSIAN, FACTOR, MOVED, SLOTS = 8, 28, 48, 68, 88, 108, 508, 908, 928
 ENOUGH = 1e-13  # gradient of the free moves, of the largest linear term
 SUFFICIENT = 1e-4  # share of the decrease that the gradient promises, L. Armijo's
 
@@ -104,16 +105,19 @@ def prepare(n, a1, a2, b, H, q1, q2, memory):
 @njit
 def residual(n, e, de, low, high, memory):
     """Write the gradient of the plan into the memory. Return the largest of the free moves, over the linear term."""
-    largest, size = 0.0, 0.0
     for i in range(n):
-        linear = memory[BY_E + i] * e + memory[BY_DE + i] * de
-        total = linear
-        for j in range(n):
-            total += memory[HESSIAN + MOVES * i + j] * memory[PLAN + j]
-        memory[GRADIENT + i] = total
-        size = max(size, abs(linear))
+        memory[GRADIENT + i] = memory[BY_E + i] * e + memory[BY_DE + i] * de
+    size = 0.0
+    for i in range(n):
+        size = max(size, abs(memory[GRADIENT + i]))
+    for j in range(n):  # by columns, which are rows
+        v = memory[PLAN + j]
+        for i in range(n):
+            memory[GRADIENT + i] += memory[HESSIAN + MOVES * j + i] * v
+    largest = 0.0
+    for i in range(n):
         if not held(i, low, high, memory):
-            largest = max(largest, abs(total))
+            largest = max(largest, abs(memory[GRADIENT + i]))
     return largest / size if size > 0.0 else largest
 
 
@@ -125,35 +129,57 @@ def held(i, low, high, memory):
 
 
 @njit
-def newton(n, low, high, memory):
-    """Write Newton's step of the free moves into the memory; those that are held stay. Return the whole share, 1."""
+def factor(n, low, high, memory):
+    """Write the Cholesky factor of the Hessian of the free moves into the memory; held moves have the identity's rows.
+
+    Return the held moves, as bits, and a bit above them.
+    """
+    bits = 1.0
+    for i in range(n):
+        bits *= 2.0
+        if held(i, low, high, memory):
+            bits += 1.0
+    if bits == memory[6]:
+        return bits
     for i in range(n):
         free_i = not held(i, low, high, memory)
-        memory[STEP + i] = -memory[GRADIENT + i] if free_i else 0.0
         for j in range(i + 1):
             free = free_i and not held(j, low, high, memory)
             total = memory[HESSIAN + MOVES * i + j] if free else (1.0 if i == j else 0.0)
             for k in range(j):
                 total -= memory[FACTOR + MOVES * i + k] * memory[FACTOR + MOVES * j + k]
             memory[FACTOR + MOVES * i + j] = math.sqrt(total) if i == j else total / memory[FACTOR + MOVES * j + j]
+    return bits
+
+
+@njit
+def newton(n, low, high, memory):
+    """Write Newton's step of the free moves into the memory; those that are held stay. Return the whole share, 1."""
+    memory[6] = factor(n, low, high, memory)
+    for i in range(n):
+        memory[STEP + i] = 0.0 if held(i, low, high, memory) else -memory[GRADIENT + i]
     for i in range(n):
         for j in range(i):
             memory[STEP + i] -= memory[FACTOR + MOVES * i + j] * memory[STEP + j]
         memory[STEP + i] /= memory[FACTOR + MOVES * i + i]
-    for k in range(n):
-        i = n - 1 - k
-        for m in range(k):
-            j = n - 1 - m
+    for m in range(n):
+        j = n - 1 - m
+        memory[STEP + j] /= memory[FACTOR + MOVES * j + j]
+        for i in range(j):
             memory[STEP + i] -= memory[FACTOR + MOVES * j + i] * memory[STEP + j]
-        memory[STEP + i] /= memory[FACTOR + MOVES * i + i]
     return 1.0
 
 
 @njit
-def change(share, low, high, memory, i):
-    """Return how a share of the step changes a move that is clipped to its bounds."""
-    v = memory[PLAN + i]
-    return min(max(v + share * memory[STEP + i], low), high) - v
+def move(n, share, low, high, memory):
+    """Write how a share of the step changes the moves, each clipped to its bounds. Return whether none is clipped."""
+    whole = True
+    for i in range(n):
+        v, wanted = memory[PLAN + i], memory[PLAN + i] + share * memory[STEP + i]
+        memory[MOVED + i] = min(max(wanted, low), high) - v
+        if wanted < low or wanted > high:
+            whole = False
+    return whole
 
 
 @njit
@@ -161,15 +187,17 @@ def advance(n, low, high, memory):
     """Move the plan by a share of Newton's step that lowers the cost enough, 1 or less. Return it; 0 for none."""
     share = newton(n, low, high, memory)
     for _ in range(MOST_HALVINGS):
-        promised, curved = 0.0, 0.0
-        for i in range(n):
-            moved = change(share, low, high, memory, i)
-            promised += memory[GRADIENT + i] * moved
-            for j in range(n):
-                curved += moved * memory[HESSIAN + MOVES * i + j] * change(share, low, high, memory, j)
-        if promised + curved / 2.0 <= SUFFICIENT * promised:
+        enough = move(n, share, low, high, memory)  # a whole step that no bound clips ends at the least cost
+        if not enough:
+            promised, curved = 0.0, 0.0
             for i in range(n):
-                memory[PLAN + i] += change(share, low, high, memory, i)
+                promised += memory[GRADIENT + i] * memory[MOVED + i]
+                for j in range(n):
+                    curved += memory[MOVED + i] * memory[HESSIAN + MOVES * i + j] * memory[MOVED + j]
+            enough = promised + curved / 2.0 <= SUFFICIENT * promised
+        if enough:
+            for i in range(n):
+                memory[PLAN + i] += memory[MOVED + i]
             return share
         share /= 2.0
     return 0.0
@@ -215,5 +243,5 @@ def mpc(y, gains, memory):
         if advance(n, low, high, memory) == 0.0:
             break
     v = memory[PLAN] + us
-    memory[4] = a1 * y.e + a2 * y.de + b * min(max(v, f - reach), f + reach)
+    memory[4] = a1 * y.e + a2 * y.de + b * v
     return command(y, v), memory[BY_E] * y.e + memory[BY_DE] * y.de
