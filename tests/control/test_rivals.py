@@ -216,7 +216,7 @@ def test_the_end_s_weight_of_mpc_solves_the_discrete_riccati_equation(plant):
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize(("q1", "q2"), [(100.0, 16.0), (3751.0, 48.0)])
 def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, q2):
-    """From the last plan or from none: the problem has one solution. With the larger weights whole steps would cycle."""
+    """From the last plan or from none: it has one solution. With the larger weights whole steps would cycle."""
     rng, n = np.random.default_rng(0), mpc.MOVES
     law = smc.law("mpc", q1=q1, q2=q2, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
     memory = np.zeros(mpc.SLOTS)
