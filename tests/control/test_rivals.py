@@ -7,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from helpers.plants_ab import constant, plant_b
+from helpers.plants_ab import called, constant, plant_b
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 
 import smc_mujoco as smc
@@ -192,8 +192,7 @@ def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
     """At a constant reading u - sat(u) tends to -ki e tt, by Euler's factor 1 - dt / tt a sample."""
     q0, tt, e, h = 9.0, 0.4, 2.0, 1e-3
     law, memory = smc.law("lqi", q0=q0, tt=tt, **UNIT), np.zeros(5)
-    asked = [law.function(measured(e=e, de=0.0, dt=h, limit=1.0), python_controller.gains_of(law), memory)[0]
-             for _ in range(3000)]  # fmt: skip
+    asked = [called(law, measured(e=e, de=0.0, dt=h, limit=1.0), memory)[0] for _ in range(3000)]
     end, k = -math.sqrt(q0) * e * tt, np.arange(3000)
     beyond = np.array(asked) + 1.0
     np.testing.assert_allclose(beyond, end + (beyond[0] - end) * (1.0 - h / tt) ** k, rtol=1e-9)
