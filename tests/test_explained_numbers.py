@@ -10,7 +10,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import apart, gains_for, ranking
 from smc_mujoco.analysis import region_of_attraction as region
-from smc_mujoco.analysis.tuning import objective, search, search_space, stages
+from smc_mujoco.analysis.tuning import objective, search, search_space
 from smc_mujoco.analysis.worst_case import search as attack
 from smc_mujoco.analysis.worst_case import uncertainty
 from smc_mujoco.envs import tasks
@@ -71,11 +71,11 @@ SAID = {
     search: [
         {12: "twelve in a comparison"}[search.SEARCHES],
         f"A search has {search.BUDGET} evaluations for each gain",
-        f"An {part(stages.SCREENED_SHARE)} screens",
-        f"A {part(stages.EVOLVED_SHARE)} evolves",
-        f"lower J by less than {percent(stages.PATIENCE)}",
+        f"An {part(search.SCREENED_SHARE)} screens",
+        f"A {part(search.EVOLVED_SHARE)} evolves",
+        f"lower J by less than {percent(search.PATIENCE)}",
         f"differ by more than {percent(search.AGREEMENT)}",
-        f"rounded to {WORDS[stages.GAIN_DIGITS]} digits",
+        f"rounded to {WORDS[search.GAIN_DIGITS]} digits",
     ],
     search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
     search_space.at_bound: [f"within {percent(search_space.BOUND_MARGIN)} of a bound"],
@@ -141,7 +141,7 @@ SAID = {
     plugin.smc_golden._fixture_function: [f"within {percent(golden.RELATIVE)} of their recorded value"],
     ROOT / "docs" / "mathematics.md": [
         f"A search has {search.BUDGET} evaluations for each gain",
-        f"lower $J$ by less than {percent(stages.PATIENCE)}",
+        f"lower $J$ by less than {percent(search.PATIENCE)}",
         f"differ by more than {percent(search.AGREEMENT)}",
     ],
     ROOT / "docs" / "design.md": [f"fails at |x| or |v| beyond {short(controller.MAX_STATE)}"],

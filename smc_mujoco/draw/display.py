@@ -1,4 +1,4 @@
-"""Check that a window can be opened, before MuJoCo's viewer, which ends the whole process if it cannot."""
+"""Check that a window can be opened, before MuJoCo and its viewer are loaded: it ends the process if it cannot."""
 
 import os
 import sys

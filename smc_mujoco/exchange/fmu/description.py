@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.units import Unit
-from smc_mujoco.exchange.fmu.controller import OUTPUTS, Controller, Variable
+from smc_mujoco.exchange.fmu.contents import OUTPUTS, ExportedLaw, Variable
 
 # Kind of joint -> units of force and position: name, exponents of the base units.
 JOINT_UNITS = {
@@ -51,19 +51,19 @@ def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
 
 
 def model_description(
-    listed: Sequence[Variable], controller: Controller, identifier: str, token: str, joint: str
+    listed: Sequence[Variable], exported: ExportedLaw, identifier: str, token: str, joint: str
 ) -> str:
     """Return modelDescription.xml of an FMU for Co-Simulation, with the units of a hinge or a slide."""
     root = xml.Element(
-        "fmiModelDescription", fmiVersion="3.0", modelName=controller.law.name, instantiationToken=token,
-        description=summary(controller), generationTool=f"smc_mujoco {__version__}",
+        "fmiModelDescription", fmiVersion="3.0", modelName=exported.law.name, instantiationToken=token,
+        description=summary(exported), generationTool=f"smc_mujoco {__version__}",
         license="use without restriction, without warranty; the headers of FMI under the 2-clause BSD licence",
         variableNamingConvention="structured",
     )  # fmt: skip
     xml.SubElement(
         root, "CoSimulation", modelIdentifier=identifier, canGetAndSetFMUState="true", canSerializeFMUState="true",
         canHandleVariableCommunicationStepSize="true", hasEventMode="true",
-        fixedInternalStepSize=repr(controller.period),
+        fixedInternalStepSize=repr(exported.period),
     )  # fmt: skip
     units = xml.SubElement(root, "UnitDefinitions")
     for unit in dict.fromkeys(v.unit for v in listed if v.unit is not None and any(v.unit)):
@@ -72,7 +72,7 @@ def model_description(
             xml.SubElement(definition, "BaseUnit", {name: str(n) for name, n in base.items()})
     categories = xml.SubElement(root, "LogCategories")
     xml.SubElement(categories, "Category", name="error", description="why a call failed")
-    xml.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(controller.period))
+    xml.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(exported.period))
     variables, structure = xml.SubElement(root, "ModelVariables"), xml.SubElement(root, "ModelStructure")
     for reference, variable in enumerate(listed):
         variables.append(_variable(reference, variable, joint))
@@ -123,9 +123,9 @@ def written(root: xml.Element) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{xml.tostring(root, encoding="unicode")}\n'
 
 
-def summary(controller: Controller) -> str:
+def summary(exported: ExportedLaw) -> str:
     """Return the controller in one line."""
-    parts = [f"law {controller.law}"]
-    parts += [f"surface {controller.surface}"] if controller.surface else []
-    parts += [f"velocity estimator {controller.estimator}"] if controller.estimator else []
-    return f"Sliding-mode controller: {', '.join(parts)}; every {controller.period:g} s"
+    parts = [f"law {exported.law}"]
+    parts += [f"surface {exported.surface}"] if exported.surface else []
+    parts += [f"velocity estimator {exported.estimator}"] if exported.estimator else []
+    return f"Sliding-mode controller: {', '.join(parts)}; every {exported.period:g} s"

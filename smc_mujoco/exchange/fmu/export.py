@@ -28,9 +28,8 @@ from smc_mujoco.control.law import Law
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.export import number_of_joints, with_head, writable
-from smc_mujoco.exchange.fmu import controller as inside
-from smc_mujoco.exchange.fmu import description
-from smc_mujoco.exchange.fmu.controller import Controller
+from smc_mujoco.exchange.fmu import contents, description
+from smc_mujoco.exchange.fmu.contents import ExportedLaw
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
@@ -92,11 +91,11 @@ def law_to_fmu(
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:
         joint = "hinge" if joint is None else joint
-    controller = _controller(law, **chosen)
-    plain = re.sub(r"\W+", "_", controller.law.name, flags=re.ASCII).strip("_")
+    exported = _exported(law, **chosen)
+    plain = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
     identifier = plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")  # of C
     target = with_ending(path if path is not None else f"{identifier}.fmu", ".fmu")
-    files = _files(controller, identifier, joint)
+    files = _files(exported, identifier, joint)
     if binary:
         files |= _binary(files, identifier)
     with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -106,7 +105,7 @@ def law_to_fmu(
 
 
 def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """Return a scenario's arguments of `_controller`, and its kind of joint. `chosen`: those that the user gives."""
+    """Return a scenario's arguments of `_exported`, and its kind of joint. `chosen`: those that the user gives."""
     if given := [name for name, value in chosen.items() if value is not None]:
         raise ScenarioError(f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead")
     s, limits = scenario.resolved, set(scenario.limits)
@@ -121,10 +120,10 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
     return own | {"u_max": limits.pop(), "joints": None}, joint
 
 
-def _controller(
+def _exported(
     law: Any, surface: Any, velocity: Any, control_period: Any, u_max: Any, model: Any, joints: int | None
-) -> Controller:
-    """Return the controller, checked. Arguments and errors as in `law_to_fmu`."""
+) -> ExportedLaw:
+    """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
     sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
     chosen = writable(law)
     count = number_of_joints(chosen, joints)
@@ -134,7 +133,7 @@ def _controller(
         check_surface(sliding, chosen)
     if chosen.requires_model and model == "none":
         raise ScenarioError(f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'")
-    return Controller(
+    return ExportedLaw(
         law=chosen,
         surface=sliding,
         estimator=None if estimator is None or estimator.name == "measured" else estimator,
@@ -154,28 +153,28 @@ def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
     return Each(one=BOUND)("u_max", u_max)
 
 
-def _files(controller: Controller, identifier: str, joint: str) -> dict[str, str]:
+def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]:
     """Return path in the archive -> text, for all files but the binary."""
-    listed = inside.variables(controller)
+    listed = contents.variables(exported)
     if joint == MIXED_JOINTS:
         joint = "hinge"  # of which no unit is left but powers of the second
         listed = [v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None) for v in listed]
-    law = with_head(controller.law, "double", *controller.code["law"], controller.joints, measured=False)
-    files = {"controller.c": inside.source(listed, inside.helpers(controller), inside.body(listed, controller))}
+    law = with_head(exported.law, "double", *exported.code["law"], exported.joints, measured=False)
+    files = {"controller.c": contents.source(listed, contents.helpers(exported), contents.body(listed, exported))}
     files["law.c"] = f'#include "controller.h"\n{law}'
-    for kind, (slots, text) in controller.code.items():
+    for kind, (slots, text) in exported.code.items():
         if kind != "law":
-            files[f"{kind}.c"] = inside.component_file(controller.parts[kind], slots, text)
+            files[f"{kind}.c"] = contents.component_file(exported.parts[kind], slots, text)
     files = {"fmu.c": (FOLDER / "fmu.c").read_text(encoding="utf-8"), **files}
-    content = "\0".join([*files.values(), inside.header(listed, controller, identifier, ""), joint])
+    content = "\0".join([*files.values(), contents.header(listed, exported, identifier, ""), joint])
     token = f"{{{uuid.UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}"
     compiled = list(files)
-    files["controller.h"] = inside.header(listed, controller, identifier, token)
+    files["controller.h"] = contents.header(listed, exported, identifier, token)
     files["smc_fmu.h"] = (FOLDER / "smc_fmu.h").read_text(encoding="utf-8")
     files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
     files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
     return {
-        "modelDescription.xml": description.model_description(listed, controller, identifier, token, joint),
+        "modelDescription.xml": description.model_description(listed, exported, identifier, token, joint),
         "sources/buildDescription.xml": description.build_description(compiled, identifier),
         **{f"sources/{name}": text for name, text in files.items()},
     }

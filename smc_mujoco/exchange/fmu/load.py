@@ -35,7 +35,7 @@ from smc_mujoco.control.law import Measurement, law_function
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.fmu import slave
-from smc_mujoco.exchange.fmu.controller import MAX_DOUBLE, OUTPUTS
+from smc_mujoco.exchange.fmu.contents import MAX_DOUBLE, OUTPUTS
 from smc_mujoco.exchange.fmu.slave import CONSTANT_TYPES, REAL_TYPES, Slave
 
 INPUT_FIELDS = tuple(n for n in Measurement._fields if n not in ("has_surface", "s", "v_eq"))

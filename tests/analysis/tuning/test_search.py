@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning import search, search_space, stages
+from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, Evaluator
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Evaluation, Objective
 from smc_mujoco.analysis.tuning.result import compare, load
@@ -201,7 +201,7 @@ def test_a_descent_ends_when_it_gains_too_little(slope, least, most):
             costs.append(1.0 + slope * float(logs @ logs))
             return costs[-1]
 
-    stages._descend(Bowl(), {"a": (0.1, 10.0), "b": (0.1, 10.0)}, np.array([0.9, -0.8]), 200)
+    search._descend(Bowl(), {"a": (0.1, 10.0), "b": (0.1, 10.0)}, np.array([0.9, -0.8]), 200)
     assert least <= len(costs) <= most
     assert min(costs) < 1.001
 
@@ -260,7 +260,7 @@ def test_a_gain_over_another_is_searched_as_far_as_a_force():
     law = smc.law("extended_state")
     assert search_space.force_limits(law, {"b": 2.0}, 6.0) == {"k": pytest.approx(12.0 * 10**2.5)}
     task = search._task("duffing", law, LEAN, 4, 0, 1)
-    trials = stages.Trials(None, None, tuple(task.box), None, None)
+    trials = search.Trials(None, None, tuple(task.box), None, None)
     trials.limit = lambda gains: search_space.force_limits(law, gains, 6.0)
     gains = dict(zip(task.box, trials.gains([5.0] * len(task.box)), strict=True))
     assert gains["k"] == pytest.approx(6.0 * 10**2.5 * gains["b"], rel=1e-3) or gains["k"] == 1e5

@@ -79,8 +79,8 @@ class Variable(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Controller:
-    """A law with all that it needs to control one joint, or many."""
+class ExportedLaw:
+    """A law with all that an FMU needs to control one joint, or many."""
 
     law: Law
     surface: Surface | None  # None: the law's own
@@ -108,33 +108,33 @@ class Controller:
         return {kind: export.translated(part, joints=joints.get(kind, 0)) for kind, part in self.parts.items()}
 
 
-def variables(controller: Controller) -> list[Variable]:
+def variables(exported: ExportedLaw) -> list[Variable]:
     """Return the variables in the order of their value references."""
-    places, of_model = controller.places, JOINT_INPUTS if controller.joints else CHANNEL_INPUTS
-    wanted = inputs(controller)
+    places, of_model = exported.places, JOINT_INPUTS if exported.joints else CHANNEL_INPUTS
+    wanted = inputs(exported)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
-        starts = _starts(name, controller) if name in wanted else {}
+        starts = _starts(name, exported) if name in wanted else {}
         listed += [Variable(f"{name}{place}", "SMC_INPUT", words, unit, start) for place, start in starts.items()]
     computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
-    if controller.surface:
+    if exported.surface:
         computed.append(("v_eq", "acceleration of the error that keeps s constant", None))
-    if controller.estimator:
+    if exported.estimator:
         computed.append(("v_estimated", "estimated velocity", SPEED))
     for name, words, unit in computed:
         listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
     words = "bound on the magnitude of u"
-    for place, bound in zip(places, controller.u_max, strict=True):
+    for place, bound in zip(places, exported.u_max, strict=True):
         start = bound if math.isfinite(bound) else MAX_DOUBLE
         listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
-    for kind, part in controller.parts.items():
+    for kind, part in exported.parts.items():
         for name, value in part.gains.items():
             indices = places if kind == "law" and name not in part.shared else ("",)
             listed += [parameter(kind, part, name, gain_at(value, i), place) for i, place in enumerate(indices)]
-    listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, controller.period))
-    for kind, (slots, _) in controller.code.items():
-        for i in range(max(1, controller.joints)):
-            joint, place = (f", joint {i + 1}", f"{i + 1},") if controller.joints else ("", "")
+    listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, exported.period))
+    for kind, (slots, _) in exported.code.items():
+        for i in range(max(1, exported.joints)):
+            joint, place = (f", joint {i + 1}", f"{i + 1},") if exported.joints else ("", "")
             listed += [
                 Variable(f"{kind}.memory[{place}{k}]", "SMC_STATE", f"number {k} of the memory of the {kind}{joint}")
                 for k in range(1, slots + 1)
@@ -142,26 +142,26 @@ def variables(controller: Controller) -> list[Variable]:
     return listed
 
 
-def _starts(name: str, controller: Controller) -> dict[str, float]:
+def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
     """Return what follows the name of an input, of each element -> its value before it is set.
 
     It is 1 where laws divide by the input, as by g or the diagonal of M, else 0.
     """
     if name not in ("M", "C", "J"):
-        return dict.fromkeys(controller.places, float(name in ("g", "gq") and not controller.joints))
-    rows, columns = range(1, 4 if name == "J" else controller.joints + 1), range(1, controller.joints + 1)
+        return dict.fromkeys(exported.places, float(name in ("g", "gq") and not exported.joints))
+    rows, columns = range(1, 4 if name == "J" else exported.joints + 1), range(1, exported.joints + 1)
     return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
 
 
-def inputs(controller: Controller) -> set[str]:
+def inputs(exported: ExportedLaw) -> set[str]:
     """Return the names of the inputs that the components read, without indices."""
-    texts = [text if controller.modelled else UNREACHED.sub(r"\1", text) for _, text in controller.code.values()]
+    texts = [text if exported.modelled else UNREACHED.sub(r"\1", text) for _, text in exported.code.values()]
     read, wanted = reads("".join(texts)), {*REQUIRED_INPUTS}
-    if controller.estimator is None or "v" in reads(controller.code["estimator"][1]):
+    if exported.estimator is None or "v" in reads(exported.code["estimator"][1]):
         wanted.add("v")
     if read & {"a", "ddr"}:  # a is ddr if no estimator gives it
         wanted.add("ddr")
-    if controller.modelled:
+    if exported.modelled:
         wanted |= read & MODEL_INPUTS
         wanted |= {name for name, needs in (("C", "coriolis"), ("J", "jacobian")) if needs in read}
     return wanted | (read & {"q", "dq"})
@@ -192,11 +192,11 @@ def place(variable: str) -> str:
     return "SMC_AT_" + re.sub(r"\W", "_", variable)
 
 
-def header(listed: Sequence[Variable], controller: Controller, identifier: str, token: str) -> str:
+def header(listed: Sequence[Variable], exported: ExportedLaw, identifier: str, token: str) -> str:
     """Return controller.h: the sizes, and the indices of the variables. `identifier`: the model's name in C."""
     memory = next((i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed))
     own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
-    joints = f"\n#define {JOINTS} {controller.joints}" if controller.joints else ""
+    joints = f"\n#define {JOINTS} {exported.joints}" if exported.joints else ""
     indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
     return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
 #ifndef SMC_CONTROLLER_H
@@ -208,7 +208,7 @@ def header(listed: Sequence[Variable], controller: Controller, identifier: str, 
 #include "smc_fmu.h"
 
 #define SMC_TOKEN "{token}"
-#define SMC_DT {controller.period!r} /* s */
+#define SMC_DT {exported.period!r} /* s */
 #define SMC_TIME {place("time")}
 enum {{
 {indices}
@@ -250,9 +250,9 @@ static double number(double x)
 """
 
 
-def helpers(controller: Controller) -> str:
+def helpers(exported: ExportedLaw) -> str:
     """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and jacobian."""
-    wanted, needs, functions = inputs(controller), reads(controller.code["law"][1]), ""
+    wanted, needs, functions = inputs(exported), reads(exported.code["law"][1]), ""
     if "coriolis" in needs:
         given = "C" in wanted
         matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}" if given else "(void)plant, (void)w"
@@ -280,32 +280,32 @@ static void coriolis(void *plant, const double *w, double *out)
     return functions
 
 
-def body(listed: Sequence[Variable], controller: Controller) -> Iterator[str]:
+def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     """Yield the statements of smc_controller, without indentation. What is of each joint is in a loop over j."""
-    wanted, many = inputs(controller), controller.joints
+    wanted, many = inputs(exported), exported.joints
     j, u, s = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
 
     def value(name: str, absent: str = "0.0") -> str:
         if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
             return absent
-        return f"value[{place(name + controller.places[0])}{' + j' * bool(many)}]"
+        return f"value[{place(name + exported.places[0])}{' + j' * bool(many)}]"
 
     def for_each(lines: Iterable[str]) -> Iterable[str]:
         if not many:
             return lines
         return itertools.chain(["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"])
 
-    yield from _tables(listed, controller)
+    yield from _tables(listed, exported)
     yield "smc_measurement y = {0};"
     yield f"double out[{'2 * SMC_JOINTS' if many else 2}];"
     yield "int failure;"
-    yield f"y.t = t, y.dt = SMC_DT, y.model = {float(controller.modelled)!r};"
-    if needs := [name for name in ("coriolis", "jacobian") if name in reads(controller.code["law"][1])]:
+    yield f"y.t = t, y.dt = SMC_DT, y.model = {float(exported.modelled)!r};"
+    if needs := [name for name in ("coriolis", "jacobian") if name in reads(exported.code["law"][1])]:
         yield f"y.plant = value, {', '.join(f'y.{name} = {name}' for name in needs)};"
-    yield from for_each(_measured(controller, value, j))
-    if many and controller.modelled and "M" in wanted:
+    yield from for_each(_measured(exported, value, j))
+    if many and exported.modelled and "M" in wanted:
         yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{place('M[1,1]')} + j];"
-    if controller.surface:
+    if exported.surface:
         yield from _call("surface", "&y", "surface_memory")
         yield f"y.has_surface = 1.0, y.s = out[0], y.v_eq = {value('v_eq')} = out[1];"
     yield from _call("law", "&y", "law_memory")
@@ -319,29 +319,29 @@ def body(listed: Sequence[Variable], controller: Controller) -> Iterator[str]:
     yield "return 0;"
 
 
-def _tables(listed: Sequence[Variable], controller: Controller) -> Iterator[str]:
+def _tables(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     """Yield the lines that collect the gains of each component, and find its memory."""
     names = {variable.name for variable in listed}
-    for kind, part in controller.parts.items():
+    for kind, part in exported.parts.items():
         yield f"const double {kind}_gains[] = {{"
         for name in part.gains:
             shared = f"{kind}.{plain(name)}"
-            elements = [shared] * max(1, controller.joints * (kind == "law"))
-            elements = elements if shared in names else [shared + place for place in controller.places]
+            elements = [shared] * max(1, exported.joints * (kind == "law"))
+            elements = elements if shared in names else [shared + place for place in exported.places]
             yield from (f"    number(value[{place(element)}])," for element in elements)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
-        first = place(f"{kind}.memory[1{',1' * bool(controller.joints)}]")
-        yield f"double *{kind}_memory = {f'&value[{first}]' if controller.code[kind][0] else 'NULL'};"
+        first = place(f"{kind}.memory[1{',1' * bool(exported.joints)}]")
+        yield f"double *{kind}_memory = {f'&value[{first}]' if exported.code[kind][0] else 'NULL'};"
 
 
-def _measured(controller: Controller, value: Callable[..., str], j: str) -> Iterator[str]:
+def _measured(exported: ExportedLaw, value: Callable[..., str], j: str) -> Iterator[str]:
     """Yield the statements that fill in the measurement of one joint. `value` returns a variable in C, `j` an index."""
     yield f"y.limit{j} = number({value('u_max')});"
     yield f"y.x{j} = {value('x')}, y.r{j} = {value('r')}, y.dr{j} = {value('dr')};"
     yield f"y.ddr{j} = y.a{j} = {value('ddr')};"
-    if controller.estimator:
-        slots = controller.code["estimator"][0]
+    if exported.estimator:
+        slots = exported.code["estimator"][0]
         yield f"const smc_reading reading = {{SMC_DT, y.x{j}, {value('v')}}};"
         yield from _call("estimator", "&reading", "estimator_memory" + f" + {slots} * j" * bool(j and slots))
         yield f"y.v{j} = {value('v_estimated')} = out[0];"
@@ -352,7 +352,7 @@ def _measured(controller: Controller, value: Callable[..., str], j: str) -> Iter
     if not j:
         yield f"y.f = {value('f', 'NAN')}, y.g = {value('g', 'NAN')};"
         yield f"y.q = {value('q')}, y.dq = {value('dq')}, y.fq = {value('fq')}, y.gq = {value('gq')};"
-    elif controller.modelled:
+    elif exported.modelled:
         yield f"y.h{j} = {value('h')}, y.g{j} = {value('g')};"
     else:
         yield "y.M[j * SMC_JOINTS + j] = 1.0;"
