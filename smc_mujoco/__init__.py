@@ -20,7 +20,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Surfaces, estimators, policies: surface, surface_function, estimator, estimator_function, Law, policy
     Machines: Plant, Contact, rig, rigs, identify
     Signals and time: Signal, Push, Jump, Clock
-    Analyse: accuracy, basin, chattering, worst_case, Uncertainty
+    Analyse: accuracy, basin, chattering, worst_case, sensitivity, Uncertainty
     Audit: audit, claims, certify, report
 
 What is needed less often is in modules: `smc.signals` (paths, gusts, series), `smc.hardware` (more friction, servos),

@@ -73,6 +73,7 @@ from smc_mujoco.studies.adviser import which as which
 from smc_mujoco.studies.compare import compare as compare
 from smc_mujoco.studies.leaderboard import leaderboard as leaderboard
 from smc_mujoco.studies.scene import Scene as Scene
+from smc_mujoco.studies.sensitivity import sensitivity as sensitivity
 from smc_mujoco.studies.study import study as study
 from smc_mujoco.studies.table import Table as Table
 from smc_mujoco.studies.worst_case import worst_case as worst_case

@@ -93,7 +93,7 @@ GOOD = {  # a plain value, and the ends themselves
     OneOf: lambda one: [*one.names],
     Flag: lambda one: [True, False],
     Each: lambda one: [*good(one.one), (good(one.one)[0],) * 2],
-    Range: lambda one: [(1.0, 1.0), (max(one.low, beyond(one.above), -9.0), 1e300)],
+    Range: lambda one: [(max(1.0, one.low),) * 2, (max(one.low, beyond(one.above), -9.0), 1e300)],
     FilePath: lambda one: [Path("a"), Path("b/c")],
 }
 TOLD = {

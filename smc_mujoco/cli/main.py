@@ -26,7 +26,14 @@ app = typer.Typer(
 GROUPS: dict[str, list[Callable[..., None]]] = {  # heading in the help -> commands; the annexes add theirs
     "Run and look": [catalogue.list_, runs.run, runs.show],
     "Compare": [studies.compare, studies.which],
-    "Tune and analyse": [analysis.tune, analysis.margins, analysis.worst, analysis.basin, analysis.chatter],
+    "Tune and analyse": [
+        analysis.tune,
+        analysis.margins,
+        analysis.worst,
+        analysis.sensitivity,
+        analysis.basin,
+        analysis.chatter,
+    ],
 }
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     for group, commands in annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS.items():

@@ -200,6 +200,10 @@ def worst_case(
     within = default_class(scenario) if within is None else within
     if not isinstance(within, Uncertainty):
         raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
+    if within.period != (1.0, 1.0):
+        raise ScenarioError(
+            "the adversary's forces have a value a sample, so period cannot differ: leave it out of within"
+        )
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)

@@ -56,6 +56,10 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "--metric peak --gains default --condition noise --duration 2 --budget 9 --seed 3 --out w "
     "--json w.json --threads 2": ["studies.worst_case.worst_case"],
     "worst simple_pendulum_ak80": ["studies.worst_case.worst_case"],
+    "sensitivity duffing": ["studies.sensitivity.sensitivity"],
+    "sensitivity duffing --law pid --disturbance 2 --bound delay=0:0.01,encoder=256:4096,period=1:4 "
+    "--metric peak --gains default --condition noise --duration 2 --points 8 --seed 3 --out s "
+    "--json s.json --threads 2": ["studies.sensitivity.sensitivity"],
     "accuracy duffing": ["evidence.accuracy.accuracy.accuracy"],
     "accuracy duffing van_der_pol --law pid --condition sine --periods 0.002,0.001 --seeds 2 --gains default "
     "--duration 2 --x0 0.4 --out a --json a.json --threads 2": ["evidence.accuracy.accuracy.accuracy"],
@@ -83,6 +87,7 @@ PRINTED = [  # command lines that are run to their ends
     "show one.npz --export csv,mat",
     "margins duffing --law classical,pid --kinds delay --quick --json m.json",
     "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf --json w.json",
+    "sensitivity duffing --law classical --bound mass=0.7:1.3 --points 4 --duration 0.2 --out s.pdf --json s.json",
     "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
     "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
     "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",
@@ -101,11 +106,18 @@ AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the 
 ALIASES = {  # option -> arguments that it may change, besides the one of its name
     "--law": "laws scenario scenarios", "--condition": "conditions scenario", "--x0": "starts scenarios",
     "--seed": "scene scenario", "--seeds": "scenarios", "--duration": "scenario scenarios", "--gains": "law scenario",
-    "--disturbance": "within", "--bound": "within", "--flag": "flags", "--label": "scenario", "--no-film": "filming",
+    "--disturbance": "within over", "--bound": "within over", "--flag": "flags", "--label": "scenario",
+    "--no-film": "filming",
     "--no-repeat": "repeated", "--out": "folder", "--actuator": "changes", "--type": "numbers",
     "--period": "control_period",
 }  # fmt: skip
-UNTOLD = {"study(scenarios)", "case(changes)", "worst_case(scenario)", "watch(scenario)"}  # not told in whole
+UNTOLD = {
+    "study(scenarios)",
+    "case(changes)",
+    "worst_case(scenario)",
+    "sensitivity(scenario)",
+    "watch(scenario)",
+}  # not told in whole
 UNTOLD |= {"study(noise_key)"}  # 0 is the function's own default
 
 

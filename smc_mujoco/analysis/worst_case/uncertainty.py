@@ -4,7 +4,7 @@
 
 A member of a class is one choice within all of its bounds. `Members` makes scenarios of members. A member has
 
-    shares      one number in [0, 1] for each constant that may differ: set, delay, mass, parameters, friction, x0
+    shares      one number in [0, 1] for each constant that may differ: set, delay, mass, friction, bound, x0, ...
     force       |force_k| <= 1, a number for each control sample: the disturbance over its bound
     noise       |noise_jk| <= 1, numbers for each time that an error of measurement is held: position, velocity
 """
@@ -23,6 +23,7 @@ from smc_mujoco.common.constraints import Natural, Positive, constrain
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
+from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.simulation.scenario import Scenario
@@ -63,6 +64,9 @@ class Uncertainty:
         `plant.added`: {"payload": (0.0, 2.0)}.
       friction: lowest and highest dry friction, N or N m, beside the scenario's own; `friction_scale` leaves it.
       friction_scale: lowest and highest factor on the friction of the scenario and on the dry friction of its plant.
+      encoder: lowest and highest counts of a position encoder, see `smc.Encoder`; equal ratios are equally likely.
+      bound: lowest and highest factor on u_max.
+      period: lowest and highest factor on the control period; those tried are multiples of the physics step.
       x0: how far each channel may start from the scenario's x0, as a share of it.
 
     Raises:
@@ -80,6 +84,9 @@ class Uncertainty:
     parameters: Mapping[str, tuple[float, float]] = frozen({})
     friction: Range = (0.0, 0.0)
     friction_scale: Range = (1.0, 1.0)
+    encoder: Annotated[tuple[float, float], constraints.Range(low=2.0)] | None = None
+    bound: Annotated[tuple[float, float], constraints.Range(above=0.0)] = (1.0, 1.0)
+    period: Annotated[tuple[float, float], constraints.Range(above=0.0)] = (1.0, 1.0)
     x0: Natural = 0.0
 
     def __post_init__(self):
@@ -89,9 +96,9 @@ class Uncertainty:
         of = constraints.Range()
         ranges = {str(name): of(f"Uncertainty's {name}", value) for name, value in self.parameters.items()}
         vars(self)["parameters"] = frozen(ranges)  # the class is frozen
-        bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0
-        ends = self.delay, self.mass, self.friction, self.friction_scale, *self.parameters.values()
-        if not any(bounds) and not any(low < high for low, high in ends):
+        bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0, self.encoder
+        ends = self.delay, self.mass, self.friction, self.friction_scale, self.bound, self.period
+        if not any(bounds) and not any(low < high for low, high in (*ends, *self.parameters.values())):
             cure = "give a bound, such as disturbance=2.0"
             raise ScenarioError(f"Uncertainty allows nothing but the scenario itself: {cure}")
 
@@ -104,7 +111,8 @@ class Uncertainty:
         parts += [f"position errors <= {self.position_noise:g} {x}{hold}"] if self.position_noise else []
         parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{hold}"] if self.velocity_noise else []
         ranges = {"delay (s)": self.delay, f"friction ({u})": self.friction, "friction x": self.friction_scale}
-        ranges |= {"mass x": self.mass, **self.parameters}
+        ranges |= {"mass x": self.mass, **self.parameters, "u_max x": self.bound, "control period x": self.period}
+        ranges |= {"encoder counts": self.encoder} if self.encoder else {}
         parts += [f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high]
         parts += [f"jitter <= {self.jitter:g} s"] if self.jitter else []
         parts += [f"x0 within {100 * self.x0:g} %"] if self.x0 else []
@@ -168,8 +176,8 @@ class Member:
 class Members:
     """The members of a class around one scenario, or around the same scenario on several parameter sets.
 
-    `constants` are functions that set a constant to a share in [0, 1] of its range; if there are several parameter
-    sets, the first chooses one. `ends` are the shares at corners. `bare` has no force or noise, and shares of 0.5.
+    `constants` has a `Constant` for each share of a member. If there are several parameter sets, the first chooses one.
+    `ends` are the shares at corners. `bare` has no force or noise, and shares of 0.5.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
@@ -178,8 +186,8 @@ class Members:
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         self.slope = 0.0 if within.slope is None else within.slope * self.h  # N or N m a sample; 0: d may jump
-        sets: list[SetConstant] = [lambda _, share: scenarios[min(int(share * count), count - 1)]]
-        self.constants = (sets if count > 1 else []) + list(_constants(scenario, within))
+        sets = Constant("set", (0.0, count), lambda _, at: scenarios[min(int(at), count - 1)])
+        self.constants = [sets] * (count > 1) + list(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
         self.hold = max(1, round(within.hold / self.h))  # samples that an error of measurement lasts
         self.times = -(-self.samples // self.hold) if within.position_noise or within.velocity_noise else 0
@@ -196,8 +204,8 @@ class Members:
     def with_constants(self, shares: np.ndarray) -> Scenario:
         """Return the scenario with constants of the class."""
         scenario = self.scenario
-        for set_constant, share in zip(self.constants, shares.tolist(), strict=True):
-            scenario = set_constant(scenario, share)
+        for constant, share in zip(self.constants, shares.tolist(), strict=True):
+            scenario = constant.put(scenario, constant.value(share))
         return scenario
 
     def scenario_of(self, member: Member, relay: Relay | None = None) -> Scenario:
@@ -288,33 +296,51 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return mutated
 
 
-SetConstant = Callable[[Scenario, float], Scenario]
+@dataclasses.dataclass(frozen=True)
+class Constant:
+    """Something that is constant in a run and may differ from member to member."""
+
+    name: str
+    bounds: tuple[float, float]
+    put: Callable[[Scenario, float], Scenario]  # the scenario with a value
+    unit: str = ""  # of a value; "" for a factor or a number
+    geometric: bool = False  # whether equal ratios, rather than equal differences, are equal shares
+
+    def value(self, share: float) -> float:
+        """Return the value at a share in [0, 1] of the range."""
+        low, high = self.bounds
+        return low * (high / low) ** share if self.geometric else min(low + share * (high - low), high)
 
 
-def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[SetConstant]:
-    """Yield, for each constant that may differ, the function that sets it to a share of its range."""
+def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
+    """Yield each constant that may differ."""
+    effort, plant = EFFORT[scenario.plant.units[0]], scenario.plant
     if within.delay != (0.0, 0.0):
-        yield _of_range(_multiples("delay", within.delay, scenario.resolved.physics_step), _with_delay)
+        yield Constant("delay", _multiples("delay", within.delay, scenario.resolved.physics_step), _with_delay, "s")
     if within.jitter:
         _, jitter = _multiples("jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES)
-        yield _of_range((0.0, jitter / scenario.control_period), with_jitter)
+        yield Constant("jitter", (0.0, jitter / scenario.control_period), with_jitter, "periods")
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
-            yield _of_range(bounds, functools.partial(_with_factor, name=name))
+            yield Constant(name, bounds, functools.partial(_with_factor, name=name))
     if within.friction_scale != (1.0, 1.0):
-        if not (scenario.friction or _dry(scenario.plant)):
+        if not (scenario.friction or _dry(plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
-            raise ScenarioError(f"friction_scale of {scenario.plant.name}, which has no friction here: {cure}")
-        yield _of_range(within.friction_scale, _with_friction_scale)
+            raise ScenarioError(f"friction_scale of {plant.name}, which has no friction here: {cure}")
+        yield Constant("friction_scale", within.friction_scale, _with_friction_scale)
     if within.friction != (0.0, 0.0):
-        yield _of_range(within.friction, with_friction)
-    for i in range(scenario.plant.n if within.x0 else 0):
-        yield _of_range((-within.x0, within.x0), functools.partial(_with_start, i=i))
-
-
-def _of_range(bounds: tuple[float, float], put: SetConstant) -> SetConstant:
-    low, high = bounds
-    return lambda scenario, share: put(scenario, min(low + share * (high - low), high))
+        yield Constant("friction", within.friction, with_friction, effort)
+    if within.encoder:
+        yield Constant("encoder", within.encoder, _with_counts, "counts", geometric=True)
+    if within.bound != (1.0, 1.0):
+        if not math.isfinite(min(scenario.limits)):
+            raise ScenarioError(f"u_max of {plant.name} has no bound that could differ: give the scenario a u_max")
+        yield Constant("bound", within.bound, _with_bound)
+    for i in range(plant.n if within.x0 else 0):
+        name = f"x0 {i + 1}" if plant.n > 1 else "x0"
+        yield Constant(name, (-within.x0, within.x0), functools.partial(_with_start, i=i))
+    if within.period != (1.0, 1.0):
+        yield Constant("period", _multiples("period", within.period, 1.0 / scenario.steps), _with_period)
 
 
 def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:
@@ -322,7 +348,8 @@ def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[flo
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
     if high < max(low, step):
-        told = f"from {bounds[0]:g} to {bounds[1]:g} s, and a run has multiples of {step:g} s"
+        unit = "" if name == "period" else " s"
+        told = f"from {bounds[0]:g} to {bounds[1]:g}{unit}, and a run has multiples of {step:g}{unit}"
         raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with one of these")
     return low, high
 
@@ -339,6 +366,25 @@ def _with_factor(scenario: Scenario, value: float, name: str) -> Scenario:
     name = plant.mass if name == "mass" and plant.mass in mismatch else name
     mismatch[name] = mismatch.get(name, 0.0) + value if name in plant.added else mismatch.get(name, 1.0) * value
     return dataclasses.replace(scenario, mismatch=mismatch)
+
+
+def _with_counts(scenario: Scenario, counts: float) -> Scenario:
+    """Return the scenario with an encoder of so many counts; all else of its sensor stays."""
+    return dataclasses.replace(scenario, sensor=dataclasses.replace(scenario.sensor or Encoder(), counts=round(counts)))
+
+
+def _with_bound(scenario: Scenario, factor: float) -> Scenario:
+    """Return the scenario with a factor on u_max."""
+    u_max = scenario.resolved.u_max
+    scaled = tuple(factor * bound for bound in u_max) if isinstance(u_max, tuple) else factor * u_max
+    return dataclasses.replace(scenario, u_max=scaled)
+
+
+def _with_period(scenario: Scenario, factor: float) -> Scenario:
+    """Return the scenario with a factor on the control period, to the next multiple of the same physics step."""
+    step = scenario.resolved.physics_step
+    period = max(1, round(factor * scenario.control_period / step)) * step
+    return dataclasses.replace(scenario, control_period=period, physics_step=step)
 
 
 def _with_start(scenario: Scenario, share: float, i: int) -> Scenario:

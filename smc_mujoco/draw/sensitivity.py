@@ -1,0 +1,120 @@
+"""The indices of a sensitivity as bars, beside the runs over the two axes that tell most.
+
+A bar is dark up to the first-order index and light up to the total index, with its interval. On the right a dot is a
+run, darker the worse its score is, and a cross one that fails. A dashed line bounds the first region where runs fail.
+"""
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Handle, Size
+
+if TYPE_CHECKING:
+    from smc_mujoco.studies.sensitivity import Cut, Sensitivity, Space
+
+ROW_HEIGHT, MIN_HEIGHT = 0.42, 3.6  # inches, of an axis, and of the panels
+PALE_SHARE = 0.6  # of white in a bar's light part: chosen
+DOT_SIZE = 26.0  # points squared, of a run
+
+
+def draw(
+    found: "Sensitivity",
+    path: str | os.PathLike[str] | None = None,
+    title: str | None = None,
+    size: Size = None,
+    format: str | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw a sensitivity; arguments as in `figure`."""
+    paths = pages.files(path, format)
+    width, height = pages.measure(size, fig)
+    colour = style.law_colour(found.scenario.law)
+    name = style.law_name(found.scenario.law)
+    handles: list[Handle] = [
+        Patch(facecolor=colour, label="alone"),
+        Patch(facecolor=_pale(colour), label="with others, 95 % interval"),
+        Line2D([], [], ls="", marker="o", color=colour, label=f"a run, darker: worse {found.label}"),
+        *([Line2D([], [], ls="", marker="x", color=style.INK, label="a run that fails")] * bool(found.failed.any())),
+    ]
+    with style.page(width):
+        head = pages.head_height(width, handles)
+        tall = max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes))
+        page = pages.blank(width, height or head + style.points(tall), fig)
+        bars, runs = page.subplots(1, 2, width_ratios=[1.0, 1.1])
+        _bars(bars, found, colour)
+        _runs(runs, found, colour)
+        told = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
+        pages.set_head(page, width, title or told, handles)
+        pages.write(page, paths)
+    return page
+
+
+def _pale(colour: str) -> str:
+    """Return the colour of a bar's part that is due to several axes."""
+    return style.mixed(colour, style.PAPER, PALE_SHARE)
+
+
+def _bars(ax: Axes, found: "Sensitivity", colour: str) -> None:
+    """Draw both indices of each axis, the largest at the top."""
+    from smc_mujoco.studies.sensitivity import in_words
+
+    rows = np.arange(len(found.axes))
+    light = _pale(colour)
+    first, total = ([getattr(axis, kind) for axis in found.axes] for kind in ("first", "total"))
+    ax.barh(rows, [100 * max(its.median, 0.0) for its in total], 0.62, color=light)
+    ax.barh(rows, [100 * min(max(its.median, 0.0), 1.0) for its in first], 0.3, color=colour)
+    ends = np.clip([(its.low, its.high) for its in total], 0.0, 1.0) * 100
+    ax.hlines(rows, *ends.T, color=style.INK, lw=style.points(1.2))
+    ax.set_yticks(rows, [in_words(axis.name) for axis in found.axes])
+    ax.set(xlim=(0.0, 100.0), xlabel=f"share of the variance of {found.label} (%)")
+    ax.invert_yaxis()
+    ax.grid(visible=False, axis="y")
+
+
+def _runs(ax: Axes, found: "Sensitivity", colour: str) -> None:
+    """Draw independent runs over the axes of the first region, then those of the largest indices."""
+    from smc_mujoco.studies.sensitivity import CHANCE, in_words
+
+    space = found.space
+    wanted = [cut.axis for cut in found.regions[0].cuts] if found.regions else []
+    ranked = [space.names.index(axis.name) for axis in found.axes if axis.name != CHANCE]
+    at = [*wanted, *(i for i in ranked if i not in wanted)][:2]
+    scales = [style.prefixed(space.ends[i][1], space.ends[i][2]) for i in at]
+    columns = [factor * space.column(i, found.shares) for i, (factor, _) in zip(at, scales, strict=True)]
+    if len(at) < 2:  # one axis has the score beside it
+        columns.append(found.values)
+        ax.set_ylabel(f"{found.label} ({found.unit})")
+    order = np.argsort(found.values)  # the worst on top
+    place = np.empty(len(order))
+    place[order] = np.linspace(0.0, 1.0, len(order))
+    shades = np.array(style.ramp(colour, 12))
+    tone = shades[np.minimum((place * len(shades)).astype(int), len(shades) - 1)]
+    for marker, kind, of in (("o", ~found.failed, tone), ("x", found.failed, np.full(len(tone), style.INK))):
+        picked = order[kind[order]]
+        ax.scatter(columns[0][picked], columns[1][picked], style.points(DOT_SIZE), of[picked].tolist(), marker=marker)
+    for k, (i, (_, unit)) in enumerate(zip(at, scales, strict=True)):
+        (ax.set_xlabel, ax.set_ylabel)[k](f"{in_words(space.names[i])} ({unit or 'of nominal'})")
+        if (constant := space.columns[i]) and constant.geometric:
+            (ax.set_xscale, ax.set_yscale)[k]("log", base=2)
+    if found.regions:
+        _border(ax, found.regions[0].cuts, at, [factor for factor, _ in scales], space)
+
+
+def _border(ax: Axes, cuts: "Sequence[Cut]", at: list[int], factors: list[float], space: "Space") -> None:
+    """Draw the border of a region."""
+    ends = [list(ax.get_xlim()), list(ax.get_ylim())]
+    for cut in cuts:
+        k = at.index(cut.axis)
+        ends[k][not cut.above] = factors[k] * space.value(cut.axis, cut.share)
+    (left, right), (low, high) = ends
+    border = Rectangle((left, low), right - left, high - low, fill=False, ls="--", ec=style.INK, lw=style.points(1.2))
+    ax.add_patch(border)

@@ -1,0 +1,177 @@
+"""What explains a score: indices against closed forms, regions and improvements against planted ones, whole runs."""
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.worst_case.uncertainty import Members
+from smc_mujoco.studies import sensitivity as module
+
+
+def scenario(**fields) -> smc.Scenario:
+    return smc.Scenario(**{"plant": "duffing", "law": "pid", "duration": 0.5} | fields)
+
+
+def space(*names: str) -> SimpleNamespace:
+    """Axes from 0 to 10 s."""
+    return SimpleNamespace(
+        names=names,
+        ends=[(0.0, 10.0, "s")] * len(names),
+        words=lambda cuts: " and ".join(f"{names[cut.axis]} {'<>'[cut.above]} {10 * cut.share:g}" for cut in cuts),
+    )
+
+
+def test_indices_of_ishigami_s_function_are_its_closed_forms():
+    """T. Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone, and a fourth never."""
+    n, three = 4096, 2.0 * math.pi
+    designs = module._designs(n, 4, 0)
+    x = three * designs - math.pi
+    scores = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+    axes = module._indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], 0)
+    whole = 49.0 / 8.0 + 0.1 * math.pi**4 / 5.0 + 0.01 * math.pi**8 / 18.0 + 0.5
+    first = 0.5 * (1.0 + 0.1 * math.pi**4 / 5.0) ** 2 / whole, 49.0 / 8.0 / whole, 0.0, 0.0
+    both = 8.0 * 0.01 * math.pi**8 / 225.0 / whole
+    for axis, alone, more in zip(axes, first, (both, 0.0, both, 0.0), strict=True):
+        assert axis.first.median == pytest.approx(alone, abs=0.02)
+        assert axis.total.median == pytest.approx(alone + more, abs=0.02)
+        assert axis.total.low <= alone + more <= axis.total.high
+    assert axes[3].total[:3] == (0.0, 0.0, 0.0)
+
+
+def test_positive_scores_are_compared_by_their_ratio():
+    designs = module._designs(1024, 2, 0)
+    scores = 10.0 ** (3.0 * designs[:, 0] + 2.0 * designs[:, 1])
+    axes = module._indices(space("a", "b"), scores, 1024, designs[:2048], scores[:2048], 0)
+    assert [axis.total.median for axis in axes] == pytest.approx([9 / 13, 4 / 13], abs=0.01)
+    assert axes[0].direction > axes[1].direction > 0.4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_planted_region_is_found_and_told_by_the_other_half(seed):
+    shares = np.random.default_rng(seed).random((512, 3))
+    inside = (shares[:, 0] > 0.625) & (shares[:, 2] < 0.5)
+    failed = inside.copy()
+    failed[:256] &= np.arange(256) % 10 != 0  # the half that chooses
+    failed[256:] &= np.arange(256) % 2 == 0  # the half that tells
+    [region] = module._regions(space("a", "b", "c"), shares, failed)
+    assert sorted(region.cuts) == [module.Cut(0, True, 0.625), module.Cut(2, False, 0.5)]
+    told = slice(256, None)
+    assert region.rate.n == inside[told].sum()
+    assert region.rate.median * region.rate.n == pytest.approx(failed[told].sum())
+    assert region.rate.low < 0.5 < region.rate.high
+    assert (region.outside.median, region.outside.n) == (0.0, 256 - region.rate.n)
+
+
+def test_failures_by_chance_have_no_region():
+    found = 0
+    for seed in range(15):
+        rng = np.random.default_rng(seed)
+        found += len(module._regions(space(*"abcdef"), rng.random((128, 6)), rng.random(128) < 0.3))
+    assert found <= 2
+
+
+def test_an_axis_of_chance_bounds_no_region_and_is_not_improved():
+    shares = np.random.default_rng(0).random((256, 2))
+    axes = space("a", module.CHANCE)
+    assert not module._regions(axes, shares, shares[:, 1] > 0.5)
+    better = module._improvement(axes, shares, 1.0 + 5.0 * shares[:, 0] + 9.0 * shares[:, 1])
+    assert better
+    assert better.words == "a to below 5"
+
+
+def test_the_improvement_is_told_by_the_half_that_did_not_choose_it():
+    shares = np.random.default_rng(1).random((400, 2))
+    values = np.where(np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1])  # better above, in the half that tells
+    assert module._improvement(space("a", "b"), shares, values) is None
+
+
+def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_index_0():
+    """Without a command no bound on it acts; and every score is that of a scenario which anybody can run again."""
+    base = scenario(law="none", plant="van_der_pol")
+    over = smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0))
+    found, alone = (smc.sensitivity(base, over, points=16, threads=threads) for threads in (None, 1))
+    indices = {axis.name: axis for axis in found.axes}
+    assert indices["mass"].total.median > 0.8
+    assert indices["bound"].total[:3] == indices["bound"].first[:3] == (0.0, 0.0, 0.0)
+    np.testing.assert_array_equal(found.values, alone.values)
+    row = found.space.scenario_at(found.shares[5])
+    assert row.mismatch["mass"] == found.space.column(found.space.names.index("mass"), found.shares)[5]
+    assert smc.score(smc.run(row))["rms_error"] == found.values[5]
+    assert found.runs == 16 * 4
+
+
+def test_levels_and_chance_are_axes():
+    """A level scales the force and the errors that chance draws; equal chances draw the same."""
+    found = module.Space(scenario(), smc.Uncertainty(disturbance=2.0, position_noise=1e-3, delay=(0.0, 0.01)))
+    assert found.names == ("delay", "disturbance", "noise", "chance")
+    rows = [1.0, 0.5, 0.2, 0.3], [0.0, 1.0, 0.4, 0.3], [0.0, 1.0, 0.4, 0.6]
+    low, high, other = (found.scenario_at(np.array(row)) for row in rows)
+    assert [one.input_delay for one in (low, high, other)] == [0.01, 0.0, 0.0]
+    forces = [np.array(one.disturbance[0].values) for one in (low, high, other)]
+    errors = [np.array(one.noise.position_error.values) for one in (low, high, other)]
+    for half, whole, others in (forces, errors):
+        np.testing.assert_allclose(2.0 * half, whole, atol=1e-15)
+        assert np.abs(whole - others).max() > 0.1 * np.abs(whole).max()
+    assert np.abs(forces[1]).max() <= 2.0
+    assert np.abs(errors[1]).max() <= 0.4e-3
+
+
+def test_encoder_bound_and_period_take_all_of_their_ranges():
+    base = scenario(u_max=4.0, physics_step=0.5e-3)
+    members = Members([base], smc.Uncertainty(encoder=(256, 4096), bound=(0.5, 1.0), period=(0.4, 3.0)))
+    low, middle, high = (members.with_constants(np.full(3, share)) for share in (0.0, 0.5, 1.0))
+    assert [one.sensor.counts for one in (low, middle, high)] == [256, 1024, 4096]
+    assert [one.u_max for one in (low, middle, high)] == [2.0, 3.0, 4.0]
+    assert [one.control_period for one in (low, high)] == pytest.approx([0.5e-3, 3e-3])
+    assert {one.physics_step for one in (low, middle, high)} == {0.5e-3}
+    kept = dataclasses.replace(base, sensor=smc.Encoder(64, bias=0.1))
+    assert Members([kept], smc.Uncertainty(encoder=(256, 512))).with_constants(np.ones(1)).sensor == smc.Encoder(
+        512, bias=0.1
+    )
+    with pytest.raises(smc.ScenarioError, match="period cannot differ: leave it out of within"):
+        smc.worst_case(base, within=smc.Uncertainty(period=(1.0, 2.0)))
+    with pytest.raises(smc.ScenarioError, match="no bound that could differ: give the scenario a u_max"):
+        smc.sensitivity(scenario(u_max=math.inf), smc.Uncertainty(bound=(0.5, 1.0)))
+
+
+def test_the_default_class_has_the_axes_of_machines():
+    found = module.Space(base := scenario(), module.default_over(base))
+    assert set(found.names) == {"mass", "friction", "delay", "noise", "encoder", "bound", "period", "chance"}
+    assert module.default_points(scenario(duration=8.0), 8) == 32
+    assert module.default_points(scenario(duration=5.0), 8) == 64
+
+
+def test_words_name_one_culprit_only_if_the_intervals_part():
+    found = smc.sensitivity(scenario(law="none"), smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0)), points=16)
+    assert found.sentences[0].startswith("Mass explains")
+    same = dataclasses.replace(found, axes=(found.axes[0], found.axes[0]._replace(name="delay")))
+    assert "that of mass and delay" in same.sentences[0]
+    assert "Nothing here changes" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
+    assert "32 runs fail" in dataclasses.replace(found, failed=np.ones(32, bool), regions=()).sentences[1]
+
+
+def test_what_cannot_be_answered_is_refused():
+    over = smc.Uncertainty(mass=(0.7, 1.3))
+    for given, fields, sentence in [
+        (scenario(), {"points": 33}, "points is 33: give a power of 2, such as 32"),
+        (scenario(), {"over": 3}, "over is 3: give a class"),
+        ("duffing", {}, "sensitivity is of a Scenario, not 'duffing'"),
+        (scenario(), {"metric": "speed"}, "metric"),
+    ]:
+        with pytest.raises(smc.ScenarioError, match=sentence):
+            smc.sensitivity(given, **{"over": over} | fields)
+
+
+def test_a_picture_has_a_bar_for_each_axis_and_a_dot_for_each_run():
+    over = smc.Uncertainty(mass=(0.5, 2.0), delay=(0.0, 0.02))
+    found = smc.sensitivity(scenario(), over, points=16)
+    bars, runs = found.figure().axes
+    assert [label.get_text() for label in bars.get_yticklabels()] == [axis.name for axis in found.axes]
+    assert sum(len(dots.get_offsets()) for dots in runs.collections) == 32
+    assert {runs.get_xlabel(), runs.get_ylabel()} == {"mass (of nominal)", "delay (ms)"}
+    one = smc.sensitivity(scenario(), smc.Uncertainty(mass=(0.5, 2.0)), points=16).figure().axes[1]
+    assert one.get_ylabel() == "rms error (m)"
