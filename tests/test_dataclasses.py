@@ -17,6 +17,7 @@ OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have 
     "frozen": {"margins.Search", "Trials", "Frames", "BorrowedData", "Tip", "runs.Runs"},
     "eq": {
         *("Linear", "Basin", "Member", "Network", "Frames", "Certificate", "Levels", "BorrowedData", "runs.Runs"),
+        *("Explained", "Sensitivity"),
         *("Scenario", "Trace", "Advice", "Compared", "Outcome", "Table", "WorstCase", "StepResponse", "Mechanism"),
     },
     "repr": {

@@ -6,7 +6,6 @@ run, darker the worse its score is, and a cross one that fails. A dashed line bo
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,12 +13,11 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from smc_mujoco.analysis.sensitivity import CHANCE, Cut, Explained, Space, in_words
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
-
-if TYPE_CHECKING:
-    from smc_mujoco.studies.sensitivity import Cut, Sensitivity, Space
+from smc_mujoco.metrics.catalogue import CATALOGUE
 
 ROW_HEIGHT, MIN_HEIGHT = 0.42, 3.6  # inches, of an axis, and of the panels
 PALE_SHARE = 0.6  # of white in a bar's light part: chosen
@@ -27,7 +25,7 @@ DOT_SIZE = 26.0  # points squared, of a run
 
 
 def draw(
-    found: "Sensitivity",
+    found: Explained,
     path: str | os.PathLike[str] | None = None,
     title: str | None = None,
     size: Size = None,
@@ -42,7 +40,7 @@ def draw(
     handles: list[Handle] = [
         Patch(facecolor=colour, label="alone"),
         Patch(facecolor=_pale(colour), label="with others, 95 % interval"),
-        Line2D([], [], ls="", marker="o", color=colour, label=f"a run, darker: worse {found.label}"),
+        Line2D([], [], ls="", marker="o", color=colour, label=f"a run, darker: worse {CATALOGUE[found.metric].label}"),
         *([Line2D([], [], ls="", marker="x", color=style.INK, label="a run that fails")] * bool(found.failed.any())),
     ]
     with style.page(width):
@@ -63,10 +61,8 @@ def _pale(colour: str) -> str:
     return style.mixed(colour, style.PAPER, PALE_SHARE)
 
 
-def _bars(ax: Axes, found: "Sensitivity", colour: str) -> None:
+def _bars(ax: Axes, found: Explained, colour: str) -> None:
     """Draw both indices of each axis, the largest at the top."""
-    from smc_mujoco.studies.sensitivity import in_words
-
     rows = np.arange(len(found.axes))
     light = _pale(colour)
     first, total = ([getattr(axis, kind) for axis in found.axes] for kind in ("first", "total"))
@@ -75,15 +71,13 @@ def _bars(ax: Axes, found: "Sensitivity", colour: str) -> None:
     ends = np.clip([(its.low, its.high) for its in total], 0.0, 1.0) * 100
     ax.hlines(rows, *ends.T, color=style.INK, lw=style.points(1.2))
     ax.set_yticks(rows, [in_words(axis.name) for axis in found.axes])
-    ax.set(xlim=(0.0, 100.0), xlabel=f"share of the variance of {found.label} (%)")
+    ax.set(xlim=(0.0, 100.0), xlabel=f"share of the variance of {CATALOGUE[found.metric].label} (%)")
     ax.invert_yaxis()
     ax.grid(visible=False, axis="y")
 
 
-def _runs(ax: Axes, found: "Sensitivity", colour: str) -> None:
+def _runs(ax: Axes, found: Explained, colour: str) -> None:
     """Draw independent runs over the axes of the first region, then those of the largest indices."""
-    from smc_mujoco.studies.sensitivity import CHANCE, in_words
-
     space = found.space
     wanted = [cut.axis for cut in found.regions[0].cuts] if found.regions else []
     ranked = [space.names.index(axis.name) for axis in found.axes if axis.name != CHANCE]
@@ -92,7 +86,7 @@ def _runs(ax: Axes, found: "Sensitivity", colour: str) -> None:
     columns = [factor * space.column(i, found.shares) for i, (factor, _) in zip(at, scales, strict=True)]
     if len(at) < 2:  # one axis has the score beside it
         columns.append(found.values)
-        ax.set_ylabel(f"{found.label} ({found.unit})")
+        ax.set_ylabel(f"{CATALOGUE[found.metric].label} ({found.unit})")
     order = np.argsort(found.values)  # the worst on top
     place = np.empty(len(order))
     place[order] = np.linspace(0.0, 1.0, len(order))
@@ -109,7 +103,7 @@ def _runs(ax: Axes, found: "Sensitivity", colour: str) -> None:
         _border(ax, found.regions[0].cuts, at, [factor for factor, _ in scales], space)
 
 
-def _border(ax: Axes, cuts: "Sequence[Cut]", at: list[int], factors: list[float], space: "Space") -> None:
+def _border(ax: Axes, cuts: Sequence[Cut], at: list[int], factors: list[float], space: Space) -> None:
     """Draw the border of a region."""
     ends = [list(ax.get_xlim()), list(ax.get_ylim())]
     for cut in cuts:

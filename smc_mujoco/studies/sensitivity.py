@@ -14,18 +14,30 @@ independent, give its rate. The axis to improve is chosen and told in the same w
 """
 
 import dataclasses
-import itertools
 import math
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from smc_mujoco.analysis.bootstrap import LEVEL, Interval, share_interval
+from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.margins import tolerates
-from smc_mujoco.analysis.worst_case.uncertainty import Constant, Member, Members, Uncertainty, strength
-from smc_mujoco.common.constraints import MAX_SEED, Seed, Whole, constrained
+from smc_mujoco.analysis.sensitivity import (
+    CHANCE,
+    Axis,
+    Cut,
+    Explained,
+    Improvement,
+    Space,
+    designs,
+    improvement,
+    in_words,
+    indices,
+    regions,
+)
+from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty, strength
+from smc_mujoco.common.constraints import Seed, Whole, constrained
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
@@ -43,70 +55,17 @@ if TYPE_CHECKING:
 METRIC = "rms_error"
 DEFAULT_STEPS = 3_600_000  # physics steps by default, for a plant of one channel: up to 20 s of a core
 MIN_POINTS, MAX_POINTS = 16, 4096  # of the default, powers of 2
-RESAMPLES = 499  # of a bootstrap: chosen
-CHANCE = "chance"  # the axis of what is drawn in a run
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
 DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)  # of the default class: control periods, rad or m; chosen
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
-CUTS = tuple(i / 8 for i in range(1, 8))  # shares of an axis at which a region may end: chosen
-MIN_REGION_RUNS = 8  # in a region: fewer tell no rate; chosen
-MAX_REGIONS = 3
-BETTER_SHARE = 0.5  # of an axis, to which it may be narrowed: chosen
 HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
-WORDS = {"bound": "u_max", "period": "control period"}
-
-
-class Axis(NamedTuple):
-    """One uncertainty, and how much of the score's variance it explains."""
-
-    name: str
-    low: float
-    high: float
-    unit: str  # of low and high; "" for a factor or a number
-    first: Interval  # first-order index, the axis alone, with its 95 % interval
-    total: Interval  # total index, with others
-    direction: float  # Spearman's rank correlation of the score with the axis; NaN for chance
-
-
-class Cut(NamedTuple):
-    """A bound on one axis."""
-
-    axis: int  # index
-    above: bool  # whether values above the bound are within, or those below it
-    share: float  # of the axis's range at which it lies
-
-
-class Region(NamedTuple):
-    """Where runs fail: within cuts, and how often there and outside, in runs that did not choose the cuts."""
-
-    cuts: tuple[Cut, ...]
-    words: str  # such as "delay > 9 ms and mass < 0.8"
-    rate: Interval  # of failures within, Wilson's interval, with the number of runs
-    outside: Interval  # of failures outside of all regions so far
-
-
-class Improvement(NamedTuple):
-    """The axis whose narrowing to one half improves the score most, in runs that did not choose it."""
-
-    words: str  # such as "delay below 10 ms"
-    median: float  # of the score within that half
-    before: float  # median of the score over the whole range
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
-class Sensitivity(Tables):
+class Sensitivity(Tables, Explained):
     """What explains a law's score over a class of uncertainty, and where its runs fail."""
 
-    scenario: Scenario
     over: Uncertainty
-    metric: str  # its name
-    unit: str  # of the score
-    axes: tuple[Axis, ...]  # the largest total index first
-    space: "Space"  # what the columns of `shares` mean
-    shares: np.ndarray  # (N, axes), where in each axis's range an independent run lies
-    values: np.ndarray  # (N,), its score; a run without one has the worst of the others
-    failed: np.ndarray  # (N,) bool, whether it fails or ends beyond 5 % of its scale
-    regions: tuple[Region, ...]
     improvement: Improvement | None  # None if no half of an axis is better
     runs: int  # number of all runs
 
@@ -151,11 +110,7 @@ class Sensitivity(Tables):
         count, n = int(self.failed.sum()), len(self.failed)
         if not count:
             return [f"None of {n} runs fails (at most {100 * share_interval(0.0, n).high:.2g} %)."]
-        told = [
-            f"It fails where {region.words}: {round(region.rate.median * region.rate.n)} of {region.rate.n} runs "
-            f"({100 * region.rate.low:.0f} to {100 * region.rate.high:.0f} %)"
-            for region in self.regions
-        ]
+        told = [f"It fails where {_words(self.space, its.cuts)}: {_rate(its.rate)}" for its in self.regions]
         if not told:
             return [f"{count} of {n} runs fail, in no region that two bounds could tell."]
         rest = self.regions[-1].outside
@@ -166,7 +121,8 @@ class Sensitivity(Tables):
         its = self.improvement
         assert its is not None
         now, before = self.text(its.median), self.text(its.before)
-        return f"Narrow {its.words} first: the median {self.label} is then {now}, not {before}."
+        words = _words(self.space, [its.half]).replace("<", "to below").replace(">", "to above")
+        return f"Narrow {words} first: the median {self.label} is then {now}, not {before}."
 
     @property
     def tables(self) -> list[Tabular]:
@@ -241,12 +197,12 @@ def sensitivity(
     points = default_points(space.scenario_at(np.full(k, 0.5)), k) if points is None else points
     if points & (points - 1):
         raise ScenarioError(f"points is {points}: give a power of 2, such as {1 << points.bit_length() - 1}")
-    designs = _designs(points, k, seed)
-    scores, held = np.empty(len(designs)), np.empty(len(designs), bool)
+    design = designs(points, k, seed)
+    scores, held = np.empty(len(design)), np.empty(len(design), bool)
     broken = ""
     words = f"sensitivity of {scenario.law.name} on {scenario.plant.name}"
-    with bar(words, len(designs) * scenario.work, shown=progress) as drawn:
-        for i, trace in stream((space.scenario_at(row) for row in designs), threads, drawn.advance):
+    with bar(words, len(design) * scenario.work, shown=progress) as drawn:
+        for i, trace in stream((space.scenario_at(row) for row in design), threads, drawn.advance):
             scores[i], held[i] = _score(trace, metric), tolerates(trace)
             broken = broken or (trace.broken if trace.failure is not None else "")
     if broken:
@@ -255,9 +211,9 @@ def sensitivity(
         raise ScenarioError(f"no run of {len(scores)} has a score: give a narrower class, or other gains")
     scores[~finite] = scores[finite].max()
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
-    shares, values, failed = designs[halves], scores[halves], ~held[halves]
-    axes = _indices(space, scores, points, shares, values, seed)
-    regions = tuple(_regions(space, shares, failed))
+    shares, values, failed = design[halves], scores[halves], ~held[halves]
+    axes = indices(space, scores, points, shares, values, seed)
+    found = tuple(regions(space, shares, failed))
     return Sensitivity(
         scenario=scenario,
         over=over,
@@ -268,9 +224,9 @@ def sensitivity(
         shares=shares,
         values=values,
         failed=failed,
-        regions=regions,
-        improvement=_improvement(space, shares, values),
-        runs=len(designs),
+        regions=found,
+        improvement=improvement(space, shares, values),
+        runs=len(design),
     )
 
 
@@ -302,74 +258,6 @@ def default_points(scenario: Scenario, axes: int) -> int:
     return min(max(MIN_POINTS, 2 ** math.floor(math.log2(max(most, 1.0)))), MAX_POINTS)
 
 
-class Space:
-    """The axes of a class around a scenario: its constants, levels of what is drawn, and chance."""
-
-    def __init__(self, scenario: Scenario, over: Uncertainty):
-        self.members = members = Members([scenario], over)
-        unit = scenario.plant.units[0]
-        errors = (over.position_noise, unit) if over.position_noise else (over.velocity_noise, f"{unit}/s")
-        levels = [("disturbance", (over.disturbance, scenario.plant.efforts[0]))] * members.forced
-        levels += [("noise", errors)] * (members.times > 0)
-        self.levels = {name: level for name, (level, _) in levels}
-        drawn = bool(levels) or over.jitter > 0.0 or _random(scenario)
-        self.columns: tuple[Constant | None, ...] = (*members.constants, *(None for _ in levels), *([None] * drawn))
-        self.names = (*(one.name for one in members.constants), *self.levels, *([CHANCE] * drawn))
-        ends = [(*one.bounds, one.unit) for one in members.constants] + [(0.0, *level) for _, level in levels]
-        self.ends = [*ends, *([(math.nan, math.nan, "")] * drawn)]
-
-    def scenario_at(self, shares: np.ndarray) -> Scenario:
-        """Return the scenario at a share of each axis."""
-        known = dict(zip(self.names, shares.tolist(), strict=True))
-        m, chance = len(self.members.constants), round(known.get(CHANCE, 0.0) * MAX_SEED)
-        drawn = self.members.random(np.random.default_rng(chance))
-        member = Member(shares[:m], known.get("disturbance", 0.0) * drawn.force, known.get("noise", 0.0) * drawn.noise)
-        scenario = self.members.scenario_of(member)
-        return dataclasses.replace(scenario, seed=chance) if CHANCE in known else scenario
-
-    def value(self, axis: int, share: float) -> float:
-        """Return the value of an axis at a share of its range."""
-        low, high, _ = self.ends[axis]
-        constant = self.columns[axis]
-        return low + share * (high - low) if constant is None else constant.value(share)
-
-    def column(self, axis: int, shares: np.ndarray) -> np.ndarray:
-        """Return the values of an axis at points, (N,); for chance the shares."""
-        if self.names[axis] == CHANCE:
-            return shares[:, axis]
-        return np.array([self.value(axis, share) for share in shares[:, axis].tolist()])
-
-    def words(self, cuts: Sequence[Cut]) -> str:
-        """Return cuts as words, such as "delay > 9 ms and mass < 0.8"."""
-        sides = "<", ">"
-        return joined(
-            f"{in_words(self.names[cut.axis])} {sides[cut.above]} "
-            f"{_with_unit(self.value(cut.axis, cut.share), self.ends[cut.axis][2])}"
-            for cut in cuts
-        )
-
-
-def _random(scenario: Scenario) -> bool:
-    """Return whether a run depends on the scenario's seed."""
-    noise, sensor = scenario.noise, scenario.sensor
-    disturbed = any(signal.random for signal in scenario.disturbance)
-    return bool(
-        noise.position or noise.velocity or (sensor and sensor.dropout) or disturbed or not scenario.clock.regular
-    )
-
-
-def _designs(points: int, k: int, seed: int) -> np.ndarray:
-    """Return Saltelli's design, ((k + 2) points, k): A, B, then A with one column of B, for each column."""
-    from scipy.stats import qmc
-
-    drawn = qmc.Sobol(2 * k, rng=np.random.default_rng(seed)).random(points)
-    a, b = drawn[:, :k], drawn[:, k:]
-    mixed = np.repeat(a[None], k, axis=0)
-    for i in range(k):
-        mixed[i, :, i] = b[:, i]
-    return np.concatenate([a, b, *mixed])
-
-
 def _score(trace: Trace, metric: str) -> float:
     """Return the score of a run, the worst of its groups of channels; NaN or inf without one."""
     if trace.failure is not None:
@@ -379,112 +267,18 @@ def _score(trace: Trace, metric: str) -> float:
     return entry.absent if math.isnan(value) else value
 
 
-def _indices(
-    space: Space, scores: np.ndarray, points: int, shares: np.ndarray, values: np.ndarray, seed: int
-) -> list[Axis]:
-    """Return each axis with its indices."""
-    from scipy.stats import sobol_indices, spearmanr
-
-    k, positive = len(space.names), scores.min() > 0.0
-    parts = (np.log(scores) if positive else scores).reshape(-1, points)
-    first = total = [Interval(0.0, 0.0, 0.0, points)] * k
-    if np.ptp(scores):
-
-        def indices(at: np.ndarray) -> np.ndarray:
-            """Return both indices of each axis, (2, k), from some of the points."""
-            some = np.stack(
-                [parts[:, at]] * 2
-            )  # twice, as scipy fails on one axis of one output; a copy, centred in place
-            found = sobol_indices(
-                func={"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}, n=points
-            )
-            return np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0]
-
-        draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
-        resampled = np.array([indices(at) for at in draws if np.ptp(parts[:2, at])])
-        ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-        whole = np.stack([indices(np.arange(points)), *ends])  # (3, 2, k)
-        first, total = ([Interval(*its, points) for its in whole[:, kind].T.tolist()] for kind in (0, 1))
-    axes = []
-    for i, name in enumerate(space.names):
-        ordered = name != CHANCE and np.ptp(values) > 0.0
-        rank = float(spearmanr(shares[:, i], values).statistic) if ordered else math.nan
-        axes.append(Axis(name, *space.ends[i], first[i], total[i], rank))
-    return axes
+def _rate(its: Interval) -> str:
+    """Return a share of runs as words, with its interval."""
+    return f"{round(its.median * its.n)} of {its.n} runs ({100 * its.low:.0f} to {100 * its.high:.0f} %)"
 
 
-def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
-    """Return which points lie within all cuts, (N,)."""
-    sides = [(shares[:, cut.axis] > cut.share) == cut.above for cut in cuts]
-    return np.logical_and.reduce(sides) if sides else np.ones(len(shares), bool)
-
-
-def _regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> "list[Region]":
-    """Return regions where runs fail, chosen by the first half of the points and told by the second."""
-    half, regions = len(failed) // 2, []
-    left = np.ones(len(failed), bool)  # not in a region yet
-    axes = [i for i, name in enumerate(space.names) if name != CHANCE]
-    single = [(Cut(i, above, share),) for i in axes for above in (False, True) for share in CUTS]
-    pairs = [one + other for one, other in itertools.combinations(single, 2) if one[0].axis != other[0].axis]
-    while len(regions) < MAX_REGIONS and failed[:half].any():
-        chooses = left[:half]
-        sides = {cuts: _within(cuts, shares[:half])[chooses] for cuts in (*single, *pairs)}
-        gains = {cuts: _gain(inside, failed[:half][chooses], len(cuts)) for cuts, inside in sides.items()}
-        cuts = max(gains, key=gains.__getitem__)
-        told = _within(cuts, shares) & left
-        told[:half] = False
-        if gains[cuts] <= 0.0 or not told.any():
-            break
-        left &= ~_within(cuts, shares)
-        rest = left.copy()
-        rest[:half] = False
-        regions.append(Region(cuts, space.words(cuts), _rate(failed[told]), _rate(failed[rest])))
-    return regions
-
-
-def _rate(failed: np.ndarray) -> Interval:
-    return share_interval(float(failed.mean()) if len(failed) else 0.0, max(1, len(failed)))._replace(n=len(failed))
-
-
-def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
-    """Return by how much a region where more fail explains failures, as the gain in log likelihood less BIC's price."""
-    n, inside = len(failed), int(within.sum())
-    if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
-        return 0.0
-    parts = [failed[within], failed[~within]]
-    return sum(map(_log_likelihood, parts)) - _log_likelihood(failed) - cuts * math.log(n)
-
-
-def _log_likelihood(failed: np.ndarray) -> float:
-    n, k = len(failed), int(failed.sum())
-    return sum(count * math.log(count / n) for count in (k, n - k) if count)
-
-
-def _improvement(space: Space, shares: np.ndarray, values: np.ndarray) -> Improvement | None:
-    """Return the half of an axis with the best median, chosen by half of the points and told by the others.
-
-    None if the others do not show that it is better (H. B. Mann & D. R. Whitney's test).
-    """
-    from scipy.stats import mannwhitneyu
-
-    half = len(values) // 2
-    axes = [i for i, name in enumerate(space.names) if name != CHANCE]
-    halves = [Cut(i, above, BETTER_SHARE) for i in axes for above in (False, True)]
-    if not halves:
-        return None
-    best = min(halves, key=lambda cut: float(np.median(values[:half][_within([cut], shares[:half])])))
-    told, within = values[half:], _within([best], shares[half:])
-    if not 0 < within.sum() < len(told):
-        return None
-    if mannwhitneyu(told[within], told[~within], alternative="less").pvalue > 1 - LEVEL:
-        return None
-    words = space.words([best]).replace("<", "to below").replace(">", "to above")
-    return Improvement(words, float(np.median(told[within])), float(np.median(told)))
-
-
-def in_words(name: str) -> str:
-    """Return the name of an axis as texts have it."""
-    return WORDS.get(name, name.replace("_", " "))
+def _words(space: Space, cuts: Sequence[Cut]) -> str:
+    """Return cuts as words, such as "delay > 9 ms and mass < 0.8 of nominal"."""
+    return joined(
+        f"{in_words(space.names[cut.axis])} {'<>'[cut.above]} "
+        f"{_with_unit(space.value(cut.axis, cut.share), space.ends[cut.axis][2])}"
+        for cut in cuts
+    )
 
 
 def _with_unit(value: float, unit: str) -> str:

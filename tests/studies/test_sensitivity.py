@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.analysis import sensitivity as module
 from smc_mujoco.analysis.worst_case.uncertainty import Members
-from smc_mujoco.studies import sensitivity as module
+from smc_mujoco.studies.sensitivity import default_over, default_points
 
 
 def scenario(**fields) -> smc.Scenario:
@@ -21,17 +22,16 @@ def space(*names: str) -> SimpleNamespace:
     return SimpleNamespace(
         names=names,
         ends=[(0.0, 10.0, "s")] * len(names),
-        words=lambda cuts: " and ".join(f"{names[cut.axis]} {'<>'[cut.above]} {10 * cut.share:g}" for cut in cuts),
     )
 
 
 def test_indices_of_ishigami_s_function_are_its_closed_forms():
     """T. Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone, and a fourth never."""
     n, three = 4096, 2.0 * math.pi
-    designs = module._designs(n, 4, 0)
+    designs = module.designs(n, 4, 0)
     x = three * designs - math.pi
     scores = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-    axes = module._indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], 0)
+    axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], 0)
     whole = 49.0 / 8.0 + 0.1 * math.pi**4 / 5.0 + 0.01 * math.pi**8 / 18.0 + 0.5
     first = 0.5 * (1.0 + 0.1 * math.pi**4 / 5.0) ** 2 / whole, 49.0 / 8.0 / whole, 0.0, 0.0
     both = 8.0 * 0.01 * math.pi**8 / 225.0 / whole
@@ -43,9 +43,9 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
 
 
 def test_positive_scores_are_compared_by_their_ratio():
-    designs = module._designs(1024, 2, 0)
+    designs = module.designs(1024, 2, 0)
     scores = 10.0 ** (3.0 * designs[:, 0] + 2.0 * designs[:, 1])
-    axes = module._indices(space("a", "b"), scores, 1024, designs[:2048], scores[:2048], 0)
+    axes = module.indices(space("a", "b"), scores, 1024, designs[:2048], scores[:2048], 0)
     assert [axis.total.median for axis in axes] == pytest.approx([9 / 13, 4 / 13], abs=0.01)
     assert axes[0].direction > axes[1].direction > 0.4
 
@@ -57,7 +57,7 @@ def test_a_planted_region_is_found_and_told_by_the_other_half(seed):
     failed = inside.copy()
     failed[:256] &= np.arange(256) % 10 != 0  # the half that chooses
     failed[256:] &= np.arange(256) % 2 == 0  # the half that tells
-    [region] = module._regions(space("a", "b", "c"), shares, failed)
+    [region] = module.regions(space("a", "b", "c"), shares, failed)
     assert sorted(region.cuts) == [module.Cut(0, True, 0.625), module.Cut(2, False, 0.5)]
     told = slice(256, None)
     assert region.rate.n == inside[told].sum()
@@ -70,23 +70,23 @@ def test_failures_by_chance_have_no_region():
     found = 0
     for seed in range(15):
         rng = np.random.default_rng(seed)
-        found += len(module._regions(space(*"abcdef"), rng.random((128, 6)), rng.random(128) < 0.3))
+        found += len(module.regions(space(*"abcdef"), rng.random((128, 6)), rng.random(128) < 0.3))
     assert found <= 2
 
 
 def test_an_axis_of_chance_bounds_no_region_and_is_not_improved():
     shares = np.random.default_rng(0).random((256, 2))
     axes = space("a", module.CHANCE)
-    assert not module._regions(axes, shares, shares[:, 1] > 0.5)
-    better = module._improvement(axes, shares, 1.0 + 5.0 * shares[:, 0] + 9.0 * shares[:, 1])
+    assert not module.regions(axes, shares, shares[:, 1] > 0.5)
+    better = module.improvement(axes, shares, 1.0 + 5.0 * shares[:, 0] + 9.0 * shares[:, 1])
     assert better
-    assert better.words == "a to below 5"
+    assert better.half == module.Cut(0, False, 0.5)
 
 
 def test_the_improvement_is_told_by_the_half_that_did_not_choose_it():
     shares = np.random.default_rng(1).random((400, 2))
     values = np.where(np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1])  # better above, in the half that tells
-    assert module._improvement(space("a", "b"), shares, values) is None
+    assert module.improvement(space("a", "b"), shares, values) is None
 
 
 def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_index_0():
@@ -112,7 +112,7 @@ def test_levels_and_chance_are_axes():
     low, high, other = (found.scenario_at(np.array(row)) for row in rows)
     assert [one.input_delay for one in (low, high, other)] == [0.01, 0.0, 0.0]
     forces = [np.array(one.disturbance[0].values) for one in (low, high, other)]
-    errors = [np.array(one.noise.position_error.values) for one in (low, high, other)]
+    errors = [np.array(vars(one.noise.position_error)["values"]) for one in (low, high, other)]
     for half, whole, others in (forces, errors):
         np.testing.assert_allclose(2.0 * half, whole, atol=1e-15)
         assert np.abs(whole - others).max() > 0.1 * np.abs(whole).max()
@@ -124,7 +124,7 @@ def test_encoder_bound_and_period_take_all_of_their_ranges():
     base = scenario(u_max=4.0, physics_step=0.5e-3)
     members = Members([base], smc.Uncertainty(encoder=(256, 4096), bound=(0.5, 1.0), period=(0.4, 3.0)))
     low, middle, high = (members.with_constants(np.full(3, share)) for share in (0.0, 0.5, 1.0))
-    assert [one.sensor.counts for one in (low, middle, high)] == [256, 1024, 4096]
+    assert [vars(one.sensor)["counts"] for one in (low, middle, high)] == [256, 1024, 4096]
     assert [one.u_max for one in (low, middle, high)] == [2.0, 3.0, 4.0]
     assert [one.control_period for one in (low, high)] == pytest.approx([0.5e-3, 3e-3])
     assert {one.physics_step for one in (low, middle, high)} == {0.5e-3}
@@ -139,10 +139,10 @@ def test_encoder_bound_and_period_take_all_of_their_ranges():
 
 
 def test_the_default_class_has_the_axes_of_machines():
-    found = module.Space(base := scenario(), module.default_over(base))
+    found = module.Space(base := scenario(), default_over(base))
     assert set(found.names) == {"mass", "friction", "delay", "noise", "encoder", "bound", "period", "chance"}
-    assert module.default_points(scenario(duration=8.0), 8) == 32
-    assert module.default_points(scenario(duration=5.0), 8) == 64
+    assert default_points(scenario(duration=8.0), 8) == 32
+    assert default_points(scenario(duration=5.0), 8) == 64
 
 
 def test_words_name_one_culprit_only_if_the_intervals_part():

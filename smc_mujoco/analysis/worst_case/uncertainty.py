@@ -186,7 +186,7 @@ class Members:
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         self.slope = 0.0 if within.slope is None else within.slope * self.h  # N or N m a sample; 0: d may jump
-        sets = Constant("set", (0.0, count), lambda _, at: scenarios[min(int(at), count - 1)])
+        sets = Constant(name="set", bounds=(0.0, count), put=lambda _, at: scenarios[min(int(at), count - 1)])
         self.constants = [sets] * (count > 1) + list(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
         self.hold = max(1, round(within.hold / self.h))  # samples that an error of measurement lasts
@@ -296,7 +296,7 @@ def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return mutated
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Constant:
     """Something that is constant in a run and may differ from member to member."""
 
@@ -316,31 +316,38 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
     """Yield each constant that may differ."""
     effort, plant = EFFORT[scenario.plant.units[0]], scenario.plant
     if within.delay != (0.0, 0.0):
-        yield Constant("delay", _multiples("delay", within.delay, scenario.resolved.physics_step), _with_delay, "s")
+        yield Constant(
+            name="delay",
+            bounds=_multiples("delay", within.delay, scenario.resolved.physics_step),
+            put=_with_delay,
+            unit="s",
+        )
     if within.jitter:
         _, jitter = _multiples("jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES)
-        yield Constant("jitter", (0.0, jitter / scenario.control_period), with_jitter, "periods")
+        yield Constant(name="jitter", bounds=(0.0, jitter / scenario.control_period), put=with_jitter, unit="periods")
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
-            yield Constant(name, bounds, functools.partial(_with_factor, name=name))
+            yield Constant(name=name, bounds=bounds, put=functools.partial(_with_factor, name=name))
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
             raise ScenarioError(f"friction_scale of {plant.name}, which has no friction here: {cure}")
-        yield Constant("friction_scale", within.friction_scale, _with_friction_scale)
+        yield Constant(name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale)
     if within.friction != (0.0, 0.0):
-        yield Constant("friction", within.friction, with_friction, effort)
+        yield Constant(name="friction", bounds=within.friction, put=with_friction, unit=effort)
     if within.encoder:
-        yield Constant("encoder", within.encoder, _with_counts, "counts", geometric=True)
+        yield Constant(name="encoder", bounds=within.encoder, put=_with_counts, unit="counts", geometric=True)
     if within.bound != (1.0, 1.0):
         if not math.isfinite(min(scenario.limits)):
             raise ScenarioError(f"u_max of {plant.name} has no bound that could differ: give the scenario a u_max")
-        yield Constant("bound", within.bound, _with_bound)
+        yield Constant(name="bound", bounds=within.bound, put=_with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
-        yield Constant(name, (-within.x0, within.x0), functools.partial(_with_start, i=i))
+        yield Constant(name=name, bounds=(-within.x0, within.x0), put=functools.partial(_with_start, i=i))
     if within.period != (1.0, 1.0):
-        yield Constant("period", _multiples("period", within.period, 1.0 / scenario.steps), _with_period)
+        yield Constant(
+            name="period", bounds=_multiples("period", within.period, 1.0 / scenario.steps), put=_with_period
+        )
 
 
 def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:

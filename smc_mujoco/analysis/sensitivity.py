@@ -1,0 +1,242 @@
+"""Sobol indices of a score over a class of uncertainty, the regions where runs fail, and the axis to improve.
+
+An index is estimated from Saltelli's design: points A and B, which are independent, and for each axis A with one
+column of B. What is chosen is chosen from A, and told from B. `smc.sensitivity` describes the whole.
+"""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from smc_mujoco.analysis.bootstrap import LEVEL, Interval, share_interval
+from smc_mujoco.analysis.worst_case.uncertainty import Constant, Member, Members, Uncertainty
+from smc_mujoco.common.constraints import MAX_SEED
+from smc_mujoco.simulation.scenario import Scenario
+
+RESAMPLES = 499  # of a bootstrap: chosen
+CHANCE = "chance"  # the axis of what is drawn in a run
+CUTS = tuple(i / 8 for i in range(1, 8))  # shares of an axis at which a region may end: chosen
+MIN_REGION_RUNS = 8  # in a region: fewer tell no rate; chosen
+MAX_REGIONS = 3
+BETTER_SHARE = 0.5  # of an axis, to which it may be narrowed: chosen
+WORDS = {"bound": "u_max", "period": "control period"}
+
+
+class Axis(NamedTuple):
+    """One uncertainty, and how much of the score's variance it explains."""
+
+    name: str
+    low: float
+    high: float
+    unit: str  # of low and high; "" for a factor or a number
+    first: Interval  # first-order index, the axis alone, with its 95 % interval
+    total: Interval  # total index, with others
+    direction: float  # Spearman's rank correlation of the score with the axis; NaN for chance
+
+
+class Cut(NamedTuple):
+    """A bound on one axis."""
+
+    axis: int  # index
+    above: bool  # whether values above the bound are within, or those below it
+    share: float  # of the axis's range at which it lies
+
+
+class Region(NamedTuple):
+    """Where runs fail: within cuts, and how often there and outside, in runs that did not choose the cuts."""
+
+    cuts: tuple[Cut, ...]
+    rate: Interval  # of failures within, Wilson's interval, with the number of runs
+    outside: Interval  # of failures outside of all regions so far
+
+
+class Improvement(NamedTuple):
+    """The axis whose narrowing to one half improves the score most, in runs that did not choose it."""
+
+    half: Cut
+    median: float  # of the score within that half
+    before: float  # median of the score over the whole range
+
+
+class Space:
+    """The axes of a class around a scenario: its constants, levels of what is drawn, and chance."""
+
+    def __init__(self, scenario: Scenario, over: Uncertainty):
+        self.members = members = Members([scenario], over)
+        unit = scenario.plant.units[0]
+        errors = (over.position_noise, unit) if over.position_noise else (over.velocity_noise, f"{unit}/s")
+        levels = [("disturbance", (over.disturbance, scenario.plant.efforts[0]))] * members.forced
+        levels += [("noise", errors)] * (members.times > 0)
+        self.levels = {name: level for name, (level, _) in levels}
+        drawn = bool(levels) or over.jitter > 0.0 or _random(scenario)
+        self.columns: tuple[Constant | None, ...] = (*members.constants, *(None for _ in levels), *([None] * drawn))
+        self.names = (*(one.name for one in members.constants), *self.levels, *([CHANCE] * drawn))
+        ends = [(*one.bounds, one.unit) for one in members.constants] + [(0.0, *level) for _, level in levels]
+        self.ends = [*ends, *([(math.nan, math.nan, "")] * drawn)]
+
+    def scenario_at(self, shares: np.ndarray) -> Scenario:
+        """Return the scenario at a share of each axis."""
+        known = dict(zip(self.names, shares.tolist(), strict=True))
+        m, chance = len(self.members.constants), round(known.get(CHANCE, 0.0) * MAX_SEED)
+        drawn = self.members.random(np.random.default_rng(chance))
+        member = Member(shares[:m], known.get("disturbance", 0.0) * drawn.force, known.get("noise", 0.0) * drawn.noise)
+        scenario = self.members.scenario_of(member)
+        return dataclasses.replace(scenario, seed=chance) if CHANCE in known else scenario
+
+    def value(self, axis: int, share: float) -> float:
+        """Return the value of an axis at a share of its range."""
+        low, high, _ = self.ends[axis]
+        constant = self.columns[axis]
+        return low + share * (high - low) if constant is None else constant.value(share)
+
+    def column(self, axis: int, shares: np.ndarray) -> np.ndarray:
+        """Return the values of an axis at points, (N,); for chance the shares."""
+        if self.names[axis] == CHANCE:
+            return shares[:, axis]
+        return np.array([self.value(axis, share) for share in shares[:, axis].tolist()])
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Explained:
+    """A score over a class: independent runs, the indices of its axes, and where runs fail."""
+
+    scenario: Scenario
+    metric: str  # its name
+    unit: str  # of the score
+    axes: tuple[Axis, ...]  # the largest total index first
+    space: Space  # what the columns of `shares` mean
+    shares: np.ndarray  # (N, axes), where in each axis's range a run lies
+    values: np.ndarray  # (N,), its score; a run without one has the worst of the others
+    failed: np.ndarray  # (N,) bool, whether it fails or ends beyond 5 % of its scale
+    regions: tuple[Region, ...]
+
+
+def _random(scenario: Scenario) -> bool:
+    """Return whether a run depends on the scenario's seed."""
+    noise, sensor = scenario.noise, scenario.sensor
+    disturbed = any(signal.random for signal in scenario.disturbance)
+    return bool(
+        noise.position or noise.velocity or (sensor and sensor.dropout) or disturbed or not scenario.clock.regular
+    )
+
+
+def designs(points: int, k: int, seed: int) -> np.ndarray:
+    """Return Saltelli's design, ((k + 2) points, k): A, B, then A with one column of B, for each column."""
+    from scipy.stats import qmc
+
+    drawn = qmc.Sobol(2 * k, rng=np.random.default_rng(seed)).random(points)
+    a, b = drawn[:, :k], drawn[:, k:]
+    mixed = np.repeat(a[None], k, axis=0)
+    for i in range(k):
+        mixed[i, :, i] = b[:, i]
+    return np.concatenate([a, b, *mixed])
+
+
+def indices(
+    space: Space, scores: np.ndarray, points: int, shares: np.ndarray, values: np.ndarray, seed: int
+) -> list[Axis]:
+    """Return each axis with its indices."""
+    from scipy.stats import sobol_indices, spearmanr
+
+    k, positive = len(space.names), scores.min() > 0.0
+    parts = (np.log(scores) if positive else scores).reshape(-1, points)
+    first = total = [Interval(0.0, 0.0, 0.0, points)] * k
+    if np.ptp(scores):
+
+        def of(at: np.ndarray) -> np.ndarray:
+            """Return both indices of each axis, (2, k), from some of the points."""
+            some = np.stack([parts[:, at]] * 2)  # twice: scipy fails on one axis of one output, and centres in place
+            outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}
+            found = sobol_indices(func=outputs, n=points)
+            return np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0]
+
+        draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
+        resampled = np.array([of(at) for at in draws if np.ptp(parts[:2, at])])
+        ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+        whole = np.stack([of(np.arange(points)), *ends])  # (3, 2, k)
+        first, total = (
+            [Interval(at, low, high, points) for at, low, high in whole[:, kind].T.tolist()] for kind in (0, 1)
+        )
+    axes = []
+    for i, name in enumerate(space.names):
+        ordered = name != CHANCE and np.ptp(values) > 0.0
+        rank = float(np.asarray(spearmanr(shares[:, i], values))[0]) if ordered else math.nan
+        axes.append(Axis(name, *space.ends[i], first[i], total[i], rank))
+    return axes
+
+
+def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
+    """Return which points lie within all cuts, (N,)."""
+    sides = [(shares[:, cut.axis] > cut.share) == cut.above for cut in cuts]
+    return np.logical_and.reduce(sides) if sides else np.ones(len(shares), bool)
+
+
+def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region]:
+    """Return regions where runs fail, chosen by the first half of the points and told by the second."""
+    half, found = len(failed) // 2, []
+    left = np.ones(len(failed), bool)  # not in a region yet
+    axes = [i for i, name in enumerate(space.names) if name != CHANCE]
+    single = [(Cut(i, above, share),) for i in axes for above in (False, True) for share in CUTS]
+    pairs = [one + other for one, other in itertools.combinations(single, 2) if one[0].axis != other[0].axis]
+    while len(found) < MAX_REGIONS and failed[:half].any():
+        chooses = left[:half]
+        sides = {cuts: _within(cuts, shares[:half])[chooses] for cuts in (*single, *pairs)}
+        gains = {cuts: _gain(inside, failed[:half][chooses], len(cuts)) for cuts, inside in sides.items()}
+        cuts = max(gains, key=gains.__getitem__)
+        told = _within(cuts, shares) & left
+        told[:half] = False
+        if gains[cuts] <= 0.0 or not told.any():
+            break
+        left &= ~_within(cuts, shares)
+        rest = left.copy()
+        rest[:half] = False
+        found.append(Region(cuts, _rate(failed[told]), _rate(failed[rest])))
+    return found
+
+
+def _rate(failed: np.ndarray) -> Interval:
+    return share_interval(float(failed.mean()) if len(failed) else 0.0, max(1, len(failed)))._replace(n=len(failed))
+
+
+def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
+    """Return by how much a region where more fail explains failures, as the gain in log likelihood less BIC's price."""
+    n, inside = len(failed), int(within.sum())
+    if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
+        return 0.0
+    parts = [failed[within], failed[~within]]
+    return sum(map(_log_likelihood, parts)) - _log_likelihood(failed) - cuts * math.log(n)
+
+
+def _log_likelihood(failed: np.ndarray) -> float:
+    n, k = len(failed), int(failed.sum())
+    return sum(count * math.log(count / n) for count in (k, n - k) if count)
+
+
+def improvement(space: Space, shares: np.ndarray, values: np.ndarray) -> Improvement | None:
+    """Return the half of an axis with the best median, chosen by half of the points and told by the others.
+
+    None if the others do not show that it is better (H. B. Mann & D. R. Whitney's test).
+    """
+    from scipy.stats import mannwhitneyu
+
+    half = len(values) // 2
+    axes = [i for i, name in enumerate(space.names) if name != CHANCE]
+    halves = [Cut(i, above, BETTER_SHARE) for i in axes for above in (False, True)]
+    if not halves:
+        return None
+    best = min(halves, key=lambda cut: float(np.median(values[:half][_within([cut], shares[:half])])))
+    told, within = values[half:], _within([best], shares[half:])
+    if not 0 < within.sum() < len(told):
+        return None
+    if mannwhitneyu(told[within], told[~within], alternative="less").pvalue > 1 - LEVEL:
+        return None
+    return Improvement(best, float(np.median(told[within])), float(np.median(told)))
+
+
+def in_words(name: str) -> str:
+    """Return the name of an axis as texts have it."""
+    return WORDS.get(name, name.replace("_", " "))
