@@ -11,7 +11,7 @@ from smc_mujoco.control.component import Component, Template
 from smc_mujoco.exchange.c.load import law_from_c
 from smc_mujoco.exchange.fmu.load import law_from_fmu
 from smc_mujoco.exchange.linear_law import law_from_control
-from smc_mujoco.exchange.policy import policy
+from smc_mujoco.exchange.policy import controller, policy
 
 READERS = {".c": law_from_c, ".so": law_from_c, ".fmu": law_from_fmu, ".onnx": policy, ".pt2": policy}
 
@@ -29,8 +29,10 @@ def law_from(source: Any, *, name: str | None = None, units: str | None = None, 
         - the path of an FMU (.fmu): `smc.exchange.law_from_fmu`;
         - a transfer function or state-space model of python-control or scipy, matrices (A, B, C, D), or the gain K of
           u = -K x as `control.lqr` returns it: `smc.exchange.law_from_control`;
+        - an object with a method compute(t, x, xref), as opensmc's controllers, which gives N or N m. x is (x, v) and
+          xref (r, r', r''). Each channel of each run has its own copy of an object;
         - a callable from an observation to an action, an object with a method `predict`, a torch module, or the path
-          of a network (.onnx, .pt2): `smc.policy`. Each channel of each run has its own copy of an object.
+          of a network (.onnx, .pt2): `smc.policy`, with copies too.
       name: of the law; default: that of the file or object.
       units: of the action of the last kind: "u_max", a fraction of u_max (the default), or "SI", N or N m.
 
@@ -43,7 +45,7 @@ def law_from(source: Any, *, name: str | None = None, units: str | None = None, 
     if units is not None:
         if reader is not policy:
             raise ScenarioError(
-                "units are of a policy's action: a law in C, an FMU or K gives N or N m, leave units out"
+                "units are of a policy's action: a law in C, an FMU, K or compute gives N or N m, leave units out"
             )
         options["units"] = units
     return reader(source, **options)
@@ -55,4 +57,4 @@ def _reader(source: Any) -> Any:
     linear = all(hasattr(source, name) for name in "ABCD") or all(hasattr(source, name) for name in ("num", "den"))
     if linear or isinstance(source, tuple | list | np.ndarray | float | int):
         return law_from_control
-    return policy
+    return controller if callable(getattr(source, "compute", None)) else policy

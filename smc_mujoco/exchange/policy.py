@@ -88,6 +88,22 @@ class Policy(Uncompiled):
             return self
 
 
+class Controller(Policy):
+    """The function of the law of an object with opensmc's method compute(t, x, xref), which gives u, or u and a dict.
+
+    xref is (r, r', r''), u is in N or N m, and the entry "s" of the dict is the law's s.
+    """
+
+    def __call__(self, y: Measurement, gains: Any, memory: np.ndarray) -> tuple[float, float]:
+        """Return u and s."""
+        arithmetic = _arithmetic()
+        answer = self.act.compute(y.t, np.array([y.x, y.v]), np.array([y.r, y.dr, y.ddr]))  # pyright: ignore[reportFunctionMemberAccess]
+        if arithmetic.changed():
+            raise ArithmeticError(f"{self.name} {ALTERS}")
+        u, told = answer if isinstance(answer, tuple) else (answer, {})
+        return float(np.asarray(u, float).item()), float(told.get("s", 0.0))
+
+
 @dataclasses.dataclass(frozen=True)
 class File:
     """A policy in a file. Two are equal if path and content are."""
@@ -212,6 +228,11 @@ def policy(
     except Exception as error:  # of the object itself, when it is inspected
         raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}") from error
     return law_function(Policy(function, name or its_name, reference, units))()
+
+
+def controller(act: Any, *, name: str | None = None) -> Law:
+    """Return an object with opensmc's method `compute` as a law; each channel of each run has its own copy."""
+    return law_function(Controller(act, name or type(act).__name__, reference=True, units="SI"))()
 
 
 def _callable(act: Any) -> tuple[Act, str]:

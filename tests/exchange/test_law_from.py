@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from helpers.plants_ab import called
 
 import smc_mujoco as smc
+from smc_mujoco.control.law import Measurement
 
 RUN = {"plant": "duffing", "duration": 0.2, "u_max": 6.0}
 LEAD = ([[-100.0]], [[1.0]], [[-3000.0]], [[40.0]])
@@ -66,6 +68,38 @@ def test_an_object_that_keeps_state_is_fresh_in_each_run():
     assert (law.name, first.failure) == ("mine", None)
     assert same(first, second)
     assert np.abs(first.u).max() > 0.1
+
+
+class Twin:
+    """The law `pid` as opensmc writes controllers: of its own error r - x, with its state in the object."""
+
+    def __init__(self, law, dt, limit):
+        self.law, self.dt, self.limit, self.memory = law, dt, limit, np.zeros(law.memory)
+
+    def compute(self, t, x, xref, plant=None, **kwargs):
+        e, de = x[0] - xref[0], x[1] - xref[1]
+        y = Measurement(t, self.dt, *x, e, de, *xref, 0.0, 1.0, limit=self.limit)
+        u, s = called(self.law, y, self.memory)
+        return u, {"s": s}
+
+
+@pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
+def test_a_controller_of_opensmc_s_kind_is_a_law_in_one_line():
+    where = {"reference": smc.Sine(0.3, 2.0), "plant": "pendulum_network"}
+    own = smc.law("pid", kp=20.0, ki=5.0, kd=4.0)
+    law = smc.law_from(Twin(own, 1e-3, 6.0))
+    first, again, truth = run(law, **where), run(law, **where), run(own, **where)
+    assert law.name == "Twin"
+    np.testing.assert_allclose(first.u, truth.u, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(first.s, truth.s, rtol=1e-9, atol=1e-9)
+    assert same(first, again)
+
+
+def test_the_gain_of_an_lqr_is_a_law_in_one_line():
+    trace = run(smc.law_from(np.array([[5.0, 2.0]])))  # u = -K x, as control.lqr returns K
+    asked = -(5.0 * trace.x[:, 0] + 2.0 * trace.v[:, 0])
+    np.testing.assert_allclose(trace.u[:, 0], asked.clip(-6.0, 6.0), rtol=1e-12, atol=1e-12)
+    assert np.abs(asked).min() < 6.0
 
 
 @pytest.mark.parametrize(
