@@ -82,10 +82,12 @@ def plot(
                 axes[i, k].set_xlabel(label)
                 axes[i, k].tick_params(labelleft=k == 0)
             over_never = 1.0 + style.points(1.7 * pages.TEXT_SIZE / 72) / style.points(tall[i])
-            its_name = style.plant_name(plant)
+            its_name = style.plant_name(plant) if title or len(plants) > 1 else ""
             beside = style.width(f"{its_name}  never", style.points(pages.TEXT_SIZE), bold=True) < room
             axes[i, 0].set_title(its_name, y=None if beside else over_never, parse_math=False)
-        pages.set_head(page, width, title or "Medians by condition", key, shared)
+        pages.set_head(
+            page, width, title or f"Medians: {style.heading(plants, conditions, short=len(plants) > 1)}", key, shared
+        )
         pages.write(page, paths)
     return page
 

@@ -170,15 +170,9 @@ def _composed_page(
     if sparks:
         _draw_sparks(page, cells[1][0], sparks, runs, len(others))
     _draw_beside(page, cells[2], beside, (groups[0], *places), runs)
-    pages.set_head(page, width, title or _head(traces), key, gains)
+    pages.set_head(page, width, title or style.head([trace.scenario for trace in traces]), key, gains)
     pages.space_ticks(page)
     return page
-
-
-def _head(traces: Sequence[Trace]) -> str:
-    """Return the plant of traces, and their condition if they have it in common."""
-    heads = {style.head(trace.scenario) for trace in traces}
-    return heads.pop() if len(heads) == 1 else style.plant_name(traces[0].scenario.plant)
 
 
 def _cells(

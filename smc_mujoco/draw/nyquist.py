@@ -68,7 +68,7 @@ def nyquist(
             if change.marked:
                 words = style.wrapped(NOTE, 72 * 0.5 * style.FULL_WIDTH, style.points(9.5), lines=2)
                 ax.set_title(words, loc="left", fontsize=style.points(9.5), fontweight="normal")
-        title = f"Chattering: {style.head(scenarios[0])}"
+        title = f"Chattering: {style.head(scenarios)}"
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         pages.write(page, pages.files(path))
     return page

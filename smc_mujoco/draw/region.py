@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control.source import NONE
+from smc_mujoco.control.source import Source
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
@@ -35,19 +36,25 @@ def draw(
         raise ScenarioError("no map to draw: give at least one")
     width, height = (MAP_SIZE[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)
     with style.page(style.FULL_WIDTH if size is None and fig is None else width):
+        rest = Line2D([], [], color=style.INK, marker="+", ms=style.points(11), lw=0, label="rest")
         across = max(1, min(len(maps), int(width / style.points(3.2)))) if size is not None else len(maps)
-        down = -(-len(maps) // across)
-        page = pages.blank(width, height or (MAP_SIZE[1] if size is None else down * width / across * 1.08), fig)
+        down, space = -(-len(maps) // across), pages.head_height(width, [rest])
+        tall = MAP_SIZE[1] if size is None else down * width / across * 1.08
+        page = pages.blank(width, height or tall + space, fig)
         axes, after = page.subplots(down, across, squeeze=False).ravel(), convergence_times(maps)
-        for ax, region in zip(axes, maps, strict=False):
-            draw_map(ax, region, after)
+        plants = dict.fromkeys(region.plant for region in maps)
+        words, gains = pages.gain_sources([[Source(kind=region.source)] for region in maps])
+        for ax, region, source in zip(axes, maps, words, strict=False):
+            plant = f", {style.plant_name(region.plant, short=True)}" * (len(plants) > 1)
+            draw_map(ax, region, after, style.law_name(region.law) + plant + source.replace(", ", "\n"))
         for ax in axes[len(maps) :]:
             ax.remove()
+        pages.set_head(page, width, f"Region of attraction: {style.heading([*plants], short=True)}", [rest], gains)
         pages.write(page, paths)
     return page
 
 
-def draw_map(ax, region: Basin, after: Sequence[float]) -> None:
+def draw_map(ax, region: Basin, after: Sequence[float], title: str) -> None:
     """Fill a matplotlib axes with a map and its legend; `after` is from `convergence_times` of all maps."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
@@ -55,10 +62,10 @@ def draw_map(ax, region: Basin, after: Sequence[float]) -> None:
     classes = colour_indices(region, after)
     colours = (*reversed(style.ramp(style.law_colour(region.law), len(BLUES), LIGHTEST)), *OTHERS)
     ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(colours), vmin=-0.5, vmax=4.5, rasterized=True)
-    ax.plot(0.0, 0.0, "+", color=style.PAPER, markersize=style.points(11), markeredgewidth=style.points(1.6))
+    for colour, wide in ((style.PAPER, 3.2), (style.INK, 1.4)):
+        ax.plot(0.0, 0.0, "+", color=colour, markersize=style.points(11), markeredgewidth=style.points(wide))
     ax.grid(visible=False)
-    gains = f"\ngains: {region.source}" * (region.source != NONE)
-    ax.set_title(f"{style.law_name(region.law)}, {style.plant_name(region.plant, short=True)}{gains}")
+    ax.set_title(title, parse_math=False)
     ax.set_xlabel(f"initial position ({region.unit})")
     ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [

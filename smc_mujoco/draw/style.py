@@ -41,6 +41,10 @@ REACTION = "#9018F0"
 LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
 MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
 PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}  # of units, by the power of 1000 that a number is given
+CAMEL = re.compile(
+    r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])"
+)  # where a word begins in DCMotor, but not in LuGre
+MAX_DIGITS, MAX_VALUES = 17, 8  # digits that tell two numbers apart; numbers of a label
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
 LIGHTEST, DARKEST = 61.0, 21.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper; of a ramp
@@ -251,24 +255,33 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
     Where the condition differs, its name replaces the fields that are equal in all its runs.
     """
     settings = _differing(_settings, trace, alike)
-    condition = settings.pop("condition", None)
-    if condition is not None:
-        same = _differing(_settings, trace, [run for run in alike if run.scenario.condition == condition])
-        settings = {name: value for name, value in settings.items() if name in same or name not in CONDITION_FIELDS}
-    machine = {
-        f"plant's {name}" if name in trace.scenario.law.gains else name: value
-        for name, value in _differing(_machine, trace, others).items()
-    }
-    words = [_setting(name, value) for name, value in [*settings.items(), *machine.items()]]
-    return ", ".join([str(condition), *words] if condition is not None else words)
+    condition = settings.pop("condition", "")
+    if condition:
+        same = _differing(
+            _settings, trace, [run for run in alike if run.scenario.condition == trace.scenario.condition]
+        )
+        settings = {name: words for name, words in settings.items() if name in same or name not in CONDITION_FIELDS}
+    machine = [
+        f"plant's {words}" if name in trace.scenario.law.gains else words
+        for name, words in _differing(_machine, trace, others).items()
+    ]
+    return ", ".join([*[condition] * bool(condition), *settings.values(), *machine])
 
 
 def _differing(
     settings: Callable[[Trace], Mapping[str, object]], trace: Trace, others: Sequence[Trace]
-) -> dict[str, object]:
-    """Return the settings of a run that not all others have."""
-    tables = [settings(other) for other in others]
-    return {name: value for name, value in settings(trace).items() if any(t.get(name) != value for t in tables)}
+) -> dict[str, str]:
+    """Return the settings of a run that not all others have, in words that no other value of a run has."""
+    tables, words = [settings(other) for other in others], {}
+    for name, value in settings(trace).items():
+        unequal = [table.get(name) for table in tables if table.get(name) != value]
+        if unequal:
+            told = (
+                (_setting(name, value, digits), {_setting(name, other, digits) for other in unequal})
+                for digits in range(3, MAX_DIGITS + 1)
+            )
+            words[name] = next((its for its, different in told if its not in different), _setting(name, value))
+    return words
 
 
 @once_per_trace
@@ -292,21 +305,40 @@ def distinct(names: Sequence[str]) -> list[str]:
     return [name.removeprefix(law) for name in names] if all(name.startswith(law) for name in names) else list(names)
 
 
-def _setting(name: str, value: object) -> str:
+def _setting(name: str, value: object, digits: int = 3) -> str:
     """Return a gain or a field of a scenario in words."""
     words = name.replace("_", " ")
+    if name == "condition":
+        return str(value).replace("_", " ")
     if isinstance(value, Jump):
         return f"jump at {value.time:g} s"
     if value is None or value is False or (isinstance(value, tuple) and not value):
         return f"no {words}"
     if value is True:
         return words
+    numbers = isinstance(value, int | float) or (isinstance(value, tuple) and isinstance(value[0], int | float))
+    its = _value(value, digits).removeprefix(f"{capital(words)}, ")  # a noise is a Noise
+    return f"{words}{' =' * numbers} {its}" if its != capital(words) else f"no {words}"
+
+
+def _value(value: object, digits: int) -> str:
+    """Return a value of a field in words, such as "0.5", "Coulomb 0.005", "Encoder, counts 2000"."""
     if isinstance(value, int | float):
-        return f"{words} = {value:.3g}"
-    if isinstance(value, tuple) and all(isinstance(part, int | float) for part in value):
-        same = len(set(value)) == 1
-        return f"{words} = {short(value[0], 3) if same else ', '.join(short(part, 3) for part in value)}"
-    return f"{words} {value}"
+        return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"
+    if isinstance(value, tuple):
+        same, few = len(set(value)) == 1, len(value) <= MAX_VALUES
+        parts = [_value(part, digits) for part in value[: 1 if same else len(value)]]
+        return ", ".join(parts) if same or few else f"{len(value)} values"
+    if isinstance(value, Component):
+        return law_name(value)
+    if not dataclasses.is_dataclass(value):
+        return str(value).replace("_", " ")
+    kind = re.sub(CAMEL, lambda start: f" {start[1].lower()}", type(value).__name__)
+    fields = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
+    told = {field.name: _value(its, digits) for field, its in fields.items() if its != field.default}
+    if len(fields) == 1:
+        return " ".join([kind, *told.values()])
+    return ", ".join([told.pop("kind", kind), *(f"{name.replace('_', ' ')} {words}" for name, words in told.items())])
 
 
 def ending(trace: Trace) -> str:
@@ -435,10 +467,16 @@ def plant_name(plant: Plant | str, short: bool = False) -> str:
     return (short and plant.short) or plant.label or (plant.name if plant.own else in_words(plant.name))
 
 
-def head(scenario: Scenario) -> str:
-    """Return what a picture of runs is about: the plant, and the condition if it has a name."""
-    condition = "" if scenario.condition in (None, "", "nominal") else f", {scenario.condition.replace('_', ' ')}"
-    return plant_name(scenario.plant) + condition
+def head(scenarios: Sequence[Scenario]) -> str:
+    """Return what a picture of runs is about: their plant, and their condition if all have the same one with a name."""
+    return heading([scenarios[0].plant], [scenario.condition or "nominal" for scenario in scenarios])
+
+
+def heading(plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False) -> str:
+    """Return plants, and the condition if there is only one, which is not the nominal one."""
+    names, condition = dict.fromkeys(plant_name(plant, short) for plant in plants), {*conditions}
+    alone = next(iter(condition)) if len(condition) == 1 else "nominal"
+    return ", ".join([*names, *[alone.replace("_", " ")] * (alone != "nominal")])
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:

@@ -15,6 +15,7 @@ import smc_mujoco as smc
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.figure import figure, signals
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
@@ -208,6 +209,39 @@ def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     noisy = dataclasses.replace(slow, scenario=dataclasses.replace(slow.scenario, input_delay=0.005))
     assert style.labels([slow, noisy], None) == ["Classical: input delay = 0", "Classical: input delay = 0.005"]
     assert style.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
+
+
+def test_labels_are_words_and_numbers_have_the_digits_that_tell_them_apart(one):
+    def told(*fields):
+        runs = [dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, **each)) for each in fields]
+        return [label.removeprefix("Classical: ") for label in style.labels(runs, None)]
+
+    rubbed = [{"friction": Coulomb(level)} for level in (0.005, 0.0050001)]
+    assert told({}, *rubbed) == ["no friction", "friction Coulomb 0.005", "friction Coulomb 0.0050001"]
+    drives = [{"actuator": part} for part in (smc.Lag(0.05), smc.DCMotor(), smc.Backlash(0.02))]
+    assert told(*drives) == ["actuator Lag 0.05", "actuator DC motor", "actuator Backlash, gap 0.02"]
+    waves = [{"disturbance": smc.Sine(0.2, omega)} for omega in (5.0, 6.0)]
+    assert told(*waves) == [f"disturbance Sine, amplitude 0.2, omega {omega}" for omega in (5, 6)]
+    assert told({}, {"noise": smc.Noise(0.01, 0.05)}) == ["no noise", "noise position 0.01, velocity 0.05"]
+    assert told({}, {"sensor": smc.Encoder(2000)}) == ["no sensor", "sensor Encoder, counts 2000"]
+    laws = [{"law": smc.law("classical", k=k)} for k in (2.0, 2.0001, 3.0)]
+    assert told(*laws) == ["k = 2", "k = 2.0001", "k = 3"]
+
+
+def test_heads_say_what_is_drawn_of_which_plant_under_which_condition(one):
+    named = [dataclasses.replace(one, scenario=one.scenario.named(name)) for name in ("slow_noise", "friction")]
+    for runs, words in ((named[:1] * 2, "Duffing oscillator, slow noise"), (named, "Duffing oscillator")):
+        assert head(figure(runs, panels=["x"])) == words
+        assert style.head([run.scenario for run in runs]) == words, "that of a film too"
+    rows = Rows()
+    assert head(smc.plot(rows)) == "Medians: Duffing, Van der Pol"
+    rows.rows = [row for row in rows.rows if row[:2] == ("duffing", "noise")]
+    page = smc.plot(rows)
+    assert (head(page), page.axes[0].get_title()) == ("Medians: Duffing oscillator, noise", "")
+
+
+def head(page) -> str:
+    return page.legends[0].get_title().get_text()
 
 
 def test_runs_under_several_conditions_have_their_names_inside_the_page(one):

@@ -118,7 +118,7 @@ def basins() -> list[Basin]:
     decided = np.array([[2.0, 4.0, 8.0], [8.0, 16.0, 1.0]])
     names = {"plant": "van_der_pol", "unit": "m", "duration": 16.0, "outcome": outcome, "decided_at": decided}
     grid = {"x": np.array([-1.0, 0.0, 2.0]), "v": np.array([-3.0, 3.0])}
-    return [Basin(law="classical", source="tuned", **names, **grid), Basin(law="adaptive", **names, **grid)]
+    return [Basin(law="classical", source="tuned here", **names, **grid), Basin(law="adaptive", **names, **grid)]
 
 
 LAWS = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("adaptive", order=math.nan)]
@@ -357,7 +357,9 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
         colours = [to_hex(colour) for colour in mesh.get_cmap()(range(5))]
         assert colours[0] == style.ramp(style.law_colour(its.law), 3, region.LIGHTEST)[2].lower()
         assert colours[4] == style.FAILED.lower(), "grey, not another law's orange"
-        assert ("gains: tuned" in ax.get_title(loc="left")) == (its.source == "tuned")
+        assert ax.get_title(loc="left") == style.law_name(its.law)
+    assert page.legends[0].get_title().get_text() == "Region of attraction: Van der Pol"
+    assert "gains: tuned here" in [text.get_text() for text in page.texts + page.artists]
 
 
 def test_equal_blues_of_maps_side_by_side_are_equal_times():

@@ -54,7 +54,7 @@ class Caption:
         clock = style.width("00.000 s", TITLE_SIZE * scale, bold=True) + EDGE * scale
         clock += style.width("8× slower", KEY_SIZE * scale, bold=True) + 2 * KEY_SIZE * scale
         self.clock = clock  # width of the clock and of the playback speed, px
-        title = title or style.plant_name(traces[0].scenario.plant)
+        title = title or style.head([trace.scenario for trace in traces])
         self.title = style.cropped(title, inside - clock, TITLE_SIZE * scale, bold=True)
         notes = [f"{words} since {time:g} s" for time, words in self.jumps.items()]
         longest = max((style.width(note, KEY_SIZE * scale, bold=True) for note in notes), default=0.0)

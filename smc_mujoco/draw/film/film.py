@@ -152,7 +152,7 @@ def film(
       path: its ending tells what is written: .mp4, a film; .webp, an animated picture that web pages show as an image;
         .png, the picture at the time `at`. None writes nothing, and returns the pictures for other packages, `Frames`.
       labels: one a trace; default: the laws' labels.
-      title: default: the plant's name.
+      title: default: the plant's name, and the condition if all traces have one.
       size: width and height in px, even. Default: 1280 x 720, and 800 x 450 for .webp and `Frames`.
       fps: frames a second; default: 30, and 20 for .webp.
       speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
