@@ -75,7 +75,7 @@ def figure(
     without an actuator, and channels in another unit, have their own panels. Realistic mechanisms have panels of the
     actuator's force and of the reaction of friction and contacts, arms of their tip. The end of a failed run and the
     instant at which a plant changes are marked. Curves that agree from the start are drawn once, in ink, until they
-    part.
+    part. What lines and bands mean is also the figure's `get_label()` and in its files, for a caption.
 
     Args:
       traces: one or several traces.
@@ -86,8 +86,8 @@ def figure(
       panels: names among "x", "error", "spread", "v", "u", "delivered", "reaction", "d", "tip", "contact", "s",
         "channels" (e and u of the worst channel, sparklines of the others), "phase", "settling" (|x - r|), "end"
         (close-up of u). Default: those that suit the plant and the size.
-      size: "ieee-column" (3.5 in wide), "ieee-page" (7.16 in), "slide" (13.3 x 7.5 in, three panels, large letters), or
-        (width, height) in inches. Default: 8.8 in wide.
+      size: "ieee-column" (3.5 in wide, without the key of lines and bands, which is for its caption), "ieee-page" (7.16
+        in), "slide" (13.3 x 7.5 in, three panels, large letters), or (width, height) in inches. Default: 8.8 in wide.
       format: "svg", "png" or "pdf", of the file.
       fig: Figure or SubFigure to draw into; default: a new one.
 
@@ -147,20 +147,22 @@ def _composed_page(
     groups = [Panel("x", *each) for each in style.split(traces).items()]
     places = _by_joint(groups)
     beside = [name for name in chosen if name in SIDE_PANELS for _ in (places if name == "phase" else "x")]
-    key, gains = _key(runs, [*overview, *(panel for row in sparks for panel in row)])
+    handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
+    key = _key([*overview, *(panel for row in sparks for panel in row)])
+    narrow = width < pages.NARROW
+    handles += [] if narrow else key
     last = _height(groups[0]._replace(quantity="u"))
     blocks = (
         [*map(_height, overview)],
         [SPARK_ROW * len(sparks) + SPARK_ENDS] * bool(sparks),
         [last if n == "end" else SIDE_PANELS[n] for n in beside],
     )
-    narrow = width < pages.NARROW
     columns = [(0, 1, 2)] if narrow else [(0,), (1, 2)]  # of blocks
     parts = {column: sum(sum(blocks[k]) for k in column) for column in columns}
     if not any(parts.values()):
         raise ScenarioError(f"panels is {list(chosen)}: give a panel that the plant has, or leave panels out")
     rows = max(*parts.values(), 0.0 if narrow else 4.0 if beside else 1.0)
-    space = pages.head_height(width, key)
+    space = pages.head_height(width, handles)
     tall = height or max(0.5625 * width * (not narrow), space + style.points(ROW_HEIGHT) * rows + 0.5)
     page = pages.blank(width, tall, fig)
     pitch = 72 * (page.bbox.height / page.dpi - space - 0.4) / max(parts[columns[0]], 1.0)
@@ -170,7 +172,8 @@ def _composed_page(
     if sparks:
         _draw_sparks(page, cells[1][0], sparks, runs, len(others))
     _draw_beside(page, cells[2], beside, (groups[0], *places), runs)
-    pages.set_head(page, width, title or style.head([trace.scenario for trace in traces]), key, gains)
+    pages.set_head(page, width, title or style.head([trace.scenario for trace in traces]), handles, gains)
+    page.set_label("; ".join(str(one.get_label()) for one in key))
     pages.space_ticks(page)
     return page
 
@@ -347,12 +350,13 @@ def _draw_end(page, cell: SubplotSpec, panel: Panel, runs: Runs) -> None:
     rows[-1][0].set_xlabel("time before the end (ms)")
 
 
-def _key(runs: Runs, shown: Sequence[Panel]) -> tuple[list[Handle], str]:
-    """Return a legend's entries for the traces, the reference, and lines and bands; and where all gains come from."""
-    handles, gains = pages.run_handles(runs.traces, runs.names, runs.colours)
+def _key(shown: Sequence[Panel]) -> list[Handle]:
+    """Return a legend's entries for the reference, and for lines and bands."""
+    handles: list[Handle] = []
     if any(panel.quantity in ("x", "e") and np.isfinite(trace.r).any() for panel in shown for trace in panel.traces):
         look = {"color": style.INK, "lw": style.points(0.8), "ls": (0, (4, 4))}
-        handles += [Line2D([], [], **look, label="reference"), Patch(color=style.BAND, label="reference ± 2 %")]
+        handles += [Line2D([], [], **look, label="dashes: reference")]
+        handles += [Patch(color=style.BAND, label="grey: reference ± 2 %")]
     looks = {
         "band": Patch(color=style.MUTED, alpha=0.3),
         "line": Line2D([], [], color=style.MUTED, lw=style.points(drawing.LINE)),
@@ -361,4 +365,4 @@ def _key(runs: Runs, shown: Sequence[Panel]) -> tuple[list[Handle], str]:
     words = drawing.meaning(shown)
     for name, look in looks.items():
         look.set_label(f"{name}: {words.get(name)}")
-    return [*handles, *(look for name, look in looks.items() if name in words)], gains
+    return [*handles, *(look for name, look in looks.items() if name in words)]

@@ -31,6 +31,7 @@ from smc_mujoco.simulation.trace import Trace
 
 DPI, PRINT_DPI = 200, 400  # of a PNG: of a full page or a slide, and of a journal's page or column
 FORMATS = ("svg", "png", "pdf")
+DESCRIPTION = {".svg": "Description", ".png": "Description", ".pdf": "Subject"}  # the key of a file's description
 NAMED = {"ieee-column": (3.5, None), "ieee-page": (7.16, None), "slide": (style.SLIDE_WIDTH, 7.5)}  # inches
 SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
@@ -214,16 +215,21 @@ def hint(text: str) -> str:
 
 
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
-    """Write a figure to files of these names. The same figure gives the same files."""
+    """Write a figure to files of these names, its label as their description. The same figure gives the same files."""
     if not paths:
         return
-    whole = page.get_figure(root=True)
-    dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": None}, whole.get_layout_engine()
+    whole, about = page.get_figure(root=True), str(page.get_label()) or None
+    dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}, whole.get_layout_engine()
     lay_out(whole, paths[0].suffix[1:])
     whole.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
     for path in paths:
         with replacing(path) as part:
-            whole.savefig(part, format=path.suffix[1:], dpi=resolution(whole), metadata=dates[path.suffix])
+            whole.savefig(
+                part,
+                format=path.suffix[1:],
+                dpi=resolution(whole),
+                metadata=dates[path.suffix] | {DESCRIPTION[path.suffix]: about},
+            )
             if path.suffix == ".svg":
                 text = Path(part).read_text(encoding="utf-8")
                 Path(part).write_text(re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8")

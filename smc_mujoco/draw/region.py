@@ -17,10 +17,8 @@ from smc_mujoco.draw.page import Size
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-# From early to late, then undecided, then not. All differ in lightness, so also with colour blindness and in grey. Maps
-# of several laws in one key are blue.
-BLUES, OTHERS, LIGHTEST = ("#00466B", "#0072B2", "#7CC0E8"), ("#F4F4F4", style.FAILED), 82.0
-COLOURS = (*BLUES, *OTHERS)
+SHADES = ("dark", "middle", "light")  # from early to late
+UNDECIDED, LIGHTEST = "#F4F4F4", 82.0  # a colour; lightness of the latest shade in CIELAB
 MAP_SIZE = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
@@ -60,7 +58,7 @@ def draw_map(ax, region: Basin, after: Sequence[float], title: str) -> None:
     from matplotlib.patches import Patch
 
     classes = colour_indices(region, after)
-    colours = (*reversed(style.ramp(style.law_colour(region.law), len(BLUES), LIGHTEST)), *OTHERS)
+    colours = colours_of(region.law)
     ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(colours), vmin=-0.5, vmax=4.5, rasterized=True)
     for colour, wide in ((style.PAPER, 3.2), (style.INK, 1.4)):
         ax.plot(0.0, 0.0, "+", color=colour, markersize=style.points(11), markeredgewidth=style.points(wide))
@@ -76,17 +74,25 @@ def draw_map(ax, region: Basin, after: Sequence[float], title: str) -> None:
     ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=style.points(9.5))
 
 
+def colours_of(law: str) -> tuple[str, ...]:
+    """Return the colours of a law's map: shades of its own from early to late, then of undecided states and of others.
+
+    All differ in lightness, so also with colour blindness and in grey.
+    """
+    return *reversed(style.ramp(style.law_colour(law), len(SHADES), LIGHTEST)), UNDECIDED, style.FAILED
+
+
 def convergence_times(maps: Sequence[Basin]) -> list[float]:
     """Return the run lengths, s, after which states were seen to converge, over all maps."""
     return sorted({float(at) for region in maps for at in np.unique(region.decided_at[region.outcome == CONVERGES])})
 
 
 def colour_indices(region: Basin, after: Sequence[float]) -> np.ndarray:
-    """Return the index into COLOURS for each state, (nv, nx): converging by horizon, then undecided, then not."""
-    shade = np.minimum(np.searchsorted(after, region.decided_at), len(BLUES) - 1)
+    """Return the index into `colours_of` for each state, (nv, nx): converging by horizon, then undecided, then not."""
+    shade = np.minimum(np.searchsorted(after, region.decided_at), len(SHADES) - 1)
     return np.where(region.outcome == CONVERGES, shade, np.where(region.outcome == DOES_NOT, 4, 3))
 
 
 def meanings(after: Sequence[float], rests: str, never: str) -> dict[int, str]:
-    """Return index into COLOURS -> what it means; `rests` has a place for the horizon, s."""
-    return {min(k, len(BLUES) - 1): rests.format(at) for k, at in enumerate(after)} | {3: "undecided", 4: never}
+    """Return index into `colours_of` -> what it means; `rests` has a place for the horizon, s."""
+    return {min(k, len(SHADES) - 1): rests.format(at) for k, at in enumerate(after)} | {3: "undecided", 4: never}

@@ -179,6 +179,21 @@ def test_the_legend_of_ten_laws_and_the_title_take_less_than_a_quarter_of_a_colu
     assert "…" not in "".join(words)
 
 
+def test_a_column_leaves_what_lines_and_bands_mean_to_its_caption(one, tmp_path):
+    chatters = dataclasses.replace(one, u=one.u + 0.5 * (-1.0) ** np.arange(len(one.t))[:, None])
+    pages_of = {
+        size: figure([one, chatters], tmp_path / f"{size}.svg", size=size, format="svg") for size in (COLUMN, PAGE)
+    }
+    names = {size: [text.get_text() for text in page.legends[0].get_texts()] for size, page in pages_of.items()}
+    labels = style.labels([one, chatters], None)
+    assert names[COLUMN] == labels
+    assert names[PAGE][:2] == labels
+    caption = pages_of[COLUMN].get_label()
+    assert caption == pages_of[PAGE].get_label() == "; ".join(" ".join(words.split()) for words in names[PAGE][2:])
+    assert caption.startswith("dashes: reference; grey: reference ± 2 %; band: range of u")
+    assert caption in (tmp_path / f"{COLUMN}.svg").read_text(encoding="utf-8")
+
+
 def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
     far = dataclasses.replace(one, r=one.r + 100.0)
     page = figure([far, under(one, "pid", 0.9)], size=COLUMN, panels=["x", "error", "channels"])

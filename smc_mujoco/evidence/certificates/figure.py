@@ -48,7 +48,7 @@ def draw(
         for ax, zoom in zip(axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False):
             X, V = np.meshgrid(x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0))
             if part is None:
-                _energy(ax, certificate, X, V, shades)
+                _energy(ax, certificate, X, V, style.ramp(law, LEVELS))
             else:
                 _region(ax, certificate, part, X, V, shades)
             for trace in traces:
@@ -94,10 +94,10 @@ def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray, 
 
 
 def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray, shades: Sequence[str]) -> None:
-    """Draw level sets of V."""
+    """Draw level sets of V, darker from which the runs come sooner: from the outer ones."""
     value = loops.energy(certificate.data, X, V)
     top = float(loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0])  # the energy at rest at the edge
-    ax.contour(X, V, value, top * np.linspace(0.15, 1.0, LEVELS) ** 2, colors=shades[1:2], linewidths=style.points(0.9))
+    ax.contour(X, V, value, top * np.linspace(0.15, 1.0, LEVELS) ** 2, colors=shades, linewidths=style.points(1.2))
 
 
 def _key(certificate: Any, part: Any, shades: Sequence[str]) -> list[pages.Handle]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from smc_mujoco.evidence.report.rigs import Repeated
     from smc_mujoco.evidence.report.stages import Field, Front
 
-FALLS, RISES = "#DCEAF4", "#C05A21"  # where V falls, where it rises: different in lightness, not only in hue
+FADED = 0.8  # share of paper in the law's colour where V falls; grey, where it rises, is darker
 # Colours of the suite's style -> those of the page, which differ by day and by night. All others become lighter there.
 OF_PAGE = {style.INK: "ink", style.MUTED: "muted", style.GRID: "line", style.RULE: "edge", style.PAPER: "page"}
 OF_PAGE |= {style.RC["axes.edgecolor"]: "edge", style.DISTURBANCE: "soft", style.BAND: "rule", "#000000": "ink"}
@@ -143,11 +143,16 @@ def basins(drawn: "Sequence[Basin]", after: Sequence[float]) -> bytes:
     unit = drawn[0].unit
     with style.page(WIDTH):
         meanings = region.meanings(after, "at rest, known after {:g} s", "does not come to rest here")
-        keys = [Patch(facecolor=region.COLOURS[k], edgecolor=style.RULE, label=text) for k, text in meanings.items()]
+        shades = dict(enumerate(region.SHADES))  # of each law's colour
+        keys = [
+            Patch(facecolor=colour, edgecolor=style.RULE, label=f"{shades[k]}: {text}" if k in shades else text)
+            for k, colour in enumerate(region.colours_of(drawn[0].law))
+            if (text := meanings.get(k))
+        ]
         titles = [f"{words.law(basin.law)}, {100 * basin.share:.0f} %" for basin in drawn]
         page, axes = panels(titles, 2.7 + pages.head_height(WIDTH, keys), share_y=True)
         for ax, basin in zip(axes, drawn, strict=True):
-            _plane(ax, basin.x, basin.v, region.colour_indices(basin, after), region.COLOURS, unit)
+            _plane(ax, basin.x, basin.v, region.colour_indices(basin, after), region.colours_of(basin.law), unit)
         axes[0].set_ylabel(f"x′ ({unit}/s)")
         pages.set_head(page, WIDTH, words.plant(drawn[0].plant), keys)
         return picture(lambda path: pages.write(page, [path]))
@@ -162,13 +167,14 @@ def _plane(ax: Axes, x: np.ndarray, v: np.ndarray, classes: np.ndarray, colours:
 
 
 def fields(drawn: "Sequence[Field]") -> bytes:
-    """Draw where V rises, dark, and the line s = 0: a panel per plant, x across, x' up."""
+    """Draw where V rises, grey, and the line s = 0: a panel per plant, x across, x' up."""
+    colours = style.mixed(words.colour(words.PAPER_LAW), style.PAPER, FADED), style.FAILED
     titles = _plants([field.plant for field in drawn])
     with style.page(WIDTH):
         page, axes = panels([f"{t}, {100 * f.share:.0f} %" for t, f in zip(titles, drawn, strict=True)], 2.8)
         for ax, field in zip(axes, drawn, strict=True):
             unit = known_plants()[field.plant].unit if field.plant in known_plants() else ""
-            _plane(ax, field.x, field.v, field.rises, (FALLS, RISES), unit)
+            _plane(ax, field.x, field.v, field.rises, colours, unit)
             ax.contour(field.x, field.v, field.s, levels=[0.0], colors=[style.INK], linewidths=1.5)
         axes[0].set_ylabel("x′ (rad/s or m/s)")
         return picture(lambda path: pages.write(page, [path]))

@@ -1,11 +1,9 @@
 """The figure of a record beside what twins predict, and their residuals."""
 
-import itertools
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from matplotlib import color_sequences
 from matplotlib.lines import Line2D
 
 from smc_mujoco.draw import page as pages
@@ -30,7 +28,7 @@ def residual_figure(
     `units`: of the columns.
     """
     paths = pages.files(Path(path).with_suffix(""))
-    colours = dict(zip(predicted, itertools.cycle(color_sequences["petroff10"]), strict=False))
+    colours = dict(zip(predicted, style.law_colours([*predicted]), strict=True))
     with style.page():
         handles = [
             Line2D([], [], color=colour, label=twin) for twin, colour in ({"measured": style.INK} | colours).items()

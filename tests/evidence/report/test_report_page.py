@@ -14,7 +14,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import Margin
 from smc_mujoco.analysis.region_of_attraction import Basin
-from smc_mujoco.draw import region
+from smc_mujoco.draw import region, style
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.evidence.audit.verdict import Claim
@@ -373,7 +373,8 @@ def test_charts_have_the_colours_of_the_page_and_say_their_numbers_where_the_poi
         colours = set(re.findall(r"(?<!, )#[0-9a-f]{6}", svg))
         assert colours == set()  # each is the page's, or lighter by night
     maps = charts.embedded(charts.basins(findings.basins, [2.5, 5.0, 10.0]), "maps", maps=True)
-    assert region.COLOURS[0].lower() in maps
+    assert style.FAILED.lower() in maps, "the key's grey"
+    assert all(f"{shade}: at rest" in maps for shade in region.SHADES)
     assert "--lift" not in maps
 
 
