@@ -11,9 +11,10 @@ number with a unit, such as the width 1 of tanh(s), has no such symmetry. So the
 """
 
 import dataclasses
+import functools
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -58,10 +59,10 @@ def gains_for(
 ) -> Design:
     """Return the largest gains whose chattering stays below an amplitude, a frequency or both.
 
-    The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one. A frequency also
-    decides its speed: the one that allows the largest forces, of 21 from a tenth to ten times that of the given
-    gains, by their cycles before the size is known. No force among the gains exceeds u_max. So the size is the largest
-    at its speed, to 0.1 %; another speed between the 21 may allow more.
+    The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one, or the frequency is
+    reached before. A frequency also decides its speed, of 21 from a tenth to ten times that of the given gains: the one
+    with the largest forces. Those whose cycle is too fast before the size is known do not count. No force among the
+    gains exceeds u_max. So the size is the largest at its speed, to 0.1 %; a speed between the 21 may allow more.
 
     Args:
       law: a law or its name. Its gains give the proportions.
@@ -102,17 +103,14 @@ def design(base: Scenario, amplitude: Positive | None, frequency: Positive | Non
             return predict(scaled(size, speed), channel)
 
         headroom = _force_headroom(base)
-        speed = 1.0 if frequency is None else _best_speed(lambda w: cycle(1.0, w), amplitude, frequency, headroom)
-        size = 1.0
+        speeds = {1.0: math.inf}
+        if frequency is not None:
+            speeds = _forces(lambda w: cycle(1.0, w), amplitude, frequency, headroom)
+        size, speed = 1.0, next(iter(speeds))
         if amplitude is not None:
-            size = _largest_size(lambda q: cycle(q, speed).amplitude_range[1], amplitude, headroom / speed**2)
+            size, speed = _largest(cycle, speeds, amplitude, math.inf if frequency is None else frequency, headroom)
         chosen = scaled(size, speed)
         predicted = predict(chosen, channel)
-        if frequency is not None and predicted.frequency > frequency:
-            found = f"{base.law.name} of amplitude {amplitude:g} oscillates at {predicted.frequency:.3g} Hz"
-            raise ScenarioError(
-                f"{found}, above the wanted {frequency:g}: give a larger frequency, or another amplitude"
-            )
         (tolerated,) = margins.margins_of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
     if math.isnan(tolerated.value):
         words = f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance"
@@ -121,10 +119,10 @@ def design(base: Scenario, amplitude: Positive | None, frequency: Positive | Non
     return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)
 
 
-def _best_speed(
+def _forces(
     cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, headroom: float
-) -> float:
-    """Return the speed that allows the largest forces, of SPEEDS whose predicted frequency is at most the wanted one.
+) -> dict[float, float]:
+    """Return speed -> the forces that it allows, largest first, of SPEEDS whose frequency is at most the wanted one.
 
     The frequency is that of size 1, and is not monotone in the speed. A speed without a limit cycle counts only below
     the first speed with one: above it, the law has become too fast for the actuator.
@@ -146,7 +144,40 @@ def _best_speed(
         size = 1.0 if amplitude is None else min(allowed, MAX_SIZE_RATIO)
         return min(size * speed**2, headroom)
 
-    return max(slow, key=lambda speed: (force(speed), speed))
+    ordered = sorted(slow, key=lambda speed: (force(speed), speed), reverse=True)
+    return {speed: force(speed) for speed in ordered}
+
+
+def _largest(
+    cycle: Callable[[float, float], Chattering],
+    speeds: Mapping[float, float],
+    amplitude: float,
+    frequency: float,
+    headroom: float,
+) -> tuple[float, float]:
+    """Return the size and the speed with the largest forces within both bounds, given speeds as `_forces` does.
+
+    What a speed allows is known only when its size is, so the next ones are tried while they may allow more.
+    """
+    best, largest, refusals = (0.0, 0.0), 0.0, []
+
+    def within(size: float, speed: float) -> float:
+        one = cycle(size, speed)
+        return math.inf if one.frequency > frequency else one.amplitude_range[1]
+
+    for speed, allowed in speeds.items():
+        if allowed <= largest:
+            break
+        try:
+            size = _largest_size(functools.partial(within, speed=speed), amplitude, headroom / speed**2)
+        except ScenarioError as error:
+            refusals.append(error)
+            continue
+        if size * speed**2 > largest:
+            best, largest = (size, speed), size * speed**2
+    if not largest:
+        raise refusals[0]
+    return best
 
 
 def _scaled(law: Component, size: float, speed: float) -> Component:
@@ -192,7 +223,9 @@ def _largest_size(predicted: Callable[[float], float], wanted: float, limit: flo
     while not low:
         if high < 1.0 / MAX_SIZE_RATIO:
             found = f"that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}"
-            raise ScenarioError(f"amplitude is {wanted:g}, and {found}: give a larger amplitude")
+            if math.isinf(amplitude):
+                found = f"gains {MAX_SIZE_RATIO:g} times smaller oscillate faster than wanted"
+            raise ScenarioError(f"amplitude is {wanted:g}, and {found}: give a larger amplitude or frequency")
         amplitude = amplitude_at(high / SIZE_STEP)
     while low < limit and high == math.inf:
         amplitude_at(min(low * SIZE_STEP, limit))

@@ -7,7 +7,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.chattering import Chattering
-from smc_mujoco.analysis.gains_for import _best_speed, _force_headroom, _largest_size
+from smc_mujoco.analysis.gains_for import SPEEDS, _force_headroom, _forces, _largest, _largest_size
 from smc_mujoco.metrics.limit_cycle import channel_cycle
 
 COARSELY = pytest.mark.usefixtures("coarse_grid")
@@ -67,7 +67,6 @@ def test_a_frequency_decides_the_speed():
 
 
 @pytest.mark.slow
-@COARSELY
 @pytest.mark.filterwarnings("ignore:classical with these gains")
 def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
@@ -124,16 +123,45 @@ def test_the_speed_is_that_of_the_largest_forces_at_most_as_fast_as_wanted(refus
         return steady(w) if 0.5 <= w <= 2.0 else Chattering()
 
     speeds = {k: 10.0 ** (0.1 * k) for k in range(-10, 11)}
-    assert _best_speed(steady, None, 20.1, math.inf) == speeds[0]
-    assert _best_speed(steady, None, 200.1, math.inf) == speeds[10]
-    assert _best_speed(steady, None, 200.1, speeds[3] ** 2) == speeds[3]
-    assert _best_speed(dipping, None, 20.1, math.inf) == speeds[6]
-    assert _best_speed(narrow, None, 11.0, math.inf) == speeds[-3]
-    assert _best_speed(narrow, None, 9.0, math.inf) == speeds[-4]  # no cycle, and slower than the first with one
-    assert _best_speed(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e-3, 200.1, math.inf) == speeds[-10]  # force ~ 1 / w
-    assert _best_speed(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e3, 200.1, 4.0) == speeds[3]  # all 4: the fastest
-    refused(lambda: _best_speed(steady, None, 1.9, math.inf))
-    refused(lambda: _best_speed(steady, None, 9.0, 1e-3))
+    assert next(iter(_forces(steady, None, 20.1, math.inf))) == speeds[0]
+    assert next(iter(_forces(steady, None, 200.1, math.inf))) == speeds[10]
+    assert next(iter(_forces(steady, None, 200.1, speeds[3] ** 2))) == speeds[3]
+    assert next(iter(_forces(dipping, None, 20.1, math.inf))) == speeds[6]
+    assert next(iter(_forces(narrow, None, 11.0, math.inf))) == speeds[-3]
+    assert (
+        next(iter(_forces(narrow, None, 9.0, math.inf))) == speeds[-4]
+    )  # no cycle, and slower than the first with one
+    assert (
+        next(iter(_forces(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e-3, 200.1, math.inf))) == speeds[-10]
+    )  # force ~ 1 / w
+    assert (
+        next(iter(_forces(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e3, 200.1, 4.0))) == speeds[3]
+    )  # all 4: the fastest
+    refused(lambda: _forces(steady, None, 1.9, math.inf))
+    refused(lambda: _forces(steady, None, 9.0, 1e-3))
+
+
+def test_size_and_speed_are_those_of_the_largest_forces_within_both_bounds(refused):
+    """Cycles that are faster at larger sizes, so that the fastest speed by its cycle at size 1 is out of reach.
+
+    The truth is a search over all sizes at each speed.
+    """
+    sizes = np.geomspace(1e-3, 1e3, 60001)
+    for power, amplitude, frequency in ((0.1, 0.5, 60.0), (0.1, 0.05, 60.0), (0.5, 2.0, 25.0)):
+
+        def cycle(q, w, power=power):
+            return predicted(20.0 * w * q**power, 0.1 * q / w)
+
+        forces = _forces(lambda w: cycle(1.0, w), amplitude, frequency, math.inf)
+        size, speed = _largest(cycle, forces, amplitude, frequency, math.inf)
+        within = [(20.0 * w * sizes**power <= frequency) & (0.1 * sizes / w <= amplitude) for w in SPEEDS]
+        best = max(sizes[its].max() * w**2 for w, its in zip(SPEEDS, within, strict=True) if its.any())
+        assert size * speed**2 == pytest.approx(best, rel=2e-3)
+    never = {1.0: 1.0, 0.5: 0.5}
+    refused(lambda: _largest(lambda q, w: predicted(70.0, 0.1), never, 1.0, 60.0, math.inf), "faster than wanted")
+    only_slow = {1.0: 1.0, 0.5: 0.5}
+    found = _largest(lambda q, w: predicted(61.0 * w, 0.1 * q), only_slow, 1.0, 60.0, math.inf)
+    assert found == (pytest.approx(10.0, rel=1e-3), 0.5)
 
 
 def test_the_largest_size_is_where_the_amplitude_is_the_wanted_one(refused):
