@@ -41,6 +41,18 @@ class Field(NamedTuple):
     adds: bool = False  # whether the value is added to the present one
 
 
+def geom_fields(
+    model: mujoco.MjModel, name: str, pos: tuple[float, ...] = (), size: tuple[int, float] | None = None
+) -> Iterator[Field]:
+    """Yield the fields of a geom, its place and one of its sizes (index, value); none in a run that leaves it out."""
+    if (at := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)) < 0:
+        return
+    if pos:
+        yield Field("geom_pos", at, pos)
+    if size:
+        yield Field("geom_size", (at, size[0]), size[1])
+
+
 class Variant(NamedTuple):
     """An alternative mechanism of a plant: an edit of its MjSpec, and the fields that its parameters then set."""
 

@@ -204,6 +204,8 @@ class ScenarioBatch:
         touching = touching and (model.npair or (np.any(model.geom_contype) and np.any(model.geom_conaffinity)))
         if touching or model.neq or np.any(model.jnt_limited) or np.any(model.tendon_limited):
             return True
+        if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS.value:  # the callback has the friction
+            return False
         values = (models.field_values(model, s, step) for s in self.scenarios for step in {0, s.jump_step})
         return any(np.any(its.get(name, getattr(model, name))) for its in values for name in DRY_FRICTION)
 

@@ -1,5 +1,6 @@
 """Models of runs: what only a picture needs is deleted, everything else stays."""
 
+import dataclasses
 import weakref
 
 import mujoco
@@ -9,6 +10,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.simulation import model
 from smc_mujoco.simulation.model import compile_model, without_scenery
+from smc_mujoco.simulation.signals import Push
 
 pytestmark = pytest.mark.quick
 
@@ -27,6 +29,12 @@ REFERRED = """
       <geom name="frame"/>
       <site name="from" pos="-1 0 0"/>
       <body pos="1 0 0"><joint type="slide"/><geom name="bob" mass="1"/><site name="to"/></body>
+      <body name="cart">
+        <joint name="slide" type="slide"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+        <geom name="paint"/><geom name="buffer" conaffinity="1"/>
+      </body>
+      <body name="column"><geom name="stone"/><body name="dial"><geom name="number"/></body></body>
+      <body name="struck"><geom name="glass"/></body>
     </body>
   </worldbody>
   <contact><pair geom1="wall" geom2="bob"/></contact>
@@ -36,21 +44,32 @@ REFERRED = """
 """
 
 
-def test_geoms_that_move_or_touch_or_are_referred_to_are_no_scenery():
+def test_what_has_mass_or_touches_or_is_referred_to_or_pushed_is_no_scenery():
     spec = mujoco.MjSpec.from_string(REFERRED)
-    without_scenery(spec)
-    assert [geom.name for geom in spec.geoms] == ["floor", "wall", "pulley", "seen", "bob"]
+    without_scenery(spec, {"struck"})
+    assert [geom.name for geom in spec.geoms] == ["floor", "wall", "pulley", "seen", "bob", "buffer"]
+    assert [body.name for body in spec.bodies] == ["world", "", "", "cart", "struck"]
     assert (len(spec.lights), len(spec.cameras)) == (0, 0)
     spec.compile()
 
 
-@pytest.mark.parametrize("contact", ["none", "stops"])
-def test_a_run_has_a_model_without_scenery(contact):
-    scenario = smc.Scenario(plant="cart_pole", law="classical", contact=contact).resolved
+@pytest.mark.parametrize(("contact", "geoms"), [("none", 0), ("stops", 8)])
+def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, monkeypatch):
+    scenario = smc.Scenario(plant="cart_pole", law="classical", contact=contact, x0=(1.2, 0.0), duration=0.5)
     whole, bare = compile_model(scenario), compile_model(scenario, scenery=False)
-    assert bare.ngeom < 0.6 * whole.ngeom
-    assert (bare.nlight, bare.ncam) == (0, 0)
-    assert (bare.nbody, bare.npair, bare.nsensor) == (whole.nbody, whole.npair, whole.nsensor)
+    assert (bare.ngeom, bare.nlight, bare.ncam) == (geoms, 0, 0)
+    assert (bare.npair, bare.nsensor) == (whole.npair, whole.nsensor)
+    short = smc.run(scenario)
+    monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
+    monkeypatch.setattr(model, "without_scenery", lambda *given: None)
+    for name, array in smc.run(scenario).arrays().items():
+        np.testing.assert_array_equal(array, short.arrays()[name])
+
+
+def test_a_body_that_is_pushed_stays_in_a_run():
+    pushed = smc.Scenario(plant="duffing", law="classical", disturbance=Push("scale", x=1.0), duration=0.01)
+    without = dataclasses.replace(pushed, disturbance=())
+    assert [trace.failure for trace in smc.run([without, pushed])] == [None, None]
 
 
 def test_the_scenery_of_a_users_model_stays():

@@ -53,15 +53,14 @@ class EquationRun:
     """A run that can be repeated, with its record, numbers and log as in a ScenarioBatch, and an mjData."""
 
     def __init__(self, prepared: Prepared):
+        self.prepared = prepared  # the record has addresses of its arrays
         s = self.scenario = prepared.scenario.resolved
         n, plant = s.plant.n, s.plant
         self.log = np.full((s.samples + 1, n), np.nan, state.LOG)
         self.record = np.zeros(1, state.SIMULATION)
         self.record[0], self.packed = pack(prepared, self.log)
-        self.first_record, self.first_numbers = self.record.copy(), self.packed.numbers.copy()
         self.model = with_values(prepared.mechanism.model, prepared.scenario)
         self.data = mujoco.MjData(self.model)
-        self.channels = prepared.mechanism.channels
         self.scratch = np.zeros(SCRATCH * n)
         at = state.address(self.scratch)
         self.seen = np.array([(0, n, at + 16 * n, at + 24 * n, at)], SEEN)
@@ -69,19 +68,20 @@ class EquationRun:
         self.nominal = cfunctions.compile_nominal(plant.nominal, tuple(plant.parameters))
         functions = callback.callback().address, self.nominal.address
         owners = self.model._address, self.data._address, state.address(self.record)
-        fields = (getattr(self.data, name).ctypes.data for name in FIELDS)
+        fields = {name: getattr(self.data, name) for name in FIELDS}
+        fields["userdata"][:] = callback.magic(), state.address(self.record)
+        channels = prepared.mechanism.channels
+        fields["qpos"][channels["qpos"]], fields["qvel"][channels["qvel"]] = s.x0, s.v0
         changes = *map(state.address, self.parameters), s.jump_step, not any(d.memory for d in s.disturbance)
-        self.run = np.array([(*owners, *functions, *changes, *fields, state.address(self.seen), at)], RUN)
+        places = *map(state.address, fields.values()), state.address(self.seen), at
+        self.run = np.array([(*owners, *functions, *changes, *places)], RUN)
+        self.changed = [self.record.view(np.uint8), self.packed.numbers, *fields.values()]  # what a run changes
+        self.at_start = [array.copy() for array in self.changed]
 
     def restart(self) -> None:
         """Put record, numbers and state at the start of the run."""
-        self.record[:] = self.first_record
-        self.packed.numbers[:] = self.first_numbers
-        for name in FIELDS:
-            getattr(self.data, name)[:] = 0.0
-        self.data.userdata[:] = callback.magic(), state.address(self.record)
-        self.data.qpos[self.channels["qpos"]] = self.scenario.x0
-        self.data.qvel[self.channels["qvel"]] = self.scenario.v0
+        for array, first in zip(self.changed, self.at_start, strict=True):
+            array[:] = first
 
     def simulate(self) -> None:
         """Run to the end. The samples are then in `log`, and a failure in `record`."""

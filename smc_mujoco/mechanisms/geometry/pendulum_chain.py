@@ -18,7 +18,7 @@ import mujoco
 
 from smc_mujoco.mechanisms.geometry import coil
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit
-from smc_mujoco.mechanisms.plant import Field, model_path
+from smc_mujoco.mechanisms.plant import Field, geom_fields, model_path
 
 PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each other
 HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
@@ -123,17 +123,15 @@ def fields(model, p):
 
 def pendulum_fields(model, p):
     """Yield the fields of the pendulums alone, without the springs between them."""
-    n, side = size(model), above(model.geom("p0/bob"))
+    n, side = size(model), above(model.body("p0/pendulum").ipos)
     bodies = [model.body(f"p{i}/pendulum").id for i in range(n)]
-    rods = [model.geom(f"p{i}/rod").id for i in range(n)]
-    bobs = [model.geom(f"p{i}/bob").id for i in range(n)]
     yield Field("body_mass", bodies, p.m)
     yield Field("body_ipos", bodies, (0.0, 0.0, side * p.l))
     yield Field("dof_damping", model.body_dofadr[bodies], p.b)
     yield Field("opt.gravity", 2, -p.grav)
-    yield Field("geom_pos", rods, (0.0, 0.0, side * p.l / 2))
-    yield Field("geom_size", (rods, 1), p.l / 2)
-    yield Field("geom_pos", bobs, (0.0, 0.0, side * p.l))
+    for i in range(n):
+        yield from geom_fields(model, f"p{i}/rod", (0.0, 0.0, side * p.l / 2), (1, p.l / 2))
+        yield from geom_fields(model, f"p{i}/bob", (0.0, 0.0, side * p.l))
 
 
 def size(model):
@@ -142,13 +140,13 @@ def size(model):
 
 
 def above(bob):
-    """Return 1 if a bob stands above its pivot, -1 if it hangs."""
-    return 1.0 if bob.pos[2] > 0.0 else -1.0
+    """Return 1 if a bob, at a place in its body's frame, stands above its pivot, -1 if it hangs."""
+    return 1.0 if bob[2] > 0.0 else -1.0
 
 
 def bobs(spec):
     """Put the pivots side by side and let neighbouring bobs hit each other."""
-    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob"))
+    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob").pos)
     width = (n - 1) * ROW_PITCH
     for i in range(n):
         spec.body(f"p{i}/pendulum").frame.pos = (i * ROW_PITCH - width / 2, 0.0, HEIGHT)
@@ -166,7 +164,7 @@ def bobs(spec):
 
 def springs(spec):
     """Replace the torsion springs by real springs between the rods."""
-    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob"))
+    n, side = len(spec.keys[0].qpos), above(spec.geom("p0/bob").pos)
     for item in [*spec.tendons, *spec.skins]:
         spec.delete(item)
     for i in range(n):

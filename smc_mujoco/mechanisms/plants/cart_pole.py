@@ -16,7 +16,7 @@ from math import cos, sin
 import mujoco
 
 from smc_mujoco.mechanisms.geometry import cart
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
 
 MIN_INERTIA = 1e-13  # kg m^2, the pole's inertia about its own length, about which it never turns
 STOP_X = 1.7  # m, |x| at the end stops: chosen, before the posts
@@ -35,9 +35,8 @@ def fields(model, p):
     yield Field("dof_damping", model.joint("slide").dofadr[0], p.b)
     yield Field("dof_damping", model.joint("hinge").dofadr[0], p.bq)
     yield Field("opt.gravity", 2, -p.grav)
-    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, p.l))
-    yield Field("geom_size", (model.geom("rod").id, 1), p.l)
-    yield Field("geom_pos", model.geom("tip").id, (0.0, 0.0, 2 * p.l))
+    yield from geom_fields(model, "rod", (0.0, 0.0, p.l), (1, p.l))
+    yield from geom_fields(model, "tip", (0.0, 0.0, 2 * p.l))
 
 
 def nominal(x, v, i, p):

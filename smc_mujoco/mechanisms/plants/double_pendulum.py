@@ -23,7 +23,7 @@ import mujoco
 from numba import njit
 
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
 
 TORQUE_LIMIT = 6.0  # N m, of a motor on the published boards
 L2 = 0.3  # m, length of the lower link: the equation has only where its centre of mass lies
@@ -72,9 +72,8 @@ def fields(model, p):
     yield Field("dof_damping", dofs, (p.b1, p.b2))
     yield Field("dof_frictionloss", dofs, (p.cf1, p.cf2))
     yield Field("opt.gravity", 2, -p.grav)
-    yield Field("geom_pos", model.geom("elbow_cap").id, (0.0, 0.0, -p.l1))
-    yield Field("geom_pos", model.geom("upper_rod").id, (0.0, 0.0, -p.l1 / 2))
-    yield Field("geom_size", (model.geom("upper_rod").id, 1), p.l1 / 2)
+    yield from geom_fields(model, "elbow_cap", (0.0, 0.0, -p.l1))
+    yield from geom_fields(model, "upper_rod", (0.0, 0.0, -p.l1 / 2), (1, p.l1 / 2))
 
 
 @njit

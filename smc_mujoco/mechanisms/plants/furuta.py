@@ -22,7 +22,7 @@ from math import cos, sin, sqrt
 
 import mujoco
 
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
 
 MIN_INERTIA = 1e-13  # kg m^2, the least inertia about its length that MuJoCo takes well
 STALL_TORQUE = 0.042 * 10.0 / 8.4  # N m
@@ -45,8 +45,7 @@ def fields(model, p):
     yield Field("dof_frictionloss", dofs, (p.cf, p.cfq))
     tz = sqrt(max(0.0, 1.0 - p.tx * p.tx - p.ty * p.ty))
     yield Field("opt.gravity", slice(3), (p.grav * p.tx, p.grav * p.ty, -p.grav * tz))
-    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, p.l))
-    yield Field("geom_size", (model.geom("rod").id, 1), p.l)
+    yield from geom_fields(model, "rod", (0.0, 0.0, p.l), (1, p.l))
 
 
 def nominal(x, v, i, p):

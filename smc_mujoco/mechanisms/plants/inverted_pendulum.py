@@ -12,7 +12,7 @@ from math import asin, cos, sin
 import mujoco
 
 from smc_mujoco.mechanisms.hardware.contact import bar, box, hit, solid
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
 
 STOP_DEPTH = 0.4  # m, depth of stops and wall behind their faces, enough for a blow of 80 m/s
 LENGTH, BOB_RADIUS, ROD_RADIUS, HINGE_Z = 0.5, 0.065, 0.012, 0.8  # m
@@ -33,9 +33,8 @@ def fields(model, p):
     yield Field("body_ipos", body, (0.0, 0.0, p.l))
     yield Field("dof_damping", model.joint("hinge").dofadr[0], p.b)
     yield Field("opt.gravity", 2, -p.grav)
-    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, p.l / 2))
-    yield Field("geom_size", (model.geom("rod").id, 1), p.l / 2)
-    yield Field("geom_pos", model.geom("bob").id, (0.0, 0.0, p.l))
+    yield from geom_fields(model, "rod", (0.0, 0.0, p.l / 2), (1, p.l / 2))
+    yield from geom_fields(model, "bob", (0.0, 0.0, p.l))
 
 
 def nominal(x, v, i, p):

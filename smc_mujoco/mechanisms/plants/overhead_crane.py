@@ -16,7 +16,7 @@ from math import cos, sin
 import mujoco
 
 from smc_mujoco.mechanisms.geometry import cart
-from smc_mujoco.mechanisms.plant import Field, Plant, model_path
+from smc_mujoco.mechanisms.plant import Field, Plant, geom_fields, model_path
 
 HOOK_HEIGHT = 0.095  # m, height of the hook above the load's middle
 STOP_X = 1.7  # m, |x| at the end stops: chosen, before the bridge's ends
@@ -34,10 +34,9 @@ def fields(model, p):
     yield Field("dof_damping", model.joint("slide").dofadr[0], p.b)
     yield Field("dof_damping", model.joint("hinge").dofadr[0], p.bq)
     yield Field("opt.gravity", 2, -p.grav)
-    yield Field("geom_pos", model.geom("rod").id, (0.0, 0.0, -p.l / 2))
-    yield Field("geom_size", (model.geom("rod").id, 1), p.l / 2)
-    yield Field("geom_pos", model.geom("bob").id, (0.0, 0.0, -p.l))
-    yield Field("geom_pos", model.geom("hook").id, (0.0, 0.0, HOOK_HEIGHT - p.l))
+    yield from geom_fields(model, "rod", (0.0, 0.0, -p.l / 2), (1, p.l / 2))
+    yield from geom_fields(model, "bob", (0.0, 0.0, -p.l))
+    yield from geom_fields(model, "hook", (0.0, 0.0, HOOK_HEIGHT - p.l))
 
 
 def nominal(x, v, i, p):
