@@ -16,11 +16,11 @@ import numpy as np
 
 from smc_mujoco.common.extras import extra
 from smc_mujoco.common.files import to_json
-from smc_mujoco.draw.film import puppet
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import joint_ids, joint_names
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import serialise
+from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.state import LOGGED
 from smc_mujoco.simulation.trace import Trace
 
@@ -47,13 +47,13 @@ def write(trace: Trace, file: Path) -> None:
         writer.write_message("/machine", scene, 0, 0)
         for k, time in enumerate((1e9 * trace.t).round().astype(int).tolist()):
             if k in at:
-                poses, (world, *names) = FrameTransforms(), frames(model)
+                transforms, (world, *names) = FrameTransforms(), frames(model)
                 for name, place, turn in zip(names, places[at[k], 1:], turns[at[k], 1:], strict=True):
-                    transform = poses.transforms.add(parent_frame_id=world, child_frame_id=name)
+                    transform = transforms.transforms.add(parent_frame_id=world, child_frame_id=name)
                     transform.timestamp.FromNanoseconds(time)
                     put(transform.translation, "xyz", place)
                     put(transform.rotation, "wxyz", turn)
-                writer.write_message("/poses", poses, time, time)
+                writer.write_message("/poses", transforms, time, time)
             for name in LOGGED:
                 if np.isfinite(values := getattr(trace, name)[k]).any():
                     signal = message(**dict(zip(fields, values.tolist(), strict=True)))
@@ -89,7 +89,7 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     channels = first.jnt_qposadr[joint_ids(first)]
     step = max(1, round(1.0 / (MAX_POSE_RATE * trace.scenario.control_period)))
     samples = np.flatnonzero(np.isfinite(trace.x).all(axis=1))[::step]
-    whole = puppet.poses(trace, trace.t[samples]) if first.nq > len(channels) else None
+    whole = poses(trace, trace.t[samples]) if first.nq > len(channels) else None
     if whole is None:
         whole = np.tile(models.initial_state(first, trace.scenario)[0], (len(samples), 1))
     whole[:, channels] = trace.x[samples]

@@ -160,6 +160,36 @@ def cores(threads: Annotated[int, Whole(low=1, high=1024)] | None = None) -> int
     return threads
 
 
+def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
+    """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the last one.
+
+    A trace has the channels only, so the run is simulated again; None if that would take long, because the law or a
+    signal does not compile.
+    """
+    prepared = prepare(trace.scenario)
+    if prepared.why_not:
+        return None
+    scenario = trace.scenario.resolved
+    total, jump = scenario.samples * scenario.steps, scenario.jump_step
+    wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
+    qpos_at: dict[int, np.ndarray] = {}
+    ends: list[int] = sorted({*wanted, *([jump] if 0 < jump < total else [])})
+    step = 0
+    with callback.installed():
+        batch = ScenarioBatch([prepared], threads=1)
+        qpos = batch.batch.bind("qpos")
+        last = qpos[0].copy()
+        for end in ends:
+            batch.advance(end - step, lambda steps: None)
+            step = end
+            if step == jump:
+                batch.set_parameters(step, [0])
+            if batch.records["failure"][0] == state.FINE:
+                last = qpos[0].copy()
+            qpos_at[end] = last
+    return np.array([qpos_at[end] for end in wanted])
+
+
 class ScenarioBatch:
     """Scenarios of one key (`Prepared.key`) in one Batch. Make and run it while the callback is installed.
 

@@ -3,6 +3,11 @@
 Software OpenGL takes time in proportion to the pixels and the shapes that it draws. So a new picture is a copy of the
 one before, in which some rectangles are drawn again: those around everything that moved, where it was and where it is,
 and around its shadow. Shapes outside a rectangle are left out of its drawing.
+
+Shadows on the floor are flattened copies of what casts them.
+A directional light casts a point (x, y, z) to the floor along its direction w, to (x, y, z) - z w / w_z. As this is
+linear, a shape's shadow is the same shape under another matrix. Its edges are as smooth as all others. MuJoCo looks its
+shadows up in a picture from the light: they have saw-tooth edges, and take as long to draw as all the rest.
 """
 
 import itertools
@@ -12,8 +17,14 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, scene, shadows
+from smc_mujoco.draw.film import camera, scene
 
+THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape would be undefined
+FLOOR_DISTANCE = 4e-4  # of the model's extent: height of shadows over the floor
+SHADOW_EMISSION = 20.0  # so large that a shadow is as dark whichever light falls on it
+SHADE = (0.70, 0.715, 0.74)  # red, green, blue of the floor in shadow, chosen
+MIN_CAST, MIN_BOX_CAST = 1.0, 3.0  # px: half the thickness of shapes, and of boxes such as scale marks, with a shadow
+MIN_ARM_CAST = 3.0  # px, the same of rings around an arm's links, which are in the shadow of the links
 MIN_MOTION = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
 EDGE_MARGIN = 3  # px around what has changed, for smoothed edges
 RECTANGLE_COST, SHAPE_COST = 8000, 4000  # px drawn in the time of a rectangle, and of a shape in it; fitted to films
@@ -40,7 +51,7 @@ class Canvas:
         self.sun = sun(model, data)
         self.steady = not any(model.light_castshadow & model.light_active)  # a lamp's shadow may be anywhere
         middle = (model.stat.center - self.place) @ -self.turn[:, 2]
-        self.casts = shadows.casting(model, middle * camera.pixel(size), shadows.MIN_ARM_SIZE if arms else 0.0)
+        self.casts = casting(model, middle * camera.pixel(size), MIN_ARM_CAST if arms else 0.0)
         ball, widest = roundness(model) / (middle * camera.pixel(size))
         quality = model.vis.quality
         # also those of cylinders
@@ -79,8 +90,8 @@ class Canvas:
             areas = self.changed(shapes, loose)
         if not areas:
             return self.picture
-        casting = [] if self.sun is None else shadows.draw(shown, self.sun, self.casts, self.model.stat.extent)
-        boxes = self.boxes(geoms, casting, around(shapes), around(loose))
+        cast = [] if self.sun is None else add_shadows(shown, self.sun, self.casts, self.model.stat.extent)
+        boxes = self.boxes(geoms, cast, around(shapes), around(loose))
 
         def load(area: Area) -> int:
             return pixels(area) + RECTANGLE_COST + SHAPE_COST * int((~outside(boxes, area)).sum())
@@ -244,3 +255,36 @@ def reach(geom: mujoco.MjvGeom) -> tuple[np.ndarray, np.ndarray]:
 def corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return the corners of a box, (8, 3)."""
     return np.array(list(itertools.product(*zip(low, high, strict=True))))
+
+
+def flattening(way: np.ndarray) -> np.ndarray:
+    """Return the matrix, (3, 3), that casts points to the floor along a light's direction `way`."""
+    matrix = np.diag([1.0, 1.0, THICKNESS])
+    matrix[:2, 2] = -way[:2] / way[2]
+    return matrix
+
+
+def casting(model: mujoco.MjModel, pixel: float, flat: float = 0.0) -> np.ndarray:
+    """Return which geoms cast shadows, (geoms,): opaque ones, neither thin nor flat; `pixel` is the size of one, m."""
+    thinnest = np.where(model.geom_type == mujoco.mjtGeom.mjGEOM_BOX, MIN_BOX_CAST, MIN_CAST) * pixel
+    half = np.sort(model.geom_aabb[:, 3:], axis=1)
+    return (half[:, 1] > thinnest) & (half[:, 0] > flat * pixel) & (model.geom_type != scene.PLANE)
+
+
+def add_shadows(shown: mujoco.MjvScene, way: np.ndarray, casts: np.ndarray, extent: float) -> list[int]:
+    """Add the shadows of a scene's geoms, (geoms,) as `casting` returns, and of its tendons; return what casts each."""
+    cast, rise = flattening(way), np.array([0.0, 0.0, FLOOR_DISTANCE * extent])
+    rgba = np.array([*np.array(SHADE) / SHADOW_EMISSION, 1.0], np.float32)
+    casting: list[int] = []
+    for i, shape in enumerate(list(shown.geoms[: shown.ngeom])):
+        if shape.rgba[3] < 1.0 or not (casts[shape.objid] if shape.objtype == GEOM else shape.objtype == TENDON):
+            continue
+        if shown.ngeom >= shown.maxgeom:
+            return casting
+        shadow = shown.geoms[shown.ngeom]
+        mujoco.mjv_initGeom(shadow, shape.type, shape.size, cast @ shape.pos + rise, (cast @ shape.mat).ravel(), rgba)
+        shadow.dataid, shadow.objtype, shadow.emission = shape.dataid, mujoco.mjtObj.mjOBJ_UNKNOWN, SHADOW_EMISSION
+        shadow.specular = 0.0
+        shown.ngeom += 1
+        casting.append(i)
+    return casting

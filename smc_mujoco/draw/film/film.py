@@ -1,16 +1,16 @@
 """Films: the machines of all traces side by side in MuJoCo, above charts that grow with the clock.
 
-pace.py sets the speed, scene.py composes the model, puppet.py and stage.py pose it, canvas.py renders it, shadows.py
-and arrows.py add shadows and forces, caption.py has the text, charts.py the charts, encoder.py writes. Frames are made
-and written one by one, so that memory does not grow with a film's length.
+In order: pace.py sets the speed; act.py says what each run does at each frame; caption.py has the text, charts.py the
+charts; scene.py composes the model, puppet.py poses a machine, stage.py all of them with the arrows of arrows.py, and
+canvas.py renders; arm.py draws over arms; encoder.py writes. Frames are made and written one by one, so that memory
+does not grow with a film's length.
 """
 
 import contextlib
 import dataclasses
 import itertools
 import os
-import warnings
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -18,19 +18,19 @@ import numpy as np
 from PIL import Image
 
 from smc_mujoco.common import errors, extras, gl
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, items_of, number, users_stacklevel
+from smc_mujoco.common.errors import ScenarioError, items_of, number
 from smc_mujoco.common.files import replacing, with_ending
 from smc_mujoco.common.progress import Bar, bar
-from smc_mujoco.draw import states, style
-from smc_mujoco.draw.decimate import Envelope, end, finite, windows
+from smc_mujoco.draw import style
+from smc_mujoco.draw.decimate import end, finite
 from smc_mujoco.draw.film import arm, arrows, pace, scene
-from smc_mujoco.draw.film.camera import Camera, Room, checked
+from smc_mujoco.draw.film.act import Act
+from smc_mujoco.draw.film.camera import Camera, checked
 from smc_mujoco.draw.film.caption import Caption
 from smc_mujoco.draw.film.charts import Charts
 from smc_mujoco.draw.film.encoder import encoder, mediapy
 from smc_mujoco.draw.film.pace import Clock
-from smc_mujoco.draw.film.puppet import Motion, Push, motion
-from smc_mujoco.draw.film.stage import Stage
+from smc_mujoco.draw.film.stage import framed
 from smc_mujoco.simulation.trace import Trace
 
 if TYPE_CHECKING:
@@ -259,100 +259,32 @@ def pictures(
     above = size[0], size[1] - low
     times = shown.times
     edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
-    hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
     traces = [finite(trace) for trace in traces]
-    scales = arrows.scales(traces)
-    arms = arm.is_arm(traces)
-    counts = [0 if arms else scene.first_channels(trace.scenario).plant.n for trace in traces]
-    scaled = [arrows.scales_by_channel(trace, scales)[:n] for trace, n in zip(traces, counts, strict=True)]
-    acting = [
-        pushes(arrows.loads(trace, edges), edges, sizes, colour)
-        for trace, sizes, colour in zip(traces, scaled, colours, strict=True)
-    ]
-    timelines = [[None] * len(times) if arms else states.timeline(trace, times, hold) for trace in traces]
+    scales, arms = arrows.scales(traces), arm.is_arm(traces)
+    grid = np.linspace(0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1)  # also for a still
+    acts = [Act(trace, colour, edges, grid, scales, arms) for trace, colour in zip(traces, colours, strict=True)]
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
     below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces)) if arms else (None, None)
-    grid = np.linspace(0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1)  # also for a still
-    told = [[None] if arms else states.timeline(trace, grid, hold) for trace in traces]
+    told = [act.told for act in acts]
     caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
     charts = Charts(traces, names, colours, (size[0], low), scale)
-    motions = [motion(trace, times) for trace in traces]
-    framing = [
-        pushes(arrows.loads(t, grid), grid, sizes, c) for t, sizes, c in zip(traces, scaled, colours, strict=True)
-    ]
-    with framed(traces, colours, above, caption.room, chosen, motions, caption.apart, framing, scale) as stage:
+    with framed(acts, above, caption.room, chosen, caption.apart, scale) as stage:
         caption.place(stage.boxes)
         overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
         over = arm.Overlay(*overlaid) if arms else None
-        places = [positions(trace.t, trace.x, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
-        wanted = [positions(trace.t, trace.r, times)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
-        ahead = [rotors(trace, edges)[:, :n] for trace, n in zip(traces, stage.shown, strict=True)]
         for frame, time in enumerate(times.tolist()):
-            failed = tuple(trace.diverged_at is not None and time >= trace.diverged_at for trace in traces)
+            failed = tuple(act.failed(time) for act in acts)
             drawn = []
-            for k, colour in enumerate(colours):
+            for k, act in enumerate(acts):
                 stage.set_shape(k, time)
-                stage.pose(k, places[k][frame], ahead[k][frame], time)
+                stage.pose(k, act.x[frame], act.ahead[frame], time)
                 lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
-                stage.aim(k, wanted[k][frame] if lost and not failed[k] else None)
-                stage.set_colour(k, style.FAILED if failed[k] else colour)
-                drawn += [] if failed[k] else [(k, *each) for each in acting[k][frame].arrows]
+                stage.aim(k, act.r[frame] if lost and not failed[k] else None)
+                stage.set_colour(k, style.FAILED if failed[k] else act.colour)
+                drawn += [] if failed[k] else [(k, *each) for each in act.pushes[frame].arrows]
             picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame, stage.find)
-            moods = tuple(timeline[frame] for timeline in timelines)
+            moods = tuple(act.states[frame] for act in acts)
             picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame]))
             yield np.concatenate([picture, charts.at(time)])
-
-
-def pushes(acting: Mapping[str, Envelope], edges: np.ndarray, sizes: Sequence[arrows.Scale], colour: str) -> list[Push]:
-    """Return the arrows of a machine in each frame between `edges`, s, for what acts on its channels."""
-    return [
-        Push(float(time), [(i, a) for i, size in enumerate(sizes) for a in arrows.arrows(acting, k, i, size, colour)])
-        for k, time in enumerate(edges[1:])
-    ]
-
-
-def framed(
-    traces: Sequence[Trace],
-    colours: Sequence[str],
-    size: tuple[int, int],
-    room: Room,
-    chosen: Camera | None,
-    motions: Sequence[Motion | None],
-    apart: float,
-    pushes: Sequence[Sequence[Push]],
-    scale: float,
-) -> Stage:
-    """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
-
-    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`. A warning tells if
-    the chosen view, or every view, shows nothing.
-    """
-    name = traces[0].scenario.plant.name
-    for view in (chosen, *scene.OTHER_VIEWS):
-        stage = Stage(traces, colours, size, room, view, motions, apart, pushes, scale)
-        if (chosen is None and not stage.is_users) or stage.shows():
-            if view != chosen is not None:
-                fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
-                warnings.warn(fact, ScenarioWarning, users_stacklevel())
-            return stage
-        if not any(len(links) for links in stage.links):
-            fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
-            break
-        stage.canvas.close()
-    else:
-        stage = Stage(traces, colours, size, room, chosen, motions, apart, pushes, scale)
-        fact = "shows nothing from any side: give another camera, such as camera=(60, -20)"
-    warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_stacklevel())
-    return stage
-
-
-def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return x (K + 1, n) at the times, (times, n), linear between samples; after a failure the last finite one."""
-    return np.stack([np.interp(times, t, channel) for channel in x.T], axis=1)
-
-
-def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:
-    """Return the mean lead of the rotors over their joints, (edges - 1, n), rad or m, from the flank that pushes."""
-    return 0.5 * states.backlash_gap(trace.scenario) * windows(trace.t, states.flanks(trace), edges).mean

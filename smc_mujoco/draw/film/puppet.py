@@ -1,18 +1,15 @@
 """A machine as a film moves it: from the positions of its channels to the pose of its whole mechanism."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from smc_mujoco.draw.film import arrows, furniture, scene
+from smc_mujoco.draw.film import arrows, scene
+from smc_mujoco.draw.film.act import Motion, Push
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
-from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.prepare import prepare
-from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -21,24 +18,6 @@ POSES = 96  # poses of a trace that must be in the picture
 MAX_FIXED_SIZE = 4.0  # of what moves: larger fixed things of a user's model may leave the picture; chosen
 NEAR_SHARE = 0.3  # how far beside what moves fixed things must be in the picture, in its sizes; chosen
 STAND_SHARE = 0.8  # height of a stand that must be in the picture, in sizes of what moves; chosen
-
-
-class Push(NamedTuple):
-    """The arrows of a machine at a time, s: each with its channel."""
-
-    time: float
-    arrows: Sequence[tuple[int, arrows.Arrow]]
-
-
-class Motion(NamedTuple):
-    """Poses of a mechanism, (times, nq), at times in s."""
-
-    times: np.ndarray
-    poses: np.ndarray
-
-    def at(self, time: float) -> np.ndarray:
-        """Return the pose at a time, (nq,): the one before."""
-        return self.poses[max(int(np.searchsorted(self.times, time + 1e-9)) - 1, 0)]
 
 
 def moved_bodies(model: mujoco.MjModel, joints: Sequence[int] | np.ndarray) -> list[int]:
@@ -57,7 +36,7 @@ class Puppet:
         self.scenario = scene.first_channels(scenario)
         self.shapes = shapes(self.scenario)  # at the start of the run, and after its jump
         for shape in self.shapes if self.scenario.plant.on_stage else ():
-            furniture.restyle(shape.model)
+            scene.restyle(shape.model)
         model = self.shapes[0].model
         ids = joint_ids(model)
         rotors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(i).name) for i in ids]
@@ -70,7 +49,6 @@ class Puppet:
         self.free = model.jnt_qposadr[model.jnt_type == FREE]
         self.place = np.zeros(3)  # m, of the machine in the film, which free bodies are not fixed to
         self.ids, self.mounts, self.lowered = ids.tolist(), list[arrows.Mount](), 0.0
-        self.whole = not off_stage or len(self._joints) + len(self._rotors) == model.nq
         self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0
 
     @property
@@ -124,7 +102,7 @@ class Puppet:
         if cut and len(points):
             axes = data[0].xaxis[self.ids][self.slides]
             its = [shape.model for shape in self.shapes]
-            self.lowered = furniture.cut(its, points, axes, self.scenario.plant.on_stage)
+            self.lowered = scene.cut(its, points, axes, self.scenario.plant.on_stage)
             scene.forward(model, data[0])
         world = scene.boxes(model, data[0])  # fixed things
         fixed &= ~plane & (model.geom_group == groups)
@@ -161,50 +139,3 @@ class Puppet:
     def shape(self, time: float) -> int:
         """Return the index of the shape at a time, s."""
         return sum(time >= shape.time for shape in self.shapes) - 1
-
-
-def motion(trace: Trace, times: np.ndarray) -> Motion | None:
-    """Return how joints without a channel move, at times in s; None if there are none, or if that is not known."""
-    moved = None if Puppet(trace.scenario).whole else poses(trace, times)
-    return None if moved is None else Motion(times, moved)
-
-
-def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
-    """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the last one.
-
-    A trace has the channels only, so the run is simulated again; None if that would take long, because the law or a
-    signal does not compile.
-    """
-    prepared = prepare(trace.scenario)
-    if prepared.why_not:
-        return None
-    scenario = trace.scenario.resolved
-    total, jump = scenario.samples * scenario.steps, scenario.jump_step
-    wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
-    qpos_at: dict[int, np.ndarray] = {}
-    ends: list[int] = sorted({*wanted, *([jump] if 0 < jump < total else [])})
-    step = 0
-    with callback.installed():
-        batch = ScenarioBatch([prepared], threads=1)
-        qpos = batch.batch.bind("qpos")
-        last = qpos[0].copy()
-        for end in ends:
-            batch.advance(end - step, lambda steps: None)
-            step = end
-            if step == jump:
-                batch.set_parameters(step, [0])
-            if batch.records["failure"][0] == state.FINE:
-                last = qpos[0].copy()
-            qpos_at[end] = last
-    return np.array([qpos_at[end] for end in wanted])
-
-
-def standing_places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
-    """Return where the machines stand, (machines, 3) m: side by side, on the floor."""
-    scenarios = [puppet.scenario for puppet in puppets]
-    step = scene.lane(scenarios, reaches, turn)
-    middles = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
-    middles[:, 2] -= [puppet.lowered for puppet in puppets]
-    if not scenarios[0].plant.on_stage:  # the floor hides what is below it
-        middles[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
-    return middles

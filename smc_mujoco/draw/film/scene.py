@@ -1,7 +1,8 @@
 """The model of a film: one machine a trace, side by side, without their surroundings, and a camera that suits them.
 
 Machines are the scenarios' mechanisms with all that they touch. The camera looks in the direction of the plant's
-own camera `look`, or of the chosen one. A user's model keeps its cameras; its lights, sky and floor are the film's.
+own camera `look`, or of the chosen one. Rails and columns are cut to what moves: a film shows the motion. A user's
+model keeps its cameras; its lights, sky and floor are the film's.
 """
 
 import dataclasses
@@ -28,7 +29,7 @@ HIDDEN_GROUP = 5  # a group of geoms that MuJoCo does not draw by default
 TENDON_GROUPS = 3  # groups of tendons that MuJoCo draws by default
 QUALITY = {"offsamples": 4, "shadowsize": 2048, "numslices": 36, "numstacks": 10, "numquads": 1}  # looks and speed
 LOOK = "look"
-SUN = "sun"  # the light whose shadows lie on the floor, see shadows.py
+SUN = "sun"  # the light whose shadows lie on the floor, see canvas.py
 FLOOR_CELLS = 7  # of the floor's grid, in the width of what is seen; chosen
 HAZE = (0.66, 0.725, 0.80)  # red, green, blue, chosen
 HAZE_AT_TOP = 0.9  # share of the full haze at the top of the picture, chosen
@@ -40,6 +41,13 @@ CORNER = (125.0, -18.0)  # for hinges about several axes; chosen
 PARALLEL_COSINE = 0.95  # of two axes that count as parallel; chosen
 OTHER_VIEWS = (CORNER, FRONT, ABOVE, (0.0, LOW_ELEVATION), (-55.0, -30.0))  # views to try where one shows nothing
 EMISSION = 0.13  # of the floor, so that it is nearly as white as the page below
+CUT_MARGIN = 0.08  # of the size of what moves, on both sides of it, to which rails and columns are cut; chosen
+SLENDER = 3.0  # a rail or column is longer than this many thicknesses; chosen
+RAIL_END = 0.06  # of a rail's length: what stands within it of an end is moved with the end; chosen
+ROUND_GEOMS = [int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_CAPSULE)]
+BOB, BOB_GROWTH = "bob", 1.3  # a pendulum's mass is the larger in films
+DIAL, DIAL_OPACITY = ("face", "bezel"), 0.4  # a dial is the paler
+CUT_FIELDS = ("geom_pos", "geom_size", "geom_aabb", "geom_group", "geom_sameframe")
 FIXED, DIRECTIONAL = mujoco.mjtCamLight.mjCAMLIGHT_FIXED.value, mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
 PLANE, CAPSULE = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_CAPSULE
 
@@ -237,3 +245,59 @@ def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
     if scenario.plant.unit == "rad" or not scenario.plant.on_stage:
         return np.inf
     return float(2 * np.abs(fixed_boxes(model)[..., 0]).max())
+
+
+def restyle(model: mujoco.MjModel) -> None:
+    """Enlarge the bobs of pendulums, to which the eye should go, and make dials translucent."""
+    names = [model.geom(i).name.rpartition("/")[2] for i in range(model.ngeom)]
+    bobs, dial = np.flatnonzero(np.isin(names, BOB)), np.flatnonzero(np.isin(names, DIAL))
+    model.geom_rgba[dial] = model.mat_rgba[model.geom_matid[dial]] * (1.0, 1.0, 1.0, DIAL_OPACITY)
+    model.geom_matid[dial] = -1
+    for field in (model.geom_size, model.geom_aabb, model.geom_rbound):
+        field[bobs] *= BOB_GROWTH
+
+
+def cut(machines: Sequence[mujoco.MjModel], points: np.ndarray, slides: np.ndarray, own: bool) -> float:
+    """Shorten columns, and rails along `slides`, (m, 3), to what moves, whose points are (m, 3) m, in all models.
+
+    The foot of a column and the posts at the ends of a rail come closer, and marks beyond are hidden. Columns are cut
+    of the library's `own` machines. Returns how far the foot came up, m.
+    """
+    model, data = machines[0], mujoco.MjData(machines[0])
+    forward(model, data)
+    fixed = np.flatnonzero((model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE))
+    corners, raised = boxes(model, data)[fixed], 0.0
+    margin = CUT_MARGIN * np.ptp(points, axis=0).max()
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    for axis in range(3) if len(fixed) else ():
+        turned = np.abs(data.geom_xmat[fixed].reshape(-1, 3, 3)[:, axis])
+        least, most, sides = corners[..., axis].min(axis=1), corners[..., axis].max(axis=1), np.ptp(corners, axis=1)
+        long = (sides[:, axis] > SLENDER * np.delete(sides, axis, axis=1).max(axis=1)) & (turned.max(axis=1) > 0.999)
+        first, last = low[axis], high[axis]
+        if axis == 2:
+            first, last = min(least[~long & (most > first)].min(initial=first) - margin, first), np.inf
+        if not long.any() or not (own if axis == 2 else (np.abs(slides[:, axis]) > 0.9).any()):
+            continue
+        start, stop = least[long].min(), most[long].max()
+        first, last, near = max(first, start), min(last, stop), RAIL_END * (stop - start)
+        home = model.geom_bodyid[fixed] == model.geom_bodyid[fixed[0]]
+        for k, geom in enumerate(fixed.tolist()):
+            way, middle = np.zeros(3), 0.5 * (least[k] + most[k])
+            if long[k]:
+                a, b, side = max(least[k], first), min(most[k], last), int(turned[k].argmax())
+                way[axis], longer = 0.5 * (a + b) - middle, 0.5 * (b - a - sides[k, axis])
+                model.geom_size[geom, 1 if int(model.geom_type[geom]) in ROUND_GEOMS else side] += longer
+                model.geom_aabb[geom, 3 + side] += longer
+            elif home[k] and middle < start + near:
+                way[axis] = first - start
+            elif home[k] and middle > stop - near:
+                way[axis] = last - stop
+            elif axis < 2 and not first <= middle <= last:
+                model.geom_group[geom] = HIDDEN_GROUP
+            if way.any():
+                model.geom_sameframe[geom] = 0  # else MuJoCo takes it to be where its body is
+            model.geom_pos[geom] += way @ data.xmat[model.geom_bodyid[geom]].reshape(3, 3)
+        raised = first - start if axis == 2 else 0.0
+    for other, name in ((other, name) for other in machines[1:] for name in CUT_FIELDS):
+        getattr(other, name)[fixed] = getattr(model, name)[fixed]
+    return raised

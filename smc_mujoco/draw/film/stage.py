@@ -5,16 +5,19 @@ its trace takes it.
 """
 
 import itertools
+import warnings
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
+from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arm, arrows, camera, furniture, scene
+from smc_mujoco.draw.film import arm, arrows, camera, scene
+from smc_mujoco.draw.film.act import Act
 from smc_mujoco.draw.film.canvas import Canvas
-from smc_mujoco.draw.film.puppet import Motion, Puppet, Push, moved_bodies, standing_places
+from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
 from smc_mujoco.mechanisms.hardware.part import joints
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.trace import Trace
@@ -45,17 +48,17 @@ class Stage:
         size: tuple[int, int],
         room: camera.Room,
         chosen: camera.Camera | None = None,
-        motions: Sequence[Motion | None] = (),
+        acts: Sequence[Act] = (),
         apart: float = 0.0,
-        pushes: Sequence[Sequence[Push]] = (),
         scale: float = 1.0,
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
         self.shown, self.is_users = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
         turn = scene.turn(scenarios[0], chosen)
-        self.motions = motions or [None] * len(traces)
-        pushes, cut = pushes or [()] * len(traces), scene.in_a_row(scenarios[0], turn)
+        self.motions = [act.motion for act in acts] or [None] * len(traces)
+        pushes = [act.framing for act in acts] or [()] * len(traces)
+        cut = scene.in_a_row(scenarios[0], turn)
         for puppet in self.puppets:
             puppet.mounts = arrows.mounts(puppet.scenario, puppet.ids, puppet.slides, puppet.rail, turn[:, 2])
         runs = zip(self.puppets, traces, self.motions, pushes, strict=True)
@@ -66,7 +69,7 @@ class Stage:
         self.model = scene.compose(scenarios, where, size)
         self.where = where
         if not self.is_users:
-            furniture.restyle(self.model)
+            scene.restyle(self.model)
         self.data, self.goal = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.aimed = np.zeros(len(traces), bool)
         self.rest: list[np.ndarray | None] = [None] * len(traces)
@@ -252,3 +255,47 @@ def placed(
         if (wide[2] - fit[2]) @ turn[:, 2] < DISTANCE_ROUNDING * np.abs(fit[2]).max():
             return wide
     return fit
+
+
+def standing_places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
+    """Return where the machines stand, (machines, 3) m: side by side, on the floor."""
+    scenarios = [puppet.scenario for puppet in puppets]
+    step = scene.lane(scenarios, reaches, turn)
+    middles = step * (np.arange(len(puppets)) - (len(puppets) - 1) / 2)[:, None]
+    middles[:, 2] -= [puppet.lowered for puppet in puppets]
+    if not scenarios[0].plant.on_stage:  # the floor hides what is below it
+        middles[:, 2] += [max(0.0, -float(points[:, 2].min())) for points in reaches]
+    return middles
+
+
+def framed(
+    acts: Sequence[Act],
+    size: tuple[int, int],
+    room: camera.Room,
+    chosen: camera.Camera | None,
+    apart: float,
+    scale: float,
+) -> Stage:
+    """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
+
+    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`. A warning tells if
+    the chosen view, or every view, shows nothing.
+    """
+    traces, colours = [act.trace for act in acts], [act.colour for act in acts]
+    name = traces[0].scenario.plant.name
+    for view in (chosen, *scene.OTHER_VIEWS):
+        stage = Stage(traces, colours, size, room, view, acts, apart, scale)
+        if (chosen is None and not stage.is_users) or stage.shows():
+            if view != chosen is not None:
+                fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
+                warnings.warn(fact, ScenarioWarning, users_stacklevel())
+            return stage
+        if not any(len(links) for links in stage.links):
+            fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
+            break
+        stage.canvas.close()
+    else:
+        stage = Stage(traces, colours, size, room, chosen, acts, apart, scale)
+        fact = "shows nothing from any side: give another camera, such as camera=(60, -20)"
+    warnings.warn(f"the picture of {name} {fact}", ScenarioWarning, users_stacklevel())
+    return stage

@@ -5,7 +5,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, puppet, scene
+from smc_mujoco.draw.film import act, camera, puppet, scene
 from smc_mujoco.draw.film.stage import Stage
 
 SIZE, ROOM = (640, 230), camera.Room(20, 20, 620, 210)
@@ -104,7 +104,7 @@ def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace,
 def test_joints_without_a_channel_move_as_in_the_run(trace):
     """The ball falls freely. The run is that of the trace: its channel moves alike."""
     times = np.array([0.0, 0.1, 0.3, 0.4])
-    motion = puppet.motion(trace, times)
+    motion = act.motion(trace, times)
     assert motion is not None
     arm = motion.poses[:, 0]
     assert arm == pytest.approx(np.interp(times, trace.t, trace.x[:, 0]), abs=1e-9)
@@ -134,4 +134,4 @@ def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_
 
 def test_a_library_plant_has_no_other_joints():
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
-    assert puppet.motion(trace, trace.t) is None
+    assert act.motion(trace, trace.t) is None

@@ -5,7 +5,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
-from smc_mujoco.draw.film import camera, canvas, shadows
+from smc_mujoco.draw.film import camera, canvas
 from smc_mujoco.draw.film.arrows import Arrow
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.stage import Stage
@@ -147,7 +147,7 @@ def test_a_model_with_a_lamp_has_its_pictures_drawn_whole():
 def test_shadows_lie_on_the_floor_where_the_light_casts_them_with_smooth_edges():
     way = np.array([0.3, 0.5, -0.8])
     point = np.array([0.2, -0.1, 1.6])
-    assert shadows.flattening(way) @ point == pytest.approx([0.8, 0.9, 0.0], abs=2e-4)
+    assert canvas.flattening(way) @ point == pytest.approx([0.8, 0.9, 0.0], abs=2e-4)
     with stage("inverted_pendulum") as shown:
         lit = shown.render().astype(int)
         shown.canvas.sun, shown.changed = None, True

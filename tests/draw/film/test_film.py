@@ -17,7 +17,7 @@ from PIL import Image
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
 from smc_mujoco.draw import states, style
-from smc_mujoco.draw.film import camera, encoder, film, pace, puppet, scene
+from smc_mujoco.draw.film import act, camera, encoder, film, pace, puppet, scene, stage
 from smc_mujoco.draw.film.arrows import Arrow, Scale, arrows, loads, scales
 from smc_mujoco.draw.film.caption import Caption, key
 from smc_mujoco.draw.film.pace import Clock
@@ -370,7 +370,7 @@ def stood(scenarios) -> np.ndarray:
     """Where machines stand."""
     found = [puppet.Puppet(scenario) for scenario in scenarios]
     reaches = [each.reach(smc.run(scenario)) for each, scenario in zip(found[:1], scenarios, strict=False)]
-    return puppet.standing_places(found, reaches * len(found), scene.turn(scenarios[0]))
+    return stage.standing_places(found, reaches * len(found), scene.turn(scenarios[0]))
 
 
 @pytest.mark.parametrize(("plant", "field", "name"), VARIANTS[::6], ids=str)
@@ -523,7 +523,7 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
             shown.pose(0, np.array([0.3]), np.array([flank * 0.1]))
             assert (rotor.qpos[0], joint.qpos[0]) == pytest.approx((0.3 + flank * 0.1, 0.3))
     pushed = np.flatnonzero(slack.reaction[:, 0] > 0)[0]
-    ahead = film.rotors(slack, np.append(-1e-3, slack.t))
+    ahead = act.rotors(slack, np.append(-1e-3, slack.t))
     assert ahead[pushed + 1, 0] == pytest.approx(0.1)
     assert np.abs(ahead).max() <= 0.1
     resting = realistic(contact="floor", duration=0.2)

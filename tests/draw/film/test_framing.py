@@ -36,7 +36,8 @@ def two(plant, **fields):
 def filmed(traces, monkeypatch):
     """Give the stage of a film of the traces, whose second picture was drawn, and its caption."""
     seen = {}
-    monkeypatch.setattr(film, "Stage", lambda *given: seen.setdefault("stage", stage.Stage(*given)))
+    made_by = stage.Stage
+    monkeypatch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
     monkeypatch.setattr(film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given)))
     with without_charts:
         made_of = film.pictures(traces, Clock(np.array([0.1, 0.2]), np.ones(2)), None, None, SIZE)
