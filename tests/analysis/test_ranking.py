@@ -29,8 +29,11 @@ from smc_mujoco.analysis.ranking import ranks as places
 from smc_mujoco.common.errors import ScenarioError, find
 from smc_mujoco.common.tabular import plain
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
+from smc_mujoco.evidence.report.scores import scores as report_scores
+from smc_mujoco.evidence.report.words import TABLE_METRICS
 from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
+from smc_mujoco.studies import board as boards_of
 from smc_mujoco.studies import run_key
 from smc_mujoco.studies.board import Board, Boards, size_in_words
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
@@ -993,6 +996,27 @@ def real(tmp_path_factory):
     laws, conditions = ["observer_free", "classical", "adaptive"], ["nominal", "noise", "coulomb"]
     scenarios = grid(["van_der_pol", "duffing"], laws, conditions, 16, gains="study", duration=0.1)
     return run_study(scenarios, tmp_path_factory.mktemp("study"))
+
+
+# a metric of each family: a time, an error of the last part, an integral, a command, and a cycle that runs may not have
+@pytest.mark.parametrize("metric", ["settling_time", "ultimate_bound", "itae", "tv_rate", "chattering_amplitude"])
+def test_a_median_that_half_the_step_moves_by_more_than_five_percent_is_marked_on_boards_and_in_the_report(metric):
+    runs = {"a": blocks(1.0), "b": blocks(3.0), "c": blocks(9.0)}
+    changes = {"a": 1.06, "b": 1.04, "c": 0.9}
+    halves = [json.dumps({metric: changes[law] * y}) for law, of in runs.items() for y in of.ravel().tolist()]
+    others = {name: np.full(60, math.nan) for name in TABLE_METRICS if name != metric}
+    table = stand(runs, metric=metric, half_step=np.array(halves, object), **others)
+    (board,) = leaderboard(table, [metric])
+    (of_board,) = board.tables
+    alarms = {law.text: cell.alarm for law, cell, *_ in of_board.rows}
+    middles = {law: float(np.median(runs[law])) for law in changes}
+    pairs = {law: (y, changes[law] * y) for law, y in middles.items()}
+    said = {law: " to ".join(boards_of.size(y, metric) for y in pair) + " by the step" for law, pair in pairs.items()}
+    assert alarms == {"a": said["a"], "b": "", "c": said["c"]}
+    assert "'by the step': the medians" in " ".join(printed([board]).split())
+    for law, score in by_law(report_scores(table, [board])).items():
+        expected = None if law == "b" else pytest.approx(pairs[law])
+        assert score.by_step == expected
 
 
 def test_boards_say_where_no_run_was_compared_with_half_its_step(tmp_path):
