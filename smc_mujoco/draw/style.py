@@ -153,12 +153,19 @@ def _palette() -> dict[str, str]:
     sights. All 55 cannot be: 218 of their 1,485 pairs are closer.
     """
     laws = known_laws().own.values()
-    colours, used = {}, [PAPER, INK, DISTURBANCE, REACTION, FAILED, *(law.colour for law in laws if law.colour)]
-    free = [law for law in laws if not law.colour]
-    for law in sorted(free, key=lambda law: (law.name not in LAWS, law.family != "baseline")):
-        colours[law.name] = _farthest([colour for colour in _grid(0) if colour not in used], used)
-        used.append(colours[law.name])
-    return colours
+    free = sorted(
+        (law for law in laws if not law.colour), key=lambda law: (law.name not in LAWS, law.family != "baseline")
+    )
+    colours = spread(len(free), [law.colour for law in laws if law.colour])
+    return {law.name: colour for law, colour in zip(free, colours, strict=True)}
+
+
+def spread(count: int, others: Sequence[str] = ()) -> list[str]:
+    """Return colours, each the farthest from the neutral ones, from the others and from all before it."""
+    used = [PAPER, INK, DISTURBANCE, REACTION, FAILED, *others]
+    for _ in range(count):
+        used.append(_farthest([colour for colour in _grid(0) if colour not in used], used))
+    return used[len(used) - count :]
 
 
 def _farthest(colours: Sequence[str], others: Sequence[str]) -> str:

@@ -28,7 +28,7 @@ def residual_figure(
     `units`: of the columns.
     """
     paths = pages.files(Path(path).with_suffix(""))
-    colours = dict(zip(predicted, style.law_colours([*predicted]), strict=True))
+    colours = dict(zip(predicted, style.spread(len(predicted)), strict=True))
     with style.page():
         handles = [
             Line2D([], [], color=colour, label=twin) for twin, colour in ({"measured": style.INK} | colours).items()
