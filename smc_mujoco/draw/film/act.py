@@ -58,7 +58,7 @@ class Act:
         self.states, self.told = (
             [None] * len(some) if arms else states.timeline(trace, some, hold) for some in (times, grid)
         )
-        self.motion = motion(trace, times)
+        self.motion = motion(trace, np.union1d(grid, times))
         self.x, self.r = (positions(trace.t, values, times)[:, :n] for values in (trace.x, trace.r))
         self.ahead = rotors(trace, edges)[:, :n]
 

@@ -18,9 +18,9 @@ from smc_mujoco.simulation.trace import Trace
 PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
 WANTED_OPACITY = 0.5  # of the wanted path
 OUTSIDE = 100  # px beyond the picture up to which a path is followed
-BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 15, 6, 32  # px, of a bar, between bars, and from one limit to the other
+BAR_WIDTH, BAR_GAP, BAR_HEIGHT = 15, 6, 26  # px, of a bar, between bars, and from one limit to the other
 BAR_LETTERS, NUMBER_SIZE = 18, 18  # px
-LABEL_GAP = 5  # px, from a label to its bars
+LABEL_GAP = 3  # px, from a label to its bars
 BARS_HEIGHT = LABEL_GAP + BAR_HEIGHT + 1.25 * BAR_LETTERS  # px, of bars with their numbers
 MAX_TIP_ERROR = 0.015  # m: only a tip farther off its path has a ghost at its reference; a nearer one hides it; chosen
 FORCE_ARROW = 0.6  # m, length of the arrow for the largest force

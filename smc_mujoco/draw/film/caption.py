@@ -86,11 +86,10 @@ class Caption:
             both = [self.width(text) for text in self.texts()] + self.badge[:, 0] + 0.4 * pill
             self.in_line = bool((both < self.max_label).all())  # labels with their badges
             high = self.badge[:, 1].max()
+            below_row = below_row if self.in_line or not self.below else 0.15 * pill
             below_row += max(pill, high) if self.in_line else pill + high
         bottom = size[1] - below_row
-        top = (KEY_TOP + KEY_PITCH * len(self.key) + 6) * scale
-        if below is None:
-            top = min(top, bottom - MIN_ROOM * size[1])
+        top = min((KEY_TOP + KEY_PITCH * len(self.key) + 6) * scale, bottom - MIN_ROOM * size[1])
         self.room = Room(side, max(top, (KEY_TOP + 4) * scale), size[0] - 40 * scale, bottom)
         self.keys = self._keys()
         self.sheet = functools.lru_cache(maxsize=16)(self._sheet)

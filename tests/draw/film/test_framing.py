@@ -1,6 +1,7 @@
 """Films show what moves and its arrows, as large as the picture allows, each machine in its own place."""
 
 import contextlib
+import itertools
 
 import numpy as np
 import pytest
@@ -33,23 +34,26 @@ def two(plant, **fields):
 
 
 @contextlib.contextmanager
-def filmed(traces, monkeypatch):
-    """Give the stage of a film of the traces, whose second picture was drawn, and its caption."""
+def filmed(traces, monkeypatch, times=(0.1, 0.2)):
+    """Give the stage of a film of the traces, whose first two pictures were drawn, and its caption."""
     seen = {}
     made_by = stage.Stage
     monkeypatch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
     monkeypatch.setattr(film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given)))
     with without_charts:
-        made_of = film.pictures(traces, Clock(np.array([0.1, 0.2]), np.ones(2)), None, None, SIZE)
-        next(made_of)
-        next(made_of)
+        made_of = film.pictures(traces, Clock(np.array(times), np.ones(len(times))), None, None, SIZE)
+        assert [*itertools.islice(made_of, 2)]
         yield seen["stage"], seen["caption"]
         made_of.close()
 
 
-@pytest.mark.parametrize("plant", ["inverted_pendulum", "cart_pole", "furuta", "pendulum_network", "overhead_crane"])
+@pytest.mark.parametrize(
+    "plant", ["inverted_pendulum", "cart_pole", "furuta", "pendulum_network", "overhead_crane", "panda"]
+)
 def test_machines_fill_the_height_or_the_width(plant, monkeypatch):
-    law = {"furuta": "rotary_swing_up"}.get(plant, "hierarchical" if smc.plant(plant).free else "classical")
+    law = {"furuta": "rotary_swing_up", "panda": "none"}.get(
+        plant, "hierarchical" if smc.plant(plant).free else "classical"
+    )
     traces = [made(smc.Scenario(plant=plant, law=law, duration=1.0))] * 3
     with filmed(traces, monkeypatch) as (shown, _):
         low, high = shown.boxes[:, :2].min(axis=0), shown.boxes[:, 2:].max(axis=0)
@@ -90,6 +94,17 @@ def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
         crates = np.array([shown.data.body(f"m{k}/crate").xpos for k in range(2)])
         assert crates - shown.where == pytest.approx(np.array([[0.5, 0.0, 0.1]] * 2), abs=0.01)
         assert abs(crates[1, 0] - crates[0, 0]) > 0.5
+
+
+def test_a_still_is_framed_by_all_of_the_way_of_a_free_body_as_the_film_is(monkeypatch):
+    """The crate starts far above the arm, and falls."""
+    plant = smc.plant_from(CRATE.replace('pos=".5 0 .1"', 'pos=".5 0 1.5"'), {"arm": smc.Channel(x0=0.5)})
+    traces = [smc.run(smc.Scenario(plant=plant, law="pid", duration=0.5))]
+    boxes = []
+    for times in (np.array([0.5]), np.linspace(0.0, 0.5, 16)):
+        with filmed(traces, monkeypatch, times) as (shown, _):
+            boxes.append(shown.boxes)
+    np.testing.assert_allclose(boxes[0], boxes[1], atol=1.0)
 
 
 def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
