@@ -38,9 +38,9 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     """Give the stage of a film of the traces, whose first two pictures were drawn, and its caption."""
     seen = {}
     made_by = stage.Stage
-    monkeypatch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
-    monkeypatch.setattr(film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given)))
-    with without_charts:
+    with without_charts, monkeypatch.context() as patch:
+        patch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
+        patch.setattr(film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given)))
         made_of = film.pictures(traces, Clock(np.array(times), np.ones(len(times))), None, None, SIZE)
         assert [*itertools.islice(made_of, 2)]
         yield seen["stage"], seen["caption"]
