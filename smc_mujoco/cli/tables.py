@@ -80,7 +80,7 @@ def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) 
     scenario = next(iter(traces.values())).scenario
     values, tables = _several(metric_scores, traces, again), []
     for group, heading in headings(scenario).items():
-        units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.fits(group)}
+        units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.applies_to(group)}
         shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
         rows = {

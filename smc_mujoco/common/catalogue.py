@@ -175,12 +175,12 @@ def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[
     return by_name
 
 
-def imported(kind: type[T], fits: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
+def imported(kind: type[T], wanted: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
     """Return a function that imports the object that an entry point names, and checks its kind and its name."""
 
     def make(point: EntryPoint) -> T:
         entry = point.load()
-        if not isinstance(entry, kind) or not fits(entry):
+        if not isinstance(entry, kind) or not wanted(entry):
             raise ScenarioError(f"it is {shown(entry)}: give {KINDS[point.group][1]}")
         if (its_name := NAME(entry)) != point.name:
             raise ScenarioError(f"its own name is {its_name!r}: give the entry point the same name")
@@ -270,10 +270,10 @@ class Files(Mapping[str, T_co]):
 
 
 def catalogue_of(
-    package: str, kind: type[T], group: str, fits: Callable[[T], bool] = lambda value: True
+    package: str, kind: type[T], group: str, wanted: Callable[[T], bool] = lambda value: True
 ) -> Catalogue[T]:
     """Return the objects of a kind in a package's modules, and those of other packages in a group of entry points."""
-    return Catalogue(Files(package, kind), added(group, imported(kind, fits)))
+    return Catalogue(Files(package, kind), added(group, imported(kind, wanted)))
 
 
 def subclasses(base: type[T]) -> list[type[T]]:

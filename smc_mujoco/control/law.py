@@ -188,7 +188,7 @@ def law(name: str, **gains: float | Sequence[float]) -> Law:
     return find("law", name, known_laws()).bind(gains, warn=True)
 
 
-def fits(law: Law | Template, plant: Plant) -> bool:
+def suits(law: Law | Template, plant: Plant) -> bool:
     """Return whether a law is for a plant: for all plants, for this one, or for user's models of the same kind."""
     if not law.plants or plant.name in law.plants:
         return True
@@ -223,5 +223,5 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     return [
         name
         for name, template in catalogue().items()
-        if fits(template, plant) and (template.plants or name == "none" or not plant.underactuated)
+        if suits(template, plant) and (template.plants or name == "none" or not plant.underactuated)
     ]

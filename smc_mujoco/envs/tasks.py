@@ -58,7 +58,7 @@ class Task:
 
     moving = False  # whether there is a moving reference, which is then part of the observation
 
-    def fits(self, plant: Plant) -> bool:
+    def applies_to(self, plant: Plant) -> bool:
         """Return whether a plant has this task."""
         return True
 
@@ -114,7 +114,7 @@ class Track(Task):
 class SwingUp(Task):
     """Bring hanging pendulums and poles upright."""
 
-    def fits(self, plant: Plant) -> bool:
+    def applies_to(self, plant: Plant) -> bool:
         """Return whether every toppling channel can hang, and u_max has one unit."""
         down, (low, high) = toppling(plant), _ranges(plant)
         hangs = (low[down] <= math.pi) & (high[down] >= math.pi)
@@ -147,7 +147,7 @@ class SwingUp(Task):
 class Synchronise(Task):
     """Bring the channels of a network together."""
 
-    def fits(self, plant: Plant) -> bool:
+    def applies_to(self, plant: Plant) -> bool:
         """Return whether the plant is a network."""
         return plant.network and not plant.rest
 
@@ -173,7 +173,7 @@ def reward(e: np.ndarray, w: np.ndarray) -> Any:
 def tasks(plant: Plant | str) -> list[str]:
     """Return the names of the tasks that a plant has."""
     plant = as_plant(plant)
-    return [name for name, task in TASKS.items() if task.fits(plant)]
+    return [name for name, task in TASKS.items() if task.applies_to(plant)]
 
 
 def starts(task: Task, plant: Plant) -> Pair:

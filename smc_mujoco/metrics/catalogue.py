@@ -63,7 +63,7 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
     """
     refuse(trace)
     return {
-        group.name: {m.name: float(m.formula(part)) for m in metrics() if m.fits(group)}
+        group.name: {m.name: float(m.formula(part)) for m in metrics() if m.applies_to(group)}
         for group, part in conventions.by_group(trace).items()
     }
 

@@ -115,7 +115,7 @@ class Metric:
     def refusal(self, plant: Plant) -> str:
         """Return why the metric has no single value for the plant, or ""."""
         driven = [group for group in groups(plant) if group.driven]
-        if not any(map(self.fits, driven)):
+        if not any(map(self.applies_to, driven)):
             return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
         if ("{" in self.unit or self.unit == UNIT_OF_S) and len(driven) > 1:
             units = " and ".join(group.unit for group in driven)
@@ -133,11 +133,11 @@ class Metric:
 
     def worst(self, traces: Mapping[Group, Trace]) -> float:
         """Return the value of the worst group, from the result of `by_group`."""
-        counted = [trace for group, trace in traces.items() if self.fits(group) and (group.driven or self.shared)]
+        counted = [trace for group, trace in traces.items() if self.applies_to(group) and (group.driven or self.shared)]
         values = [value for value in (float(self.formula(trace)) for trace in counted) if not math.isnan(value)]
         return max(values, default=math.nan)  # a group without the value, such as a limit cycle, hides no other
 
-    def fits(self, group: Group) -> bool:
+    def applies_to(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""
         return (group.driven or not self.command) and (len(group.channels) > 1 or not self.network)
 

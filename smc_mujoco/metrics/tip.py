@@ -194,6 +194,6 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
         for i in group.channels:
             joint = dataclasses.replace(group, channels=(i,))
             part, power = group_trace(trace, joint), np.abs(trace.force[:, i] * trace.v[:, i])
-            values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.fits(joint)}
+            values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)}
             values[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
     return {name: values[name] for name in names}

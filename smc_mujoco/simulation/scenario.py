@@ -25,7 +25,7 @@ from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control import design
 from smc_mujoco.control.component import Template, gain_text
 from smc_mujoco.control.estimator import Estimator, estimator
-from smc_mujoco.control.law import Law, fits
+from smc_mujoco.control.law import Law, suits
 from smc_mujoco.control.surface import Surface
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
@@ -561,10 +561,10 @@ def check_law(s: Resolved) -> None:
     """Check that the law suits the plant, and the surface the law."""
     check_channels(s)
     for law in s.law.parts:
-        if not fits(law, s.plant):
+        if not suits(law, s.plant):
             paired = dataclasses.replace(s.plant, underactuated=True)
             listed = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
-            cure = "give each channel a partner" if s.plant.own and fits(law, paired) else listed
+            cure = "give each channel a partner" if s.plant.own and suits(law, paired) else listed
             raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}")
     if s.model == "nominal" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")

@@ -88,9 +88,8 @@ def _restored(data: Any) -> Any:
     kinds = {(kind.__name__, kind.__module__): kind for base in (Signal, Part) for kind in subclasses(base)}
     if (kind := kinds.get((data["kind"], data["module"]))) is None:
         raise ScenarioError(f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it")
-    known = {field.name for field in dataclasses.fields(kind)}  # older versions wrote more, None where it was left out
-    values = {name: value for name, value in data["values"].items() if value is not None or name in known}
-    return kind(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
+    return kind(**values)
 
 
 def _restore_plant(data: dict) -> Plant:

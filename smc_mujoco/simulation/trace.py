@@ -316,10 +316,12 @@ def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | Non
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)
     if scenario is None:
-        fits = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MAX_TEXT
+        expected = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MAX_TEXT
     else:
-        fits = dtype == np.dtype(float) and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
-    if not fits:
+        expected = (
+            dtype == np.dtype(float) and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
+        )
+    if not expected:
         raise ScenarioError(f"its {name} is {dtype} of shape {shape}, which does not fit its scenario")
     with archive.open(f"{name}.npy") as stream:
         array = npy.read_array(stream, allow_pickle=False)

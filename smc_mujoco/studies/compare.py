@@ -21,7 +21,7 @@ from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import joined
 from smc_mujoco.control import gain_sets, source
 from smc_mujoco.control.component import Template, gain_text
-from smc_mujoco.control.law import Law, catalogue, fits
+from smc_mujoco.control.law import Law, catalogue, suits
 from smc_mujoco.control.properties import suitable
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
@@ -306,6 +306,6 @@ def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
 
 def _usual(plant: Plant) -> list[Any]:
     """Return the laws to compare on a plant if none are given."""
-    known = [name for name in gain_sets.LAWS if fits(catalogue()[name], plant)]
+    known = [name for name in gain_sets.LAWS if suits(catalogue()[name], plant)]
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]

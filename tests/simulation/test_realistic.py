@@ -15,7 +15,7 @@ import pytest
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.control.law import fits
+from smc_mujoco.control.law import suits
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import reference
@@ -152,7 +152,7 @@ def scattered(number):
         contact = smc.Contact(contact, **{k: numbers[k] for k, take in takes.items() if take and rng.integers(2)})
     return smc.Scenario(
         plant=plant,
-        law=smc.law(str(rng.choice([name for name in smc.laws() if fits(smc.law(name), plant)]))),
+        law=smc.law(str(rng.choice([name for name in smc.laws() if suits(smc.law(name), plant)]))),
         duration=0.05,
         control_period=int(rng.integers(1, 20)) * h,
         physics_step=h,

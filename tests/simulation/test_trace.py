@@ -18,13 +18,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers import arms
 from helpers.runs import scenario
 from pyarrow import parquet
 from scipy.io import loadmat
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import serialise
 
 pytestmark = pytest.mark.quick
 
@@ -172,15 +170,6 @@ def test_an_estimator_of_one_s_own_keeps_its_name(tmp_path):
     mine = smc.estimator_function(gains={"a": 1.0})(lambda y, gains, memory: gains.a * y.v)()
     again = smc.load(smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")).scenario
     assert (again.resolved.velocity.name, dict(again.resolved.velocity.gains)) == (mine.name, {"a": 1.0})
-
-
-def test_fields_that_only_older_versions_had_may_be_none():
-    made = smc.Scenario(plant=arms.arm(), law="none", friction=smc.hardware.Sigmoid(1.0, 2.0))
-    data = json.loads(json.dumps(serialise.describe(made)))
-    data["friction"][0]["values"]["stiffness"] = None
-    for channel in data["plant"]["mjcf"]["channels"].values():
-        channel["actuator"] = None
-    assert serialise.restore(data) == made
 
 
 def test_the_arrays_are_read_only_wherever_a_trace_comes_from(trace, tmp_path):

@@ -274,9 +274,9 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
     return tuple(parts)
 
 
-def only_for(ctx: typer.Context, names: Iterable[str], fits: bool, kind: str) -> None:
+def only_for(ctx: typer.Context, names: Iterable[str], allowed: bool, kind: str) -> None:
     """Raise ScenarioError if one of these options was given although it does not fit: it is only for a kind of call."""
-    for name in () if fits else names:
+    for name in () if allowed else names:
         if str(ctx.get_parameter_source(name)).endswith("COMMANDLINE"):
             flags = next(parameter.opts for parameter in ctx.command.params if parameter.name == name)
             raise ScenarioError(f"{flags[0]} is for {kind}")

@@ -509,7 +509,7 @@ class Function:
             raise refuse(value, "another number of results")
         self.results = [wider(kind, v.kind) for kind, v in zip(self.results, values, strict=True)]
         wanted = f"real[{JOINTS}]" if self.program.joints else "real"
-        if self.entry and (len(values) != 2 or any(not self.fits(kind, wanted) for kind in self.results)):
+        if self.entry and (len(values) != 2 or any(not self.same_shape(kind, wanted) for kind in self.results)):
             joints = "a result other than two vectors, u and s, of one number for each joint,"
             raise refuse(value, joints if self.program.joints else "another number of results")
         if len(values) == 1 and not shape(self.results[0]):
@@ -530,7 +530,7 @@ class Function:
             if target.id in self.parameters:
                 raise refuse(target, "an assignment to an argument that is an array")
             before, kind = self.kinds.get(target.id, ""), value.kind
-            if shape(before) and self.fits(before, kind):  # 3 or SMC_JOINTS, where there are three joints
+            if shape(before) and self.same_shape(before, kind):  # 3 or SMC_JOINTS, where there are three joints
                 kind = base(kind) + before[len(base(before)) :]
             self.destination(target, kind)
             place = self.value(target)
@@ -538,7 +538,7 @@ class Function:
             place = self.changeable(target)
             if wider(base(place.kind), base(value.kind)) != base(place.kind):
                 raise refuse(target, "real numbers for elements of an array of whole numbers")
-        if shape(value.kind) and not self.fits(value.kind, place.kind):
+        if shape(value.kind) and not self.same_shape(value.kind, place.kind):
             raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
         same = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
         others = re.sub("|".join(same), "", value.text)
@@ -590,7 +590,7 @@ class Function:
             target = target.value
         return indices < (1 + bool(self.program.joints) if kind == "memory" else len(shape(kind)))
 
-    def fits(self, kind: str, other: str) -> bool:
+    def same_shape(self, kind: str, other: str) -> bool:
         """Return whether two kinds have the same shape."""
         return [*map(self.program.size, shape(kind))] == [*map(self.program.size, shape(other))]
 
@@ -624,7 +624,7 @@ class Function:
             return value
         shapes, calls = self.frames[-1]
         if dimensions := shape(value.kind):
-            if shapes and not self.fits(shapes[0], value.kind):
+            if shapes and not self.same_shape(shapes[0], value.kind):
                 raise refuse(node, "arrays of different shapes in one expression")
             shapes.append("".join(f"[{n}]" for n in dimensions))
             return value._replace(kind=base(value.kind))

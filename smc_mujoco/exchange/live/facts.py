@@ -22,7 +22,7 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.docstring import entry
-from smc_mujoco.control.law import Measurement, fits, laws
+from smc_mujoco.control.law import Measurement, laws, suits
 from smc_mujoco.control.properties import reads
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import arrows
@@ -135,7 +135,7 @@ def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], users: Sequen
     joints = [model.joint(int(joint)) for joint in joint_ids(model)]
     resolved = defaults.Scenario(plant=plant, law="none").resolved
     suited = set(laws(plant))
-    offered = [law for law in kinds["law"] if (law.name in suited if law.name in laws() else fits(law, plant))]
+    offered = [law for law in kinds["law"] if (law.name in suited if law.name in laws() else suits(law, plant))]
     gains = {law.name: _gains(law, plant, law in users) for law in offered}
     return {
         "label": style.plant_name(plant),

@@ -135,8 +135,7 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
 def _of_text(text: str, assets: Mapping[str, Any]) -> Source:
     """Return the source of a text whose files are all among the assets."""
     kinds = bytes | bytearray | memoryview | str
-    fits = isinstance(assets, Mapping) and all(isinstance(k, str) and isinstance(v, kinds) for k, v in assets.items())
-    if not fits:
+    if not (isinstance(assets, Mapping) and all(isinstance(k, str) and isinstance(assets[k], kinds) for k in assets)):
         raise ScenarioError(f"assets is {shown(assets)}: give names of files with their contents, as bytes or text")
     assets = {name: v.encode() if isinstance(v, str) else bytes(v) for name, v in assets.items()}
     given = {PurePosixPath(name).name for name in assets}

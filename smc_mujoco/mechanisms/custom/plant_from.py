@@ -246,8 +246,4 @@ def restored(data: Mapping, name: str) -> Plant:
         source = mjcf.source(model)
         if source.sha256 != data["sha256"]:
             raise ScenarioError(f"its model {model}, or a file that it names, has changed since the run: put it back")
-    given = {  # older versions wrote more fields, None where they were left out
-        joint: {field: value for field, value in channel.items() if value is not None}
-        for joint, channel in data["channels"].items()
-    }
-    return _plant(source, own.coerce(given), name, data["keyframe"], data.get("tip"))
+    return _plant(source, own.coerce(data["channels"]), name, data["keyframe"], data.get("tip"))

@@ -18,7 +18,7 @@ from smc_mujoco.common import process
 from smc_mujoco.common.files import slug
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import design
-from smc_mujoco.control.law import fits
+from smc_mujoco.control.law import suits
 from smc_mujoco.envs import episode, tasks
 from smc_mujoco.mechanisms.custom import channels as own_channels
 from smc_mujoco.mechanisms.custom import mjcf
@@ -590,9 +590,9 @@ def acrobot_alone() -> smc.Plant:
 
 def test_a_law_for_a_plant_with_a_free_joint_fits_models_with_one(arm):
     law = smc.law_function(plants=("duffing", "cart_pole"))(lambda y, gains, memory: (0.0, 0.0))
-    assert fits(law, acrobot())
-    assert not fits(law, arm())
-    assert not fits(law, smc.plant("furuta"))
+    assert suits(law, acrobot())
+    assert not suits(law, arm())
+    assert not suits(law, smc.plant("furuta"))
 
 
 def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
