@@ -235,6 +235,9 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
 
 def _kinds() -> dict[str, Any]:
     """Return name -> class of all parts and signals, also users'. If two have one name, the suite's is returned."""
+    from smc_mujoco.mechanisms.hardware import servos  # noqa: F401
+    from smc_mujoco.simulation import time_series  # noqa: F401
+
     kinds: list[type] = [Noise, Jump, Clock, *subclasses(Part), *subclasses(Signal)]
     kinds = [kind for kind in kinds if kind not in ABSTRACT]
     kinds.sort(key=lambda kind: kind.__module__.startswith("smc_mujoco."))

@@ -1,7 +1,9 @@
 """A scenario as JSON data and back."""
 
+import contextlib
 import dataclasses
 import functools
+import importlib
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any
@@ -14,14 +16,13 @@ from smc_mujoco.control import serialise as components
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
 from smc_mujoco.control.surface import catalogue as surfaces
-from smc_mujoco.mechanisms.hardware import backlash, drives, friction, servos  # noqa: F401  # whose parts a file may name
 from smc_mujoco.mechanisms.hardware.part import Part
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import plant as find_plant
-from smc_mujoco.simulation import time_series  # noqa: F401  # whose signals a file may name
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Clock, Jump, Noise, PerChannel, Signal
 
+FOLDERS = ("smc_mujoco.mechanisms.hardware", "smc_mujoco.simulation")  # of the parts and signals of this package
 RESOLVED = tuple(Resolved.__annotations__)  # fields that are None if left out, with a default that `resolved` has
 
 
@@ -85,6 +86,9 @@ def _restored(data: Any) -> Any:
         return PerChannel(tuple(map(_restored, data["each"])))
     if not isinstance(data, dict) or "kind" not in data:
         return data
+    if data["module"].rpartition(".")[0] in FOLDERS:  # else it is a user's, and imported already
+        with contextlib.suppress(ImportError):
+            importlib.import_module(data["module"])
     kinds = {(kind.__name__, kind.__module__): kind for base in (Signal, Part) for kind in subclasses(base)}
     if (kind := kinds.get((data["kind"], data["module"]))) is None:
         raise ScenarioError(f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it")

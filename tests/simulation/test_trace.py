@@ -23,6 +23,7 @@ from pyarrow import parquet
 from scipy.io import loadmat
 
 import smc_mujoco as smc
+from smc_mujoco.simulation import serialise
 
 pytestmark = pytest.mark.quick
 
@@ -170,6 +171,24 @@ def test_an_estimator_of_one_s_own_keeps_its_name(tmp_path):
     mine = smc.estimator_function(gains={"a": 1.0})(lambda y, gains, memory: gains.a * y.v)()
     again = smc.load(smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")).scenario
     assert (again.resolved.velocity.name, dict(again.resolved.velocity.gains)) == (mine.name, {"a": 1.0})
+
+
+def test_a_file_brings_the_parts_and_signals_that_nothing_has_used(tmp_path):
+    made = smc.Scenario(
+        plant="duffing", law="none", duration=0.01, friction=smc.hardware.Sigmoid(1.0, 2.0),
+        reference=smc.signals.TimeSeries((0.0, 1.0), (0.0, 0.1)),
+    )  # fmt: skip
+    path = smc.run(made).save(tmp_path / "a.npz")
+    code = f"import smc_mujoco as smc; s = smc.load({str(path)!r}).scenario; print(s.reference, s.friction)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == f"{made.reference} {made.friction}"
+
+
+def test_a_part_that_the_package_does_not_have_is_one_sentence():
+    data = serialise.describe(smc.Scenario(plant="duffing", law="none", friction=smc.Viscous(0.1)))
+    data["friction"][0]["module"] = "smc_mujoco.mechanisms.hardware.gone"
+    with pytest.raises(smc.ScenarioError, match="'Viscous' is unknown here"):
+        serialise.restore(data)
 
 
 def test_the_arrays_are_read_only_wherever_a_trace_comes_from(trace, tmp_path):
@@ -547,6 +566,7 @@ def test_an_existing_file_is_replaced(ending, trace, traces, tmp_path):
 
 REAL = """
 import smc_mujoco as smc
+from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation import serialise
 scenario = smc.Scenario(
     plant="duffing", law="classical", duration=0.01, contact="floor", mechanism="springs",
