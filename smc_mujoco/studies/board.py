@@ -19,6 +19,7 @@ from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
+    from smc_mujoco.analysis.law_time import LawTime
     from smc_mujoco.studies.worst_case import WorstCase
 
 MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
@@ -28,6 +29,10 @@ MAX_NAMES = 6  # in a sentence; chosen
 MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
 UNCHECKED = "unchecked"  # the mark of a law
 UNCHECKED_WORDS = "'unchecked': its code may read more than its arguments, see why_unchecked of the law."
+TIMED = (
+    "Time: of the law's compiled code a sample on this machine, the median over that of pid; below it, the median and "
+    "the 99 % quantile over the samples of a run."
+)
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
 
 
@@ -309,7 +314,8 @@ def first_of(names: Iterable[str]) -> str:
 class Boards(Tables, list[Board]):
     """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
 
-    worst: Mapping[str, Mapping[str, "WorstCase"]] = frozen({})  # plant -> law -> its worst case, for a last column
+    worst: Mapping[str, Mapping[str, "WorstCase"]] = frozen({})  # plant -> law -> its worst case, for a column
+    times: Mapping[str, Mapping[str, "LawTime"]] = frozen({})  # plant -> law -> its time, for the plant's first table
     failures: Sequence[str] = ()  # a sentence for each law with failed runs, below the last table
 
     @property
@@ -324,8 +330,12 @@ class Boards(Tables, list[Board]):
             groups.setdefault(board.about, []).append(board)
         if not groups:
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
-        made = [_table(name, its, self.worst.get(its[0].group.get("plant", ""), {})) for name, its in groups.items()]
-        return [*made[:-1], dataclasses.replace(made[-1], notes=(*made[-1].notes, *self.failures, key(self)))]
+        plants, made = [its[0].group.get("plant", "") for its in groups.values()], list[Tabular]()
+        for i, (name, its) in enumerate(groups.items()):
+            times = self.times.get(plants[i], {}) if plants[i] not in plants[:i] else {}
+            made.append(_table(name, its, self.worst.get(plants[i], {}), times))
+        notes = (*made[-1].notes, *self.failures, f"{key(self)} {TIMED}" if self.times else key(self))
+        return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 
 
 def size(value: float, metric: str) -> str:
@@ -357,7 +367,9 @@ def heading(board: Board) -> str:
     return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
 
 
-def _table(name: str, boards: Sequence[Board], worst: Mapping[str, "WorstCase"]) -> Tabular:
+def _table(
+    name: str, boards: Sequence[Board], worst: Mapping[str, "WorstCase"], times: Mapping[str, "LawTime"]
+) -> Tabular:
     """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
     sources_of = sources(boards)
     cells = {(i, entry.law): _cell(board, entry) for i, board in enumerate(boards) for entry in board.entries}
@@ -371,7 +383,8 @@ def _table(name: str, boards: Sequence[Board], worst: Mapping[str, "WorstCase"])
         name_cell = Cell(law, ", ".join(marks), colour=style.law_colour(law))
         found = worst.get(law)
         case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}") if found else ""] * bool(worst)
-        rows.append([name_cell, *(cells.get((i, law), "") for i in range(len(boards))), *case])
+        time = [_time(times[law]) if law in times else ""] * bool(times)
+        rows.append([name_cell, *(cells.get((i, law), "") for i in range(len(boards))), *case, *time])
     units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
     if len(largest.blocks) == 1:
@@ -379,11 +392,20 @@ def _table(name: str, boards: Sequence[Board], worst: Mapping[str, "WorstCase"])
     samples = {block.sample: block.condition for block in reversed(largest.blocks)}
     several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
     return Tabular(
-        headings=["law", *map(heading, boards), *units],
+        headings=["law", *map(heading, boards), *units, *["time (of pid's)"] * bool(times)],
         rows=rows,
         title=f"{name}: {several if len(samples) > 1 else largest.blocks[0].sample}",
         notes=_verdicts(boards),
     )
+
+
+def _time(one: "LawTime") -> Cell:
+    """Return the time of a law a sample: over that of pid, and below it median and 99 % quantile."""
+    return Cell(f"{one.ratio:.2g}" if one.ratio < 100.0 else f"{one.ratio:.0f}", f"{_ns(one.median)}, {_ns(one.high)}")
+
+
+def _ns(seconds: float) -> str:
+    return f"{1e9 * seconds:.3g} ns" if seconds < 1e-6 else f"{1e6 * seconds:.3g} us"
 
 
 def _cell(board: Board, entry: Entry) -> Cell:

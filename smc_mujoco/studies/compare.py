@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from smc_mujoco.analysis import paired_runs
+from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning import search
 from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
@@ -60,6 +61,7 @@ class Compared(Tables):
     # A board for each metric on each plant in each condition; on each plant, if that makes more than 12 blocks
     leaderboard: Boards
     worst: Mapping[str, Mapping[str, "WorstCase"]]  # plant -> law -> its `worst_case`; empty if it was not searched
+    times: Mapping[str, Mapping[str, LawTime]]  # plant -> law -> time of its compiled code a sample, on this machine
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
@@ -125,9 +127,9 @@ class Compared(Tables):
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.
 
         Its columns are plant, condition, law, gains (their source), metric, unit, median, low and high (the interval),
-        failed (runs without a value), runs, best (whether no law is better), winner, and worst_found: the rms error of
-        the worst run that an adversary found on the plant, NaN without a search. All runs are in
-        `table.data.to_pandas()`.
+        failed (runs without a value), runs, best (whether no law is better), winner, worst_found: the rms error of the
+        worst run that an adversary found on the plant, NaN without a search, and time, s, and time_ratio, see `times`.
+        All runs are in `table.data.to_pandas()`.
 
         Raises:
           MissingPackageError: pandas is not installed.
@@ -140,7 +142,8 @@ class Compared(Tables):
     def _rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of `to_pandas`."""
         for board in self.leaderboard:
-            worst = self.worst.get(board.group.get("plant", ""), {})
+            plant = board.group.get("plant", "")
+            worst, times = self.worst.get(plant, {}), self.times.get(plant, {})
             for entry in board.entries:
                 yield {
                     **{"plant": "", "condition": ""} | dict(board.group),
@@ -156,6 +159,8 @@ class Compared(Tables):
                     "best": entry.rank.best,
                     "winner": board.winner == entry.law,
                     "worst_found": worst[entry.law].value if worst else math.nan,
+                    "time": times[entry.law].median if entry.law in times else math.nan,
+                    "time_ratio": times[entry.law].ratio if entry.law in times else math.nan,
                 }
 
     def plot(
@@ -242,7 +247,8 @@ def compare(
     sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
     outside = {p: tuple(c.law.name for c in candidates[p] if not c.law.checked) for p in unseen}
     boards[:0] = objective_boards(unseen, sources, defaults, relevant, outside, unchecked)
-    return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found)
+    boards.times = times = _times(trial, candidates)
+    return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found, times=times)
 
 
 def _trial(
@@ -291,6 +297,17 @@ def _worst_cases(
         return trial.attack(f"{plant.name}-{law.name}", scenario, within)
 
     return {p.name: {c.law.name: attacked(p, c.law) for c in candidates[p.name]} for p in trial.plants}
+
+
+def _times(trial: Trial, candidates: Mapping[str, Sequence[Candidate]]) -> dict[str, dict[str, LawTime]]:
+    """Return `Compared.times`, of the laws with their best gains, without those that do not compile."""
+
+    def timed(plant: Plant) -> Iterator[tuple[str, LawTime]]:
+        for candidate in candidates[plant.name]:
+            if found := law_time(case(plant, candidate.law, trial.conditions[0], trial.duration, starts=trial.starts)):
+                yield candidate.law.name, found
+
+    return {plant.name: dict(timed(plant)) for plant in trial.plants}
 
 
 def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:

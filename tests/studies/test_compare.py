@@ -78,7 +78,7 @@ def test_a_comparison_s_table_of_gains_and_its_columns_for_programs_are_whole(fo
     assert all("=" in str(row[4]) for row in gains.rows)
     heads = " ".join(str(cell).replace("\n", " ") for cell in boards[-1].headings)
     assert all(unit in heads for unit in ("(%)", "(s)", "(rad)", "(rad s^2)", "(N m/s)"))
-    names = "plant condition law gains metric unit median low high failed runs best winner worst_found"
+    names = "plant condition law gains metric unit median low high failed runs best winner worst_found time time_ratio"
     assert list(found.to_pandas().columns) == names.split()
 
 
@@ -218,7 +218,7 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     assert "duffing: rms error in m, worst of 16 runs within |d| <= 0.5 N" in text
     assert all(number(each.value) in text for each in made.worst["duffing"].values())
     assert "worst found (m)" in made.to_latex()
-    column = {row[0].text: row[-1] for row in made.leaderboard.tables[0].rows}
+    column = {row[0].text: row[-1] for row in made.leaderboard.tables[1].rows}
     assert column == {law: (one.shown(one.value), f"median {one.shown(one.median)}", False, "", "")
                       for law, one in made.worst["duffing"].items()}  # fmt: skip
     monkeypatch.setattr(worst_case, "worst_case", None)

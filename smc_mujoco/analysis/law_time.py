@@ -1,0 +1,102 @@
+"""Time of a law a sample: of its compiled code alone, on this machine, on what it measures in a run.
+
+Every sample of the run is given to several copies of the law at once, each with its own memory, so that a clock can
+tell tens of ns. Of a few rounds the least time of each sample counts, as what else the machine does only adds to it.
+So the 99 % quantile is over samples: of a law that iterates it is the time of its hard ones. The code is warm: it and
+its memory are in the processor's caches. The law `pid` takes its turn on the same measurements.
+"""
+
+# pyright: reportCallIssue=false
+# (an intrinsic is called without its typing context)
+import dataclasses
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from smc_mujoco.common.jit import NotCompilable, call
+from smc_mujoco.control.law import Law, Measurement, law
+from smc_mujoco.simulation import cfunctions
+from smc_mujoco.simulation.python_controller import Controller, Failure
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.scenario import Scenario
+
+LONGEST = 2.0  # s of a run, with the approach and some rest of most; chosen
+COPIES, MOST_NUMBERS = 256, 8192  # of a law at once; numbers of their memories, which fit a processor's first cache
+ROUNDS = 5
+
+
+class LawTime(NamedTuple):
+    """The time of a law a sample."""
+
+    median: float  # s
+    high: float  # s, the 99 % quantile over samples
+    ratio: float  # of the median to that of `pid` on the same measurements
+
+
+class _Listener:
+    """In place of a controller's law: keeps what channel 0 measures, and gives the u of a run."""
+
+    def __init__(self, u: np.ndarray):
+        self.name, self.u, self.seen = "listener", u, list[Measurement]()
+
+    def __call__(self, i: int, y: Measurement) -> tuple[float, float]:
+        if i == 0:
+            self.seen.append(y)
+        return float(self.u[len(self.seen) - 1, i]), 0.0
+
+
+def law_time(scenario: Scenario) -> LawTime | None:
+    """Return the time of a scenario's law in its channel 0; None for a law that does not compile, or of many joints."""
+    of_channel = scenario.resolved.law
+    if of_channel.joint:
+        return None
+    timed, reference = of_channel.of_channel(0), law("pid")
+    try:
+        cfunctions.compile_component(timed)
+        seen = _measured(scenario)
+    except (NotCompilable, Failure):
+        return None
+    rounds = [(_round(timed, seen), _round(reference, seen)) for _ in range(ROUNDS)]  # in turn, as loads come and go
+    own, other = (np.min(each, axis=0) for each in zip(*rounds, strict=True))
+    median, high = np.quantile(own, (0.5, 0.99)).tolist()
+    return LawTime(median, high, median / float(np.median(other)))
+
+
+def _measured(scenario: Scenario) -> np.ndarray:
+    """Return what the law measures in channel 0 in a run, (samples, fields of a Measurement)."""
+    trace: Any = run(dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST)))
+    controller, listener = Controller(trace.scenario), _Listener(trace.u)
+    controller.law = listener  # pyright: ignore[reportAttributeAccessIssue]
+    for k in np.flatnonzero(np.isfinite(trace.u).all(axis=1)).tolist():
+        controller(k, float(trace.t[k]), trace.x[k], trace.v[k])
+    if not listener.seen:
+        raise Failure("the run has no sample")
+    return np.array(listener.seen)
+
+
+def _round(timed: Law, seen: np.ndarray) -> np.ndarray:
+    """Return the time of a law at each sample, s, (samples,)."""
+    function, copies = cfunctions.compile_component(timed), max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1)))
+    gains, memory, out = np.array([*timed.gains.values(), 0.0]), np.zeros((copies, timed.memory + 1)), np.zeros(2)
+    own, stride = [a.ctypes.data for a in (gains, memory, out)], memory.strides[0]
+    rows = [row.ctypes.data for row in seen]
+    clock, spent = time.perf_counter_ns, np.empty(len(rows))
+    empty = np.empty(len(rows))
+    for k, row in enumerate(rows):
+        start = clock()
+        _calls(function.address, row, *own, stride, 0)
+        middle = clock()
+        _calls(function.address, row, *own, stride, copies)
+        spent[k], empty[k] = clock() - middle, middle - start
+    return 1e-9 * np.maximum(spent - np.median(empty), 0.0) / copies
+
+
+@njit
+def _calls(function, y, gains, memory, out, stride, copies):
+    """Call some copies of a law with one measurement. Return how many of them raised."""
+    raised = 0
+    for i in range(copies):
+        raised += call(function, y, gains, memory + i * stride, out)
+    return raised

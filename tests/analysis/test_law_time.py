@@ -1,0 +1,45 @@
+"""The time of a law is that of its compiled code, on what it measures in a run."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis import law_time
+from smc_mujoco.control.law import Measurement
+from smc_mujoco.simulation import python_controller
+
+pytestmark = pytest.mark.quick
+
+
+def test_the_law_is_given_what_it_measures_in_its_run():
+    scenario = smc.Scenario(
+        plant="pendulum_network",
+        law="pid",
+        model="nominal",
+        velocity="filtered_difference",
+        noise=smc.Noise(position=0.01),
+        reference=smc.Sine(0.2, 3.0),
+        duration=0.3,
+    )
+    law, u = scenario.resolved.law, smc.run(scenario).u[:, 0]
+    gains, memory = python_controller.gains_of(law), np.zeros(law.memory)
+    seen = [Measurement(*row) for row in law_time._measured(scenario)]
+    asked = np.array([law.function(y, gains, memory)[0] for y in seen])
+    np.testing.assert_allclose(asked.clip(-seen[0].limit, seen[0].limit), u, rtol=1e-9, atol=1e-9)
+
+
+def test_a_time_is_what_is_left_of_the_clock_without_the_call_over_the_copies(monkeypatch):
+    """The clock says 1 us for no copy, and for 256 copies 7 ns more for each, but 50 ns at one sample in 50."""
+    each = [1000 + 256 * (50 if k % 50 == 0 else 7) for k in range(101)]
+    ticks = itertools.cycle(itertools.chain.from_iterable((0, 1000, one) for one in each))
+    now = itertools.accumulate(ticks)
+    monkeypatch.setattr(law_time.time, "perf_counter_ns", lambda: next(now))
+    found = law_time.law_time(smc.Scenario(plant="duffing", law="pid", duration=0.1))
+    assert found == pytest.approx((7e-9, 50e-9, 1.0))
+
+
+@pytest.mark.parametrize("law", [smc.policy(lambda seen: -0.1 * seen[0]), smc.law("observer_free_joint")])
+def test_a_law_in_python_or_of_many_joints_has_none(law):
+    assert law_time.law_time(smc.Scenario(plant="panda" if law.joint else "duffing", law=law, duration=0.01)) is None
