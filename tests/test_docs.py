@@ -115,7 +115,7 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
         runpy.run_path("compare.py", run_name="__main__")
     (shown,) = blocks(TUTORIAL.read_text(), "text")
     # Each comparison draws new noise, so the page's numbers do not come again; who wins in which metric does.
-    wins = r"^(?:settling time|TV rate) on .*?: \S+ wins"
+    wins = r"^(?:J|TV rate) on .*?: \S+ wins"
     told = [re.findall(wins, text, re.MULTILINE) for text in (said.getvalue(), shown)]
     assert told[0] == told[1]
     assert len(told[0]) == 2

@@ -6,7 +6,7 @@
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
 - tuned: the gains that independent searches by `tuning` found, for every general law, with a cost of the variation of
   u. The runs of a study use their sets in turn, run i that of search i, so that gains are part of the sample. The laws
-  of LAWS have twelve searches. All others have three, which no verdict follows from.
+  of COMPARED have twelve searches. All others have three, which no verdict follows from.
 - tracking: the same for the laws of LAWS, of three searches, without that cost.
 - default: the default gains of the law.
 
@@ -35,12 +35,15 @@ SETS = ("study", "tuned", "tracking")
 KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
 NameOfSet = Annotated[str, OneOf(names=(*KNOWN_SETS,))]
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
-# The laws on the report's first page: the four of the paper, two more of its first study, and the first law of each
-# other family in the table of docs/catalogue.md, which was written before any tuning.
+# The laws on the report's first page, and all that are compared where none are named: the four of the paper, two more of
+# its first study, and the first law of each other family in the table of docs/catalogue.md, which was written before any
+# tuning; then laws without a sliding mode that want to win, written for that after the others were tuned.
 LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
     "implicit_first_order", "twisting", "terminal", "extended_state", "pid",
 )  # fmt: skip
+RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
+COMPARED = (*LAWS, *RIVALS)
 
 # Other implementation or name of a law -> the law whose gains it uses.
 ALIASES = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
@@ -81,14 +84,14 @@ def law(plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | N
 
 
 def general() -> tuple[str, ...]:
-    """List every law that can be compared on some plant: those of LAWS, then all others by name."""
-    others = {name for name, template in catalogue().items() if not template.plants} - {"none", *ALIASES, *LAWS}
-    return *LAWS, *sorted(others)
+    """List every law that can be compared on some plant: those of COMPARED, then all others by name."""
+    others = {name for name, template in catalogue().items() if not template.plants} - {"none", *ALIASES, *COMPARED}
+    return *COMPARED, *sorted(others)
 
 
 @constrained
 def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
-    """List the general laws that have gains in a set on each of these plants, those of LAWS first."""
+    """List the general laws that have gains in a set on each of these plants, those of COMPARED first."""
     named = [as_plant(plant) for plant in plants]
     if names := [name for name in general() if all(in_set(plant, name, gains) for plant in named)]:
         return names

@@ -211,7 +211,8 @@ def compare(
     Laws whose code is unchecked, see `Law.checked`, are marked.
 
     Args:
-      laws: names, or your own laws. Default: those of the report's first page, or else all that suit the plant.
+      laws: names, or your own laws. Default: those of the report's first page, of these the ones that come with gains
+        for the plant, if any do; or else all that suit the plant.
       plants: names, or Plants, such as one from your own MJCF. Default: the paper's five.
       conditions: names, such as "noise + coulomb", texts, or your own, see `condition`. Default: one of each kind.
       seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
@@ -323,6 +324,7 @@ def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
 
 def _usual(plant: Plant) -> list[Any]:
     """Return the laws to compare on a plant if none are given."""
-    known = [name for name in gain_sets.LAWS if suits(catalogue()[name], plant)]
+    known = [name for name in gain_sets.COMPARED if suits(catalogue()[name], plant)]
+    known = [name for name in known if gain_sets.in_set(plant, name, "tuned")] or known
     left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
     return known or [law for law in suitable(plant=plant) if law.name not in left_out]

@@ -149,7 +149,7 @@ class Paper:
         if of_set is None:
             if law in self.laws:
                 return self.bound(law, {})
-            known = law in (*gain_sets.LAWS, *gain_sets.STUDY_ALIASES)
+            known = law in (*gain_sets.COMPARED, *gain_sets.STUDY_ALIASES)
             return gain_sets.law(self.plant(plant), law, gains if known else "default")
         values = {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})}
         made = self.bound(law, values)

@@ -43,7 +43,7 @@ def interval(median: float, low: float, high: float) -> str:
 
 def colour(name: str) -> str:
     """Return the colour of a law, different from those of the short list and of other packages' laws."""
-    shown = list(dict.fromkeys([*gain_sets.LAWS, *known_laws().added, name]))
+    shown = list(dict.fromkeys([*gain_sets.COMPARED, *known_laws().added, name]))
     return style.law_colours(shown)[shown.index(name)]
 
 
