@@ -35,8 +35,8 @@ SETS = ("study", "tuned", "tracking")
 KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
 NameOfSet = Annotated[str, OneOf(names=(*KNOWN_SETS,))]
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
-# The laws on the report's first page, and all that are compared where none are named: the four of the paper, two more of
-# its first study, and the first law of each other family in the table of docs/catalogue.md, which was written before any
+# The laws on the report's first page, which are compared where none are named: the four of the paper, two more of its
+# first study, and the first law of each other family in the table of docs/catalogue.md, which was written before any
 # tuning; then laws without a sliding mode that want to win, written for that after the others were tuned.
 LAWS = (
     "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",

@@ -189,7 +189,12 @@ def law(name: str, **gains: float | Sequence[float]) -> Law:
 
 
 def suits(law: Law | Template, plant: Plant) -> bool:
-    """Return whether a law is for a plant: for all plants, for this one, or for user's models of the same kind."""
+    """Return whether a law is for a plant: for all plants, for this one, or for user's models of the same kind.
+
+    A law with gains of the plant's linearisation, which nobody gave, is for plants that have one.
+    """
+    if isinstance(law, Template) and any(gain.plant for gain in law.gains.values()):
+        return not (plant.unmodelled or plant.underactuated)
     if not law.plants or plant.name in law.plants:
         return True
     plants = [plants_known()[name] for name in law.plants if name in plants_known()]

@@ -1,5 +1,6 @@
 """Laws without a sliding mode that want to win are what their textbooks say, with foreign solvers as judges."""
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -124,6 +125,11 @@ def test_a_scenario_gives_the_law_the_plant_that_it_runs_on(name):
     assert tuple(given[key] for key in UNIT) == design.linearised(smc.plant("inverted_pendulum"), "lqr")
     own = smc.Scenario(plant="inverted_pendulum", law=smc.law(name, **UNIT)).resolved.law.gains
     assert {key: own[key] for key in UNIT} == UNIT
+
+
+def test_a_law_of_the_linear_theory_is_for_plants_that_have_one():
+    bare = dataclasses.replace(smc.plant("duffing"), unmodelled="nobody wrote it")
+    assert set(smc.laws("duffing")) - set(smc.laws(bare)) == {"lqi", "mpc", "loop_shaping"}
 
 
 # ADRC
