@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.plants_ab import called
 
 import smc_mujoco as smc
 from smc_mujoco.analysis import law_time
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
 
@@ -24,9 +24,9 @@ def test_the_law_is_given_what_it_measures_in_its_run():
         duration=0.3,
     )
     law, u = scenario.resolved.law, smc.run(scenario).u[:, 0]
-    gains, memory = python_controller.gains_of(law), np.zeros(law.memory)
+    memory = np.zeros(law.memory)
     seen = [Measurement(*row) for row in law_time._measured(scenario)]
-    asked = np.array([law.function(y, gains, memory)[0] for y in seen])
+    asked = np.array([called(law, y, memory)[0] for y in seen])
     np.testing.assert_allclose(asked.clip(-seen[0].limit, seen[0].limit), u, rtol=1e-9, atol=1e-9)
 
 
