@@ -515,6 +515,7 @@ def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
     return [shades[int(np.abs(lightness - level).argmin())] for level in np.linspace(lightest, DARKEST, count)]
 
 
+@functools.cache
 def letters_on(colour: str) -> str:
     """Return the colour of letters that have more contrast with a colour, white or ink (WCAG 2.2)."""
     on, ink, paper = (_luminance(shade) + 0.05 for shade in (colour, INK, PAPER))

@@ -207,7 +207,8 @@ def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
     shaft = np.column_stack([np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T])
-    along = np.gradient(shaft, axis=0)
+    ahead, behind = np.concatenate([shaft[1:], shaft[-1:]]), np.concatenate([shaft[:1], shaft[:-1]])
+    along = ahead - behind
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
     return np.concatenate([shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]])
