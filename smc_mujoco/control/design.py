@@ -52,18 +52,18 @@ def at_plant(law: Law, plant: Plant) -> Law:
     return dataclasses.replace(law, gains=gains).sourced(law.source.kind, law.source.search)
 
 
-def lqr(of: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
+def lqr(plant: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
     """Return the law `lqr` for a plant at the origin, which minimises the integral of q[0] e^2 + q[1] de^2 + r u^2.
 
     Args:
-      of: a Plant or the name of one.
+      plant: a Plant or the name of one.
       q: weights of error and rate, the plant's units.
       r: weight of the control.
 
     Raises:
       ScenarioError: a weight out of range, or a joint without an actuator.
     """
-    a1, a2, b = linearised(as_plant(of), "lqr")
+    a1, a2, b = linearised(as_plant(plant), "lqr")
     if len(weights := items_of("q", q)) != 2:
         raise ScenarioError(f"q is {shown(q)}: give two weights, of error and rate")
     return law("lqr", q1=weights[0], q2=weights[1], r=r, a1=a1, a2=a2, b=b)

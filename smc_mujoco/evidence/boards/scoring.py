@@ -96,7 +96,7 @@ def criteria(trace: Trace) -> Criteria:
 
 @constrained
 def score(
-    of: Trace | Mapping[str, Any] | Criteria | Row, version: Annotated[str, OneOf(names=(*VERSIONS,))] = "v2"
+    run: Trace | Mapping[str, Any] | Criteria | Row, version: Annotated[str, OneOf(names=(*VERSIONS,))] = "v2"
 ) -> float:
     """Return the score of a run, in 0 .. 1, or of criteria by name, such as those of a published row.
 
@@ -104,7 +104,7 @@ def score(
       ScenarioError: an unknown version, a criterion that is missing, or another plant.
     """
     wanted = VERSIONS[version]
-    measured = criteria(of) if isinstance(of, Trace) else of
+    measured = criteria(run) if isinstance(run, Trace) else run
     values: Mapping[str, Any] = measured if isinstance(measured, Mapping) else measured._asdict()
     for name in wanted:
         if values.get(name) is None:

@@ -31,17 +31,17 @@ class Pick(NamedTuple):
     median: float  # of the conditions' medians
     wins: int  # conditions
     losses: int  # conditions in which another law is better, it has runs that fail, or samples are too few to tell
-    of: int  # conditions
+    conditions: int
     level: tuple[str, ...]  # the other laws that lose no more of them
 
     @property
     def sure(self) -> str:
         """How sure the choice is, in words."""
         if not self.law:
-            return f"all {len(self.level)} laws level in {'each of ' * (self.of > 1)}{self.of}"
-        if self.wins == self.of:
-            return "wins" + f" in {every(self.of)}" * (self.of > 1)
-        unbeaten = f"unbeaten in {self.of - self.losses or 'none'} of {self.of}"
+            return f"all {len(self.level)} laws level in {'each of ' * (self.conditions > 1)}{self.conditions}"
+        if self.wins == self.conditions:
+            return "wins" + f" in {every(self.conditions)}" * (self.conditions > 1)
+        unbeaten = f"unbeaten in {self.conditions - self.losses or 'none'} of {self.conditions}"
         return f"{unbeaten}, wins in {self.wins}" if self.wins else unbeaten
 
 
@@ -118,11 +118,11 @@ def pick(findings: "Findings", metric: str, plant: str) -> Pick | None:
     losses = {law: sum(law not in block.best for block in board.blocks) for law in entries}
     best = min(entries, key=lambda law: (losses[law], entries[law].failed, entries[law].rank.mean))
     level = [law for law in sorted(entries, key=lambda law: entries[law].rank.mean) if losses[law] == losses[best]]
-    of = len(board.blocks)
+    conditions = len(board.blocks)
     if len(entries) > 1 and not any((*wins.values(), *losses.values())):
-        return Pick("", math.nan, 0, 0, of, tuple(level))
+        return Pick("", math.nan, 0, 0, conditions, tuple(level))
     level.remove(best)
-    return Pick(best, entries[best].interval.median, wins[best], losses[best], of, tuple(level))
+    return Pick(best, entries[best].interval.median, wins[best], losses[best], conditions, tuple(level))
 
 
 def attacked(findings: "Findings") -> dict[str, WorstCases]:

@@ -167,7 +167,7 @@ class Identified:
 
 @constrained
 def identify(
-    of: Rig | Plant | str,
+    rig: Rig | Plant | str,
     records: Source | Sequence[Source],
     quantities: Sequence[str] | None = None,
     *,
@@ -180,7 +180,7 @@ def identify(
     """Find a rig's quantities from records.
 
     Args:
-      of: a Rig or its name; or a Plant, whose records are traces, or columns named as those of traces.
+      rig: a Rig or its name; or a Plant, whose records are traces, or columns named as those of traces.
       records: one record or several: columns by name (see `Rig.columns`), or traces of simulated runs.
       quantities: names of those to find; None: the rig's `free`, or all parameters of a plant that are not 0.
       start: quantity -> value, SI units, from which the search starts; those not given start at the rig's own.
@@ -197,7 +197,7 @@ def identify(
     many: list[Any] = list(records) if isinstance(records, (list, tuple)) else [records]
     if not many:
         raise ScenarioError("there are no records: give at least one")
-    twin, data = _twin(of, many)
+    twin, data = _twin(rig, many)
     twin = twin.with_values(start or {})
     names = _checked_names(twin, quantities)
     fits_before = tuple(twin.fits(data))  # also refuses records that are too short
@@ -286,16 +286,16 @@ def _starting_states(
     return [whole_records.state(candidates[best[i]], i) for i in range(len(data))]
 
 
-def _twin(of: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
+def _twin(given: Rig | Plant | str, many: Sequence[Source]) -> tuple[Rig, list[Mapping[str, Any]]]:
     """Return the rig to identify, and its records as columns."""
-    if isinstance(of, str):
-        of = find_rig(of)
+    if isinstance(given, str):
+        given = find_rig(given)
     traces = [record for record in many if isinstance(record, Trace)]
-    if isinstance(of, Plant):
-        of = _of_plant(of, traces[0].scenario if traces else None)
-    if not isinstance(of, Rig):
-        raise ScenarioError(f"cannot identify {shown(of)}: give a rig, the name of one, or a smc.Plant")
-    return of.reading(many)
+    if isinstance(given, Plant):
+        given = _of_plant(given, traces[0].scenario if traces else None)
+    if not isinstance(given, Rig):
+        raise ScenarioError(f"cannot identify {shown(given)}: give a rig, the name of one, or a smc.Plant")
+    return given.reading(many)
 
 
 def _of_plant(plant: Plant, base: Scenario | None) -> Rig:

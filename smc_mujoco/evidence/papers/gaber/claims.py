@@ -72,9 +72,9 @@ def comes_to_rest(runs, grid):
     return {"ultimate bound / |x0|": {name: score["ultimate_bound"] / scale(run) for (name, run), score in scores}}
 
 
-def larger_than(value, of=0.0):
+def larger_than(value, scale=0.0):
     """Return the least value that is relevantly larger: by 3 % of the larger one, and by 0.5 % of a scale."""
-    return max(value / (1.0 - RELEVANT), value + RELEVANT_SCALE_SHARE * of)
+    return max(value / (1.0 - RELEVANT), value + RELEVANT_SCALE_SHARE * scale)
 
 
 def times(runs, plant, *laws):
@@ -468,7 +468,7 @@ def side_by_side(runs):
     rival = law if other == OURS else other
 
     def overshoots_more():
-        limit = larger_than(overshoot(runs, plant, OURS), of=100.0)
+        limit = larger_than(overshoot(runs, plant, OURS), scale=100.0)
         what = f"{plant}: overshoot of {rival} against {OURS}'s, %"
         return runs.check("overshoot", what, runs.score(plant, rival)["overshoot"], limit)
 
@@ -498,7 +498,7 @@ def moderate_undershoot(runs):
 
 def largest_oscillation(runs):
     """Claim 32: Van der Pol: HOSMC largest oscillation."""
-    others = larger_than(max(overshoot(runs, runs.plant, law) for law in LAWS if law != HOSMC), of=100.0)
+    others = larger_than(max(overshoot(runs, runs.plant, law) for law in LAWS if law != HOSMC), scale=100.0)
     over = {law: runs.score(runs.plant, law)["overshoot"] for law in (HOSMC, CONDITIONED, UNCLAMPED)}
     names = {law: f"{runs.plant}: overshoot of {law}, %" for law in over}
     checks = [runs.check("overshoot", names[law], over[law], others) for law in (HOSMC, CONDITIONED)]
