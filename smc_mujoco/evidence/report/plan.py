@@ -28,6 +28,7 @@ class Plan(Extent):
     """How much of everything: the extent of the grid, and the rest."""
 
     quick: bool  # whether margins and claims are quick
+    laws: tuple[str, ...] = GRID.laws
     conditions: tuple[str, ...] = GRID.conditions
     seeds: int = GRID.seeds
     relevant: float = RELEVANT  # the least relevant difference, see `leaderboard`

@@ -239,7 +239,7 @@ THIRTEEN = (
 
 
 def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
-    monkeypatch.setattr(gains, "LAWS", THIRTEEN)
+    monkeypatch.setattr(gains, "COMPARED", THIRTEEN)
     assert len({words.colour(law) for law in THIRTEEN}) == 13
     assert len({words.short(law) for law in THIRTEEN}) == 13
     assert max(len(words.short(law)) for law in THIRTEEN) <= 3
