@@ -11,7 +11,7 @@ heavy until a test uses a fixture or the marker, and does not change MUJOCO_GL.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +20,7 @@ import pytest
 if TYPE_CHECKING:
     from smc_mujoco.testing.response import StepResponse
 
+EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
 GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wrote
 
 
@@ -56,16 +57,45 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if marker is None:
         return
     from smc_mujoco.common.errors import ScenarioError
-    from smc_mujoco.testing.cases import cases
 
     try:
-        names_of, wrong = cases(marker.args, marker.kwargs, metafunc.fixturenames), ""
+        names_of, wrong = _cases(marker.args, marker.kwargs, metafunc.fixturenames), ""
     except ScenarioError as error:
         names_of, wrong = {}, str(error)
     if wrong:  # raised outside of the handler, so that pytest does not show the frames of the error
         pytest.fail(f"{metafunc.definition.nodeid}: {wrong}", pytrace=False)
     for argument, names in names_of.items():
         metafunc.parametrize(argument, names)
+
+
+def _cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
+    """Return the test's argument, "plant" or "condition" -> the names with which the test runs."""
+    from smc_mujoco.common.errors import ScenarioError, find, shown
+    from smc_mujoco.mechanisms.plant import catalogue
+    from smc_mujoco.simulation.conditions import PLANTS, find_condition
+
+    defaults = {"plants": PLANTS, "conditions": ("nominal",)}
+    name_of = {
+        "plant": lambda one: find("plant", one, catalogue()).name,
+        "condition": lambda one: str(find_condition(one)),
+    }
+    if given:
+        raise ScenarioError(f"marker smc is given {shown(given[0])}: name its arguments, as in {EXAMPLE}")
+    for name in named:
+        find("argument of marker smc", name, defaults)
+    used: dict[str, list[str]] = {}
+    for plural, default in defaults.items():
+        argument, value = plural.removesuffix("s"), named.get(plural, default)
+        several = value if isinstance(value, list | tuple) else [value]
+        if argument in arguments:
+            if not several:
+                raise ScenarioError(f"{plural} of marker smc is {shown(value)}: give names, as in {EXAMPLE}")
+            used[argument] = [name_of[argument](one) for one in several]
+        elif plural in named:
+            raise ScenarioError(f"marker smc gives {plural} and the test takes no {argument}: add the argument")
+    if not used:
+        raise ScenarioError("marker smc is on a test that takes neither plant nor condition: add the arguments")
+    return used
 
 
 @pytest.fixture(scope="session")
