@@ -27,18 +27,20 @@ Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) ->
 class Pick(NamedTuple):
     """The law to take for a metric on a plant, over the conditions."""
 
-    law: str  # "" where all laws are level
+    law: str  # "" where no law is beaten
     median: float  # of the conditions' medians
     wins: int  # conditions
     losses: int  # conditions in which another law is better, it has runs that fail, or samples are too few to tell
     conditions: int
-    level: tuple[str, ...]  # the other laws that lose no more of them
+    others: tuple[str, ...]  # the other laws that lose no more of them
+    level: bool = False  # whether all laws are level, which more than that none is beaten, in every condition
 
     @property
     def sure(self) -> str:
         """How sure the choice is, in words."""
         if not self.law:
-            return f"all {len(self.level)} laws level in {'each of ' * (self.conditions > 1)}{self.conditions}"
+            how = "level" if self.level else "unbeaten"
+            return f"all {len(self.others)} laws {how} in {'each of ' * (self.conditions > 1)}{self.conditions}"
         if self.wins == self.conditions:
             return "wins" + f" in {every(self.conditions)}" * (self.conditions > 1)
         unbeaten = f"unbeaten in {self.conditions - self.losses or 'none'} of {self.conditions}"
@@ -72,6 +74,13 @@ def leaders(by_cell: Cells, plant: str, condition: str, metric: str) -> list[str
     """Return the laws that are best, or level with the best; none where no law has a finite median."""
     best = [s for s in by_cell.get((plant, condition, metric), ()) if s.best]
     return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
+
+
+def nobody(by_cell: Cells, plant: str, condition: str, metric: str) -> str:
+    """Return why a cell has no leaders, in words."""
+    if all(s.failed or math.isinf(s.median) for s in by_cell.get((plant, condition, metric), ())):
+        return "every law has runs that fail, or never gets there"
+    return "each is beaten, fails, or has too few runs to tell"
 
 
 def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
@@ -117,12 +126,12 @@ def pick(findings: "Findings", metric: str, plant: str) -> Pick | None:
     wins = {law: len(board.wins(law)) for law in entries}
     losses = {law: sum(law not in block.best for block in board.blocks) for law in entries}
     best = min(entries, key=lambda law: (losses[law], entries[law].failed, entries[law].rank.mean))
-    level = [law for law in sorted(entries, key=lambda law: entries[law].rank.mean) if losses[law] == losses[best]]
+    others = [law for law in sorted(entries, key=lambda law: entries[law].rank.mean) if losses[law] == losses[best]]
     conditions = len(board.blocks)
     if len(entries) > 1 and not any((*wins.values(), *losses.values())):
-        return Pick("", math.nan, 0, 0, conditions, tuple(level))
-    level.remove(best)
-    return Pick(best, entries[best].interval.median, wins[best], losses[best], conditions, tuple(level))
+        return Pick("", math.nan, 0, 0, conditions, tuple(others), all(block.level for block in board.blocks))
+    others.remove(best)
+    return Pick(best, entries[best].interval.median, wins[best], losses[best], conditions, tuple(others))
 
 
 def attacked(findings: "Findings") -> dict[str, WorstCases]:
@@ -174,10 +183,12 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
         return f"{words.law(winners[0])} wins in every respect compared here, on every plant in every condition."
     if unbeaten := [law for law in sorted(findings.laws) if by_cell and best[law] == len(by_cell)]:
         if len(unbeaten) == len(findings.laws):
-            return "No law can be called the best: in every respect compared here, all laws are level."
+            return "No law can be called the best: in no respect compared here is one shown to be better than another."
         names = joined(map(words.law, unbeaten))
-        return f"No law can be called the best; none is better than {names} anywhere, in any respect compared here."
-    return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
+        return f"No law can be called the best; none is shown to be better than {names} in any respect, anywhere."
+    if len(wins) > 1:
+        return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
+    return "No law is shown to be the best in every respect and condition."
 
 
 def sure(findings: "Findings", metrics: Sequence[str]) -> str:

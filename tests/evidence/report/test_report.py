@@ -339,6 +339,16 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
     assert never[0].times == math.inf
 
 
+def test_a_cell_without_leaders_says_of_which_kind_it_is():
+    def why(*cell):
+        return answer.nobody(answer.cells(cell), cell[0].plant, cell[0].condition, cell[0].metric)
+
+    a, b = scores(observer_free=3.0, classical=1.0)
+    failing = [one._replace(failed=1) for one in (a, b)]
+    assert why(*failing) == why(failing[0], b._replace(median=math.inf)) != why(failing[0], b)
+    assert "beaten" in why(failing[0], b)
+
+
 def picked(findings, *places):
     one = answer.pick(dataclasses.replace(findings, boards=boards_of(places, 4)), "itae", "duffing")
     assert one
@@ -347,14 +357,20 @@ def picked(findings, *places):
 
 def test_the_law_to_take_is_beaten_in_the_fewest_conditions_then_has_the_best_mean_rank(findings):
     one = picked(findings, Place("a", 2, 2, 1.0), Place("b", 1, 0, 3.0), Place("c", 1, 0, 2.0), Place("d", plant="x"))
-    assert (one.law, one.level) == ("c", ("b",))
+    assert (one.law, one.others) == ("c", ("b",))
     assert one.sure == "unbeaten in 3 of 4"
     assert picked(findings, Place("a", 4, median=2.0), Place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
     assert picked(findings, Place("a", 0, 4)).sure == "wins in all 4"
     failing = Place("a", 1, mean=1.0)._replace(failed=2)
     assert picked(findings, failing, Place("b", 1, mean=2.0)).law == "b"
-    level = picked(findings, Place("a"), Place("b"), Place("c"))
-    assert (level.law, level.sure) == ("", "all 3 laws level in each of 4")  # none is named, by the alphabet or else
+    unbeaten = picked(findings, Place("a"), Place("b"), Place("c"))
+    assert (unbeaten.law, unbeaten.sure) == ("", "all 3 laws unbeaten in each of 4")  # none is named, by the alphabet
+    boards = boards_of([Place("a"), Place("b")], 2)
+    for block in boards[0].blocks:
+        block.level = True
+    level = answer.pick(dataclasses.replace(findings, boards=boards), "itae", "duffing")
+    assert level is not None
+    assert level.sure == "all 2 laws level in each of 2"
     assert picked(findings, Place("a", 4)).sure == "unbeaten in none of 4"
     assert answer.pick(dataclasses.replace(findings, boards=()), "itae", "duffing") is None
 

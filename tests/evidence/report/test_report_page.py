@@ -93,7 +93,7 @@ def boards_of(places, of):
             )
             for p in lines
         ]
-        blocks = [SimpleNamespace(best=[p.law for p in lines if k >= p.losses]) for k in range(of)]
+        blocks = [SimpleNamespace(best=[p.law for p in lines if k >= p.losses], level=False) for k in range(of)]
         wins = {p.law: ["a condition"] * p.wins for p in lines}
         group = {"plant": plant}
         boards.append(SimpleNamespace(group=group, metric=metric, entries=entries, blocks=blocks, wins=wins.get))
