@@ -13,7 +13,7 @@ import sys
 
 from smc_mujoco.analysis.apart import apart, relative_range
 from smc_mujoco.analysis.paired_runs import floor
-from smc_mujoco.analysis.step_halving import halved, nudged
+from smc_mujoco.analysis.step_halving import first_order, halved, nudged
 from smc_mujoco.common.text import number
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.metrics.catalogue import score
@@ -40,10 +40,11 @@ def row(part: str) -> str:
         for change in (lambda one: one, halved, nudged, finest)
     )
     off, marked, wandering, found, errors, laws = 0, 0, 0, 0, [0.0], set()
+    order = first_order(made[0])
     for scenario, *its in zip(made, same, halves, moved, fine, strict=True):
         for name in SCORES:
             (value, half, nudge, truth), least = (one[name] for one in its), floor(scenario, name)
-            wrong, mark = apart((value, truth), least), apart((value, half, nudge), least)
+            wrong, mark = apart((value, truth), least), apart((value, half, nudge), least, order)
             off, marked, found = off + wrong, marked + mark, found + (wrong and mark)
             wandering += apart((value, nudge), least)
             errors.append(relative_range((value, truth), least))

@@ -1,7 +1,8 @@
 """When a number of a run and of the same run again count as different: the rule by which all numbers are marked.
 
 They do where they are more than 5 % apart, or where only some of the runs have the number, such as a limit cycle.
-Values below what matters in the problem count as equal.
+Values below what matters in the problem count as equal. Under an integrator of first order half the step removes half
+of the error: the value that is as far from that at half the step as this one from that at the step counts, too.
 """
 
 import math
@@ -10,11 +11,14 @@ from collections.abc import Sequence
 MAX_CHANGE = 0.05  # relative change of a number above which it is marked: chosen
 
 
-def relative_range(values: Sequence[float], least: float = 0.0) -> float:
+def relative_range(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> float:
     """Return the range of a number in several runs over its smallest magnitude; inf if only some of them have it.
 
-    What lies within `least` of 0 matters in no problem, see `paired_runs.floor`. NaN is a run without the number.
+    What lies within `least` of 0 matters in no problem, see `paired_runs.floor`. NaN is a run without the number. With
+    `first_order` the first two are of a run and of the same at half the step, under an integrator of first order.
     """
+    if first_order and all(map(math.isfinite, values[:2])):
+        values = [*values, 2.0 * values[1] - values[0]] if len(values) > 1 else values
     missing = [math.isnan(value) for value in values]
     if any(missing):
         return 0.0 if all(missing) else math.inf
@@ -23,6 +27,6 @@ def relative_range(values: Sequence[float], least: float = 0.0) -> float:
     return 0.0 if not width > 0.0 else width / smallest if smallest else math.inf  # inf - inf is no change
 
 
-def apart(values: Sequence[float], least: float = 0.0) -> bool:
+def apart(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> bool:
     """Return whether a number of a run and of the same run again are more than 5 % apart, see `relative_range`."""
-    return relative_range(values, least) > MAX_CHANGE
+    return relative_range(values, least, first_order) > MAX_CHANGE

@@ -103,11 +103,12 @@ class Comparison:
     """Every law compared with every other in every block.
 
     Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a run. If they are
-    `shares`, 0.0 or 1.0, means are compared instead of medians. Floors are the q of the blocks, and `untested` says
-    whether a value is no sample, such as a worst case: one for all blocks, or one for each. Outcomes and sets are law
-    -> a number per cell, equal if two seeds gave the same result, or had the same gains; default: all results differ,
-    and all gains are the same. Limits are given where the blocks belong to a larger family. `halves` and `trends` are
-    law -> y' and rho of each run, NaN where they are not known; default: nowhere.
+    `shares`, 0.0 or 1.0, means are compared instead of medians. Floors are the q of the blocks, `untested` says whether
+    a value is no sample, such as a worst case, and `first_order` whether the integrator is of first order: one for all
+    blocks, or one for each. Outcomes and sets are law -> a number per cell, equal if two seeds gave the same result, or
+    had the same gains; default: all results differ, and all gains are the same. Limits are given where the blocks
+    belong to a larger family. `halves` and `trends` are law -> y' and rho of each run, NaN where they are not known;
+    default: nowhere.
     """
 
     @constrained
@@ -123,6 +124,7 @@ class Comparison:
         untested: ArrayLike = False,
         halves: Mapping[str, ArrayLike] | None = None,
         trends: Mapping[str, ArrayLike] | None = None,
+        first_order: ArrayLike = False,
     ):
         def stacked(by_law: Mapping[str, ArrayLike], kind: type) -> np.ndarray:
             return np.array([np.atleast_2d(by_law[law]) for law in self.laws]).astype(kind)
@@ -135,6 +137,7 @@ class Comparison:
         blocks = range(cells.shape[1])
         self.floors = np.broadcast_to(np.asarray(floors, float), len(blocks))
         self.untested = np.broadcast_to(np.asarray(untested, bool), len(blocks))
+        self.first_order = np.broadcast_to(np.asarray(first_order, bool), len(blocks))
         gains = np.zeros(cells.shape, np.int64) if sets is None else stacked(sets, np.int64)
         results = None if outcomes is None else stacked(outcomes, np.int64)
         ran = ~np.isnan(cells[0])
@@ -280,7 +283,8 @@ class Comparison:
         if self.shares or not (again := ~np.isnan(half)).any():
             return None
         before, after = (float(middle(values[again][None, None])[0, 0]) for values in (whole, half))
-        return (before, after) if apart((before, after), float(self.floors[block])) else None
+        differ = apart((before, after), float(self.floors[block]), bool(self.first_order[block]))
+        return (before, after) if differ else None
 
     def _by_unit(self, by_run: np.ndarray, block: int, a: int, b: int) -> np.ndarray:
         """Return values by run, (seeds,), as values by unit of two laws."""

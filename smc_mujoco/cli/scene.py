@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from smc_mujoco.analysis.apart import apart
-from smc_mujoco.analysis.step_halving import NUDGE, halved, nudged
+from smc_mujoco.analysis.step_halving import NUDGE, first_order, halved, nudged
 from smc_mujoco.cli import tables
 from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common import gl
@@ -116,17 +116,18 @@ def other_answers(scene: Scene, traces: Traces, again: Mapping[str, tables.Again
             c: {label: again.get(c, {}).get(label, [t, t])[k] for label, t in its.items()} for c, its in traces.items()
         }
         other = scene.sentence(runs)
-        if not same_answer(answer, other):
+        order = k == 0 and any(first_order(trace.scenario) for its in runs.values() for trace in its.values())
+        if not same_answer(answer, other, order):
             said.append(f"{words}: {other}")
     return said
 
 
-def same_answer(one: str, other: str) -> bool:
-    """Return whether two answers say the same: equal words, and numbers that are no more than 5 % apart."""
+def same_answer(one: str, other: str, first_order: bool = False) -> bool:
+    """Return whether two answers say the same: equal words, and numbers that are not `apart`."""
     if NUMBER.sub("#", one) != NUMBER.sub("#", other):
         return False
     pairs = zip(map(float, NUMBER.findall(one)), map(float, NUMBER.findall(other)), strict=True)
-    return not any(apart(pair) for pair in pairs)
+    return not any(apart(pair, first_order=first_order) for pair in pairs)
 
 
 def save(traces: Traces, out: Path, export: Sequence[str] = ()) -> list[Path]:

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from smc_mujoco.analysis.apart import apart
 from smc_mujoco.analysis.paired_runs import floor
-from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE
+from smc_mujoco.analysis.step_halving import MARK, NOTE, SCORE_NOTE, first_order
 from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
@@ -119,10 +119,12 @@ def _failed(trace: Trace) -> bool:
 
 def _score(values: Sequence[float | None], metric: str, scenario: Scenario) -> Text:
     """Return a metric of the same run several times as text, see `_marked`."""
-    return _marked(values, lambda value: _score_text(metric, value), floor(scenario, metric))
+    return _marked(values, lambda value: _score_text(metric, value), scenario, floor(scenario, metric))
 
 
-def _marked(values: Sequence[float | None], text: Callable[[float], str], least: float = 0.0) -> Text:
+def _marked(
+    values: Sequence[float | None], text: Callable[[float], str], scenario: Scenario, least: float = 0.0
+) -> Text:
     """Return a number as text; with its range, marked, if its values in the same run again are apart.
 
     None is a run that failed, which counts as the largest value.
@@ -133,7 +135,8 @@ def _marked(values: Sequence[float | None], text: Callable[[float], str], least:
 
     texts = {value: FAILED.plain if value is None else text(value) for value in values}
     low, high = (texts[end(values, key=size)] for end in (min, max))
-    if low == high or not apart([math.inf if value is None else value for value in values], least):
+    numbers = [math.inf if value is None else value for value in values]
+    if low == high or not apart(numbers, least, first_order(scenario)):
         return FAILED if values[0] is None else Text(texts[values[0]])
     return Text(f"{low}{MARK}").append(f"\nto {high}", "dim")
 
@@ -148,7 +151,11 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
     rows = {
         label: [
-            _marked([None if one is None else factor * one.get(name, math.nan) for one in its], number)
+            _marked(
+                [None if one is None else factor * one.get(name, math.nan) for one in its],
+                number,
+                traces[label].scenario,
+            )
             for name, _, factor in shown.values()
         ]
         for label, its in values.items()

@@ -5,11 +5,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from smc_mujoco.analysis.apart import MAX_CHANGE
 from smc_mujoco.analysis.bootstrap import LEVEL, MIN_INTERVAL_SAMPLES, Interval
 from smc_mujoco.analysis.paired_runs import MIN_COMMAND_SHARE, OBJECTIVE, SETTLES, UNITS
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, POWER, Effect, Rank, min_p
-from smc_mujoco.analysis.step_halving import UNTRIED
+from smc_mujoco.analysis.step_halving import APART, UNTRIED
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined, number
@@ -440,8 +439,7 @@ def key(boards: Sequence[Board]) -> str:
         )
     if any(block.by_step for board in boards for block in board.blocks):
         words += (
-            " 'by the step': the medians at the physics step and at half of it, which differ by more than "
-            f"{100 * MAX_CHANGE:g} %."
+            f" 'by the step': the medians at the physics step and at half of it, which differ by more than {APART}."
         )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     if any(not entry.checked for board in boards for entry in board.entries):

@@ -15,7 +15,7 @@ from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of, share_interval
 from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, ByRow, Columns, Group, Scores
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
-from smc_mujoco.analysis.step_halving import repeats_all
+from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, Source
@@ -196,6 +196,7 @@ def _compared(
         limits=limits,
         halves=scores.halves,
         trends=scores.trends,
+        first_order=[(of := ran[k]) is not None and first_order(of) for k in scores.blocks],
     )
 
 

@@ -432,6 +432,18 @@ def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lo
     assert [relative_range(values, 0.2) for values in ((0.0, 0.25), (0.1, -0.2))] == pytest.approx([0.25, 0.0])
 
 
+def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too():
+    """A number with an error of h c and so with c (h - h / 2) = c h / 2 between the runs: the error itself is told."""
+    exact, error = 2.0, 0.3
+    halves = [exact + error / 2**k for k in range(2)]
+    assert relative_range(halves) == pytest.approx(0.5 * error / (exact + error / 2))
+    assert relative_range(halves, first_order=True) == pytest.approx(error / exact)
+    assert relative_range([*halves, 4.0], first_order=True) == pytest.approx(4.0 / exact - 1.0)  # another nudged start
+    never = (math.inf, math.inf), (math.nan,) * 2, (0.2,)
+    assert [relative_range(values, first_order=True) for values in never] == [0.0, 0.0, 0.0]
+    assert relative_range((0.2, math.inf), first_order=True) == math.inf
+
+
 @pytest.mark.slow
 @COARSELY
 def test_a_smooth_law_oscillates_only_above_its_critical_delay():

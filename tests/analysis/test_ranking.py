@@ -516,6 +516,17 @@ def test_a_median_that_half_the_step_moves_is_marked_by_the_rule_of_all_numbers(
     assert found.step_change(0, "b") is None
 
 
+@pytest.mark.parametrize(("parts", "marked"), [({}, False), ({"actuator": smc.Backlash(0.01)}, True)])
+def test_without_rk4_half_of_the_change_is_marked(parts, marked):
+    """Of runs under RK4, and under implicitfast: half the step moves a by 3 %."""
+    runs = {"a": blocks(1.0), "b": blocks(3.0)}
+    halves = [json.dumps({"itae": (1.03 if law == "a" else 1.02) * y}) for law, of in runs.items() for y in of[0]]
+    ran = run_key.row(paper.scenario("duffing", "none", changes=parts))["scenario"]
+    table = stand(runs, half_step=np.array(halves, object), scenario=np.array([ran] * 40))
+    ((block,),) = (board.blocks for board in leaderboard(table, ["itae"]))
+    assert list(block.by_step) == ["a"] * marked
+
+
 def test_what_half_the_step_gives_is_charged_to_the_law_and_spared_the_rival():
     cells = {"a": twelve(1.0), "b": twelve(2.0, seed=1)}
     unchanged = {law: y.copy() for law, y in cells.items()}

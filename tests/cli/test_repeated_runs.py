@@ -75,6 +75,18 @@ def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
     assert "half the physics step" in str(table.caption)
 
 
+@pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
+def test_a_score_that_changes_by_less_is_marked_without_rk4_alone(integrator):
+    trace = smc.run(smc.Scenario(plant="duffing", law="adaptive", integrator=integrator, duration=1.0))
+    larger = dataclasses.replace(trace, x=1.03 * trace.x)
+    (table,) = tables.scores("t", {"a": trace}, {"a": [larger, trace]})
+    assert any(MARK in cell for cell in cells(table)) == (integrator != "RK4")
+    (table,) = tables.scores("t", {"a": trace}, {"a": [trace, larger]})  # a nudged start
+    assert not any(MARK in cell for cell in cells(table))
+    answers = "it ends at 1.00 mm", "it ends at 1.03 mm"
+    assert [show.same_answer(*answers), show.same_answer(*answers, first_order=True)] == [True, False]
+
+
 def cells(table) -> list[str]:
     """The rows of a table as text."""
     return [" ".join(map(str, row)) for row in zip(*(column.cells for column in table.columns), strict=True)]

@@ -15,8 +15,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, TypeVar
 
-from smc_mujoco.analysis.apart import MAX_CHANGE
-from smc_mujoco.analysis.step_halving import NUDGED
+from smc_mujoco.analysis.step_halving import APART, NUDGED
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
@@ -102,7 +101,7 @@ def page(findings: Findings) -> str:
         u_max=scenarios.U_MAX,
         control_period=scenarios.CONTROL_PERIOD,
         relevant=100 * share,
-        step_change=MAX_CHANGE,
+        step_change=APART,
         nudged=NUDGED,
         relevance=relevance(share, ((s.metric, s.floor) for s in findings.scores)),
         metrics={metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n") for metric in metrics()},
