@@ -45,11 +45,11 @@ DRIVES = {
 
 
 def halving(plant: str) -> None:
-    """Print the laws with tuned gains whose cycles half the step or a nudge changes by over 5 %, behind each drive."""
-    marked, cases = Counter(), Counter()
+    """Print the laws with tuned gains whose cycles half the step or a nudge changes, behind each drive."""
+    marked, cases, laws = Counter(), Counter(), gain_sets.general_laws([plant], "tuned")
     for name, drive in DRIVES.items():
         changes = {} if drive is None else {"actuator": drive}
-        runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in gain_sets.general()])
+        runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in laws])
         integrator = runs[0].scenario.resolved.integrator
         found = {
             t.scenario.law.name: c for t, c in zip(runs, smc.fidelity.step_halving(runs, 0), strict=True) if c.marked

@@ -111,7 +111,7 @@ def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
 
 
 def pick(findings: "Findings", metric: str, plant: str) -> Pick | None:
-    """Return the law that is beaten in the fewest conditions.
+    """Return the law that is unbeaten in the most conditions.
 
     Of several such laws it is the one with the fewest runs that fail, then by mean rank. If no law is beaten anywhere,
     none is named. Laws that settle in less than half as many runs as the law that settles in the most are left out: a
@@ -164,7 +164,9 @@ def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     own = [s for s in findings.scores if s.law == words.PAPER_LAW and s.metric in metrics]
     lost, wins, parts = len(losses(cells(findings.scores), metrics)), sum(s.wins for s in own) or "none", []
     if own:
-        parts.append(f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}")
+        unclear = sum(not s.best and not s.beaten for s in own)
+        also = f", and has too few samples to tell in {unclear}" * bool(unclear)
+        parts.append(f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}{also}")
     if counts := totals(findings.claims):
         verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in counts.items())
         sets = {name for claim in findings.claims for name in claim.verdicts}

@@ -20,6 +20,7 @@ from smc_mujoco.simulation.scenario import U_MAX
 
 CLAIMS = paper("gaber").claims
 PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
+VERDICTS = json.loads((Path(__file__).parents[1] / "papers" / "quick_verdicts.json").read_text())["gaber"]
 COMMANDS = sorted({claim.shown_by for claim in CLAIMS.values() if "certify" in claim.shown_by})
 DECIMALS = r"-?\d+\.\d+"
 
@@ -38,8 +39,7 @@ def told(command):
 
 
 def test_each_claim_that_does_not_hold_has_a_sentence_and_a_command():
-    verdicts = json.loads((Path(__file__).parents[1] / "papers" / "quick_verdicts.json").read_text())["gaber"]
-    lost = [id for id, its in verdicts.items() if its["verdict"] != "supported"]
+    lost = [id for id, its in VERDICTS.items() if its["verdict"] != "supported"]
     assert len(lost) > 20
     assert [id for id in lost if not (CLAIMS[id].instead and CLAIMS[id].shown_by)] == []
 
@@ -73,6 +73,11 @@ def test_comparisons_of_sentences_hold_with_the_tuned_gains():
     assert (D + ours.lam) ** 2 < 4.0 * M * (ours.lam * ours.k1 - slope)
     assert "boundary_layer has the same bound of u" in CLAIMS["12"].instead
     assert min(loop("duffing", "boundary_layer")[1].k, ours.lam) > U_MAX
+    assert "steady error under d is larger than each rival's" in CLAIMS["12"].instead
+    numbers = VERDICTS["12"]["numbers"]
+    limits = {name: limit for name, limit in numbers.items() if "steady error" in name and name.endswith("<=")}
+    assert limits
+    assert all(numbers[name.removesuffix(" <=")] > np.max(limit) for name, limit in limits.items())
 
 
 def test_the_series_of_order_7_falls_where_claim_55_says():

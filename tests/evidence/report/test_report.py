@@ -403,6 +403,9 @@ def test_the_papers_verdict_is_one_line_that_counts(findings):
     failing = [s._replace(best=False, beaten=True) for s in scores("step", observer_free=math.inf, classical=math.inf)]
     with_failing = dataclasses.replace(few, scores=(*cells, *failing), claims=())
     assert "beaten in 1 of 4 comparisons" in answer.verdict(with_failing, ["settling_time"])  # as the table of losses
+    unclear = [s._replace(best=False, beaten=False) for s in failing]
+    few_samples = dataclasses.replace(with_failing, scores=(*cells, *unclear))
+    assert "too few samples to tell in 1" in answer.verdict(few_samples, ["settling_time"])
     none = dataclasses.replace(few, scores=(), claims=())
     assert answer.verdict(none, ["settling_time"]) == ""
 
