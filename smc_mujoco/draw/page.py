@@ -39,6 +39,7 @@ TEXT_SIZE, TITLE_SIZE = 11.0, 17.0  # points on a full page
 ENTRY_SAMPLE, ENTRY_SPACE = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and all its spaces
 TITLE_PAD = 5.0  # points on a full page, above the title
 MAX_SHARE, MAX_SINGLE_SHARE = 0.55, 0.95  # largest width of a legend's entry, of the page's: in several columns, in one
+MAX_NAME = 0.42  # of a full page's width, of a run's name in a legend
 MAX_TICKS = 9  # ticks of an axis, as of matplotlib's
 TICK_GAP = 0.6  # between labels of ticks, in heights of their letters
 Handle = Line2D | Patch
@@ -168,7 +169,7 @@ def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence
     gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
     for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
         how = style.ending(trace)
-        words = style.cropped(name, 0.3 * 72 * style.FULL_WIDTH, TEXT_SIZE) + source + (f" ({how})" if how else "")
+        words = style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE) + source + (f" ({how})" if how else "")
         handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
     return handles, shared
 

@@ -279,8 +279,9 @@ def _differing(
     settings: Callable[[Trace], Mapping[str, object]], trace: Trace, others: Sequence[Trace]
 ) -> dict[str, str]:
     """Return the settings of a run that not all others have, in words that no other value of a run has."""
-    tables, words = [settings(other) for other in others], {}
-    for name, value in settings(trace).items():
+    mine, *tables = _in_parts([settings(run) for run in (trace, *others)])
+    words = {}
+    for name, value in mine.items():
         unequal = [table.get(name) for table in tables if table.get(name) != value]
         if unequal:
             told = (
@@ -289,6 +290,25 @@ def _differing(
             )
             words[name] = next((its for its, different in told if its not in different), _setting(name, value))
     return words
+
+
+def _in_parts(tables: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
+    """Return settings with the fields of a part or signal, such as "disturbance omega", where all have one alike."""
+    found = [dict(table) for table in tables]
+    for name in tables[0]:
+        values = [table.get(name) for table in tables]
+        parts = [value[0] if isinstance(value, tuple) and len(value) == 1 else value for value in values]
+        kind = type(parts[0])
+        if (
+            dataclasses.is_dataclass(kind)
+            and {type(part) for part in parts} == {kind}
+            and kind.__name__.lower() != name
+        ):
+            fields = [field.name for field in dataclasses.fields(kind)]
+            for table, part in zip(found, parts, strict=True):
+                table |= {f"{name} {field}": getattr(part, field) for field in fields}
+                del table[name]
+    return found
 
 
 @once_per_trace

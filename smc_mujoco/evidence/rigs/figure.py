@@ -10,6 +10,7 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.rigs.records import Record
 
+TITLE_SHARE = 0.85  # of a panel's width, of the words above it in letters that are not bold
 ROW_HEIGHT = 2.6  # inches, height of a column's panels
 
 
@@ -47,8 +48,10 @@ def residual_figure(
                 fit = list(fits[twin].values())[k]
                 reached.append(f"{twin} {fit:.1f}{' %' * (fit > -np.inf)}")
                 left_over.append(f"{twin} {np.sqrt(np.mean(residual**2)):.3g}")
-            left.set(ylabel=f"{name} ({units[name]})", title=f"fit: {', '.join(reached)}")
-            right.set_title(f"residual, rms: {', '.join(left_over)}")
+            left.set_ylabel(f"{name} ({units[name]})")
+            for ax, words in ((left, f"fit: {', '.join(reached)}"), (right, f"residual, rms: {', '.join(left_over)}")):
+                room = TITLE_SHARE * 72 * ax.get_window_extent().width / page.dpi
+                ax.set_title(style.wrapped(words, room, pages.TEXT_SIZE, lines=2), parse_math=False)
         for ax in axes[-1]:
             ax.set_xlabel("time (s)")
         pages.set_head(page, style.FULL_WIDTH, title, handles)
