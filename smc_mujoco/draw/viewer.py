@@ -90,7 +90,8 @@ class Live:
         """Start the run again."""
         with installed():
             self.scenario = stepped_by_mujoco(scenario)  # whose friction feels the push, too
-            self.loop = Pushed(self.scenario, models.mechanism(self.scenario))
+            base = models.compile_model(self.scenario, models.USERDATA)  # with the bodies that are on screen
+            self.loop = Pushed(self.scenario, models.Mechanism(base, models.channels(base)))
         self.step, self.due, self.late = 0, 0.0, False
         self.build(0)
 
