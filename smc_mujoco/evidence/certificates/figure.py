@@ -55,13 +55,13 @@ def draw(
                 ax.plot(trace.x[:, 0], trace.v[:, 0], color=law, linewidth=style.points(1.8))
                 ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
             ax.set(xlim=X[0, [0, -1]], ylim=V[[0, -1], 0], xlabel=f"position ({unit})", ylabel=f"velocity ({unit}/s)")
-        under = f"|d| ≤ {data['disturbance']:g} {EFFORT[unit]}" if data["disturbance"] else "no disturbance"
-        plant = style.plant_name(as_plant(certificate.plant))
+        under = f", |d| ≤ {data['disturbance']:g} {EFFORT[unit]}" if data["disturbance"] else ""
+        plant = style.plant_name(as_plant(certificate.plant), short=True)
         if bounded:
             axes[1].set_title("around the bound")
         handles = _key(certificate, part, shades)
         handles += [Line2D([], [], color=law, label=_run_words(trace, unit, worst_of)) for trace in traces]
-        pages.set_head(page, width, f"Certificate: {style.law_name(certificate.law)}, {plant}, {under}", handles)
+        pages.set_head(page, width, f"Certificate: {style.law_name(certificate.law)}, {plant}{under}", handles)
         pages.write(page, paths)
     return page
 
@@ -104,7 +104,7 @@ def _key(certificate: Any, part: Any, shades: Sequence[str]) -> list[pages.Handl
     """Return what the areas and the lines of the plane are."""
     light, middle, dark = shades
     if part is None:
-        return [Line2D([], [], color=middle, label="level sets of V, which never rises")]
+        return [Line2D([], [], color=middle, label="level sets of V, which never rises without d")]
     ends = f"ends in |x| ≤ {part['bound']:.3g} {certificate.data['unit']}"
     told = "certified: " + ("comes to rest" if certificate.rests else ends)
     handles: list[pages.Handle] = [
