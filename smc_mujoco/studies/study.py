@@ -30,7 +30,7 @@ from smc_mujoco.common.constraints import FilePath, OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, printable, shown
 from smc_mujoco.common.files import reading, slug, to_json
 from smc_mujoco.common.progress import counter
-from smc_mujoco.control.gain_sets import COMPARED, LAWS
+from smc_mujoco.control.gain_sets import COMPARED
 from smc_mujoco.control.law import checked_name
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.simulation.conditions import DURATION, PLANTS
@@ -167,7 +167,8 @@ class Extent:
     duration: float = DURATION
 
 
-FULL = Extent(laws=LAWS, conditions=IDEAL + REAL, seeds=24)  # the others have no gains on networks yet
+# Without `mpc`, which has no gains on networks yet: twelve searches take it some ten minutes of processor time on each.
+FULL = Extent(laws=tuple(law for law in COMPARED if law != "mpc"), conditions=IDEAL + REAL, seeds=24)
 # It takes a minute on 2 cores.
 QUICK = Extent(
     plants=("inverted_pendulum", "van_der_pol", "duffing"),
