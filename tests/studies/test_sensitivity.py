@@ -104,6 +104,17 @@ def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_inde
     assert found.runs == 16 * 4
 
 
+def test_a_run_fails_where_its_force_is_too_small_and_one_without_a_score_has_the_worst():
+    base = scenario(plant="inverted_pendulum", law="observer_free", duration=4.0)
+    found = smc.sensitivity(base, smc.Uncertainty(bound=(0.05, 1.0)), "settling_time", points=16)
+    bounds = found.space.column(0, found.shares)
+    assert 0 < found.failed.sum() < 16
+    assert bounds[found.failed].max() < bounds[~found.failed].min()
+    worst = found.values[found.failed]
+    assert math.isfinite(found.values.max())
+    assert (worst == found.values.max()).all()
+
+
 def test_levels_and_chance_are_axes():
     """A level scales the force and the errors that chance draws; equal chances draw the same."""
     found = module.Space(scenario(), smc.Uncertainty(disturbance=2.0, position_noise=1e-3, delay=(0.0, 0.01)))
@@ -148,7 +159,8 @@ def test_the_default_class_has_the_axes_of_machines():
 def test_words_name_one_culprit_only_if_the_intervals_part():
     found = smc.sensitivity(scenario(law="none"), smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0)), points=16)
     assert found.sentences[0].startswith("Mass explains")
-    same = dataclasses.replace(found, axes=(found.axes[0], found.axes[0]._replace(name="delay")))
+    wide = found.axes[0].total._replace(median=0.0, low=0.0)  # reaches into the first interval
+    same = dataclasses.replace(found, axes=(found.axes[0], found.axes[0]._replace(name="delay", total=wide)))
     assert "that of mass and delay" in same.sentences[0]
     assert "Nothing here changes" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
     assert "32 runs fail" in dataclasses.replace(found, failed=np.ones(32, bool), regions=()).sentences[1]
