@@ -1,0 +1,233 @@
+"""Where sliding mode loses: its best law against the best rival, as a load, a delay, noise or friction grows.
+
+    python benchmarks/families.py PLANT [PLANT ...] [--out families.json]
+
+Each law has the gains of its twelve shipped searches, run i those of search i, from start i. A level is told without
+units: the load's frequency and the delay by the bandwidth wc of the tuned ADRC, noise by the start, dry friction by
+u_max. The error is rms_error, of the last three quarters of 8 s, at least 1e-4 of the start. The cost is what the gains
+were searched for, ITAE/|x0| plus the weighted variation of u, of this one run.
+
+In each family the law is chosen by half of the runs and told by the other half, and the reverse, so the larger family
+has no advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), and it is
+told at half the physics step, too. A plant takes about 6 minutes of processor time.
+"""
+
+import argparse
+import itertools
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
+
+from smc_mujoco.analysis.paired_runs import EPS
+from smc_mujoco.analysis.ranking import interval
+from smc_mujoco.analysis.step_halving import halved
+from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.control import gain_sets
+from smc_mujoco.draw import page as pages
+from smc_mujoco.draw import style
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.metrics.catalogue import CATALOGUE
+from smc_mujoco.metrics.conventions import by_group
+from smc_mujoco.simulation.grid import case
+from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.signals import Noise, Sine
+
+FAMILIES = {
+    "switching": (
+        *("classical", "adaptive", "super_twisting", "conditioned_super_twisting", "implicit_first_order"),
+        *("twisting", "terminal"),
+    ),
+    "smoothed": ("observer_free", "boundary_layer"),  # the same surface, and a steep slope in place of the sign
+    "rivals": ("pid", "extended_state", "adrc", "pd_observer", "lqi", "mpc", "loop_shaping"),
+}
+RUNS, DURATION, U_MAX, LOAD = 12, 8.0, 6.0, 1.0  # runs a cell; s; N or N m
+VELOCITY_NOISE_RATIO = 5.0  # 1/s, as in margins
+LEVELS = {
+    "load, omega / wc": (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0),
+    "delay x wc": (0.0, 0.05, 0.1, 0.2, 0.4, 0.8),
+    "noise / start": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
+    "friction / u_max": (0.01, 0.02, 0.05, 0.1, 0.2),
+}
+# The sentences of docs/where_sliding_mode_loses.md: axis, lowest and highest level, score, kind, and whether it leads.
+SENTENCES = (
+    ("load, omega / wc", 0.5, 2.0, "error", "switching", True),
+    ("load, omega / wc", 1.0, 1.0, "cost", "switching", True),
+    ("load, omega / wc", 0.0, 0.25, "error", "smoothed", False),
+    ("load, omega / wc", 0.0, 0.25, "cost", "smoothed", False),
+    ("noise / start", 0.0, 1e-2, "cost", "switching", False),
+    ("noise / start", 1e-3, 1e-2, "cost", "smoothed", False),
+    ("delay x wc", 0.0, 0.4, "cost", "switching", False),
+    ("friction / u_max", 0.0, 0.2, "cost", "smoothed", False),
+)
+SCORES, KINDS = ("error", "cost"), ("switching", "smoothed")
+COLOURS, FIGURE_WIDTH, ROW_HEIGHT, LIMIT = (
+    ("#0072B2", "#7CC0E8", "#D55E00", "#F0B080"),
+    12.0,
+    3.0,
+    1e3,
+)  # inches; of the drawn leads
+FAILED = 1e3  # score of a run that fails, times its scale: chosen, beyond all others
+
+
+def changes(axis: str, level: float, wc: float, start: float, run: int) -> dict:
+    """Return the fields of a scenario that a level sets."""
+    if axis.startswith("load"):
+        return {"disturbance": Sine(LOAD, level * wc, math.tau * run / RUNS)}
+    if axis.startswith("delay"):
+        return {"input_delay": round(1e3 * level / wc) * 1e-3}
+    if axis.startswith("noise"):
+        return {"noise": Noise(position=level * start, velocity=VELOCITY_NOISE_RATIO * level * start)}
+    return {"friction": [Coulomb(level * U_MAX)]}
+
+
+def laws_of(plant: str, names: Sequence[str]) -> list[str]:
+    """Return the laws that have twelve searches on a plant."""
+    return [
+        name for name in names if gain_sets.in_set(find_plant(plant), name, "tuned") and searches(plant, name) >= RUNS
+    ]
+
+
+def searches(plant: str, name: str) -> int:
+    """Return the number of a law's searches on a plant."""
+    return len(gain_sets.tuned(find_plant(plant), name, "tuned").sets)
+
+
+def scenarios(plant: str, axis: str, level: float, law: str) -> Iterator[Scenario]:
+    """Yield the runs of a law at a level."""
+    wc = gain_sets.tuned(find_plant(plant), "adrc", "tuned").best["wc"]
+    start = max(map(abs, find_plant(plant).x0))
+    for run in range(RUNS):
+        yield case(plant, law, "nominal", DURATION, "tuned", run, changes=changes(axis, level, wc, start, run))
+
+
+def scores(made: Sequence[Scenario]) -> np.ndarray:
+    """Return the rms error and the cost of each run, (2, runs)."""
+    values, cost = np.full((2, len(made)), FAILED), Objective(duration=DURATION)
+    for i, trace in stream(made):
+        if trace.failure is None:
+            tracking, variation = cost.terms_of_run(trace)
+            error = CATALOGUE["rms_error"].worst(by_group(trace))
+            values[:, i] = max(error, EPS * max(map(abs, trace.scenario.plant.x0))), tracking + cost.weight * variation
+    return values
+
+
+def chosen(values: np.ndarray) -> tuple[np.ndarray, list[int]]:
+    """Return a family's score in each run, (RUNS,), of the law that the other half of the runs chose, and both laws."""
+    told, best = np.empty(RUNS), []
+    for half in (0, 1):
+        best.append(int(np.median(values[:, 1 - half :: 2], axis=1).argmin()))
+        told[half::2] = values[best[-1], half::2]
+    return told, best
+
+
+def cells(plant: str, axis: str, level: float, families: dict[str, list[str]]) -> Iterator[dict]:
+    """Yield the lead of sliding mode at a level, of each kind in each score: above 1, it is that many times better."""
+    made = {law: list(scenarios(plant, axis, level, law)) for laws in families.values() for law in laws}
+    values = {law: scores(its) for law, its in made.items()}
+    fine: dict[str, np.ndarray] = {}
+    for k, score in enumerate(SCORES):
+        told, best, told_fine = {}, {}, {}
+        for family, laws in families.items():
+            told[family], picked = chosen(np.array([values[law][k] for law in laws]))
+            best[family] = [laws[i] for i in picked]
+            for law in set(best[family]) - set(fine):
+                fine[law] = scores([halved(one) for one in made[law]])
+            told_fine[family] = np.empty(RUNS)
+            for half in (0, 1):
+                told_fine[family][half::2] = fine[best[family][half]][k, half::2]
+        medians = {law: float(np.median(its[k])) for law, its in values.items()}
+        for kind in KINDS:
+            lead, low, high = map(math.exp, interval(np.log(told["rivals"] / told[kind]), 0.025))
+            at_half = math.exp(interval(np.log(told_fine["rivals"] / told_fine[kind]), 0.025)[0])
+            cell = {"plant": plant, "axis": axis, "level": level, "score": score, "kind": kind}
+            cell |= {"lead": lead, "low": low, "high": high, "half": at_half, "law": best[kind]}
+            runs = {law: its[k].tolist() for law, its in values.items()}
+            yield cell | {"rival": best["rivals"], "medians": medians, "runs": runs}
+
+
+def draw(known: Sequence[dict], path: Path) -> None:
+    """Draw the leads over the levels: a row a plant, a column an axis."""
+    plants, axes = list(dict.fromkeys(one["plant"] for one in known)), list(LEVELS)
+    with style.page(FIGURE_WIDTH):
+        figure = pages.blank(FIGURE_WIDTH, ROW_HEIGHT * len(plants) + 0.8, None)
+        panels = figure.subplots(len(plants), len(axes), squeeze=False, sharey="row")
+        for (i, plant), (k, axis) in itertools.product(enumerate(plants), enumerate(axes)):
+            ax = panels[i, k]
+            for (score, kind), colour in zip(itertools.product(SCORES, KINDS), COLOURS, strict=True):
+                its = [
+                    one
+                    for one in known
+                    if all(
+                        one[key] == value
+                        for key, value in {"plant": plant, "axis": axis, "score": score, "kind": kind}.items()
+                    )
+                ]
+                if not its:
+                    continue
+                x = [one["level"] or LEVELS[axis][1] / 2 for one in its]  # no delay is drawn at half of the smallest
+                ends = [[one["lead"] - one["low"] for one in its], [one["high"] - one["lead"] for one in its]]
+                ax.errorbar(x, [one["lead"] for one in its], ends, fmt="o-", color=colour, ms=4, lw=1.2)
+            ax.axhline(1.0, color=style.INK, lw=0.8)
+            ax.set(xscale="log", yscale="log", ylim=(1 / LIMIT, LIMIT))
+            ax.xaxis.set_minor_formatter(NullFormatter())
+            if i == len(plants) - 1:
+                ax.set_xlabel(axis)
+        for i, plant in enumerate(plants):
+            panels[i, 0].set_ylabel("lead (ratio)")
+            panels[i, 0].set_title(style.plant_name(plant))
+        names = [f"{score}, {kind}" for score, kind in itertools.product(SCORES, KINDS)]
+        handles = [Line2D([], [], color=c, marker="o", label=name) for name, c in zip(names, COLOURS, strict=True)]
+        pages.set_head(figure, FIGURE_WIDTH, "Sliding mode ahead above 1, a rival below", handles)
+        pages.write(figure, pages.files(path))
+
+
+def judged(known: Sequence[dict]) -> Iterator[str]:
+    """Yield for each sentence and plant how many of its levels stand, are open, and are contradicted."""
+    for axis, lowest, highest, score, kind, leads in SENTENCES:
+        for plant in dict.fromkeys(one["plant"] for one in known):
+            wanted = {"plant": plant, "axis": axis, "score": score, "kind": kind}
+            its = [one for one in known if wanted.items() <= one.items() and lowest <= one["level"] <= highest]
+            stand = sum(one["low"] > 1.0 if leads else one["high"] < 1.0 for one in its)
+            against = sum(one["high"] < 1.0 if leads else one["low"] > 1.0 for one in its)
+            told = f"{kind} {'leads' if leads else 'trails'} in {score}, {axis} {lowest:g} to {highest:g}"
+            yield f"{plant}: {told}: {stand} of {len(its)} stand, {against} contradicted"
+
+
+def main() -> None:
+    """Print a line a cell, and write them all."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("plants", nargs="*")
+    parser.add_argument("--figure", type=Path, help="draw the cells of --out, without plants those of an earlier call")
+    parser.add_argument("--out", type=Path, default=Path("families.json"))
+    asked, known = parser.parse_args(), []
+    if not asked.plants:
+        known = json.loads(asked.out.read_text())
+    for plant in asked.plants:
+        families = {family: laws_of(plant, names) for family, names in FAMILIES.items()}
+        print(plant, families, file=sys.stderr)
+        for axis, levels in LEVELS.items():
+            for level in levels:
+                for one in cells(plant, axis, level, families):
+                    its = f"{one['lead']:.3g} ({one['low']:.3g} to {one['high']:.3g}; half step {one['half']:.3g})"
+                    laws = " | ".join("/".join(dict.fromkeys(one[who])) for who in ("law", "rival"))
+                    print(
+                        f"| {plant} | {axis} {level:.3g} | {one['score']} | {one['kind']} | {its} | {laws} |",
+                        flush=True,
+                    )
+                    known.append(one)
+                asked.out.write_text(json.dumps(known, indent=1))
+    print(*judged(known), sep="\n")
+    if asked.figure:
+        draw(known, asked.figure)
+
+
+if __name__ == "__main__":
+    main()
