@@ -1,5 +1,6 @@
 """One call that compares laws: gains by one rule, their sources, verdicts that say where, resumed from its folder."""
 
+import dataclasses
 import functools
 import math
 import re
@@ -15,7 +16,7 @@ from smc_mujoco.cli.commands import options
 from smc_mujoco.common.text import number
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.units import FORCE, RATE, Gain
-from smc_mujoco.studies import executors, fair_gains, worst_case
+from smc_mujoco.studies import compare, executors, fair_gains, worst_case
 from smc_mujoco.studies.leaderboard import METRICS
 
 SHORT = {"duration": 0.5, "budget": 48, "progress": False}
@@ -173,6 +174,17 @@ def test_a_plant_on_which_laws_cannot_be_tuned_says_so(tmp_path):
     made = smc.compare(None, "overhead_crane", "nominal", 1, out=tmp_path, **SHORT)
     assert set(kinds(made, "overhead_crane").values()) == {"default"}
     assert all("tuning is not possible here: " in remark for remark in made.remarks)
+
+
+def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
+    usual = {name: compare._usual(smc.plant(name)) for name in ("duffing", "pendulum_network")}
+    assert usual["duffing"] == [*gain_sets.COMPARED]
+    for name, laws in usual.items():
+        assert (
+            set(gain_sets.LAWS) <= {law for law in laws if gain_sets.in_set(smc.plant(name), law, "tuned")} == {*laws}
+        )
+    bare = dataclasses.replace(smc.plant("duffing", delta=0.5), name="mine", unmodelled="nobody wrote it")
+    assert {*gain_sets.COMPARED} - {*compare._usual(bare)} == {"lqi", "mpc", "loop_shaping"}
 
 
 def test_what_cannot_run_is_refused_before_any_gains_are_searched(tmp_path, monkeypatch):
