@@ -221,11 +221,14 @@ def test_the_end_s_weight_of_mpc_solves_the_discrete_riccati_equation(plant):
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize(("q1", "q2"), [(100.0, 16.0), (3751.0, 48.0)])
 def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, q2):
-    """From the last plan or from none: it has one solution. With the larger weights whole steps would cycle."""
+    """From the last plan or from none: it has one solution. With the larger weights whole steps would cycle.
+
+    Of 200 jumps to another state one may end before its solution, as the law's docstring says.
+    """
     rng, n = np.random.default_rng(0), mpc.MOVES
     law = smc.law("mpc", q1=q1, q2=q2, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
-    memory = np.zeros(mpc.SLOTS)
-    for _ in range(20):
+    memory, missed = np.zeros(mpc.SLOTS), 0
+    for _ in range(200):
         e, de, d, limit = *rng.normal(size=2), rng.normal(), 10.0 ** rng.uniform(-1, 1.5)
         memory[:5] = 1.0, e, de, d, 0.0
         u = call(law, memory, e=e, de=de, dt=1e-12, limit=limit)
@@ -236,7 +239,9 @@ def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, 
         rank = mujoco.mju_boxQP(v, factor, index, np.ascontiguousarray(H), g, np.full(n, -limit - us),
                                 np.full(n, limit - us))  # fmt: skip
         assert rank >= 0
-        assert abs(u - min(max(v[0] + us, -limit), limit)) <= 1e-6 * max(limit, abs(u))
+        assert abs(u - min(max(memory[mpc.PLAN] + us, -limit), limit)) <= 1e-12 * limit
+        missed += np.abs(memory[mpc.PLAN : mpc.PLAN + n] - v).max() > 1e-6 * max(limit, np.abs(v).max())
+    assert missed <= 1
 
 
 def test_mpc_gives_the_control_of_a_foreign_solver(vectors):

@@ -6,10 +6,11 @@ on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of th
 a2 de, and us = -d / b, so a constant disturbance leaves no error. P is the solution of the discrete Riccati equation,
 so that without bounds the law is the linear quadratic regulator with d taken away. It differs from that regulator,
 clipped, only where a later move is at the bound: real gains need bounds on states or rates, or a reference known ahead.
-The plan is solved at every control sample, by projected Newton steps from the last plan, until the gradient of the
-moves that are free is 1e-13 of the linear term; every plan keeps the bounds. H must be long against the control period,
-and N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates
-e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the first move.
+The plan is solved at every control sample, by projected Newton steps from the last plan, or from none where that fails,
+until the gradient of the moves that are free is 1e-13 of the linear term; every plan keeps the bounds. Of 1,600 jumps
+to a random state one was not solved, and its cost was 0.8 % too large. H must be long against the control period, and
+N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates e'' =
+v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the first move.
 Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N,
 number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the plant at
 its origin.
@@ -32,9 +33,9 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 # The memory: 0 to 4 the observer; 5, 1 once the matrices are there; 6, the held moves of the Cholesky factor, as bits;
 # then the plan, the gradient, the step, the linear term by e and by de, the Hessian and the factor, 20 x 20, by rows,
 # and what a share of the step changes.
-MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = 20, 30, 40, 40  # chosen
+MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = 20, 40, 40, 40  # chosen; from no plan 34 steps were enough in 60,000 states
 PLAN, GRADIENT, STEP, BY_E, BY_DE, HESSIAN, FACTOR, MOVED, SLOTS = 8, 28, 48, 68, 88, 108, 508, 908, 928
-ENOUGH = 1e-13  # gradient of the free moves, of the largest linear term
+ENOUGH, FAR = 1e-13, 1e-6  # gradient of the free moves, of the largest linear term: solved, and not yet near
 SUFFICIENT = 1e-4  # share of the decrease that the gradient promises, L. Armijo's
 
 
@@ -203,6 +204,21 @@ def advance(n, low, high, memory):
     return 0.0
 
 
+@njit
+def solve(n, e, de, low, high, kept, memory):
+    """Solve for the plan from a multiple of the last one, and return its `residual`."""
+    for i in range(n):
+        memory[PLAN + i] = min(max(kept * memory[PLAN + i], low), high)
+    left = residual(n, e, de, low, high, memory)
+    for _ in range(MOST_STEPS):
+        if left <= ENOUGH:
+            break
+        if advance(n, low, high, memory) == 0.0:
+            break
+        left = residual(n, e, de, low, high, memory)
+    return left
+
+
 @law_function(
     family="predictive",
     continuous=True,
@@ -234,14 +250,9 @@ def mpc(y, gains, memory):
     us = -observe(y, gains.w, memory) / b
     reach = abs(g) * y.limit
     low, high = f - reach - us, f + reach - us
-    for i in range(n):
-        memory[PLAN + i] = min(max(memory[PLAN + i], low), high)
-    for _ in range(MOST_STEPS):
-        left = residual(n, y.e, y.de, low, high, memory)
-        if left <= ENOUGH:
-            break
-        if advance(n, low, high, memory) == 0.0:
-            break
+    left = solve(n, y.e, y.de, low, high, 1.0, memory)
+    if left > FAR:  # the last plan was of another state, and bounds in between cut its steps short
+        left = solve(n, y.e, y.de, low, high, 0.0, memory)
     v = memory[PLAN] + us
     memory[4] = a1 * y.e + a2 * y.de + b * v
     return command(y, v), memory[BY_E] * y.e + memory[BY_DE] * y.de
