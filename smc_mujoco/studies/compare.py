@@ -97,7 +97,9 @@ class Compared(Tables):
         rows = []
         for plant, candidates in self.candidates.items():
             for law, sets, _ in candidates:
-                best = ", ".join(f"{name}={gain_text(value)}" for name, value in law.gains.items())
+                # inf: no bound, or a number of the plant
+                told = {name: value for name, value in law.gains.items() if value != math.inf}
+                best = ", ".join(f"{name}={gain_text(value)}" for name, value in told.items())
                 rows.append((plant, law.name, law.source.kind, f"{len(sets)}", best))
         heads = ["plant", "law", "gains", "sets", "best set"]
         gains = Tabular(headings=heads, rows=rows, title="Gains", notes=self.remarks, left=len(heads))
