@@ -313,3 +313,15 @@ def test_loop_shaping_s_law_answers_as_its_controller():
     F, Hs, p = np.array([FH[:3]]), np.array([FH[3:6]]).T, 1j * omega
     Ks = (F @ np.linalg.solve(p * np.eye(3) - A - B @ F - Hs @ C, -Hs)).item()
     assert got == pytest.approx(k * (1.0 + wi / p) * Ks, rel=5e-3)
+
+
+def test_loop_shaping_s_observer_is_sampled_exactly():
+    k, wi, plant, h = 20.0, 0.5, (5.0, -1.0, 0.4), 0.05
+    law = smc.law("loop_shaping", k=k, wi=wi, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
+    memory = np.zeros(loop_shaping.SLOTS)
+    called(law, measured(e=0.1, de=0.0, dt=h), memory)
+    A, _, C = shaped(*plant, k, wi)
+    M = A + np.outer(loop_shaping.design(*plant, k, wi)[3:6], C)
+    whole = expm(h * np.block([[M, np.eye(3)], [np.zeros((3, 6))]]))[:3]
+    got = memory[loop_shaping.PHI :].reshape(2, 3, 3)
+    np.testing.assert_allclose(got, (whole[:, :3], whole[:, 3:]), rtol=1e-12, atol=1e-15)
