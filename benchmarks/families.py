@@ -59,8 +59,7 @@ LEVELS = {
 # The sentences of docs/where_sliding_mode_loses.md: axis, lowest and highest level, score, kind, and whether it leads.
 SENTENCES = (
     ("load, omega / wc", 0.5, 2.0, "error", "switching", True),
-    ("load, omega / wc", 1.0, 1.0, "cost", "switching", True),
-    ("load, omega / wc", 0.0, 0.25, "error", "smoothed", False),
+    ("load, omega / wc", 0.5, 1.0, "cost", "switching", True),
     ("load, omega / wc", 0.0, 0.25, "cost", "smoothed", False),
     ("noise / start", 0.0, 1e-2, "cost", "switching", False),
     ("noise / start", 1e-3, 1e-2, "cost", "smoothed", False),
@@ -205,6 +204,7 @@ def main() -> None:
     """Print a line a cell, and write them all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("plants", nargs="*")
+    parser.add_argument("--between", action="store_true", help="levels between those of the page, every other one")
     parser.add_argument("--figure", type=Path, help="draw the cells of --out, without plants those of an earlier call")
     parser.add_argument("--out", type=Path, default=Path("families.json"))
     asked, known = parser.parse_args(), []
@@ -214,7 +214,9 @@ def main() -> None:
         families = {family: laws_of(plant, names) for family, names in FAMILIES.items()}
         print(plant, families, file=sys.stderr)
         for axis, levels in LEVELS.items():
-            for level in levels:
+            pairs = itertools.pairwise(level for level in levels if level)
+            between = [math.sqrt(low * high) for low, high in pairs][1::2]
+            for level in between if asked.between else levels:
                 for one in cells(plant, axis, level, families):
                     its = f"{one['lead']:.3g} ({one['low']:.3g} to {one['high']:.3g}; half step {one['half']:.3g})"
                     laws = " | ".join("/".join(dict.fromkeys(one[who])) for who in ("law", "rival"))
