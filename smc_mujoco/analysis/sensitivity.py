@@ -112,6 +112,7 @@ class Explained:
     shares: np.ndarray  # (N, axes), where in each axis's range a run lies
     values: np.ndarray  # (N,), its score; a run without one has the worst of the others
     failed: np.ndarray  # (N,) bool, whether it fails or ends beyond 5 % of its scale
+    unscored: int  # how many of them have no score
     regions: tuple[Region, ...]
 
 
@@ -145,7 +146,7 @@ def indices(
     k, positive = len(space.names), scores.min() > 0.0
     parts = (np.log(scores) if positive else scores).reshape(-1, points)
     first = total = [Interval(0.0, 0.0, 0.0, points)] * k
-    if np.ptp(scores):
+    if np.ptp(parts[:2]):
 
         def of(at: np.ndarray) -> np.ndarray:
             """Return both indices of each axis, (2, k), from some of the points."""
@@ -157,7 +158,7 @@ def indices(
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
         resampled = np.array([of(at) for at in draws if np.ptp(parts[:2, at])])
         ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-        whole = np.stack([of(np.arange(points)), *ends])  # (3, 2, k)
+        whole = np.clip([of(np.arange(points)), *ends], 0.0, 1.0)  # (3, 2, k); estimates may lie beyond
         first, total = (
             [Interval(at, low, high, points) for at, low, high in whole[:, kind].T.tolist()] for kind in (0, 1)
         )
@@ -189,13 +190,21 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
         cuts = max(gains, key=gains.__getitem__)
         told = _within(cuts, shares) & left
         told[:half] = False
-        if gains[cuts] <= 0.0 or not told.any():
+        if gains[cuts] <= math.log(len(gains)) or not _confirmed(failed[half:], told[half:], left[half:]):
             break
         left &= ~_within(cuts, shares)
         rest = left.copy()
         rest[:half] = False
         found.append(Region(cuts, _rate(failed[told]), _rate(failed[rest])))
     return found
+
+
+def _confirmed(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
+    """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact test."""
+    from scipy.stats import fisher_exact
+
+    counts = [[int((failed & side).sum()), int((~failed & side).sum())] for side in (within, left & ~within)]
+    return float(np.asarray(fisher_exact(counts, "greater"))[1]) < 1.0 - LEVEL
 
 
 def _rate(failed: np.ndarray) -> Interval:

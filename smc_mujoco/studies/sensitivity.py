@@ -92,15 +92,18 @@ class Sensitivity(Tables, Explained):
 
     @property
     def _culprit(self) -> str:
+        if 2 * self.unscored > len(self.values):
+            told = f"{self.unscored} of {len(self.values)} runs have no {self.label}, too many to explain it"
+            return f"{told}: take another metric, or longer runs."
         low, high = np.quantile(self.values, [0.05, 0.95])
         spread = f"the spread of {self.label} ({self.text(low)} to {self.text(high)} in 90 % of the runs)"
         if not self.axes or not np.ptp(self.values):
             return f"Nothing here changes {self.label}, {self.text(float(self.values[0]))}."
         first, *others = self.axes
-        ends = f"{100 * max(0.0, first.total.low):.0f} to {100 * min(1.0, first.total.high):.0f} %"
+        ends = f"{100 * first.total.low:.0f} to {100 * first.total.high:.0f} %"
         rivals = [axis for axis in others if axis.total.high > first.total.low]
         if not rivals:
-            share = f"{100 * min(first.total.median, 1.0):.0f} %"
+            share = f"{100 * first.total.median:.0f} %"
             return f"{in_words(first.name)} explains {share} of {spread}, 95 % interval {ends}."
         named = joined(in_words(axis.name) for axis in (first, *rivals))
         return f"The largest share of {spread} is that of {named}: their intervals overlap, so more points must tell."
@@ -110,6 +113,8 @@ class Sensitivity(Tables, Explained):
         count, n = int(self.failed.sum()), len(self.failed)
         if not count:
             return [f"None of {n} runs fails (at most {100 * share_interval(0.0, n).high:.2g} %)."]
+        if count == n:
+            return [f"All of {n} runs fail."]
         told = [f"It fails where {_words(self.space, its.cuts)}: {_rate(its.rate)}" for its in self.regions]
         if not told:
             return [f"{count} of {n} runs fail, in no region that two bounds could tell."]
@@ -137,7 +142,10 @@ class Sensitivity(Tables, Explained):
         key = (
             "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 % intervals."
         )
-        return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=[*self.sentences, key])]
+        fails = ["A run fails, too, if it ends beyond 5 % of its scale."] if self.failed.any() else []
+        missing = [f"{self.unscored} runs have no score and count as the worst."] if self.unscored else []
+        notes = [*self.sentences, *missing, key, *fails]
+        return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
 
     def about(self) -> dict[str, Any]:
         """Return the result as JSON data."""
@@ -163,7 +171,7 @@ def sensitivity(
     scenario: Scenario,
     over: Uncertainty | None = None,
     metric: str = METRIC,
-    points: Annotated[int, Whole(low=2, high=2**16)] | None = None,
+    points: Annotated[int, Whole(low=8, high=2**16)] | None = None,
     seed: Seed = 0,
     threads: int | None = None,
     progress: bool = False,
@@ -205,10 +213,11 @@ def sensitivity(
         for i, trace in stream((space.scenario_at(row) for row in design), threads, drawn.advance):
             scores[i], held[i] = _score(trace, metric), tolerates(trace)
             broken = broken or (trace.broken if trace.failure is not None else "")
-    if broken:
+    if broken and np.isfinite(scores).any():
         warn_of_broken({scenario.law.name: broken})
     if not (finite := np.isfinite(scores)).any():
-        raise ScenarioError(f"no run of {len(scores)} has a score: give a narrower class, or other gains")
+        cure = f"{broken}: correct the law" if broken else "give longer runs, another metric or a narrower class"
+        raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
     scores[~finite] = scores[finite].max()
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
     shares, values, failed = design[halves], scores[halves], ~held[halves]
@@ -224,6 +233,7 @@ def sensitivity(
         shares=shares,
         values=values,
         failed=failed,
+        unscored=int((~finite[halves]).sum()),
         regions=found,
         improvement=improvement(space, shares, values),
         runs=len(design),
@@ -241,12 +251,12 @@ def default_over(scenario: Scenario) -> Uncertainty:
         mass=MASS if plant.mass and not plant.uncertain else (1.0, 1.0),
         parameters=plant.uncertain,
         friction=(0.0, FRICTION_SHARE * u) if math.isfinite(u) else (0.0, 0.0),
-        delay=(0.0, DELAY_PERIODS * scenario.control_period),
+        delay=(0.0, min(DELAY_PERIODS, scenario.samples // 10) * scenario.control_period),
         position_noise=NOISE * (not any(scenario.noise.errors)),
         hold=scenario.control_period,
         encoder=COUNTS,
         bound=BOUND if math.isfinite(u) else (1.0, 1.0),
-        period=PERIOD,
+        period=(1.0, 1.0) if hasattr(scenario.law.function, "control_period") else PERIOD,
     )
 
 
@@ -285,8 +295,12 @@ def _with_unit(value: float, unit: str) -> str:
     """Return a value of an axis as text, such as "9 ms" or "x 0.8"."""
     if not unit:
         return f"{value:.3g} of nominal"
-    if unit == "counts":
-        return f"{value:.0f} counts"
+    if unit in ("counts", "periods"):
+        return f"{value:.3g} {unit}" if unit == "periods" else f"{value:.0f} counts"
+    if unit == "%":
+        return f"{100 * value:+.3g} %"
+    if unit == "added":
+        return f"+{value:.3g}"
     factor, prefixed = style.prefixed(value, unit)
     return f"{factor * value:.3g} {prefixed}"
 
@@ -296,5 +310,4 @@ def _valued(axis: Axis, end: float) -> str:
 
 
 def _percent(its: Interval) -> Cell:
-    share, low, high = (100 * min(max(end, 0.0), 1.0) for end in (its.median, its.low, its.high))
-    return Cell(f"{share:.0f}", f"{low:.0f}–{high:.0f}")
+    return Cell(f"{100 * its.median:.0f}", f"{100 * its.low:.0f}–{100 * its.high:.0f}")

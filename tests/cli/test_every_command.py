@@ -87,7 +87,7 @@ PRINTED = [  # command lines that are run to their ends
     "show one.npz --export csv,mat",
     "margins duffing --law classical,pid --kinds delay --quick --json m.json",
     "worst duffing --law classical --budget 3 --duration 0.2 --gains default --out w.pdf --json w.json",
-    "sensitivity duffing --law classical --bound mass=0.7:1.3 --points 4 --duration 0.2 --out s.pdf --json s.json",
+    "sensitivity duffing --law classical --bound mass=0.7:1.3 --points 8 --duration 0.2 --out s.pdf --json s.json",
     "accuracy duffing --law classical --periods 0.004,0.002 --seeds 1 --duration 0.5 --out a.pdf --json a.json",
     "basin duffing --law classical --points 2 --duration 0.1 --out b.pdf --json b.json",
     "chatter duffing --law super_twisting --actuator lag:0.01 --gains default --duration 0.2 --out c.pdf --json c.json",

@@ -303,7 +303,7 @@ class Constant:
     name: str
     bounds: tuple[float, float]
     put: Callable[[Scenario, float], Scenario]  # the scenario with a value
-    unit: str = ""  # of a value; "" for a factor or a number
+    unit: str = ""  # of a value; "" for a factor, "added" for what is added to a parameter, "%" for a relative change
     geometric: bool = False  # whether equal ratios, rather than equal differences, are equal shares
 
     def value(self, share: float) -> float:
@@ -327,7 +327,8 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
         yield Constant(name="jitter", bounds=(0.0, jitter / scenario.control_period), put=with_jitter, unit="periods")
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
-            yield Constant(name=name, bounds=bounds, put=functools.partial(_with_factor, name=name))
+            unit = "added" if name in plant.added else ""
+            yield Constant(name=name, bounds=bounds, put=functools.partial(_with_factor, name=name), unit=unit)
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
@@ -343,7 +344,7 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
         yield Constant(name="bound", bounds=within.bound, put=_with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
-        yield Constant(name=name, bounds=(-within.x0, within.x0), put=functools.partial(_with_start, i=i))
+        yield Constant(name=name, bounds=(-within.x0, within.x0), put=functools.partial(_with_start, i=i), unit="%")
     if within.period != (1.0, 1.0):
         yield Constant(
             name="period", bounds=_multiples("period", within.period, 1.0 / scenario.steps), put=_with_period
