@@ -32,7 +32,7 @@ class Axis(NamedTuple):
     name: str
     low: float
     high: float
-    unit: str  # of low and high; "" for a factor or a number
+    unit: str  # of low and high, as that of a `Constant`
     first: Interval  # first-order index, the axis alone, with its 95 % interval
     total: Interval  # total index, with others
     direction: float  # Spearman's rank correlation of the score with the axis; NaN for chance
@@ -71,10 +71,9 @@ class Space:
         errors = (over.position_noise, unit) if over.position_noise else (over.velocity_noise, f"{unit}/s")
         levels = [("disturbance", (over.disturbance, scenario.plant.efforts[0]))] * members.forced
         levels += [("noise", errors)] * (members.times > 0)
-        self.levels = {name: level for name, (level, _) in levels}
         drawn = bool(levels) or over.jitter > 0.0 or _random(scenario)
         self.columns: tuple[Constant | None, ...] = (*members.constants, *(None for _ in levels), *([None] * drawn))
-        self.names = (*(one.name for one in members.constants), *self.levels, *([CHANCE] * drawn))
+        self.names = (*(one.name for one in members.constants), *(name for name, _ in levels), *([CHANCE] * drawn))
         ends = [(*one.bounds, one.unit) for one in members.constants] + [(0.0, *level) for _, level in levels]
         self.ends = [*ends, *([(math.nan, math.nan, "")] * drawn)]
 

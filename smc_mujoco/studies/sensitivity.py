@@ -25,7 +25,6 @@ from smc_mujoco.analysis.bootstrap import Interval, share_interval
 from smc_mujoco.analysis.margins import tolerates
 from smc_mujoco.analysis.sensitivity import (
     CHANCE,
-    Axis,
     Cut,
     Explained,
     Improvement,
@@ -78,7 +77,7 @@ class Sensitivity(Tables, Explained):
     @property
     def sentences(self) -> list[str]:
         """The result in words: what explains the spread, where runs fail, and what to improve."""
-        told = [self._culprit, *self._failures, *([self._improvement] if self.improvement else [])]
+        told = [self._culprit, *self._failures, *self._improvement]
         return [sentence[0].upper() + sentence[1:] for sentence in told]
 
     @property
@@ -98,7 +97,7 @@ class Sensitivity(Tables, Explained):
         low, high = np.quantile(self.values, [0.05, 0.95])
         spread = f"the spread of {self.label} ({self.text(low)} to {self.text(high)} in 90 % of the runs)"
         if not self.axes or not np.ptp(self.values):
-            return f"Nothing here changes {self.label}, {self.text(float(self.values[0]))}."
+            return f"All of {len(self.values)} runs have the same {self.label}, {self.text(float(self.values[0]))}."
         first, *others = self.axes
         ends = f"{100 * first.total.low:.0f} to {100 * first.total.high:.0f} %"
         rivals = [axis for axis in others if axis.total.high > first.total.low]
@@ -122,12 +121,12 @@ class Sensitivity(Tables, Explained):
         return [f"{'; '.join(told)}; elsewhere {round(rest.median * rest.n)} of {rest.n}."]
 
     @property
-    def _improvement(self) -> str:
-        its = self.improvement
-        assert its is not None
+    def _improvement(self) -> list[str]:
+        if not (its := self.improvement):
+            return []
         now, before = self.text(its.median), self.text(its.before)
         words = _words(self.space, [its.half]).replace("<", "to below").replace(">", "to above")
-        return f"Narrow {words} first: the median {self.label} is then {now}, not {before}."
+        return [f"Narrow {words} first: the median {self.label} is then {now}, not {before}."]
 
     @property
     def tables(self) -> list[Tabular]:
@@ -135,7 +134,7 @@ class Sensitivity(Tables, Explained):
         rows = []
         for axis in self.axes:
             chance = axis.name == CHANCE
-            ends = ["–", "–"] if chance else [_valued(axis, end) for end in (axis.low, axis.high)]
+            ends = ["–", "–"] if chance else [_with_unit(end, axis.unit) for end in (axis.low, axis.high)]
             trend = "–" if chance or abs(axis.direction) < 0.1 else ("worse" if axis.direction > 0.0 else "better")
             rows.append([in_words(axis.name), *ends, _percent(axis.first), _percent(axis.total), trend])
         title = f"{self.scenario.law.name} on {self.scenario.plant.name}: shares of the variance of {self.label}, %"
@@ -182,7 +181,7 @@ def sensitivity(
       scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and parameters.
       over: the class. Its disturbance and its errors of measurement are axes with a level from 0 to the bound, and
         random within it. Default: mass, friction, delay, noise, encoder, period and bound, see `default_over`.
-      metric: name of any metric; more is worse. A run that fails counts as the worst that did not.
+      metric: name of any metric; more is worse. A run without a score counts as the worst.
       points: number of points, a power of 2; with k axes there are (k + 2) times as many runs. Default: as many as
         take up to about 20 s of one core.
       seed: of the points.
@@ -292,21 +291,19 @@ def _words(space: Space, cuts: Sequence[Cut]) -> str:
 
 
 def _with_unit(value: float, unit: str) -> str:
-    """Return a value of an axis as text, such as "9 ms" or "x 0.8"."""
+    """Return a value of an axis as text, such as "9 ms" or "0.8 of nominal"."""
     if not unit:
         return f"{value:.3g} of nominal"
-    if unit in ("counts", "periods"):
-        return f"{value:.3g} {unit}" if unit == "periods" else f"{value:.0f} counts"
+    if unit == "counts":
+        return f"{value:.0f} counts"
+    if unit == "periods":
+        return f"{value:.3g} periods"
     if unit == "%":
         return f"{100 * value:+.3g} %"
     if unit == "added":
         return f"+{value:.3g}"
     factor, prefixed = style.prefixed(value, unit)
     return f"{factor * value:.3g} {prefixed}"
-
-
-def _valued(axis: Axis, end: float) -> str:
-    return _with_unit(end, axis.unit)
 
 
 def _percent(its: Interval) -> Cell:

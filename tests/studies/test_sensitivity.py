@@ -197,7 +197,7 @@ def test_words_name_one_culprit_only_if_the_intervals_part():
     wide = found.axes[0].total._replace(median=0.0, low=0.0)  # reaches into the first interval
     same = dataclasses.replace(found, axes=(found.axes[0], found.axes[0]._replace(name="delay", total=wide)))
     assert "that of mass and delay" in same.sentences[0]
-    assert "Nothing here changes" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
+    assert "All of 4 runs have the same" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
     some = np.arange(32) < 5
     assert "5 of 32 runs fail, in no region" in dataclasses.replace(found, failed=some, regions=()).sentences[1]
 

@@ -17,6 +17,16 @@ if TYPE_CHECKING:
     from smc_mujoco.control.law import Law
     from smc_mujoco.simulation.scenario import Scenario
 
+Bound = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME=BOUND,...",
+        help="Bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), friction=0:0.1 (N or N m), encoder=2048:32768 "
+        "(counts); factors: mass=0.7:1.3, friction_scale=0.5:2, bound=0.5:1 (on u_max), period=1:4 (on the control "
+        "period; not in worst), parameters of the plant, as payload=0:2. Numbers: slope (of d, per s), "
+        "position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
+    ),
+]
 QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
     "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
@@ -127,15 +137,7 @@ def worst(
     ],
     law: options.Laws = None,
     disturbance: options.Disturbance = None,
-    bound: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME=BOUND,...",
-            help="Other bounds of `smc.Uncertainty`. Ranges: delay=0:0.01 (s), mass=0.7:1.3 and friction_scale=0.5:2 "
-            "(factors), friction=0:0.1 (N or N m), parameters of the plant, as payload=0:2. Numbers: slope (of d, per "
-            "s), position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
-        ),
-    ] = None,
+    bound: Bound = None,
     metric: Annotated[str, typer.Option(help="The metric to make large, any of `smc.score`.")] = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
@@ -184,15 +186,7 @@ def sensitivity(
     plant: options.PlantName,
     law: options.OneLaw = "observer_free",
     disturbance: options.Disturbance = None,
-    bound: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME=BOUND,...",
-            help="The axes. Ranges: delay=0:0.02 (s), friction=0:0.3 (N or N m), encoder=2048:32768 (counts); factors: "
-            "mass=0.7:1.3, bound=0.5:1 (on u_max), period=1:4 (on the control period), friction_scale=0.5:2, those "
-            "of the plant. Largest: position_noise, velocity_noise, jitter (s), slope, hold (s), x0 (a share).",
-        ),
-    ] = None,
+    bound: Bound = None,
     metric: Annotated[str, typer.Option(help="The score to explain, any of `smc.score`.")] = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
@@ -230,7 +224,11 @@ def sensitivity(
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
     found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
     terminal.print(found)
-    terminal.note(f"{found.runs} runs, {options.gains_used([chosen], gains)}", "dim", wrap=True)
+    terminal.note(
+        f"{found.runs} runs, {len(found.values)} of them independent, {options.gains_used([chosen], gains)}",
+        "dim",
+        wrap=True,
+    )
     if json:
         terminal.wrote(write_json(json, found.about()))
     if out:
