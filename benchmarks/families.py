@@ -153,35 +153,26 @@ def cells(plant: str, axis: str, level: float, families: dict[str, list[str]]) -
 
 
 def draw(known: Sequence[dict], path: Path) -> None:
-    """Draw the leads over the levels: a row a plant, a column an axis."""
-    plants, axes = list(dict.fromkeys(one["plant"] for one in known)), list(LEVELS)
+    """Draw the leads over the levels: a row an axis, a column a plant."""
+    plants = list(dict.fromkeys(one["plant"] for one in known))
     with style.page(FIGURE_WIDTH):
-        figure = pages.blank(FIGURE_WIDTH, ROW_HEIGHT * len(plants) + 0.8, None)
-        panels = figure.subplots(len(plants), len(axes), squeeze=False, sharey="row")
-        for (i, plant), (k, axis) in itertools.product(enumerate(plants), enumerate(axes)):
+        figure = pages.blank(FIGURE_WIDTH, ROW_HEIGHT * len(LEVELS) + 0.8, None)
+        panels = figure.subplots(len(LEVELS), len(plants), squeeze=False, sharex="row", sharey=True)
+        for (i, axis), (k, plant) in itertools.product(enumerate(LEVELS), enumerate(plants)):
             ax = panels[i, k]
             for (score, kind), colour in zip(itertools.product(SCORES, KINDS), COLOURS, strict=True):
-                its = [
-                    one
-                    for one in known
-                    if all(
-                        one[key] == value
-                        for key, value in {"plant": plant, "axis": axis, "score": score, "kind": kind}.items()
-                    )
-                ]
-                if not its:
-                    continue
+                wanted = {"plant": plant, "axis": axis, "score": score, "kind": kind}
+                its = [one for one in known if wanted.items() <= one.items()]
                 x = [one["level"] or LEVELS[axis][1] / 2 for one in its]  # no delay is drawn at half of the smallest
                 ends = [[one["lead"] - one["low"] for one in its], [one["high"] - one["lead"] for one in its]]
                 ax.errorbar(x, [one["lead"] for one in its], ends, fmt="o-", color=colour, ms=4, lw=1.2)
             ax.axhline(1.0, color=style.INK, lw=0.8)
-            ax.set(xscale="log", yscale="log", ylim=(1 / LIMIT, LIMIT))
+            ax.set(xscale="log", yscale="log", ylim=(1 / LIMIT, LIMIT), xlabel=axis)
             ax.xaxis.set_minor_formatter(NullFormatter())
-            if i == len(plants) - 1:
-                ax.set_xlabel(axis)
-        for i, plant in enumerate(plants):
-            panels[i, 0].set_ylabel("lead (ratio)")
-            panels[i, 0].set_title(style.plant_name(plant))
+        for ax, plant in zip(panels[0], plants, strict=True):
+            ax.set_title(style.plant_name(plant))
+        for ax in panels[:, 0]:
+            ax.set_ylabel("lead (ratio)")
         names = [f"{score}, {kind}" for score, kind in itertools.product(SCORES, KINDS)]
         handles = [Line2D([], [], color=c, marker="o", label=name) for name, c in zip(names, COLOURS, strict=True)]
         pages.set_head(figure, FIGURE_WIDTH, "Sliding mode ahead above 1, a rival below", handles)
