@@ -4,5 +4,6 @@ from smc_mujoco.mechanisms.hardware.drives import RateLimit
 from smc_mujoco.mechanisms.hardware.friction import LuGre
 from smc_mujoco.mechanisms.hardware.servos import ServoFriction, servo
 from smc_mujoco.mechanisms.hardware.sliding import Sigmoid
+from smc_mujoco.mechanisms.hardware.stepper import Stepper
 
-__all__ = ["LuGre", "RateLimit", "ServoFriction", "Sigmoid", "servo"]
+__all__ = ["LuGre", "RateLimit", "ServoFriction", "Sigmoid", "Stepper", "servo"]

@@ -73,6 +73,8 @@ class Loop:
         if not s.clock.regular:
             cure = "leave the clock out, or measure it in a run"
             raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
+        if s.stepper is not None:
+            raise ScenarioError("chattering is not predicted for a Stepper, whose queue is no lag: measure it in a run")
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 moves = f"joint {joint!r} of {plant.name} moves from {low:g} to {high:g}"

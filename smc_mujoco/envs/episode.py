@@ -54,6 +54,8 @@ class Setting:
         self.scenario = stepped_by_mujoco(scenario).resolved
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
+        if self.scenario.stepper is not None:
+            raise ScenarioError("environments have no Stepper, whose queue the callback keeps: give another actuator")
         if self.scenario.formula_friction is not None:
             name = type(self.scenario.formula_friction).__name__
             raise ScenarioError(f"friction {name} is a formula, which environments lack: give Coulomb or LuGre")

@@ -22,6 +22,7 @@ import numpy as np
 from smc_mujoco.common.constraints import Positive, constrained
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import drive_ids, initial_pose, joint_ids, joint_names
+from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.metrics import conventions
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.conventions import group_trace, groups
@@ -93,7 +94,8 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
-    return [part for part in scenario.actuator if part.in_callback or part.delay or not part.drives]
+    hidden = (part.in_callback or part.delay or isinstance(part, Stepper) for part in scenario.actuator)
+    return [part for part, has in zip(scenario.actuator, hidden, strict=True) if has or not part.drives]
 
 
 @once_per_trace

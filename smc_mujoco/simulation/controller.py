@@ -28,12 +28,13 @@ from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
+from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
-from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, state_at
+from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, motor_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
@@ -83,6 +84,8 @@ def control(address, sim, data):
         return
     if stage == 0 and within == 0:
         _log(sim, data, k)
+    if sim.motors != 0:
+        _apply_steppers(sim, data, stage)
     if sim.exact_friction != 0:
         _apply_exact_friction(sim, data, stage)
 
@@ -269,6 +272,10 @@ def _measure_channel(address, sim, k, t, i):
     if _evaluate_model(address, sim, i) != 0:
         return record.RAISED
     y.f, y.g = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
+    if sim.motors != 0:  # u is the acceleration x''
+        y.gq /= y.g
+        y.fq -= y.gq * y.f
+        y.f, y.g = 0.0, 1.0
     y.x, y.v = x[i], v[i]
     y.e, y.de = y.x - y.r, y.v - y.dr
     y.a = y.ddr if math.isnan(a[i]) else a[i]  # NaN: the estimator gives none
@@ -353,6 +360,14 @@ def _actuate(sim, data, step):
             state_at(sim.states, i).delayed = buffer[i]
             if sim.has_drives == 0 and i < sim.driven:
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
+            if sim.motors != 0 and i < sim.driven and not _missed(sim, past // sim.steps):
+                _command_stepper(_motor_at(sim, i), sim.stepper, buffer[i], step * sim.step)
+    if sim.motors != 0:
+        for i in range(sim.driven):
+            motor, queue = _motor_at(sim, i), pointer(_queue_of(sim, i))
+            _advance_stepper(motor, sim.stepper, queue, step * sim.step, (step + 1) * sim.step)
+            _turn_field(motor, sim.stepper, queue, step * sim.step, (step + 1) * sim.step)
+        return
     if sim.has_drives != 0:
         for i in range(sim.driven):
             channel = channel_at(sim.channels, i)
@@ -366,6 +381,37 @@ def _actuate(sim, data, step):
                 state.rise *= sim.scale
                 V -= state.rise
             data.ctrl[channel.ctrl] = V
+
+
+_command_stepper, _advance_stepper, _turn_field, _stepper_torque = map(
+    njit(error_model="numpy"), (stepper.command, stepper.advance, stepper.field, stepper.torque)
+)
+
+
+@njit(error_model="numpy", inline="always")
+def _motor_at(sim, i):
+    """Return the stepper motor of a channel."""
+    return motor_at(sim.motors + i * sim.motor_stride, 0)
+
+
+@njit(error_model="numpy", inline="always")
+def _queue_of(sim, i):
+    """Return the address of the queue of a channel's stepper motor."""
+    return sim.motors + i * sim.motor_stride + record.MOTOR_BYTES
+
+
+@njit(error_model="numpy")
+def _apply_steppers(sim, data, stage):
+    """Give every motor its torque at a stage, in the field whose stages have its mean and moment over the step."""
+    for i in range(sim.driven):
+        channel, state, motor = channel_at(sim.channels, i), state_at(sim.states, i), _motor_at(sim, i)
+        moved, weight = motor.middle, 1.0
+        if sim.stages > 1:  # RK4
+            moved += motor.rise if stage == 3 else (-motor.rise if stage == 0 else 0.0)
+            weight = 6.0 if stage % 3 == 0 else 3.0
+        force = _stepper_torque(motor, sim.stepper, data.qpos[channel.shaft_qpos], moved)
+        data.ctrl[channel.ctrl] = force
+        state.force += force / weight
 
 
 @njit(error_model="numpy", inline="always")
@@ -594,7 +640,7 @@ def _sum_forces(sim, data):
     """Add the forces of the last physics step on each joint: of the drive, and of friction and contacts."""
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
-        if channel.force >= 0 and sim.drive_step.rise_first == 0.0:
+        if channel.force >= 0 and sim.drive_step.rise_first == 0.0 and sim.motors == 0:
             state.force += data.actuator_force[channel.force]
         state.reaction += data.qfrc_constraint[channel.qvel]
         if channel.friction_force >= 0:

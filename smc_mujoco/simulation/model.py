@@ -117,6 +117,7 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
         "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
         "force": model.actuator_outadr[drive] if drive >= 0 else -1,
         "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
+        "shaft_qpos": model.jnt_qposadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
         "horizontal": xfrc,
         "axis": 0,
         "hinge_body": -1,

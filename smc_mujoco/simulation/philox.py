@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise and of the first process noise; the second has 2, and so on
 DROPOUT = 1 << 32  # stream that decides which readings are lost
 JITTER, MISSED = 1 << 33, 1 << 34  # streams that decide which samples are late, and which are missed
+REFILL = 1 << 35  # stream that decides when the generators of stepper motors look at their queues
 
 _M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)
 _W0, _W1 = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBB67AE8584CAA73B)
@@ -59,3 +60,10 @@ def normals(seed, channel, stream, k):
 def uniform(seed, channel, stream, k):
     """Return a number uniform in [0, 1) from block k."""
     return (block(seed, channel, stream, k)[0] >> _SHIFT) * 2.0**-53
+
+
+def random_words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
+    """Return two whole numbers of 53 random bits, from numpy's generator."""
+    counter = (k - 1 + (stream << 64)) % 2**256
+    first, second = np.random.Philox(key=seed + (channel << 64), counter=counter).random_raw(2)
+    return int(first) >> 11, int(second) >> 11

@@ -7,6 +7,7 @@ What does not compile runs in the reference loop; `prepared.why_not` says why.
 """
 
 import dataclasses
+import itertools
 import math
 import re
 from collections.abc import Hashable, Mapping
@@ -24,8 +25,9 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
 from smc_mujoco.mechanisms.plant import Native, Plant
-from smc_mujoco.simulation import cfunctions, state
+from smc_mujoco.simulation import cfunctions, philox, state
 from smc_mujoco.simulation.model import Mechanism, check_start, mechanism, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
@@ -224,8 +226,9 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "missed": s.clock.missed,
         "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
-        "has_drives": drives is not None,
+        "has_drives": drives is not None or s.stepper is not None,
         "drive_step": drives._asdict() if drives else {},
+        "stepper": pulsing(s.stepper)._asdict() if s.stepper else {},
         "exact_friction": s.exact_friction,
         "seed": s.noise_seed,
         "sigma_x": s.noise.position,
@@ -247,9 +250,13 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     late = bool(s.clock.jitter_steps(s.physics_step))  # a late command may take effect after the next sample began
     slots = s.delay_steps // s.steps + 1 + late
     states = np.zeros(n, state.CHANNEL_STATE)  # at the start of a run
+    motors = {}
+    if s.stepper is not None:
+        each = [[*motor.values(), *(0.0,) * (2 * s.stepper.queued)] for motor in motors_at_start(s)]
+        motors = {"motors": buffer.put(itertools.chain(*each)), "motor_stride": 8 * len(each[0])}
     if s.drive_step is not None:
         states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
-    return {
+    return motors | {
         "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
         "a": buffer.reserve(n),
         "width": width,
@@ -259,6 +266,13 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
     }
+
+
+def motors_at_start(s: Resolved) -> list[dict[str, float]]:
+    """Return each stepper motor at the start of a run: at rest, with its field at its joint."""
+    zero = dict.fromkeys(GENERATOR, 0.0) | {"stepped": -math.inf, "until": math.inf}
+    phases = (philox.random_words(s.noise_seed, i, philox.REFILL, 0)[0] * 2.0**-53 for i in range(s.plant.driven))
+    return [zero | {"phase": phase, "origin": s.x0[i]} for i, phase in enumerate(phases)]
 
 
 def _joint_measurement(

@@ -91,7 +91,7 @@ class Controller:
         x += sensor.bias
         if q := sensor.quantum(self.scenario.plant.units[i] == "rad"):
             x = q * float(np.floor(x / q + 0.5))
-        if j > 0 and random_words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
+        if j > 0 and philox.random_words(seed, i, philox.DROPOUT, j)[0] * 2.0**-53 < sensor.dropout:
             return self.last_reading[i, 0], self.last_reading[i, 1]
         self.last_reading[i] = x, v
         return x, v
@@ -122,6 +122,9 @@ class Controller:
         if (j := i + len(scenario.limits)) < len(x):  # a joint without actuator, which moves with channel i
             fq, gq = self.model_at(x, v, j, i)
             y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
+        if scenario.stepper is not None:  # u is the acceleration x''
+            gq = y.gq / y.g
+            y = y._replace(f=0.0, g=1.0, fq=y.fq - gq * y.f, gq=gq)
         if self.surface:
             sliding, v_eq = self.surface(i, y)
             y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
@@ -293,14 +296,7 @@ def as_floats(name: str, out: Any, expected: str, count: int) -> list[float]:
 
 def normals(seed: int, channel: int, stream: int, k: int) -> tuple[float, float]:
     """Return the numbers of philox.normals, from numpy's generator."""
-    first, second = random_words(seed, channel, stream, k)
+    first, second = philox.random_words(seed, channel, stream, k)
     radius = math.sqrt(-2.0 * math.log((first + 1) * 2.0**-53))
     angle = 2.0 * math.pi * second * 2.0**-53
     return radius * math.cos(angle), radius * math.sin(angle)
-
-
-def random_words(seed: int, channel: int, stream: int, k: int) -> tuple[int, int]:
-    """Return two whole numbers of 53 random bits, from numpy's generator."""
-    counter = (k - 1 + (stream << 64)) % 2**256
-    first, second = np.random.Philox(key=seed + (channel << 64), counter=counter).random_raw(2)
-    return int(first) >> 11, int(second) >> 11

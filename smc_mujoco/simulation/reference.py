@@ -6,11 +6,13 @@ Trace. It is written to be read, with numpy's Philox and none of the callback's 
 
 import contextlib
 import math
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 
 from smc_mujoco.common import jit, mjcb
+from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED, Sliding
@@ -18,6 +20,7 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
+from smc_mujoco.simulation.prepare import motors_at_start
 from smc_mujoco.simulation.python_controller import (
     USER_EXCEPTIONS,
     Controller,
@@ -25,7 +28,6 @@ from smc_mujoco.simulation.python_controller import (
     as_floats,
     evaluate,
     failure_of,
-    random_words,
 )
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push, Signal
@@ -59,6 +61,26 @@ def run(scenario: Scenario, mechanism: models.Mechanism | None = None) -> Trace:
     return from_log(scenario, loop.log, loop.failed_step, loop.failure)
 
 
+class Motor:
+    """A stepper motor, by the functions of hardware.stepper, without their compilation."""
+
+    def __init__(self, part: stepper.Stepper, values: dict[str, float]):
+        self.state, self.numbers = SimpleNamespace(**values), stepper.pulsing(part)
+        self.queue = [0.0] * (2 * part.queued)
+
+    def step(self, u: float | None, step: int, h: float) -> None:
+        """Turn the field through a physics step of h s; u is a command that arrives at its start, or None."""
+        start, end = step * h, (step + 1) * h
+        if u is not None:
+            stepper.command(self.state, self.numbers, u, start)
+        stepper.advance(self.state, self.numbers, self.queue, start, end)
+        stepper.field(self.state, self.numbers, self.queue, start, end)
+
+    def torque(self, x: float, sign: int) -> float:
+        """Return the torque on a joint at x; sign is -1 and 1 in the first and last stage of RK4, else 0."""
+        return stepper.torque(self.state, self.numbers, x, self.state.middle + sign * self.state.rise)
+
+
 class Loop:
     """One simulation and its controller; `control` is the control callback."""
 
@@ -87,6 +109,11 @@ class Loop:
         self.numbers = [] if formula is None else [friction_numbers(formula, i) for i in range(n)]
         self.stuck_at, self.speed = [math.nan] * n, [0.0] * n  # positions of joints that stick, or NaN; last speeds
         self.rubbing, self.held = np.zeros((n, 4)), np.zeros(n)  # of Coulomb friction, see `apply_exact_friction`
+        self.motors = (
+            []
+            if scenario.stepper is None
+            else [Motor(scenario.stepper, values) for values in motors_at_start(self.scenario)]
+        )
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
@@ -126,7 +153,8 @@ class Loop:
                 self.apply_friction(data, d, self.scenario.formula_friction)
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
-                delayed = self.delayed if self.drive_step else data.ctrl[self.channels["ctrl"]] / self.controller.scale
+                held = self.drive_step or self.motors
+                delayed = self.delayed if held else data.ctrl[self.channels["ctrl"]] / self.controller.scale
                 applied, limits = np.zeros(len(x)), self.controller.limits
                 # the quotient may round to just beyond the limit
                 applied[self.driven] = np.clip(delayed[self.driven], -limits, limits)
@@ -144,6 +172,7 @@ class Loop:
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
                 self.forces[:] = self.held[:] = 0.0
+            self.apply_motors(data, stage)
             if self.scenario.exact_friction:
                 self.apply_exact_friction(data, d, stage)
         except Failure as failure:
@@ -166,6 +195,12 @@ class Loop:
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
             self.delayed = self.commands[past // self.scenario.steps]
+        if self.motors:
+            sampled = past // self.scenario.steps if past >= 0 else 0
+            arrives = past >= 0 and past % self.scenario.steps == self.late(sampled) and not self.missed(sampled)
+            for motor, u in zip(self.motors, self.delayed, strict=False):
+                motor.step(float(u) if arrives else None, step, self.scenario.physics_step)
+            return
         command, v = self.delayed, data.qvel[self.channels["shaft"]]
         if self.drive_step:
             self.rise = self.controller.scale * self.drive_step.rise(command, self.first)
@@ -176,6 +211,14 @@ class Loop:
             moving = zip(control, data.qpos[self.channels["qpos"]], v, strict=True)
             control = np.array([rippled(self.drive_step, *each) for each in moving])
         data.ctrl[self.channels["ctrl"][self.driven]] = control[self.driven]
+
+    def apply_motors(self, data: mujoco.MjData, stage: int) -> None:
+        """Give every stepper motor its torque at a stage."""
+        rk4 = self.scenario.stages > 1
+        for i, motor in enumerate(self.motors):
+            force = motor.torque(float(data.qpos[self.channels["shaft_qpos"][i]]), (-1, 0, 0, 1)[stage] if rk4 else 0)
+            data.ctrl[self.channels["ctrl"][i]] = force
+            self.forces[0, i] += force / ((6.0, 3.0, 3.0, 6.0)[stage] if rk4 else 1.0)
 
     def give_moment(self, data: mujoco.MjData, stage: int) -> None:
         """Give the later stages of an RK4 step the force that has its mean and first moment, see `DriveStep`."""
@@ -189,14 +232,14 @@ class Loop:
         steps = self.scenario.clock.jitter_steps(self.scenario.physics_step)
         if not steps or k in (0, self.scenario.samples):
             return 0
-        return int(random_words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
+        return int(philox.random_words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
 
     def missed(self, k: int) -> bool:
         """Return whether sample k does not run."""
         probability = self.scenario.clock.missed
         if not probability or k in (0, self.scenario.samples):
             return False
-        return random_words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < probability
+        return philox.random_words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < probability
 
     def apply_disturbances(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
@@ -292,7 +335,7 @@ class Loop:
 
     def sum_forces(self, data: mujoco.MjData) -> None:
         """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
-        if not (self.drive_step and self.drive_step.rise_first):
+        if not (self.motors or (self.drive_step and self.drive_step.rise_first)):
             self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
         self.forces[1] += data.qfrc_constraint[self.channels["qvel"]]
         if self.has_friction.any():

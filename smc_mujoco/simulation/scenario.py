@@ -35,6 +35,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, joint_names, moves_alone
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
+from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
@@ -309,8 +310,20 @@ class Scenario:
         return next((part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None)
 
     @property
+    def stepper(self) -> Stepper | None:
+        """The stepper motor, whose u is the joint's acceleration; None without one."""
+        return next((part for part in self.actuator if isinstance(part, Stepper)), None)
+
+    @property
+    def force_command(self) -> bool:
+        """Whether u is a force."""
+        return self.voltage_motor is None and self.stepper is None
+
+    @property
     def efforts(self) -> tuple[str, ...]:
-        """Unit of u in each channel, (n,): that of the joint's force, or "V"."""
+        """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its acceleration."""
+        if self.stepper is not None:
+            return tuple(f"{unit}/s^2" for unit in self.plant.units)
         return self.plant.efforts if self.voltage_motor is None else (self.voltage_motor.unit,) * self.plant.n
 
     @functools.cached_property
@@ -320,6 +333,8 @@ class Scenario:
         bounds = u_max if isinstance(u_max, tuple) else (u_max,) * self.plant.driven
         if self.voltage_motor is not None:
             return tuple(min(bound, self.voltage_motor.voltage) for bound in bounds)
+        if self.stepper is not None:  # the plant's limits are of a force
+            return bounds
         limits = self.plant.limits or bounds
         return tuple(min(bound, limit) for bound, limit in zip(bounds, limits, strict=True))
 
@@ -422,7 +437,7 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     defaults = {
         "model": "nominal" if s.law.requires_model else "none",
         "physics_step": s.control_period / _default_steps(s),
-        "u_max": suggested_u_max(s.plant) if s.voltage_motor is None else s.voltage_motor.voltage,
+        "u_max": _default_bound(s),
         "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
         "v0": (0.0,) * s.plant.n,
         "reference": coerce.suggested_reference(s.plant),
@@ -431,6 +446,13 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     }
     missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
     return missing | {"law": design.at_plant(s.law, s.plant)}
+
+
+def _default_bound(s: Scenario) -> float | tuple[float, ...]:
+    """Return the default of u_max: a motor's own, or what the plant suggests."""
+    if s.voltage_motor is not None:
+        return s.voltage_motor.voltage
+    return suggested_u_max(s.plant) if s.stepper is None else s.stepper.ramp
 
 
 def longest_step(s: Scenario) -> float:
@@ -445,7 +467,7 @@ def longest_step(s: Scenario) -> float:
     jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
     if any(isinstance(part, Backlash) for part in s.actuator):
         return min(PLAY_STEP, jitter)
-    if not (s.plain_equation or s.exact_friction):
+    if not (s.plain_equation or s.exact_friction) or s.stepper is not None:
         return min(REALISTIC_STEP, jitter)
     one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(s.actuator[0], Lag)
     moving = [part for part in s.actuator if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited]
@@ -637,6 +659,8 @@ def check_mechanism(s: Resolved) -> None:
         )
     if len(s.actuator) > 1 and any(isinstance(part, DCMotor) and part.ripple for part in s.actuator):
         raise ScenarioError("DCMotor has a ripple beside another part: give the motor alone, or ripple=0")
+    if s.stepper is not None:
+        check_stepper(s)
     for part in s.friction:
         part.check(s.plant)
     for step in (0, s.samples * s.steps):
@@ -649,6 +673,17 @@ def check_mechanism(s: Resolved) -> None:
                     f"the obstacles of contact {s.contact.kind!r} of {s.plant.name} are placed for {name} = {value:g}, "
                     f"and {name} is {present:g}: leave {name} as it is"
                 )
+
+
+def check_stepper(s: Resolved) -> None:
+    """Check that a stepper motor has the command itself, and a law of one channel or without a model."""
+    if len([part for part in s.actuator if part.drives]) > 1:
+        raise ScenarioError(f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that out")
+    if s.law.joint and s.model == "nominal":
+        raise ScenarioError(
+            f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a Stepper's u is an "
+            "acceleration: give model='none', a law of one channel, or another actuator"
+        )
 
 
 @functools.lru_cache(maxsize=16)
@@ -667,20 +702,20 @@ def _doubts(s: Resolved) -> Iterator[str]:
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
                 fact = f"{what} is {value:g} rad, {abs(value) / math.tau:.1f} turns"
                 yield f"{fact}: if it is {value:g} degrees, give math.radians({value:g})"
-    for motor in [part for part in s.actuator if isinstance(part, DCMotor)]:
+    for motor in [part for part in s.actuator if isinstance(part, DCMotor | Stepper)]:
         for i, limit in enumerate(s.limits):
             with np.errstate(all="ignore"):
                 f, g = s.plant.nominal(np.array(s.x0), np.zeros(s.plant.n), i, s.plant.values({}))
             need = abs(f) / abs(g) if g else 0.0
-            if motor.stall < need and (need <= limit or motor.unit):
-                fact = f"DCMotor gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and channel {i} of "
-                fact += f"{s.plant.name} needs {need:.3g} to hold its start"
-                yield f"{fact}: give the motor more gear, voltage or current"
+            if motor.stall < need and (need <= limit or not s.force_command):
+                fact = f"{type(motor).__name__} gives at most {motor.stall:.3g} {s.plant.efforts[i]} at rest, and "
+                fact += f"channel {i} of {s.plant.name} needs {need:.3g} to hold its start"
+                yield f"{fact}: give the motor more {'torque' if s.stepper else 'gear, voltage or current'}"
 
 
 def _made_up_bound(s: Scenario) -> str:
     """Return a sentence about the joints of your own model whose force only a default bounds; "" if there are none."""
-    if s.u_max is not None or not s.plant.own or s.voltage_motor is not None or s.law.name == "none":
+    if s.u_max is not None or not s.plant.own or not s.force_command or s.law.name == "none":
         return ""
     driven, u_max = range(s.plant.driven), s.resolved.u_max
     taken = u_max if isinstance(u_max, tuple) else [u_max for _ in driven]

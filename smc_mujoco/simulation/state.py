@@ -18,6 +18,7 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import ARRAYS, HANDLE
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.hardware.drives import DriveStep
+from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, Pulsing
 from smc_mujoco.mechanisms.plant import SEEN
 
 # Inputs and outputs of functions.
@@ -32,7 +33,7 @@ FRICTION_INPUT, FRICTION_OUTPUT = floats(("v", "motor", "load")), floats(("f", "
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
 #   qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in actuator_force
-#   shaft: in qvel, of what the actuator drives: the joint, or its rotor
+#   shaft, shaft_qpos: in qvel and qpos, of what the actuator drives: the joint, or its rotor
 #   xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which d enters there
 #   horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of the world, 0 or 1
 #   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
@@ -43,7 +44,7 @@ CHANNEL = np.dtype(
         (name, "i8")
         for name in (
             "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "horizontal", "axis",
-            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc",
+            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc", "shaft_qpos",
         )
     ]
 )  # fmt: skip
@@ -60,7 +61,7 @@ CHANNEL = np.dtype(
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
 RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
-DRIVE_STEP = floats(DriveStep._fields)
+DRIVE_STEP, PULSING, MOTOR = floats(DriveStep._fields), floats(Pulsing._fields), floats(GENERATOR)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
 
@@ -98,6 +99,9 @@ SIMULATION = np.dtype(
         ("jitter", "i8"), ("missed", "f8"),
         # drives in the callback: whether there are, and what a physics step does to them
         ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
+        # stepper motors: their numbers, the address of the first MOTOR, whose queue follows it, 0 without any, and the
+        # bytes from one to the next
+        ("stepper", PULSING), ("motors", "i8"), ("motor_stride", "i8"),
         # whether the callback gives the joints their Coulomb friction
         ("exact_friction", "i8"),
         # the sensor: noise, encoder
@@ -129,8 +133,8 @@ SIMULATION = np.dtype(
 )  # fmt: skip
 
 # How compiled code reads record i of an array at an address.
-simulation_at, channel_at, state_at, log_at, disturbance_at, function_at = map(
-    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION)
+simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at = map(
+    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION, MOTOR)
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
@@ -139,6 +143,8 @@ AT = At(*(SIMULATION.fields[name][1] for name in At._fields))  # pyright: ignore
 
 # Values of `failure`. RAISED: another function than the law raised an exception.
 FINE, DIVERGED, NOT_FINITE, LAW_RAISED, RAISED, DISTURBANCE_NOT_FINITE, INTERRUPTED = range(7)
+
+MOTOR_BYTES = MOTOR.itemsize
 
 
 class Index(int):

@@ -163,8 +163,9 @@ def _board(
 ) -> Board:
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
     unit = UNITS[metric]
-    if all((scenario := ran[k]) is not None and scenario.voltage_motor for k in scores.blocks):
-        unit = unit.replace("({u})", "V").replace("{u}", "V")
+    others = {one.efforts[0] if (one := ran[k]) is not None and not one.force_command else "" for k in scores.blocks}
+    if len(others) == 1 and (other := others.pop()):
+        unit = unit.replace("({u})", other if other.isalpha() else f"({other})").replace("{u}", other)
     blocks = tuple(
         _block(group.blocks[k], group.seeds[k], comparison, at, untuned, () if unchecked else outside)
         for at, k in enumerate(scores.blocks)

@@ -134,7 +134,7 @@ def default_class(scenario: Scenario) -> Uncertainty:
 
 def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
-    return min(scenario.limits) * scenario.nominal_drive.gain
+    return scenario.stepper.stall if scenario.stepper else min(scenario.limits) * scenario.nominal_drive.gain
 
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:

@@ -39,7 +39,7 @@ def is_arm(traces: Sequence[Trace]) -> bool:
 def has_bars(trace: Trace) -> bool:
     """Return whether u is a torque with a limit in every joint of an arm."""
     scenario = trace.scenario
-    return bool(scenario.plant.tip) and scenario.voltage_motor is None and max(scenario.limits) < math.inf
+    return bool(scenario.plant.tip) and scenario.force_command and max(scenario.limits) < math.inf
 
 
 def key(traces: Sequence[Trace]) -> list[str]:

@@ -110,8 +110,8 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
         raise ScenarioError(f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead")
     s, limits = scenario.resolved, set(scenario.limits)
     several = len(limits) > 1 and not s.law.joint
-    if several or s.feedforward is not None:
-        what = "a bound for each channel" if several else "a feedforward"
+    if several or s.feedforward is not None or s.stepper is not None:
+        what = "a bound for each channel" if several else "a feedforward" if s.feedforward else "a Stepper"
         raise ScenarioError(f"the scenario has {what}, which an FMU cannot have: give its law, with u_max=")
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
     joint = MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"

@@ -1,0 +1,245 @@
+"""A stepper motor behind a pulse generator: the command is an acceleration, and the motor follows a field that steps.
+
+    u, in rad/s^2 -> speed -> rate of steps -> queue of steps -> the motor's field -> torque ~ sin(field - shaft)
+
+Three functions simulate it, compiled in the callback and as they are in the reference loop: `command` is the firmware's
+part at a control sample, `advance` fills the queue, and `field` turns the field. They know no MuJoCo. g, the state of
+one motor, is a record of GENERATOR; p is a `Pulsing`; the queue has two numbers for a step, its time and its direction.
+"""
+
+import dataclasses
+import math
+from collections.abc import Iterator
+from typing import Annotated, NamedTuple
+
+import mujoco
+from numba.extending import register_jitable
+
+from smc_mujoco.common.constraints import Number, Whole
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive, drive_ids, drives
+from smc_mujoco.mechanisms.plant import Field
+
+MAX_QUEUED = 100_000  # steps of one motor; chosen, 1.6 MB
+ROUNDING = 1e-9  # steps/s: a rate that is less than this below a whole number is that number
+
+
+@dataclasses.dataclass(frozen=True)
+class Stepper(Actuator):
+    """Stepper motor, driver and pulse generator: u is the wanted acceleration of the joint, rad/s^2 (m/s^2).
+
+    At each control sample the firmware adds u times the time since the last sample to a speed. Below the stop band it
+    asks for a stop, else for steps at this rate, in whole steps/s. If the sign changes while steps are wanted, it asks
+    for a stop first, and for the other direction at the next sample.
+
+    The generator looks at this wish every `refill`, and adds steps to a queue until `queue` is filled. A step in the
+    queue does not change any more, and its whole period is committed with it: a new rate acts after the queue, and up
+    to a period later. A counter n of the steps with which it became faster shapes its ramp. A faster step has the
+    period max(1/rate, 1/sqrt(2 ramp (n + 1))), no longer than the last; a slower one 1/rate, as far as `ramp` allows
+    it, and n - 1, at least 1. To stop it makes n more steps at the last period, and only then turns back. This is the
+    logic of FastAccelStepper 0.33.9 (MIT) on an ATmega2560, as far as its sources tell; how it slows down above the
+    speed sqrt(2 ramp) is chosen.
+
+    The driver spreads a step of the field over the interval before it, as drivers with finer microsteps do. The field
+    holds the rotor by a magnetic spring, which slips by itself if the load is too large:
+
+        torque = gear torque sin(teeth gear (field - x)) - gear^2 damping v
+
+    A law's nominal model is x'' = u. There is no model of currents: the torque does not fall with speed.
+
+    Defaults: a NEMA 17 motor of 1.8 degrees at 8 microsteps, typical numbers; damping is chosen. Speeds and
+    accelerations are those of the joint, in rad or m.
+
+    Attributes:
+      steps: per turn of the motor, with microsteps; math.inf: the field turns at the commanded speed at once, without a
+        generator.
+      teeth: of the rotor, periods of the torque per turn of the motor.
+      torque: N m at the motor, the largest that the field holds; greater than 0.
+      damping: N m s/rad at the motor, 0 or more.
+      rotor_inertia: kg m^2 at the motor, 0 or more.
+      gear: turns of the motor per turn of the joint, rad/m on a slide; greater than 0.
+      speed: bound on the commanded speed, rad/s (m/s).
+      ramp: rad/s^2 (m/s^2), of the generator's ramp, and the default of u_max.
+      stop_band: rad/s (m/s): a slower command means stop; 0 or more. A rate below 1 step/s does, too.
+      queue: s of steps that are queued, 0 or more.
+      refill: s between two looks of the generator at its queue, whose first comes after a part of it that depends on
+        the seed. 0: each step is computed when it is due, and `queue` has no effect.
+      spread: share of the last interval over which the driver spreads a step, 0 (a jump) to 1.
+      longest_spread: s, the longest interval that the driver measures; chosen: a step at 50 Hz.
+    """
+
+    steps: Annotated[float, Whole(low=1, high=10**9, infinite=True)] = 1600
+    teeth: Positive = 50.0
+    torque: Positive = 0.4
+    damping: Natural = 0.002
+    rotor_inertia: Natural = 54e-7
+    gear: Positive = 1.0
+    speed: Positive = 40.0
+    ramp: Positive = 80.0
+    stop_band: Natural = 0.2
+    queue: Natural = 0.02
+    refill: Natural = 4.096e-3
+    spread: Annotated[float, Number(low=0.0, high=1.0)] = 1.0
+    longest_spread: Natural = 0.02
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.queued > MAX_QUEUED:
+            long = f"queue {self.queue:g} s at a speed of {self.speed:g} is {self.queued:,} steps"
+            raise ScenarioError(f"Stepper's {long}: give at most {MAX_QUEUED:,}, by a shorter queue or a lower speed")
+
+    @property
+    def per_unit(self) -> float:
+        """Steps per rad (m) of the joint; rad of the motor without steps."""
+        return self.gear if self.steps == math.inf else self.gear * self.steps / math.tau
+
+    @property
+    def queued(self) -> int:
+        """How many steps the queue must hold."""
+        if self.steps == math.inf:
+            return 1
+        return 4 + math.ceil((self.queue + self.refill) * self.speed * self.per_unit)
+
+    @property
+    def stall(self) -> float:
+        """The largest torque that the field holds at rest, N m (N)."""
+        return self.gear * self.torque
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        for actuator in drives(spec):
+            actuator.set_to_motor()
+            actuator.ctrllimited = actuator.forcelimited = False
+
+    def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
+        driven = model.jnt_dofadr[model.actuator_trnid[drive_ids(model), 0]]
+        yield Field("dof_armature", driven, self.gear**2 * self.rotor_inertia, adds=True)
+        yield Field("dof_damping", driven, self.gear**2 * self.damping, adds=True)
+
+
+class Pulsing(NamedTuple):
+    """A Stepper as its functions read it. Lengths are steps, or rad of the motor without steps."""
+
+    per_unit: float = 0.0  # steps per rad (m) of the joint
+    top: float = 0.0  # bound on the speed, steps/s
+    ramp: float = 0.0  # steps/s^2
+    band: float = 0.0  # stop band, steps/s
+    queue: float = 0.0  # s
+    refill: float = 0.0  # s
+    spread: float = 0.0
+    longest: float = 0.0  # s
+    slots: float = 0.0  # steps that the queue has room for
+    steady: float = 0.0  # 1 without steps
+    sharpness: float = 0.0  # periods of the torque per rad (m) of the joint, times 2 pi
+    torque: float = 0.0  # at the joint, N m (N)
+
+
+# The state of a motor: the commanded speed and when it was commanded; the direction that the firmware wants, 0 for a
+# stop, and its rate; of the generator the phase and number of its looks at the queue, the direction of its steps, its
+# ramp's counter, the period of the last step, and the end of this period; numbers of the queue's first step and of the
+# one behind its last; of the field the position of the driver's, the position wanted, its speed and when it ends, and
+# the time of the last step; the joint's position at the start; the field's mean over a physics step, and its rise from
+# the middle of the step to its end.
+GENERATOR = (
+    "speed", "commanded", "wanted", "rate", "phase", "looks", "direction", "n", "period", "free", "head", "tail",
+    "position", "target", "slope", "until", "stepped", "origin", "middle", "rise",
+)  # fmt: skip
+
+
+def pulsing(stepper: Stepper) -> Pulsing:
+    """Return a Stepper as its functions read it."""
+    unit = stepper.per_unit
+    return Pulsing(
+        per_unit=unit, top=stepper.speed * unit, ramp=stepper.ramp * unit, band=stepper.stop_band * unit,
+        queue=stepper.queue, refill=stepper.refill, spread=stepper.spread, longest=stepper.longest_spread,
+        slots=stepper.queued, steady=float(stepper.steps == math.inf), sharpness=stepper.teeth * stepper.gear,
+        torque=stepper.gear * stepper.torque,
+    )  # fmt: skip
+
+
+def command(g, p, u, t):
+    """Give the firmware a command u at time t, s."""
+    g.speed = min(max(g.speed + p.per_unit * u * (t - g.commanded), -p.top), p.top)
+    g.commanded = t
+    size, direction = math.floor(abs(g.speed) + ROUNDING), math.copysign(1.0, g.speed)
+    if abs(g.speed) < p.band or size < 1.0 or direction == -g.wanted:
+        g.wanted = 0.0
+    else:
+        g.wanted, g.rate = direction, size
+
+
+def advance(g, p, queue, start, end):
+    """Queue the steps of all looks of the generator from `start` to before `end`, s."""
+    while p.steady == 0.0:
+        now = (g.looks + g.phase) * p.refill if p.refill > 0.0 else max(g.free, start)
+        if now >= end:
+            return
+        while g.free <= now or (p.refill > 0.0 and g.free - now < p.queue):
+            direction = next_step(g, p)
+            if direction == 0.0:
+                break
+            slot = 2 * int(g.tail % p.slots)
+            g.free = max(g.free, now)
+            queue[slot], queue[slot + 1] = g.free, direction
+            g.free += g.period
+            g.tail += 1.0
+        if p.refill > 0.0:
+            g.looks += 1.0
+        elif g.free <= now:  # it stands
+            return
+
+
+@register_jitable
+def next_step(g, p):
+    """Return the direction of the next step, whose period is `g.period`; 0 if it stands."""
+    if g.direction not in (0.0, g.wanted) and g.n >= 1.0:  # it runs down
+        g.n -= 1.0
+        return g.direction
+    if g.direction != g.wanted:
+        g.direction, g.n, g.period = g.wanted, 0.0, math.inf
+    if g.direction == 0.0:
+        return 0.0
+    period = 1.0 / g.rate
+    if period < g.period:
+        g.n += 1.0
+        g.period = min(max(period, 1.0 / math.sqrt(2.0 * p.ramp * g.n)), g.period)
+    elif period > g.period:
+        g.n -= 1.0
+        slowest = g.period**-2 - 2.0 * p.ramp
+        g.period = min(period, 1.0 / math.sqrt(slowest)) if slowest > 0.0 else period
+    g.n = max(g.n, 1.0)
+    return g.direction
+
+
+def field(g, p, queue, start, end):
+    """Turn the field from `start` to `end`, s, and keep its mean, and its rise as `drives._rise` defines it."""
+    t, mean, moment = start, 0.0, 0.0
+    if p.steady != 0.0:
+        g.slope, g.until = g.speed, math.inf
+    while t < end:
+        step_time = queue[2 * int(g.head % p.slots)] if g.head < g.tail else math.inf
+        reached = g.until if g.slope != 0.0 else math.inf
+        after = max(min(step_time, reached, end), t)
+        span, left = after - t, end - t
+        mean += span * (g.position + 0.5 * g.slope * span)
+        moment += span * (g.position * (left - 0.5 * span) + g.slope * span * (0.5 * left - span / 3.0))
+        g.position += g.slope * span
+        t = after
+        if t == reached:
+            g.position, g.slope = g.target, 0.0
+        if t == step_time:
+            g.target += queue[2 * int(g.head % p.slots) + 1]
+            g.head += 1.0
+            interval = p.spread * min(t - g.stepped, p.longest)
+            g.stepped, g.until = t, t + interval
+            if interval > 0.0:
+                g.slope = (g.target - g.position) / interval
+            else:
+                g.position, g.slope = g.target, 0.0
+    h = end - start
+    mean, moment = mean / h, moment / (h * h)
+    g.middle, g.rise = mean, 6.0 * (0.5 * mean - moment)
+
+
+def torque(g, p, x, moved):
+    """Return the torque on a joint at x, when the field is at `moved`."""
+    return p.torque * math.sin(p.sharpness * (g.origin + moved / p.per_unit - x))

@@ -1,0 +1,277 @@
+"""A stepper motor's steps, field and torque are those of an event integration, written here from its docstring."""
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.analysis.chattering import chattering
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.envs.episode import Setting
+from smc_mujoco.hardware import Stepper
+from smc_mujoco.simulation import model, reference
+from smc_mujoco.simulation.callback import installed
+from smc_mujoco.simulation.prepare import motors_at_start
+
+PERIOD = 5e-3  # s, of the control
+MOTOR = Stepper(steps=1600, torque=0.3, damping=4e-3, speed=60.0, ramp=80.0, stop_band=0.2)
+# accelerations that turn, and stop; rates below and above sqrt(2 ramp)
+SLOW, FAST = smc.Sine(6.0, 17.0, phase=math.pi / 2), smc.Sine(40.0, 25.0, phase=math.pi / 2)
+KINDS = {
+    "slow": (MOTOR, SLOW),
+    "fast": (MOTOR, FAST),
+    "without queue": (dataclasses.replace(MOTOR, queue=0.0), SLOW),
+    "each step when it is due": (dataclasses.replace(MOTOR, refill=0.0), FAST),
+    "jumps": (dataclasses.replace(MOTOR, spread=0.0, stop_band=0.0), FAST),
+    "half spread": (dataclasses.replace(MOTOR, spread=0.5, queue=0.05, longest_spread=0.004), SLOW),
+    "slips": (dataclasses.replace(MOTOR, torque=0.02), FAST),
+    "geared": (dataclasses.replace(MOTOR, gear=3.0, torque=0.05), SLOW),
+}
+
+
+PLANT = smc.plant("inverted_pendulum", m=0.02, l=0.3)
+
+
+def scenario(motor, push, plant=PLANT, **fields):
+    fields = {"duration": 1.2, "seed": 5, "x0": 0.3, "control_period": PERIOD, "law": "none"} | fields
+    return smc.Scenario(plant=plant, actuator=motor, feedforward=push, **fields)
+
+
+def steps_by_events(motor, commands, phase, duration):
+    """Times and directions of all steps, from events in the order of time. `commands`: (time, u) of the samples."""
+    per = motor.steps * motor.gear / math.tau
+    ramp, speed, wish, last = motor.ramp * per, 0.0, (0, 0), 0.0
+    events = [(t, 0, u) for t, u in commands]
+    if motor.refill:
+        looks = [(k + phase) * motor.refill for k in range(math.ceil(duration / motor.refill))]
+        events += [(t, 1, 0.0) for t in looks if t < duration]
+    steps, way, n, period, free = [], 0, 0, math.inf, 0.0
+
+    def next_step():
+        """Return the period of a step that is added, 0 for none."""
+        nonlocal way, n, period
+        wanted, rate = wish
+        if way and wanted != way and n > 0:
+            n -= 1
+            return period
+        if way and wanted != way:
+            way = 0
+        if not way:
+            way, n, period = wanted, 0, math.inf
+        if not way:
+            return 0.0
+        if 1.0 / rate < period:
+            period, n = min(period, max(1.0 / rate, 1.0 / math.sqrt(2.0 * ramp * (n + 1)))), n + 1
+        elif 1.0 / rate > period:
+            slowest = period**-2 - 2.0 * ramp
+            period, n = 1.0 / max(rate, math.sqrt(slowest) if slowest > 0.0 else 0.0), n - 1
+        n = max(n, 1)
+        return period
+
+    def add(now):
+        nonlocal free
+        at = max(now, free)
+        before = way
+        if length := next_step():
+            steps.append((at, way or before))
+            free = at + length
+        return length
+
+    events.sort()
+    for i, (t, is_look, u) in enumerate(events):
+        if is_look:
+            while (free <= t or free - t < motor.queue) and add(t):
+                pass
+            continue
+        speed = max(-motor.speed * per, min(motor.speed * per, speed + u * per * (t - last)))
+        last, rate, sign = t, math.floor(abs(speed) + 1e-9), 1 if speed >= 0.0 else -1
+        stops = abs(speed) < motor.stop_band * per or rate < 1 or wish[0] == -sign
+        wish = (0, 0) if stops else (sign, rate)
+        until = events[i + 1][0] if i + 1 < len(events) else duration
+        while not motor.refill and max(free, t) < until and add(t):
+            pass
+    return [(t, way) for t, way in steps if t < duration]
+
+
+def field_of(motor, steps):
+    """Knots (t, position of the field in rad of the joint) of a piecewise linear field; two at a jump."""
+    knots, target, before = [(0.0, 0.0)], 0, -math.inf
+
+    def at(t):
+        (t0, p0), (t1, p1) = knots[-2:] if len(knots) > 1 else (knots[0], knots[0])
+        return p1 if t >= t1 or t1 == t0 else p0 + (p1 - p0) * (t - t0) / (t1 - t0)
+
+    for t, way in steps:
+        now = at(t)
+        while len(knots) > 1 and knots[-1][0] > t:  # not reached
+            knots.pop()
+        target, interval = target + way, motor.spread * min(t - before, motor.longest_spread)
+        knots += [(t, now), (t + interval, float(target))]
+        before = t
+    times, positions = map(np.array, zip(*knots, strict=True))
+    return times, positions * math.tau / (motor.steps * motor.gear)
+
+
+def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
+    """x, v and the mean torque between `times` of the joint, by RK4 that stops at each knot of the field."""
+    knots, positions = field_of(motor, steps)
+    grid = np.unique(np.concatenate([np.arange(0.0, times[-1], substep), times, knots[knots <= times[-1]]]))
+    x, v, impulse, values = x0, 0.0, 0.0, plant.values({})
+    rows = []
+
+    def torque(place, x):
+        return motor.gear * motor.torque * math.sin(motor.teeth * motor.gear * (x0 + place - x))
+
+    def rate(place, x, v):
+        f, g = plant.nominal(np.array([x]), np.array([v]), 0, values)
+        free = 1.0 / g  # the plant's inertia, to which the rotor's is added
+        return (f * free + torque(place, x) - motor.gear**2 * motor.damping * v) / (free + inertia)
+
+    wanted = set(times)
+    for a, b in itertools.pairwise(grid):
+        if a in wanted:
+            rows.append((x, v, impulse))
+        h = b - a
+        # the field is continuous from the right at a, and from the left at b
+        first = np.interp(a, knots, positions) if a not in knots else positions[np.flatnonzero(knots == a)[-1]]
+        last = np.interp(b, knots, positions) if b not in knots else positions[np.flatnonzero(knots == b)[0]]
+        mid = 0.5 * (first + last)
+        k1 = rate(first, x, v)
+        k2 = rate(mid, x + h / 2 * v, v + h / 2 * k1)
+        k3 = rate(mid, x + h / 2 * (v + h / 2 * k1), v + h / 2 * k2)
+        k4 = rate(last, x + h * (v + h / 2 * k2), v + h * k3)
+        middle = x + h / 2 * v + h * h / 8 * k1
+        start, x, v = x, x + h * v + h * h / 6 * (k1 + k2 + k3), v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        impulse += h / 6 * (torque(first, start) + 4 * torque(mid, middle) + torque(last, x))
+    rows.append((x, v, impulse))
+    x, v, impulse = np.array(rows).T
+    return x, v, np.diff(impulse) / np.diff(times)
+
+
+def by_events(one):
+    """Steps of a scenario's motor by events, with the commands of its run's samples."""
+    s, motor = one.resolved, one.stepper
+    trace = smc.run(one)
+    commands = list(zip(trace.t, trace.u[:, 0], strict=True))
+    return trace, steps_by_events(motor, commands[:-1], motors_at_start(s)[0]["phase"], trace.t[-1])
+
+
+def looped(one):
+    """The reference loop of a scenario, after its run."""
+    with installed():
+        loop = reference.Loop(one, model.mechanism(one))
+    with installed(loop.control):
+        for step in range(loop.total):
+            loop.step(step)
+    assert not loop.failure
+    return loop
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_steps_are_those_of_an_event_integration(kind):
+    motor, push = KINDS[kind]
+    one = scenario(dataclasses.replace(motor, speed=400.0), push)  # so that the queue has room for all
+    _, steps = by_events(one)
+    state, queue = (own := looped(one).motors[0]).state, own.queue
+    made = [(queue[2 * i], queue[2 * i + 1]) for i in range(int(state.tail))]
+    made = [step for step in made if step[0] < one.duration]
+    assert len(steps) > 30
+    assert {way for _, way in steps} == {-1, 1}
+    assert [way for _, way in made] == [way for _, way in steps]
+    assert [t for t, _ in made] == pytest.approx([t for t, _ in steps], abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_joint_moves_as_behind_these_steps(kind):
+    motor, push = KINDS[kind]
+    one = scenario(motor, push, duration=0.8, physics_step=1.25e-4)
+    trace, steps = by_events(one)
+    x, v, force = moved(motor, steps, one.plant, 0.3, trace.t, motor.gear**2 * motor.rotor_inertia)
+    rough = 5e3 if kind == "jumps" else 1.0  # RK4 gets the mean and the first moment of a jump within a step
+    assert trace.x[:, 0] == pytest.approx(x, abs=rough * 1e-9)
+    assert trace.v[:, 0] == pytest.approx(v, abs=rough * 1e-7)
+    assert trace.force[1:, 0] == pytest.approx(force, abs=rough * 1e-8)
+    assert np.ptp(x) > 0.04
+
+
+CONDITIONS = {
+    "late and missed samples": {"clock": smc.Clock(jitter=2e-3, missed=0.2), "input_delay": 3e-3},
+    "friction": {"friction": smc.Coulomb(0.01)},
+    "play": {"actuator": (MOTOR, smc.Backlash(0.05))},
+    "several motors": {"plant": "pendulum_network", "x0": 0.1, "law": "pid", "actuator": Stepper(torque=20.0)},
+    "a free joint": {"plant": "cart_pole", "x0": (0.0, 0.05), "law": "hierarchical"},
+}
+
+
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_the_callback_is_the_reference_loop_to_the_last_bit(name):
+    fields = {"plant": PLANT, "law": "none", "actuator": MOTOR, "feedforward": SLOW, "x0": 0.3} | CONDITIONS[name]
+    one = smc.Scenario(**fields, duration=0.4, control_period=PERIOD, seed=2)
+    compiled, looped = smc.run(one), reference.run(one)
+    for column, values in compiled.arrays().items():
+        assert np.array_equal(values, looped.arrays()[column]), column
+
+
+def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
+    """A field without a generator turns at the speed that the firmware sums."""
+    one = scenario(dataclasses.replace(MOTOR, steps=math.inf), SLOW, clock=smc.Clock(missed=0.3), duration=0.5)
+    loop, speed, last = looped(one), 0.0, 0.0
+    for k, t in enumerate(PERIOD * np.arange(one.samples)):
+        if not loop.missed(k):
+            speed, last = speed + loop.log["u"][k, 0] * (t - last), t
+    assert 10 < sum(loop.missed(k) for k in range(one.samples)) < 50
+    assert loop.motors[0].state.speed == pytest.approx(speed, rel=1e-12)
+
+
+def test_a_strong_motor_without_a_generator_has_the_wanted_acceleration():
+    """The plain twin of a stepper: x'' = u, a sample late."""
+    ideal = Stepper(steps=math.inf, torque=1e3, damping=0.0, ramp=100.0)
+    trace = smc.run(scenario(ideal, SLOW, control_period=1e-3, physics_step=1.25e-4))
+    speed = np.cumsum(np.append(0.0, 1e-3 * trace.u[1:, 0]))
+    assert trace.v[:, 0] == pytest.approx(speed, abs=0.02)
+    assert np.ptp(speed) > 0.6
+
+
+@smc.law_function(gains={"a": 3.0})
+def pushed(y, gains, memory):
+    return gains.a, y.fq + y.gq * gains.a
+
+
+def test_the_nominal_model_has_the_acceleration_as_its_input():
+    plant, x, v = smc.plant("furuta", bq=1e-5), (0.3, 0.2), (1.0, 2.0)
+    trace = smc.run(scenario(MOTOR, None, plant, law=pushed(), model="nominal", x0=x, v0=v, duration=0.01))
+    p = plant.values({})
+    Jp, s, c = p.Jc + p.m * p.l**2, math.sin(x[1]), math.cos(x[1])
+    torque = Jp * s * c * v[0] ** 2 + p.m * p.grav * p.l * s - p.bq * v[1] - p.m * p.L * p.l * c * 3.0
+    assert trace.s[0, 0] == pytest.approx(torque / Jp, rel=1e-12)
+    assert trace.units()["u0"] == "rad/s^2"
+
+
+def test_the_default_bound_is_the_ramp_and_a_weak_motor_warns():
+    assert scenario(MOTOR, None).limits == (80.0,)
+    with pytest.warns(smc.errors.ScenarioWarning, match=r"Stepper gives at most 0\.01 .* more torque"):
+        scenario(dataclasses.replace(MOTOR, torque=0.01), None)
+
+
+REFUSED = {
+    "lagged": (lambda: scenario((smc.Lag(0.01), MOTOR), SLOW), "leave that out"),
+    "long": (lambda: Stepper(queue=1e3), "queue 1000 s"),
+    "joint": (
+        lambda: scenario(MOTOR, None, "pendulum_network", law="computed_torque", x0=0.1),
+        "computed_torque.*model='none'",
+    ),
+    "environment": (lambda: Setting(PLANT, "regulate", {"actuator": MOTOR}), "no Stepper"),
+    "FMU": (lambda: smc.exchange.law_to_fmu(scenario(MOTOR, None, law="pid"), "never.fmu"), "a Stepper.*u_max"),
+    "prediction": (lambda: chattering(scenario(MOTOR, None, law="pid")), "measure it in a run"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_a_stepper_cannot_have_is_refused_in_a_sentence(name):
+    made, words = REFUSED[name]
+    with pytest.raises(ScenarioError, match=words) as refusal:
+        made()
+    assert "\n" not in str(refusal.value)
