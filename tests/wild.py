@@ -234,6 +234,7 @@ def actuator(random: Random) -> list:
         lambda: smc.hardware.RateLimit(positive(random)),
         lambda: changed(random, smc.DCMotor, [], motor),
         lambda: changed(random, smc.Backlash, ["gap"], ["rotor_inertia", "rotor_damping"]),
+        lambda: changed(random, smc.hardware.Stepper, [], ["teeth", "torque", "gear", "ramp", "queue", "refill"]),
     ]
     return [random.choice(kinds)() for _ in range(random.randint(0, 2))]
 

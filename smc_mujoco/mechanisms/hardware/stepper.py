@@ -53,19 +53,19 @@ class Stepper(Actuator):
     Attributes:
       steps: per turn of the motor, with microsteps; math.inf: the field turns at the commanded speed at once, without a
         generator.
-      teeth: of the rotor, periods of the torque per turn of the motor.
+      teeth: of the rotor, periods of the torque per turn of the motor; greater than 0.
       torque: N m at the motor, the largest that the field holds; greater than 0.
       damping: N m s/rad at the motor, 0 or more.
       rotor_inertia: kg m^2 at the motor, 0 or more.
       gear: turns of the motor per turn of the joint, rad/m on a slide; greater than 0.
-      speed: bound on the commanded speed, rad/s (m/s).
-      ramp: rad/s^2 (m/s^2), of the generator's ramp, and the default of u_max.
+      speed: bound on the commanded speed, rad/s (m/s), greater than 0.
+      ramp: rad/s^2 (m/s^2), of the generator's ramp, and the default of u_max; greater than 0.
       stop_band: rad/s (m/s): a slower command means stop; 0 or more. A rate below 1 step/s does, too.
       queue: s of steps that are queued, 0 or more.
-      refill: s between two looks of the generator at its queue, whose first comes after a part of it that depends on
-        the seed. 0: each step is computed when it is due, and `queue` has no effect.
-      spread: share of the last interval over which the driver spreads a step, 0 (a jump) to 1.
-      longest_spread: s, the longest interval that the driver measures; chosen: a step at 50 Hz.
+      refill: s between two looks of the generator at its queue, 0 or more. The first comes after a part of it that
+        depends on the seed. If it is 0, each step is computed when it is due, and `queue` has no effect.
+      spread: share of the last interval over which the driver spreads a step, 0 .. 1; a step is a jump if it is 0.
+      longest_spread: s, the longest interval that the driver measures, 0 or more; chosen: a step at 50 Hz.
     """
 
     steps: Annotated[float, Whole(low=1, high=10**9, infinite=True)] = 1600

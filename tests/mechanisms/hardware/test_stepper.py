@@ -28,6 +28,7 @@ KINDS = {
     "jumps": (dataclasses.replace(MOTOR, spread=0.0, stop_band=0.0), FAST),
     "half spread": (dataclasses.replace(MOTOR, spread=0.5, queue=0.05, longest_spread=0.004), SLOW),
     "slips": (dataclasses.replace(MOTOR, torque=0.02), FAST),
+    "turns at once": (dataclasses.replace(MOTOR, stop_band=0.05), smc.Sine(60.0, 120.0, phase=1.5)),
     "geared": (dataclasses.replace(MOTOR, gear=3.0, torque=0.05), SLOW),
 }
 
@@ -260,8 +261,8 @@ REFUSED = {
     "lagged": (lambda: scenario((smc.Lag(0.01), MOTOR), SLOW), "leave that out"),
     "long": (lambda: Stepper(queue=1e3), "queue 1000 s"),
     "joint": (
-        lambda: scenario(MOTOR, None, "pendulum_network", law="computed_torque", x0=0.1),
-        "computed_torque.*model='none'",
+        lambda: scenario(MOTOR, None, "pendulum_network", law="computed_torque_sliding", x0=0.1),
+        "computed_torque_sliding.*model='none'",
     ),
     "environment": (lambda: Setting(PLANT, "regulate", {"actuator": MOTOR}), "no Stepper"),
     "FMU": (lambda: smc.exchange.law_to_fmu(scenario(MOTOR, None, law="pid"), "never.fmu"), "a Stepper.*u_max"),
