@@ -21,7 +21,7 @@ GRAV = 9.81
 STATES = 1000
 # plant -> parameters that have friction and rotors of every kind
 ROUGH = {
-    "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5, "tx": 0.1, "ty": -0.2},
+    "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5, "k": 4e-3, "tx": 0.1, "ty": -0.2},
     "double_pendulum": MODEL_1_0,
     "pendubot": MODEL_1_0,
     "acrobot": MODEL_1_0,
@@ -42,7 +42,7 @@ def furuta(p, q, v, u):
     arm, ahead = np.array([math.sin(q[0]), -math.cos(q[0]), 0.0]), np.array([math.cos(q[0]), math.sin(q[0]), 0.0])
     jacobian = np.array([p.L * ahead - p.l * s * arm, p.l * (c * ahead - s * np.array([0.0, 0.0, 1.0]))])
     down = GRAV * np.array([p.tx, p.ty, -math.sqrt(1.0 - p.tx**2 - p.ty**2)])
-    return np.linalg.solve(mass, [u[0], 0.0] - gyration - friction + p.m * jacobian @ down)
+    return np.linalg.solve(mass, [u[0] - p.k * q[0], 0.0] - gyration - friction + p.m * jacobian @ down)
 
 
 def double_pendulum(p, q, v, u):
