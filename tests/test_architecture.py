@@ -25,9 +25,9 @@ CATALOGUES = {
 # The rooms of the package, each of which imports from itself and from those before it.
 ROOMS = (
     "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "studies", "envs", "testing", "cli",
-    "exchange", "evidence",
+    "exchange", "evidence", "benchmark",
 )  # fmt: skip
-ANNEXES = ROOMS[-2:]
+ANNEXES = ROOMS[-3:]
 HEAVY = {"numpy", "mujoco", "numba", "scipy", "matplotlib", "mediapy", "dm_control", "PIL", "rich", "typer"}
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
@@ -133,11 +133,11 @@ trace = smc.run(scenarios)[0]
 smc.figure(trace, "figure.png")
 smc.leaderboard(smc.study(scenarios, "study"))
 smc.plot
-for name in "exchange law_from live audit claims rig identify report boards paper".split():
+for name in "exchange law_from live audit claims rig identify report boards paper problem".split():
     try:
         getattr(smc, name)
     except smc.ScenarioError as error:
-        assert f"smc.{name} needs smc_mujoco.e" in str(error), error
+        assert f"smc.{name} needs smc_mujoco." in str(error), error
     else:
         raise AssertionError(name)
 main(["compare", "duffing", "--law", "pid", "--seeds", "1", "--duration", "0.1", "--out", "compared"])

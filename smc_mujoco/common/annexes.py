@@ -1,10 +1,10 @@
-"""The annexes `exchange` and `evidence`. The core reaches them by name only, and works where they are missing."""
+"""The annexes, which the core reaches by name only. It works where they are missing."""
 
 import importlib
 import importlib.util
 from types import ModuleType
 
-ANNEXES = ("exchange", "evidence")
+ANNEXES = ("exchange", "evidence", "benchmark")
 
 
 def module(name: str, what: str) -> ModuleType:

@@ -1,0 +1,1 @@
+"""Annex: problems with names, suites of them, entries, results and their pages."""

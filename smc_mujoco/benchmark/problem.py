@@ -1,0 +1,240 @@
+"""Problems: a plant under a condition, by name, whose instances everybody draws alike.
+
+    problem = smc.problem("duffing/noise@1")
+    traces = smc.run(problem.scenarios("super_twisting"))
+    print([problem.measures(trace) for trace in traces])
+
+An ID is plant/condition@version. The version's rules, `rules/VERSION.toml`, have the duration, the bound on u, the
+ranges and the order of the draws, and the targets. Visible instances are drawn from the ID alone, hidden ones from the
+ID and a number of 256 bits that is told later.
+"""
+
+import dataclasses
+import functools
+import hashlib
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.benchmark import controls
+from smc_mujoco.common.errors import ScenarioError, find, items_of, shown, whole
+from smc_mujoco.control import gain_sets
+from smc_mujoco.control.component import Template
+from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.metrics import conventions
+from smc_mujoco.simulation.grid import case
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.trace import Trace
+
+RULES = Path(__file__).parent / "rules"
+ID = re.compile(r"(\w+)/(\w+)@(\d+)")
+NUMBER = re.compile(r"[0-9a-f]{64}|")
+DRAWS = 8  # of an instance, see the rules
+STEP = 4096  # of the generator's counter from one instance to the next
+MAX_INSTANCE = 10**9  # chosen
+MEASURES = "accuracy", "itae", "calm"  # that have targets
+FACTORS = "mass", "disturbance"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Instance:
+    """What distinguishes an instance of a problem from the others: a side and factors, see the rules."""
+
+    side: float
+    start: float
+    mass: float
+    disturbance: float
+    seed: int
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """A problem. It is made by `problem`.
+
+    Attributes:
+      id: its name, such as "duffing/noise@1".
+      plant, condition, version: the three parts of the name.
+      u_max: bound on |u|, N or N m.
+      duration: of every run, s.
+      rules: the text of the version's rules.
+      targets: measure -> the levels that laws are to reach, the hardest first.
+    """
+
+    id: str
+    plant: str
+    condition: str
+    version: int
+    u_max: float
+    duration: float
+    rules: str
+    targets: Mapping[str, tuple[float, ...]]
+
+    def __repr__(self) -> str:
+        return f"Problem({self.id!r})"
+
+    @property
+    def controls(self) -> dict[str, Law]:
+        """The laws of the controls: "zero", which must reach no target."""
+        return controls.laws()
+
+    def instance(self, index: int, number: str = "") -> Instance:
+        """Return what an instance has drawn; `number` as in `scenarios`."""
+        key = hashlib.sha256(f"{self.id}{_number(number)}".encode()).digest()[:16]
+        index = whole("an instance", index, 0, MAX_INSTANCE)
+        words = np.random.Philox(key=int.from_bytes(key), counter=STEP * index).random_raw(DRAWS).tolist()
+        u = [(word >> 11) * 2.0**-53 for word in words]
+        of = rules(self.version)
+        start, mass, disturbance = (
+            low + (high - low) * u[i] for i, (low, high) in enumerate((of[name] for name in ("start", *FACTORS)), 1)
+        )
+        side = -1.0 if u[0] < 0.5 else 1.0
+        return Instance(side=side, start=start, mass=mass, disturbance=disturbance, seed=words[4] % 2**52)
+
+    def scenarios(
+        self, law: str | Law | Template, instances: str | Iterable[int] = "visible", number: str = ""
+    ) -> tuple[Scenario, ...]:
+        """Return the scenarios of a law, one for each instance.
+
+        Args:
+          law: a name, which gets its best shipped gains for the plant if there are some, or a law with its own gains.
+          instances: "visible", the first of the rules' number of them, or the instances themselves.
+          number: "" for visible instances, or the 64 hex digits from which hidden ones are drawn.
+
+        Raises:
+          ScenarioError: instances or a number that do not exist, or a law that the plant cannot have.
+        """
+        if isinstance(instances, str):
+            find("kind of instances", instances, {"visible": None})
+            instances = range(rules(self.version)["visible"])
+        base = self._base(law)
+        return tuple(self._place(base, self.instance(i, number)) for i in items_of("instances", instances))
+
+    def _base(self, law: str | Law | Template) -> Scenario:
+        """Return the scenario before anything is drawn."""
+        if isinstance(law, str) and law in known_laws():
+            shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
+            law = gain_sets.law(self.plant, law) if shipped else gain_sets.law(self.plant, law, "default")
+        of = rules(self.version)
+        changes = {"u_max": self.u_max, "control_period": of["control_period"]}
+        return case(self.plant, law, self.condition, self.duration, changes=changes)
+
+    def _place(self, base: Scenario, drawn: Instance) -> Scenario:
+        """Return the scenario of an instance."""
+        plant, resolved = base.plant, base.resolved
+        mismatch = dict(base.mismatch)
+        mismatch["mass"] = drawn.mass * mismatch.pop("mass", mismatch.pop(plant.mass, 1.0))
+        scenario = dataclasses.replace(
+            base,
+            x0=[drawn.side * drawn.start * x for x in resolved.x0],
+            mismatch=mismatch,
+            disturbance=[_scaled(signal, drawn.disturbance) for signal in base.disturbance],
+            seed=drawn.seed,
+        )
+        return scenario.named(self.condition)
+
+    def measures(self, trace: Trace) -> dict[str, float]:
+        """Return the measures of a run, and the time from which each target is reached and kept, s (NaN for never).
+
+        failed: 1 for a run that failed, whose other measures are infinite. accuracy, itae [s^2], settling [s] into 2 %
+        and calm [1/s], the variation of u per second over its bound, are of the whole trace; "accuracy_1" is the time
+        of the first target, the hardest. A level of itae or calm counts from the time from which the easiest accuracy
+        holds, because effort counts only where the error does.
+        """
+        if trace.failure is not None or trace.diverged_at is not None:
+            values = {"failed": 1.0} | dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
+            return values | dict.fromkeys(self._names(), math.nan)
+        groups = conventions.by_group(trace).values()
+        relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
+        worst = np.max([conventions.row_max(error) for error in relative], axis=0)
+        total = np.sum([error.sum(axis=1) for error in relative], axis=0)
+        driven = trace.scenario.plant.driven
+        variation = np.abs(np.diff(trace.u[:, :driven], axis=0)).sum(axis=0) / np.array(trace.scenario.limits[:driven])
+        values = {
+            "failed": 0.0,
+            "accuracy": max(float(worst[conventions.last_part(trace)].max()), rules(self.version)["floor"]),
+            "itae": float(np.trapezoid(trace.t * total, trace.t)),
+            "settling": conventions.last_exit(trace.t, worst, conventions.SETTLING_BAND),
+            "calm": float(variation.max() / self.duration),
+        }
+        return values | self._times(trace, worst, values)
+
+    def _times(self, trace: Trace, worst: np.ndarray, values: Mapping[str, float]) -> dict[str, float]:
+        """Return the time of each target, by name."""
+        reached = [conventions.last_exit(trace.t, worst, level) for level in self.targets.get("accuracy", ())]
+        times = dict(zip(self._names(), map(_or_never, reached), strict=False))
+        holds = _or_never(reached[-1]) if reached else math.nan
+        for measure in MEASURES[1:]:
+            for i, level in enumerate(self.targets.get(measure, ()), 1):
+                times[f"{measure}_{i}"] = holds if values[measure] <= level else math.nan
+        return times
+
+    def _names(self) -> list[str]:
+        """List the names of the targets' times."""
+        return [f"{name}_{i}" for name in MEASURES for i, _ in enumerate(self.targets.get(name, ()), 1)]
+
+
+def problem(name: str) -> Problem:
+    """Return the problem of a name, such as "duffing/noise@1".
+
+    Raises:
+      ScenarioError: a text that is no such name, or an unknown version, plant or condition.
+    """
+    parts = ID.fullmatch(name) if isinstance(name, str) else None
+    if parts is None:
+        raise ScenarioError(f"problem {shown(name)} is no plant/condition@version: write it as duffing/noise@1")
+    plant, condition, version = parts.groups()
+    find("version of the rules", version, dict.fromkeys(versions()))
+    of = rules(int(version))
+    find("plant of the problems", plant, dict.fromkeys(of["plants"]))
+    find("condition of the problems", condition, dict.fromkeys(of["conditions"]))
+    targets = of.get("targets", {}).get(f"{plant}/{condition}", {})
+    return Problem(
+        id=name,
+        plant=plant,
+        condition=condition,
+        version=int(version),
+        u_max=of["u_max"],
+        duration=of["duration"],
+        rules=_text(int(version)),
+        targets={measure: tuple(levels) for measure, levels in targets.items()},
+    )
+
+
+def versions() -> tuple[str, ...]:
+    """List the versions of the rules."""
+    return tuple(sorted((path.stem for path in RULES.glob("*.toml")), key=int))
+
+
+@functools.cache
+def _text(version: int) -> str:
+    return (RULES / f"{version}.toml").read_text(encoding="utf-8")
+
+
+@functools.cache
+def rules(version: int) -> Mapping[str, Any]:
+    """Return the rules of a version."""
+    return tomllib.loads(_text(version))
+
+
+def _number(number: object) -> str:
+    """Return the number of hidden instances, or ""."""
+    if not isinstance(number, str) or not NUMBER.fullmatch(number):
+        raise ScenarioError(f"the number of hidden instances is {shown(number)}: give 64 hex digits, 0-9 and a-f")
+    return number
+
+
+def _scaled(signal: Any, factor: float) -> Any:
+    """Return a disturbance times a factor."""
+    name = "sigma" if hasattr(signal, "sigma") else "amplitude"
+    return dataclasses.replace(signal, **{name: factor * getattr(signal, name)})
+
+
+def _or_never(time: float) -> float:
+    """Return a time, or NaN for infinity."""
+    return time if time < math.inf else math.nan

@@ -1,0 +1,44 @@
+"""Suites: lists of problems, by name; and boards, the questions that a problem informs.
+
+A file `suites/NAME.txt` has an ID a line. The suites `smc-30@1` and `smc-50@1` follow a pattern that knows no law: with
+plants and conditions counted from 0 in the order of the rules, a problem is in if (condition + 2 plant + version) mod 5
+is below 3, or 5.
+"""
+
+from pathlib import Path
+
+from smc_mujoco.benchmark.problem import problem, rules
+from smc_mujoco.common.errors import find
+
+SUITES = Path(__file__).parent / "suites"
+PERIOD = 5  # of the pattern
+
+
+def suites() -> tuple[str, ...]:
+    """List the names of the suites."""
+    return tuple(sorted(path.stem for path in SUITES.glob("*.txt")))
+
+
+def suite(name: str) -> tuple[str, ...]:
+    """Return the IDs of a suite's problems. Raise ScenarioError for an unknown name."""
+    find("suite", name, dict.fromkeys(suites()))
+    lines = (SUITES / f"{name}.txt").read_text(encoding="utf-8").splitlines()
+    return tuple(line for line in lines if line and not line.startswith("#"))
+
+
+def boards(name: str) -> tuple[str, ...]:
+    """Return the questions that a problem informs, of "forces", "sensors", "speed" and "calm"."""
+    one = problem(name)
+    informing = rules(one.version)["boards"]
+    return tuple(board for board, conditions in informing.items() if {"*", one.condition} & {*conditions})
+
+
+def pattern(version: int, share: int) -> tuple[str, ...]:
+    """Return the IDs that the pattern of a version chooses, `share` of 5 of its plants and conditions."""
+    of = rules(version)
+    return tuple(
+        f"{plant}/{condition}@{version}"
+        for j, plant in enumerate(of["plants"])
+        for i, condition in enumerate(of["conditions"])
+        if (i + 2 * j + version) % PERIOD < share
+    )
