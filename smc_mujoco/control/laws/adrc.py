@@ -23,7 +23,7 @@ function and margins are worked out here.
 """
 
 from smc_mujoco.control.law import law_function
-from smc_mujoco.control.laws.extended_state import observe
+from smc_mujoco.control.laws.extended_state import corrections, observe
 from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
 
 
@@ -43,7 +43,8 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, Gain
 )
 def adrc(y, gains, memory):
     b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
-    d = observe(y, gains.w, memory)
+    l1, l2, l3 = corrections(gains.w, y.dt)
+    d = observe(y, l1, l2, l3, memory)
     s = gains.wc * gains.wc * memory[1] + 2.0 * gains.wc * memory[2]
     u = -(s + d + known) / b
     memory[4] = b * min(max(u, -y.limit), y.limit) + known

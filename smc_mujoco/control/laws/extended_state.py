@@ -27,21 +27,28 @@ from smc_mujoco.control.units import ACCELERATION, INPUT_GAIN, RATE, Gain
 
 
 @njit
-def observe(y, w, memory):
-    """Bring the observer in memory to this sample's reading, and return z3, the estimate of d.
+def corrections(w, h):
+    """Return by how much of a miss z1, z2 and z3 are corrected, for an observer of bandwidth w sampled every h."""
+    p = math.exp(-w * h)
+    q = 1.0 - p
+    return 1.0 - p * p * p, 1.5 * q * q * (1.0 + p) / h, q * q * q / (h * h)
+
+
+@njit
+def observe(y, l1, l2, l3, memory):
+    """Bring the observer in memory to this sample's reading, with its `corrections`. Return z3, the estimate of d.
 
     The memory has started, z1, z2, z3, and the known acceleration of the last period, which the law writes.
     """
-    h, p = y.dt, math.exp(-w * y.dt)
-    q = 1.0 - p
+    h = y.dt
     if memory[0] == 0.0:
         memory[0], memory[1], memory[2] = 1.0, y.e - h * y.de, y.de  # the first prediction is the reading
     push = memory[3] + memory[4]
     z1, z2 = memory[1] + h * memory[2] + h * h / 2.0 * push, memory[2] + h * push
     miss = y.e - z1
-    memory[1] = z1 + (1.0 - p * p * p) * miss
-    memory[2] = z2 + 1.5 * q * q * (1.0 + p) / h * miss
-    memory[3] += q * q * q / (h * h) * miss
+    memory[1] = z1 + l1 * miss
+    memory[2] = z2 + l2 * miss
+    memory[3] += l3 * miss
     return memory[3]
 
 
@@ -61,7 +68,8 @@ def observe(y, w, memory):
 )
 def extended_state(y, gains, memory):
     b, known = (y.g, y.f - y.ddr) if y.model != 0.0 else (gains.b, 0.0)
-    d = observe(y, gains.w, memory)
+    l1, l2, l3 = corrections(gains.w, y.dt)
+    d = observe(y, l1, l2, l3, memory)
     s = y.de + gains.c * y.e
     u = (-gains.k * sgn(s) - gains.c * y.de - d - known) / b
     memory[4] = b * min(max(u, -y.limit), y.limit) + known

@@ -340,6 +340,8 @@ class Function:
         match node:
             case ast.Expr(value=ast.Constant(value=str())) | ast.Pass():
                 pass
+            case ast.Expr(value=ast.Call() as call):
+                yield f"{self.numeric(call).text};"
             case ast.Assign(targets=[target]):
                 yield from self.assign(target, node.value)
             case ast.AnnAssign(target=target, value=ast.expr() as value):
