@@ -98,7 +98,7 @@ def export(
     if len(others) > 1:
         raise ScenarioError(f"{len(others)} laws for {out}: give one")
     chosen = options.law_with(others[0] if others else out.stem, gains)
-    with delay_ctrl_c(), options.joints_as_option():
+    with delay_ctrl_c(), options.as_options({r"\bjoints=": "--joints "}):
         if out.suffix == ".c":
             from smc_mujoco.common.files import replacing
             from smc_mujoco.exchange.c.export import law_to_c

@@ -38,6 +38,9 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     of the scenario.
     """
     if not (model := MODEL.fullmatch(text)):
+        if set(text) & set(":./\\"):
+            file = text.partition(":")[0]
+            raise ScenarioError(f"plant {text!r}: {file!r} ends in none of .xml, .mjcf and .urdf: give FILE.xml:joint")
         return plant(text, **values)
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 

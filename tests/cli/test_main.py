@@ -1,5 +1,6 @@
 """What the command line promises: tables that fit, files where they were asked for, one sentence for every mistake."""
 
+import dataclasses
 import itertools
 import json
 import os
@@ -522,10 +523,10 @@ REFUSED = {  # command line -> what the sentence names
     "chatter duffing --out chatter.gif": ("chatter.gif",),
     "worst duffing --law pid --disturbance 2 --bound mass=": ("'mass='", "mass=0.7:1.3"),
     "worst duffing --law pid --disturbance 2 --bound mass=heavy": ("mass=heavy", "mass=0.7:1.3"),
-    "worst duffing --law pid --disturbance 2 --bound mass=0.7": ("mass is 0.7",),
     "worst duffing --law pid --disturbance 2 --bound mass=0.7:1.3,mass=0.5:2": ("mass twice",),
     "worst duffing --law pid --disturbance 2 --bound disturbance=1": ("--disturbance",),
-    "worst duffing --law pid --disturbance 2 --bound weight=0:1": ("'weight'",),
+    "worst duffing --law pid --disturbance 2 --bound delai=0:1": ("'delai'", "delay", "delta", "mass"),
+    "which arm.xm:shoulder --quick": ("'arm.xm'", ".xml"),
 }
 
 
@@ -538,6 +539,20 @@ def test_a_mistake_is_one_sentence_that_names_it_with_code_2_and_nothing_is_writ
     before = {path: path.stat().st_size for path in folder.iterdir()}
     refused(call(*line.split()), *REFUSED[line])
     assert {path: path.stat().st_size for path in folder.iterdir() if path.name != "__pycache__"} == before
+
+
+TOO_FAR = {"delay": "0:20", "x0": "1e12", "period": "1:1e9", "jitter": "5", "mass": "0.5:1e30", "friction": "0:1e300"}
+BOUNDS = [one.name for one in dataclasses.fields(smc.Uncertainty) if one.name not in ("disturbance", "parameters")]
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_a_wrong_bound_is_told_by_its_name_in_the_syntax_of_the_command_line(name, call):
+    ranged = isinstance(getattr(smc.Uncertainty(mass=(0.7, 1.3)), name), tuple) or name == "encoder"
+    for value in ["0.3" if ranged else "0.1:0.3", "0.3:0.1", "-1", TOO_FAR.get(name, "-2")]:
+        bound = f"{name}={value}"
+        answer = call("sensitivity", "duffing", "--law", "pid", "--disturbance", 1, "--bound", bound)
+        refused(answer, f"--bound {name}")
+        assert not re.search(r"Uncertainty|\(\d|smc\.|give .* as \(|input_delay", answer[2])
 
 
 TRACEBACK = "Traceback (most recent call last):"

@@ -145,8 +145,16 @@ def test_encoder_bound_and_period_take_all_of_their_ranges():
     )
     with pytest.raises(smc.ScenarioError, match="period cannot differ: leave it out of within"):
         smc.worst_case(base, within=smc.Uncertainty(period=(1.0, 2.0)))
-    with pytest.raises(smc.ScenarioError, match="no bound that could differ: give the scenario a u_max"):
+    with pytest.raises(smc.ScenarioError, match="none that differs: give the scenario a u_max"):
         smc.sensitivity(scenario(u_max=math.inf), smc.Uncertainty(bound=(0.5, 1.0)))
+
+
+def test_a_jitter_keeps_the_delays_of_a_fine_step_and_an_axis_of_one_value_is_refused():
+    fine = scenario(physics_step=5e-5)  # 20 steps a sample, no multiple of 8
+    members = Members([fine], smc.Uncertainty(delay=(0.0, 0.00255), jitter=5e-4))
+    assert members.with_constants(np.ones(2)).input_delay == pytest.approx(0.00255)
+    with pytest.raises(smc.ScenarioError, match="give a range with several"):
+        smc.sensitivity(scenario(physics_step=1e-3), smc.Uncertainty(period=(0.9, 1.1)))
 
 
 def test_the_default_class_has_the_axes_of_machines():

@@ -198,8 +198,10 @@ class Members:
         if count > 1:
             self.ends[0], middle[0] = [(i + 0.5) / count for i in range(count)], 0.0
         self.bare = Member(middle, np.zeros(0), np.zeros((2, self.times)))
+        for constant in self.constants:
+            constant.check(scenario)
         for share in (0.0, 1.0):
-            self.with_constants(np.full(len(self.constants), share))  # raises if the plant lacks one
+            self.with_constants(np.full(len(self.constants), share))  # raises where bounds do not go together
 
     def with_constants(self, shares: np.ndarray) -> Scenario:
         """Return the scenario with constants of the class."""
@@ -311,10 +313,26 @@ class Constant:
         low, high = self.bounds
         return low * (high / low) ** share if self.geometric else min(low + share * (high - low), high)
 
+    def check(self, scenario: Scenario) -> None:
+        """Raise ScenarioError, which names the bound, if the scenario cannot have it at an end of its range."""
+        for value in self.bounds:
+            try:
+                self.put(scenario, value)
+            except ScenarioError as error:
+                unit = f" {self.unit}" * (self.unit not in ("", "added", "%"))
+                named = f"Uncertainty's {self.name.partition(' ')[0]} reaches {value:g}{unit}"
+                raise ScenarioError(f"{named}, with which {error}") from None
+
 
 def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
     """Yield each constant that may differ."""
     effort, plant = EFFORT[scenario.plant.units[0]], scenario.plant
+    if foreign := [name for name in within.parameters if name not in (*plant.parameters, "mass")]:
+        fields = [field.name for field in dataclasses.fields(within) if field.name != "parameters"]
+        known = ", ".join(sorted({*fields, *plant.parameters}))
+        raise ScenarioError(f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from {known}")
+    if (longest := scenario.duration - scenario.input_delay) < within.delay[1]:
+        raise ScenarioError(f"Uncertainty's delay reaches {within.delay[1]:g} s: give at most {longest:g}, a run's end")
     if within.delay != (0.0, 0.0):
         yield Constant(
             name="delay",
@@ -332,7 +350,7 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
-            raise ScenarioError(f"friction_scale of {plant.name}, which has no friction here: {cure}")
+            raise ScenarioError(f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: {cure}")
         yield Constant(name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale)
     if within.friction != (0.0, 0.0):
         yield Constant(name="friction", bounds=within.friction, put=with_friction, unit=effort)
@@ -340,7 +358,8 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
         yield Constant(name="encoder", bounds=within.encoder, put=_with_counts, unit="counts", geometric=True)
     if within.bound != (1.0, 1.0):
         if not math.isfinite(min(scenario.limits)):
-            raise ScenarioError(f"u_max of {plant.name} has no bound that could differ: give the scenario a u_max")
+            cure = "give the scenario a u_max"
+            raise ScenarioError(f"Uncertainty's bound is of {plant.name}, whose u_max has none that differs: {cure}")
         yield Constant(name="bound", bounds=within.bound, put=_with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
@@ -352,13 +371,13 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
 
 
 def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:
-    """Return the lowest and the highest multiple of a step, s, within bounds; ScenarioError for none but 0."""
+    """Return the lowest and the highest multiple of a step within bounds; ScenarioError for none but 0, or for one."""
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
-    if high < max(low, step):
+    if high < max(low, step) or low == high and bounds[0] < bounds[1]:
         unit = "" if name == "period" else " s"
         told = f"from {bounds[0]:g} to {bounds[1]:g}{unit}, and a run has multiples of {step:g}{unit}"
-        raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with one of these")
+        raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with several of these")
     return low, high
 
 
@@ -422,7 +441,7 @@ def _with_friction_scale(scenario: Scenario, factor: float) -> Scenario:
 
 def with_jitter(scenario: Scenario, level: float) -> Scenario:
     """Return the scenario whose samples are late by up to `level` control periods, counted in eighths of one."""
-    steps = JITTER_SHARES * math.ceil(scenario.steps / JITTER_SHARES)
+    steps = math.lcm(JITTER_SHARES, scenario.steps)  # so that delays stay multiples of a step
     jitter = round(level * JITTER_SHARES) / JITTER_SHARES * scenario.control_period
     clock = dataclasses.replace(scenario.clock, jitter=jitter)
     return dataclasses.replace(scenario, clock=clock, physics_step=scenario.control_period / steps)

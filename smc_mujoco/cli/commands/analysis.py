@@ -1,6 +1,5 @@
 """smc-mujoco tune, margins, worst, basin, chatter: one question about laws on a plant, by many runs."""
 
-import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +26,12 @@ Bound = Annotated[
         "position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
     ),
 ]
+BOUNDS = {  # what sentences about a class say in Python -> on the command line
+    r"\bUncertainty's ": "--bound ",
+    r"\bUncertainty\b": "--bound",
+    r"=\(([^ ,]+), ([^ ,]+)\)": r"=\1:\2",
+    r"\bsmc\.| of within\b": "",
+}
 QUICK_MARGINS = {  # defaults of `margins --quick`
     "plants": ["inverted_pendulum", "duffing"],
     "laws": ["observer_free", "classical", "adaptive", "super_twisting"],
@@ -172,7 +177,8 @@ def worst(
     terminal, within = Terminal(), _within(disturbance, bound)
     options.check_files(json, *files(out))
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
-    results = WorstCases(worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases)
+    with options.as_options(BOUNDS):
+        results = WorstCases(worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases)
     terminal.print(results)
     terminal.note(f"{sum(case.tried for case in results)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
     if json:
@@ -222,7 +228,8 @@ def sensitivity(
     options.check_files(json, *files(out))
     chosen = options.law(law)
     scenario = case(as_plant(plant), chosen, condition, duration, gains)
-    found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
+    with options.as_options(BOUNDS):
+        found = sensitivity(scenario, over, metric, points, seed, threads, progress=True)
     terminal.print(found)
     terminal.note(
         f"{found.runs} runs, {len(found.values)} of them independent, {options.gains_used([chosen], gains)}",
@@ -239,23 +246,29 @@ def sensitivity(
 def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | None":
     """Return the class of the options --disturbance and --bound: numbers and ranges; None if neither is given."""
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+    from smc_mujoco.common import constraints
 
-    known = [field.name for field in dataclasses.fields(Uncertainty)]
+    known = constraints.of_fields(Uncertainty)
     fields: dict[str, Any] = {} if disturbance is None else {"disturbance": disturbance}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
-            low, *high = map(float, text.split(":"))
+            values = tuple(map(float, text.split(":")))
         except ValueError:
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
-        value = (low, *high) if high else low
         if name in fields:
             raise ScenarioError(f"--bound {name}={text} bounds what --disturbance does: leave out one of them")
-        if name in known:
-            fields[name] = value
+        constraint = known.get(name)
+        ranged = constraint is None or isinstance(getattr(constraint, "one", constraint), constraints.Range)
+        if len(values) != 1 + ranged:
+            cure = f"the lowest and the highest, as {name}=LOW:HIGH" if ranged else f"one number, as {name}=HIGH"
+            raise ScenarioError(f"--bound {name}={text} is no {'range' if ranged else 'number'}: give {cure}")
+        if constraint:
+            fields[name] = values if ranged else values[0]
         else:
-            fields.setdefault("parameters", {})[name] = value
-    return Uncertainty(**fields) if fields else None
+            fields.setdefault("parameters", {})[name] = values
+    with options.as_options(BOUNDS):
+        return Uncertainty(**fields) if fields else None
 
 
 def _attacked_cases(

@@ -5,7 +5,7 @@ import importlib
 import itertools
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -133,12 +133,15 @@ X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or
 
 
 @contextlib.contextmanager
-def joints_as_option() -> Iterator[None]:
-    """Write the argument joints= as the option --joints in sentences of errors."""
+def as_options(words: Mapping[str, str]) -> Iterator[None]:
+    """Write arguments of Python as options in sentences of errors; `words` is pattern -> what takes its place."""
     try:
         yield
     except ScenarioError as error:
-        raise ScenarioError(re.sub(r"\bjoints=", "--joints ", str(error))) from None
+        sentence = str(error)
+        for pattern, option in words.items():
+            sentence = re.sub(pattern, option, sentence)
+        raise ScenarioError(sentence) from None
 
 
 def names(texts: str | Sequence[str] | None, default: Sequence[str] = ()) -> list[str]:
