@@ -186,6 +186,7 @@ class Members:
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
         self.slope = 0.0 if within.slope is None else within.slope * self.h  # N or N m a sample; 0: d may jump
+        _check_class(scenario, within)
         sets = Constant(name="set", bounds=(0.0, count), put=lambda _, at: scenarios[min(int(at), count - 1)])
         self.constants = [sets] * (count > 1) + list(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
@@ -324,15 +325,20 @@ class Constant:
                 raise ScenarioError(f"{named}, with which {error}") from None
 
 
-def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
-    """Yield each constant that may differ."""
-    effort, plant = EFFORT[scenario.plant.units[0]], scenario.plant
+def _check_class(scenario: Scenario, within: Uncertainty) -> None:
+    """Raise ScenarioError for a parameter that the plant does not have, or for a delay beyond the end of a run."""
+    plant = scenario.plant
     if foreign := [name for name in within.parameters if name not in (*plant.parameters, "mass")]:
         fields = [field.name for field in dataclasses.fields(within) if field.name != "parameters"]
         known = ", ".join(sorted({*fields, *plant.parameters}))
         raise ScenarioError(f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from {known}")
     if (longest := scenario.duration - scenario.input_delay) < within.delay[1]:
         raise ScenarioError(f"Uncertainty's delay reaches {within.delay[1]:g} s: give at most {longest:g}, a run's end")
+
+
+def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
+    """Yield each constant that may differ."""
+    effort, plant = EFFORT[scenario.plant.units[0]], scenario.plant
     if within.delay != (0.0, 0.0):
         yield Constant(
             name="delay",
@@ -374,7 +380,7 @@ def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[flo
     """Return the lowest and the highest multiple of a step within bounds; ScenarioError for none but 0, or for one."""
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
-    if high < max(low, step) or low == high and bounds[0] < bounds[1]:
+    if high < max(low, step) or (low == high and bounds[0] < bounds[1]):
         unit = "" if name == "period" else " s"
         told = f"from {bounds[0]:g} to {bounds[1]:g}{unit}, and a run has multiples of {step:g}{unit}"
         raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with several of these")
