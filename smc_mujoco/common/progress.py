@@ -3,7 +3,9 @@
 import contextlib
 import html
 import math
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
@@ -87,7 +89,8 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
 
 def note(text: str) -> None:
     """Say something about work that begins, on stderr."""
-    print(text, file=sys.stderr, flush=True)
+    width = shutil.get_terminal_size().columns
+    print(textwrap.fill(text, width, break_long_words=False, break_on_hyphens=False), file=sys.stderr, flush=True)
 
 
 def about(seconds: float) -> str:

@@ -37,7 +37,7 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable, find_condition
 from smc_mujoco.simulation.grid import Starts, case, check_moving, listed, listed_laws
 from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, ties
-from smc_mujoco.studies.fair_gains import Candidate, Trial, check_tuned, law_or_template
+from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget
@@ -109,9 +109,7 @@ def which(
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
-    candidates = _candidates(trial, _suited(machine, wanted, laws), extent)
-    if not defaults:
-        check_tuned([*candidates.values()])
+    candidates = _candidates(trial, _suited(machine, wanted, laws), extent, defaults)
     table = trial.run({machine.name: [*candidates.values()]}, seeds, noise_key=noise_key)
     worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
@@ -196,9 +194,12 @@ def _has(law: Component | Template, properties: Sequence[str]) -> bool:
     return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
-def _candidates(trial: Trial, laws: Sequence[Component | Template], extent: Extent) -> dict[str, Candidate]:
+def _candidates(
+    trial: Trial, laws: Sequence[Component | Template], extent: Extent, defaults: bool
+) -> dict[str, Candidate]:
     """Return name of the law -> the law with gains; raise ScenarioError if two laws have one name."""
-    (candidates,) = trial.gains({trial.plants[0].name: laws}, searches=extent.searches, budget=extent.budget).values()
+    options = {"defaults": defaults, "searches": extent.searches, "budget": extent.budget}
+    (candidates,) = trial.gains({trial.plants[0].name: laws}, **options).values()
     by_name = {candidate.law.name: candidate for candidate in candidates}
     if len(by_name) < len(candidates):
         raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")

@@ -241,7 +241,8 @@ def compare(
     _check_worst(worst)
     trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
     number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
-    candidates = _candidates(trial, laws, tune, gains, number, budget)
+    options = {"tune": tune and gains == "tuned", "gains": gains, "searches": number, "budget": budget}
+    candidates = trial.gains(_checked(trial, laws), defaults, **options)
     table = trial.run(candidates, seeds, executor=workers, traces=traces, noise_key=noise_key)
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
@@ -269,14 +270,6 @@ def _trial(
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
     given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
     return Trial(machines, [find_condition(name) for name in given], length, starts, out, threads, progress)
-
-
-def _candidates(
-    trial: Trial, laws: Any, tune: bool, gains: str, searches: int, budget: int
-) -> dict[str, list[Candidate]]:
-    """Return plant -> its laws with gains."""
-    options: dict[str, Any] = {"tune": tune and gains == "tuned", "gains": gains}
-    return trial.gains(_checked(trial, laws), searches=searches, budget=budget, **options)
 
 
 def _check_worst(worst: object) -> None:

@@ -34,6 +34,7 @@ from smc_mujoco.simulation.conditions import Condition, applicable
 from smc_mujoco.simulation.grid import Starts, all_combinations
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import run_key
+from smc_mujoco.studies.board import first_of
 from smc_mujoco.studies.leaderboard import Unseen
 from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.studies.worst_case import WorstCase
 
+LONG = 120.0  # s of tuning, from which on it is said what takes less; chosen
 NOT_TUNED, UNTUNABLE = "not tuned: ", "tuning is not possible here: "  # at the start of a remark
 
 
@@ -114,13 +116,6 @@ def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
     return Candidate(best, sets, words * bool(without_unit))
 
 
-def check_tuned(candidates: Sequence[Candidate]) -> None:
-    """Raise ScenarioError, with the first reason, if none of several laws could be tuned: none could be advised."""
-    if len(candidates) > 1 and all(one.remark.startswith((NOT_TUNED, UNTUNABLE)) for one in candidates):
-        why = candidates[0].remark.removeprefix(NOT_TUNED)
-        raise ScenarioError(f"{why}; or give laws with gains, or defaults=True (--defaults) for default gains")
-
-
 class Trial(NamedTuple):
     """The plants and conditions of a comparison, and its folder; `threads` and `progress` are as in `run`."""
 
@@ -132,8 +127,17 @@ class Trial(NamedTuple):
     threads: int | None
     progress: bool
 
-    def gains(self, laws: Mapping[str, Sequence[Component | Template]], **options: Any) -> dict[str, list[Candidate]]:
-        """Return plant -> its laws with gains, see `gains_on` for the options."""
+    def gains(
+        self, laws: Mapping[str, Sequence[Component | Template]], defaults: bool, **options: Any
+    ) -> dict[str, list[Candidate]]:
+        """Return plant -> its laws with gains, see `gains_on` for the options.
+
+        Raises:
+          ScenarioError: none of several laws can be tuned on a plant, so that there could be no winner, unless
+            `defaults`. It is raised before the first search.
+        """
+        for plant in () if defaults else self.plants:
+            self._check_tunable(plant, laws[plant.name], **options)
         if self.progress:
             self._announce(laws, **options)
         return {plant.name: self.gains_on(plant, laws[plant.name], **options) for plant in self.plants}
@@ -167,6 +171,22 @@ class Trial(NamedTuple):
         shipped = any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known)
         return known, None if shipped else self.starts
 
+    def _check_tunable(
+        self, plant: Plant, laws: Sequence[Component | Template], tune: bool = True, gains: str = "tuned", **_: Any
+    ) -> None:
+        """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a plant."""
+        if len(laws) < 2 or not tune:
+            return
+        known, starts = self._known(plant, laws, gains)
+        reasons = []
+        for law, candidate in zip(laws, known, strict=True):
+            if candidate is not None and not candidate.remark.startswith(UNTUNABLE):
+                return
+            if not (why := candidate.remark if candidate else search.why_not(plant, law, self._goal(plant, starts))):
+                return
+            reasons.append(why)
+        raise ScenarioError(f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default gains")
+
     def _announce(
         self,
         laws: Mapping[str, Sequence[Component | Template]],
@@ -179,18 +199,24 @@ class Trial(NamedTuple):
         seconds, named = 0.0, dict[str, list[str]]()
         for plant in self.plants if tune else ():
             known, starts = self._known(plant, laws[plant.name], gains)
+            goal = self._goal(plant, starts)
             new = [law for law, candidate in zip(laws[plant.name], known, strict=True) if candidate is None]
-            for law in new:
-                file = self._file(plant, law, searches, budget)
-                if not any(file.parent.glob(f"{file.stem}-*")):
-                    with contextlib.suppress(ScenarioError):  # told by `tuned`
-                        goal = self._goal(plant, starts)
-                        seconds += searches * search.expected_seconds(plant, law, goal, budget, self.threads)
-                        named.setdefault(law.name, []).append(plant.name)
+            files = [self._file(plant, law, searches, budget) for law in new]
+            new = [law for law, file in zip(new, files, strict=True) if not any(file.parent.glob(f"{file.stem}-*"))]
+            if new := [law for law in new if not search.why_not(plant, law, goal)]:
+                seconds += searches * search.expected_seconds(plant, new, goal, budget, self.threads)
+                for law in new:
+                    named.setdefault(law.name, []).append(plant.name)
         if named:
-            what = "; ".join(f"{law} on {joined(plants)}" for law, plants in named.items())
+            groups: dict[str, list[str]] = {}
+            for law, plants in named.items():
+                groups.setdefault(joined(plants), []).append(law)
+            what = "; ".join(f"{first_of(its)} on {plants}" for plants, its in groups.items())
             each = f"{searches} searches each" if searches > 1 else "1 search each"
-            note(f"tuning {what}: {each}, {about(seconds)}")
+            cures = ["name some of the laws (laws=, --law)"] * (len(named) > 1)
+            cures += ["quick=True (--quick)"] * (searches >= search.SEARCHES)
+            less = f". For less time: {' or '.join(cures)}" * (seconds > LONG and bool(cures))
+            note(f"tuning {what}: {each}, {about(seconds)}{less}")
 
     def _file(self, plant: Plant, law: Component | Template, searches: int, budget: int) -> Path:
         """Return the path of a tuning, without its hashes."""

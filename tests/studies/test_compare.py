@@ -152,13 +152,30 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
 
 def test_what_is_tuned_is_said_before_it_starts_and_only_once(tmp_path, capsys, monkeypatch):
     """Two laws need two searches on each of two plants, of 30 s or 20 s, and one law has shipped gains."""
-    monkeypatch.setattr(search, "expected_seconds", lambda plant, law, *_: 30.0 if plant.name == "duffing" else 20.0)
+    each = {"duffing": 30.0, "inverted_pendulum": 20.0}
+    monkeypatch.setattr(search, "expected_seconds", lambda plant, new, *_: len(new) * each[plant.name])
     options = {"duration": 0.1, "searches": 2, "budget": 1, "tune": True, "out": tmp_path, "progress": True}
     laws = [my_law, plain_law, "classical"]
-    for said in (["tuning my_law on duffing and inverted_pendulum; plain_law on duffing and inverted_pendulum: "], []):
+    for said in (["my_law and plain_law on duffing and inverted_pendulum: 2 searches each, about 3 minutes"], []):
         smc.compare(laws, PLANTS, "nominal", 1, **options)
-        lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("tuning ")]
-        assert lines == [f"{line}2 searches each, about 3 minutes" for line in said]
+        told = re.findall(r"^tuning (.*?)\. For less", capsys.readouterr().err, re.MULTILINE | re.DOTALL)
+        assert [" ".join(text.split()) for text in told] == said
+
+
+def test_many_laws_on_a_model_of_ones_own_are_announced_at_once_with_the_cure(tmp_path, capsys, monkeypatch):
+    """One evaluation stands for all laws, and the words fit a terminal."""
+    monkeypatch.setenv("COLUMNS", "80")
+    asked = []
+    monkeypatch.setattr(search, "_seconds", lambda task: asked.append(task.law.name) or 0.1)
+    monkeypatch.setattr(fair_gains.Trial, "tuned", lambda *_: pytest.fail("announced"))
+    own = dataclasses.replace(smc.plant("duffing", delta=0.5), name="mine")
+    with pytest.raises(pytest.fail.Exception, match="announced"):
+        smc.which(own, laws=[*gain_sets.COMPARED, my_law], out=tmp_path, progress=True)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(asked) == 2
+    assert max(map(len, lines)) <= 80
+    assert len(lines) <= 5
+    assert {"--quick", "--law"} <= set(re.findall(r"--\w+", " ".join(lines)))
 
 
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
@@ -171,7 +188,10 @@ def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_the
 
 
 def test_a_plant_on_which_laws_cannot_be_tuned_says_so(tmp_path):
-    made = smc.compare(None, "overhead_crane", "nominal", 1, out=tmp_path, **SHORT)
+    with pytest.raises(smc.ScenarioError, match=r"tuning is not possible here: .* defaults=True"):
+        smc.compare(None, ["duffing", "overhead_crane"], "nominal", 1, out=tmp_path, **SHORT)
+    assert not list(tmp_path.iterdir())
+    made = smc.compare(None, "overhead_crane", "nominal", 1, out=tmp_path, defaults=True, **SHORT)
     assert set(kinds(made, "overhead_crane").values()) == {"default"}
     assert all("tuning is not possible here: " in remark for remark in made.remarks)
 

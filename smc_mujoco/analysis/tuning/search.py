@@ -54,6 +54,7 @@ from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
 from smc_mujoco.control.component import Component, Template, unit_cure
+from smc_mujoco.control.law import catalogue
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce, serialise
 from smc_mujoco.simulation.codes import code_hashes
@@ -345,13 +346,40 @@ def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed
     return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
 
 
+def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
+    """Return why a law cannot be tuned on a plant, in a sentence; "" if it can. BrokenLawError: no run of it can be."""
+    try:
+        _task(plant, coerce.law(law), goal, BUDGET, 0, None)
+    except BrokenLawError:
+        raise
+    except ScenarioError as error:
+        return str(error)
+    return ""
+
+
 def expected_seconds(
-    plant: Plant, law: Component | Template, goal: Objective, budget: int, threads: int | None
+    plant: Plant, laws: Sequence[Component | Template], goal: Objective, budget: int, threads: int | None
 ) -> float:
-    """Return about how long a search takes, s, from the time of evaluations in the middle of its box."""
-    task = _task(plant, coerce.law(law), goal, budget, 0, threads)
+    """Return about how long a search for each of several laws takes, s, from evaluations in the middle of a box.
+
+    Most of an evaluation's time is the mechanism's. So the first of the library's laws stands for all of them; a law of
+    the user's, which may not compile, is evaluated itself.
+    """
+    tasks = [_task(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
+    seconds, of_library = 0.0, None
+    for task in tasks:
+        if catalogue().get(task.law.name) is not task.law.template:
+            seconds += task.size * _seconds(task)
+        else:
+            of_library = of_library or _seconds(task)
+            seconds += task.size * of_library
+    return seconds
+
+
+def _seconds(task: Task) -> float:
+    """Return about how long an evaluation takes, s."""
     middle = tuple(math.sqrt(low * high) for low, high in task.box.values())
-    accurate = Evaluator(task.goal, task.cases(0), tuple(task.box), threads, by_equation=True)
+    accurate = Evaluator(task.goal, task.cases(0), tuple(task.box), task.threads, by_equation=True)
     engines = [accurate] if accurate.engine == EQUATION else [_cheap(accurate), accurate]
 
     def seconds(evaluate: Evaluator) -> float:
@@ -361,7 +389,7 @@ def expected_seconds(
         return time.perf_counter() - start
 
     shares = (USUAL_SHARE,) if len(engines) == 1 else (SCREENED_SHARE + EVOLVED_SHARE, LAST_SHARE)
-    return task.size * sum(share * seconds(one) for share, one in zip(shares, engines, strict=True))
+    return sum(share * seconds(one) for share, one in zip(shares, engines, strict=True))
 
 
 def _cheap(accurate: Evaluator) -> Evaluator:
