@@ -249,7 +249,8 @@ class Advice(Tables):
             return f"No law is reliable here: {first.law.name} settles in {share}; {cure}."
         if self.all_level and self._too_few:
             comparisons = counted(len(self.blocks), "comparison")
-            return f"No law can be called the best with {self.samples}: too few for {comparisons}."
+            cure = "give more seeds (--seeds), and leave out quick (--quick)"
+            return f"No law can be called the best with {self.samples}, too few for {comparisons}: {cure}."
         if self.all_level:
             laws = f"{every(len(self.compared))} laws"
             where = "in the worst that was found" if self._untested else f"in every comparison of {self.samples}"

@@ -1,6 +1,7 @@
 """A board: laws compared in one metric, its verdict in words, and boards as tables, with medians and intervals."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -32,6 +33,7 @@ TIMED = (
     "Time: of the law's compiled code a sample on this machine, the median over that of pid; below it, the median and "
     "the 99 % quantile over the samples of a run."
 )
+SMALL = "by less than the problem can show"
 LEVEL_WORDS = f"level within {100 * LEVEL_SHARE:g} %"
 
 
@@ -54,11 +56,13 @@ class Lead(NamedTuple):
     law: str
     rival: str
     effect: Effect
+    small: bool = False  # whether their medians differ by less than the problem can show, see `paired_runs.floor`
 
     @property
     def words(self) -> str:
         """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 runs"."""
-        return f"{size_in_words(self.effect, self.rival)}, {ahead_in_words(self.effect)}"
+        small = f", {SMALL}" if self.small else ""
+        return f"{size_in_words(self.effect, self.rival)}, {ahead_in_words(self.effect)}{small}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -176,11 +180,14 @@ class Board(Tables):
             leads = [block.lead for block in self.blocks if block.lead]
             closest = max(leads, key=lambda lead: lead.effect.high, default=None)
             how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
+            if closest and not closest.small:
+                how += self._small(self.winner)
             return f"{self.winner} wins{f' {blocks}' * (len(self.blocks) > 1)}{how}{self._search(self.winner)}{these}"
         results = []
         for law in (entry.law for entry in self.entries if self.wins(entry.law)):
             losses = f", loses under {_listed(self.losses(law))}" * bool(self.losses(law))
-            results.append(f"{law} wins under {_listed(self.wins(law))}{losses}{self._search(law)}")
+            won = f"{law} wins under {_listed(self.wins(law))}{self._small(law)}"
+            results.append(f"{won}{losses}{self._search(law)}")
         if results:
             return f"no winner {blocks}: {'; '.join(results)}{these}"
         if self.why:
@@ -204,8 +211,10 @@ class Board(Tables):
         visible = [block.visible[law] for block in self.blocks for law in self.best if law in block.visible]
         if not visible:
             return "cannot tell them apart"
-        lead = f"a lead of {_percent(max(visible))} %" if max(visible) < MAX_VISIBLE else "no lead"
-        return f"cannot tell them apart: {lead} would have been seen"
+        if max(visible) >= MAX_VISIBLE:
+            return "cannot tell them apart: no lead would have been seen"
+        seen = f"a lead of {_percent(max(visible))} % would have been seen in {100 * POWER:g} % of such comparisons"
+        return f"cannot tell them apart: {seen}"
 
     def visible(self, law: str) -> float:
         """Return the largest, over the blocks, of the least leads that would have been seen, a share; NaN for none."""
@@ -214,6 +223,11 @@ class Board(Tables):
     def step_change(self, law: str) -> tuple[float, float] | None:
         """Return the medians of a law at the physics step and at half of it, in the first block that is marked."""
         return next((block.by_step[law] for block in self.blocks if law in block.by_step), None)
+
+    def _small(self, law: str) -> str:
+        """Return the conditions in which a law wins by less than the problem can show, after a comma."""
+        won = [block for block in self.blocks if block.winner == law and block.lead and block.lead.small]
+        return f", {SMALL} under {_listed([block.condition for block in won])}" if won else ""
 
     @property
     def _these_gains(self) -> str:
@@ -256,7 +270,12 @@ class Board(Tables):
             return ""
         known = largest.sets if largest.sets > 1 else largest.runs
         samples = f": {counted(largest.samples, 'sample')}" * (largest.samples != known)
-        return f"{largest.sample}{samples}, too few" + f" for {self.family} comparisons" * (self.family > 1)
+        few = f"{largest.sample}{samples}, too few" + f" for {self.family} comparisons" * (self.family > 1)
+        if largest.runs < largest.seeds and largest.sets == 1:
+            return f"{few}: most seeds change nothing here"
+        least = next(n for n in itertools.count(1) if 2 * min_p(n) <= (1 - LEVEL) / self.family)
+        searches = f" and as many searches (searches={least}, without --quick)" * (largest.sets > 1)
+        return f"{few}: take {least} seeds (--seeds {least}){searches}"
 
     def failures(self, entry: Entry) -> str:
         """Return how many of a law's runs failed, or never reach a time, such as "2 of 24 failed"; "" if none did."""
@@ -410,8 +429,9 @@ def _ns(seconds: float) -> str:
 def _cell(board: Board, entry: Entry) -> Cell:
     """Return a law's median, strong if no law is better, no run failed and there are enough runs for a winner."""
     median = size(entry.interval.median, board.metric)
-    best = entry.rank.best and median != "" and not board.too_few and not board.barred
     visible, change = board.visible(entry.law), board.step_change(entry.law)
+    blind = board.too_few or visible >= MAX_VISIBLE
+    best = entry.rank.best and median != "" and not blind and not board.barred
     seen = f"sees {_percent(visible)} %" if visible < MAX_VISIBLE else "sees no lead" * (not math.isnan(visible))
     step = " to ".join(size(value, board.metric) for value in change) + " by the step" if change else ""
     lines = "\n".join(filter(None, (spread(entry.interval, board.metric), seen)))
@@ -428,14 +448,19 @@ def key(boards: Sequence[Board]) -> str:
     several = f", corrected for {family} comparisons a metric" * (family > 1)
     least = relevance(boards[0].relevant, [(board.metric, board.resolution) for board in boards])
     words += (
-        ". Marked: no law is better, no run failed, and there are enough samples to tell. A winner is better than "
+        ". Marked: no law is better, no run failed, and the samples are enough to see a lead. A winner is better than "
         f"every other law in a paired test{several}. Pairs of runs tell by how much, not the medians. Ahead means by "
         f"more than the least relevant difference, {least}."
     )
     if any(block.visible for board in boards for block in board.blocks):
         words += (
             " 'sees 24 %': a lead of 24 % between the law and the one in front would have been seen in "
-            f"{100 * POWER:g} % of such comparisons."
+            f"{100 * POWER:g} % of such comparisons, at the level of {100 * (1 - LEVEL):.0f} % for all."
+        )
+    if any(block.lead and block.lead.small and block.winner for board in boards for block in board.blocks):
+        words += (
+            f" '{SMALL}': the medians differ by less than half a count of the encoder, the noise or 1e-4 of the start, "
+            "or by less than follows from these for other units."
         )
     if any(block.by_step for board in boards for block in board.blocks):
         words += (

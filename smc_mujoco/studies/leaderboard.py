@@ -58,7 +58,8 @@ def leaderboard(
       metrics: names of metrics, for which lower is better, or "settles".
       by: what the runs of a group have in common: ("plant",), or ("plant", "condition").
       defaults: whether a winner may be named over laws whose gains are their defaults.
-      relevant: the least relevant difference, as a share of the larger value. `paired_runs.floor` is its lower bound.
+      relevant: the least relevant difference, as a share of the larger value. Values below
+        `paired_runs.floor` count as equal, and a lead that is less than it is called that.
       worst: plant -> law -> its `worst_case`, for a column of the tables of a plant.
       unchecked: whether a law whose code is unchecked, see `Law.checked`, may be named the winner over checked laws.
 
@@ -259,7 +260,8 @@ def _lead(comparison: Comparison, at: int) -> Lead | None:
     rival = max((i for i in order if i != first), key=lambda i: comparison.p[at, first, i])
     names = comparison.laws[first], comparison.laws[rival]
     effect = comparison.effect(at, *names)
-    return Lead(*names, effect) if effect.samples else None
+    apart = abs(float(comparison.centres[rival, at] - comparison.centres[first, at]))
+    return Lead(*names, effect, apart < float(comparison.floors[at])) if effect.samples else None
 
 
 def _level(comparison: Comparison, at: int) -> bool:

@@ -254,7 +254,7 @@ def test_few_seeds_are_too_few_for_many_comparisons_and_the_board_says_so():
     laws = {f"law{i:02}": blocks(*range(i + 1, i + 6), seeds=6) for i in range(30)}
     board = leaderboard(stand(laws), ["itae"])[0]
     assert board.family == 5
-    assert board.result == "no winner: 6 seeds, too few for 5 comparisons"
+    assert board.result == "no winner: 6 seeds, too few for 5 comparisons: take 8 seeds (--seeds 8)"
     enough = {law: blocks(*range(i + 1, i + 6), seeds=8) for i, law in enumerate(laws)}
     assert leaderboard(stand(enough), ["itae"])[0].winner == "law00"
 
@@ -893,7 +893,7 @@ def test_seeds_that_change_nothing_are_one_sample():
     same = stand({law: np.repeat(values, 20, axis=1) for law, values in once.items()})
     (board,) = leaderboard(same, ["itae"])
     assert board.winner is None
-    assert board.result == "no winner: 20 seeds, 1 distinct run, too few"
+    assert board.result == "no winner: 20 seeds, 1 distinct run, too few: most seeds change nothing here"
     assert all(math.isnan(entry.interval.low) for entry in board.entries)
     assert "20 seeds, 1 distinct run" in " ".join(printed([board]).split())
 
@@ -948,7 +948,7 @@ def test_one_condition_without_randomness_is_one_sample_beside_others():
 def test_seeds_that_change_rounding_alone_are_one_sample():
     values = 1.0 + 1e-12 * np.arange(20.0)
     (board,) = leaderboard(stand({"a": values[None], "b": 2 * values[None]}), ["itae"])
-    assert board.result == "no winner: 20 seeds, 1 distinct run, too few"
+    assert board.result == "no winner: 20 seeds, 1 distinct run, too few: most seeds change nothing here"
     apart = 1.0 + 1e-5 * np.arange(20.0)
     assert leaderboard(stand({"a": apart[None], "b": 2 * apart[None]}), ["itae"])[0].blocks[0].runs == 20
 
@@ -985,10 +985,27 @@ def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves
     table = stand({"a": blocks(1e-3), "b": blocks(2e-3)}, metric="ultimate_bound")
     table.columns["scenario"] = np.array([run_key.row(fine)["scenario"]] * 40)
     assert leaderboard(table, ["ultimate_bound"])[0].winner == "a"
+    for near, small in ((1.1e-3, True), (1.5e-3, False)):  # the smallest difference that this problem shows is 1.5e-4
+        close = stand({"a": blocks(1e-3, 1e-3), "b": blocks(near, 2e-3)}, metric="ultimate_bound")
+        close.columns["scenario"] = np.array([run_key.row(fine)["scenario"]] * len(close.columns["seed"]))
+        (board,) = leaderboard(close, ["ultimate_bound"])
+        assert board.winner == "a"
+        assert ("by less than the problem can show" in board.result) == small
+        assert ("'by less than the problem can show'" in " ".join(printed([board]).split())) == small
     table.columns["scenario"] = np.array([run_key.row(noisy)["scenario"]] * 40)
     (board,) = leaderboard(table, ["ultimate_bound"])
     assert board.result == "no winner: both laws are level within 10 %"
     assert "up to 0.0200 rad or m of a position" in " ".join(printed([board]).split())
+
+
+def test_a_law_is_not_marked_where_no_lead_would_have_been_seen():
+    """Twelve runs are enough for a winner, but these spread over more than any lead."""
+    for spread, marked in ((0.01, True), (20.0, False)):
+        cells = {law: np.exp(spread * np.random.default_rng(i).normal(size=(1, 20))) for i, law in enumerate("ab")}
+        (board,) = leaderboard(stand(cells), ["itae"])
+        assert (board.too_few, set(board.best)) == ("", {"a", "b"})
+        assert ("*" in printed([board])) == marked
+        assert ("sees no lead" in printed([board])) != marked
 
 
 def test_commands_of_laws_that_friction_holds_are_level_though_one_creeps_a_thousand_times_less():
@@ -1054,7 +1071,7 @@ def test_a_real_scenario_without_randomness_is_one_run_from_any_seed(tmp_path):
         for seed in range(20)
     ]
     board = leaderboard(run_study(scenarios, tmp_path), ["itae"])[0]
-    assert board.result == "no winner: 20 seeds, 1 distinct run, too few"
+    assert board.result == "no winner: 20 seeds, 1 distinct run, too few: most seeds change nothing here"
 
 
 def test_a_law_that_fails_more_often_does_not_tie():

@@ -305,7 +305,7 @@ def test_few_seeds_tell_no_law_from_another(folder):
     assert few.answer[0].startswith("No law can be called the best")
     assert not few.comparison.better.any()
     assert few.tied == []
-    assert "the best with 4 runs: too few for 2 comparisons" in text(few)
+    assert "the best with 4 runs, too few for 2 comparisons: give more seeds" in text(few)
     assert "How sure: not at all, with 4 runs." in text(few)
 
 

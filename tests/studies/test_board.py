@@ -277,7 +277,10 @@ REASONS = {  # changes of the first block -> what stands instead of a winner
     "barred": ({"untuned": ("second", "third", EVIL)}, "third wins under noise"),
     "all fail": ({"ahead": None, "best": (), "lacking": dict.fromkeys(LAWS, 2)}, "every law has runs that fail"),
     "undecided": ({"ahead": None, "best": (), "undecided": ("second",)}, "too few samples to tell"),
-    "few sets": ({"ahead": None, "samples": 3, "sets": 3}, "3 sets of gains, too few for 2 comparisons"),
+    "few sets": (
+        {"ahead": None, "samples": 3, "sets": 3},
+        "3 sets of gains, too few for 2 comparisons: take 7 seeds (--seeds 7) and as many",
+    ),
     "linked sets": ({"ahead": None, "samples": 2, "sets": 3}, "3 sets of gains: 2 samples, too few"),
     "few runs of two": ({"ahead": None, "samples": 1, "runs": 7}, "7 distinct runs: 1 sample, too few"),
     "repeated runs": ({"ahead": None, "samples": 4, "runs": 4}, "4 distinct runs, too few"),
