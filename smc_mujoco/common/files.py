@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import errno
 import hashlib
 import json
 import math
@@ -45,16 +46,25 @@ def slug(name: str, max_bytes: int = MAX_NAME) -> str:
 
 
 def as_path(path: object, what: str = "the path") -> Path:
-    """Return a path; raise ScenarioError, which names `what`, for what is none."""
+    """Return a path; raise ScenarioError, which names `what`, for what is none, or what no file can be called."""
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"{what} is {shown(path)}: give the name of a file or folder as a text")
-    return Path(path)
+    named = Path(path)
+    try:
+        named.lstat()
+    except ValueError:
+        cure = "give a name without \\0, which UTF-8 can encode"
+        raise ScenarioError(f"{what} is {shown(str(path))}: {cure}") from None
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise ScenarioError(f"{what} is {shown(str(path))}: {error.strerror}; give a shorter one") from None
+    return named
 
 
 def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
     """Return the path if its name ends in one of `endings`, such as ".json"; raise ScenarioError otherwise."""
     path = as_path(path)
-    if path.suffix not in endings or "\0" in path.name:
+    if path.suffix not in endings:
         raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {' or '.join(endings)}")
     return path
 
@@ -71,12 +81,7 @@ def writable(*paths: str | os.PathLike[str] | None) -> None:
 @contextlib.contextmanager
 def _writing(path: Path) -> Iterator[None]:
     """Make a file's folder, and turn an OSError in the block into a ScenarioError."""
-    if "\0" in str(path):
-        raise ScenarioError(f"cannot write {shown(str(path))}: give a name without \\0")
-    try:
-        os.fsencode(path)
-    except UnicodeEncodeError:
-        raise ScenarioError(f"cannot write {shown(str(path))}: give a name that UTF-8 can encode") from None
+    as_path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield

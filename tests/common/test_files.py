@@ -179,6 +179,12 @@ def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
 def test_a_name_that_no_file_can_have_is_one_sentence(name):
     calls: list[Callable[[str], object]] = [smc.audit, writable, scene.find, lambda name: rigs.read(Path(name))]
     calls += [lambda name: smc.exchange.law_from_c(f"{name}.c"), lambda name: smc.live("duffing", out=name)]
+    short: dict[str, Any] = {"seeds": 1, "duration": 0.02, "progress": False}
+    runs = [smc.Scenario(plant="duffing", law="classical", duration=0.02)]
+    calls += [lambda name: smc.tune("duffing", "classical", budget=1, searches=1, folder=name, progress=False)]
+    calls += [lambda name: smc.which("duffing", "nominal", laws=["classical"], out=name, **short)]
+    calls += [lambda name: smc.compare("classical", "duffing", "nominal", out=name, **short)]
+    calls += [lambda name: smc.study(runs, name, progress=False)]
     for call in (*calls, lambda name: new(Path(name))):
         with pytest.raises(smc.ScenarioError):
             call(name)
@@ -304,12 +310,13 @@ def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
 
 def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
     cells, beside = "give a CSV file, with commas or semicolons between cells", Path(files.__file__).parents[1]
+    cure = r"give a name without \0, which UTF-8 can encode"
     refusals = {
         lambda: files.with_ending("a.txt", ".json"): "cannot save to 'a.txt': end the name in .json",
-        lambda: files.with_ending("a\0.json", ".json"): r"cannot save to 'a\x00.json': end the name in .json",
+        lambda: files.with_ending("a\0.json", ".json"): rf"the path is 'a\x00.json': {cure}",
         lambda: writable(tmp_path): f"cannot write {tmp_path}: it is a folder, give the file in it a name",
-        lambda: writable("a\0"): r"cannot write 'a\x00': give a name without \0",
-        lambda: writable("\ud800/a"): r"cannot write '\ud800/a': give a name that UTF-8 can encode",
+        lambda: writable("a\0"): rf"the path is 'a\x00': {cure}",
+        lambda: writable("\ud800/a"): rf"the path is '\ud800/a': {cure}",
         lambda: files.shipped("nope"): f"no folder 'nope' in {beside} or beside it: reinstall smc-mujoco",
         lambda: files.csv_rows(tmp_path / "no"): f"no CSV file at {tmp_path / 'no'}: {cells}",
         lambda: files.csv_rows(3): f"cannot read 3: {cells}",  # pyright: ignore[reportArgumentType]

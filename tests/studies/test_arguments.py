@@ -57,7 +57,7 @@ CHANGES = {  # call -> argument, its value, and what a part is then given
         ("quick", True, "searches: 3"),
     ],
     smc.compare: [
-        ("plants", "cart_pole", "cart_pole"), ("conditions", "noise", "['noise']"), ("seeds", 3, "range(0, 3)"),
+        ("plants", "servo_axis", "servo_axis"), ("conditions", "noise", "['noise']"), ("seeds", 3, "range(0, 3)"),
         ("tune", False, "tune: False"), ("gains", "study", "gains: 'study'"), ("budget", 30, "[30, "),
         ("out", "mine", "study mine"), ("traces", "all", "traces: 'all'"), ("noise_key", 5, "noise_key: 5"),
         ("threads", 2, "threads: 2"), ("duration", 2.0, "[2.0, None]"), ("progress", False, "progress: False"),

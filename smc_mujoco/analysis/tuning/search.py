@@ -48,7 +48,7 @@ from smc_mujoco.analysis.tuning.result import Found, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
-from smc_mujoco.common.constraints import Whole, constrained
+from smc_mujoco.common.constraints import FilePath, Whole, constrained
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning, find, users_stacklevel
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
@@ -105,7 +105,7 @@ def tune(
     starts: Starts | None = None,
     chattering: float | None = None,
     searches: Searches = SEARCHES,
-    folder: str | os.PathLike[str] | None = None,
+    folder: Annotated[str | os.PathLike[str], FilePath()] | None = None,
 ) -> Tuned:
     """Find gains of a law on the plant by independent searches, by the rule that is the same for every law.
 
