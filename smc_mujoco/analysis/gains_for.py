@@ -189,7 +189,7 @@ def _scaled(law: Component, size: float, speed: float) -> Component:
 def _force_headroom(base: Scenario) -> float:
     """Return the factor by which the forces among the gains can grow, until the first reaches the actuator's limit."""
     law, plant, u_max = base.law, base.plant, min(base.limits)
-    rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model == "nominal"
+    rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model != "none"
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
     force = min(accelerations) if with_model else u_max
     limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}

@@ -170,7 +170,7 @@ class Loop:
     def _controlled(self, h: float, motion: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Return u and s for x and v of the channel, and of the joint that it moves, every h seconds."""
         s = self.scenario.resolved
-        fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model == "nominal"}
+        fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model != "none"}
         return self.controller(0, fixed, motion, self.nominal_models, self.controller.memories())
 
     def _gain(self, amplitude: float, omega: float, max_samples: float = MAX_SAMPLES_PER_PERIOD) -> complex:

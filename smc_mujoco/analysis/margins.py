@@ -131,7 +131,7 @@ class Kind:
     def expected(self, base: Scenario) -> float | None:
         """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
         changed = base.disturbance or base.friction or base.mismatch or base.jump or base.sensor or base.feedforward
-        if changed or not base.clock.regular or base.resolved.model == "nominal" or base.resolved.reference != REST:
+        if changed or not base.clock.regular or base.resolved.model != "none" or base.resolved.reference != REST:
             return None  # not in the theory
         try:
             return self.theory(base)

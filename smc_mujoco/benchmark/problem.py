@@ -122,7 +122,8 @@ class Problem:
             law = gain_sets.law(self.plant, law) if shipped else gain_sets.law(self.plant, law, "default")
         of = rules(self.version)
         changes = {"u_max": self.u_max, "control_period": of["control_period"]}
-        return case(self.plant, law, self.condition, self.duration, changes=changes)
+        base = case(self.plant, law, self.condition, self.duration, changes=changes)
+        return dataclasses.replace(base, **controls.truth()) if controls.is_oracle(base.law) else base
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
         """Return the scenario of an instance."""

@@ -27,7 +27,7 @@ from smc_mujoco.simulation.signals import Constant, PerChannel, Signal, paramete
 T = TypeVar("T")
 
 INTEGRATORS = ("RK4", "Euler", "implicitfast", "implicit")
-MODELS = ("none", "nominal")
+MODELS = ("none", "nominal", "true")
 MIN_TIME = 1e-9  # s, of periods
 REST = Constant(0.0)
 

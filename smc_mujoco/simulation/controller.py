@@ -197,6 +197,8 @@ def _measure(address, sim, data, k, t):
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
+        if sim.told != 0:
+            pointer(sim.told)[i] = _generalised_disturbance(data, channel) + state.reaction / sim.steps
     return record.FINE
 
 
@@ -218,6 +220,8 @@ def update_law(address, sim, k, t):
     y = sim.joint.head if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
     sim.instant.t = t
+    for i in range(n if sim.told != 0 else 0):
+        last_u[i] += pointer(sim.told)[i]  # what the model takes for the force on each joint
     if sim.feedforward.address != 0:
         if _call(sim.feedforward, 0, address + record.AT.instant, address + record.AT.motion) != 0:
             return record.RAISED
@@ -237,9 +241,13 @@ def update_law(address, sim, k, t):
                 sim.seen.i = i
                 return record.NOT_FINITE
             buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
+            if sim.told != 0:
+                last_u[i] += pointer(sim.told)[i]
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
         buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
+    for i in range(n if sim.told != 0 else 0):
+        last_u[i] = log_at(sim.log, k * n + i).u
     return record.FINE
 
 
@@ -272,6 +280,8 @@ def _measure_channel(address, sim, k, t, i):
     if _evaluate_model(address, sim, i) != 0:
         return record.RAISED
     y.f, y.g = model.f - sim.drive_drag * v[i] * model.g, sim.drive_gain * model.g
+    if sim.told != 0:
+        y.f += pointer(sim.told)[i] * model.g
     if sim.motors != 0:  # u is the acceleration x''
         y.gq /= y.g
         y.fq -= y.gq * y.f

@@ -202,7 +202,7 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: state.Buffer)
     if nominal is not None:
         fields["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
     elif compiled := _compiled_nominal(s.plant):
-        fields["nominal"] = _function(compiled, s.plant.parameters.values(), buffer)
+        fields["nominal"] = _function(compiled, known_values(s), buffer)
     signals = {"feedforward": s.feedforward}
     signals |= {"position_error": s.noise.position_error, "velocity_error": s.noise.velocity_error}
     return fields | {name: _signal(signal, buffer) for name, signal in signals.items() if signal}
@@ -238,7 +238,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "dropout": sensor.dropout,
         "read_period": sensor.period or 0.0,
         "read_delay": sensor.delay,
-        "uses_model": s.model == "nominal",
+        "uses_model": s.model != "none",
         "drive_gain": s.nominal_drive.gain,
         "drive_drag": s.nominal_drive.drag,
     }
@@ -259,6 +259,7 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     return motors | {
         "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
         "a": buffer.reserve(n),
+        "told": buffer.reserve(n) if s.model == "true" else 0,
         "width": width,
         "commands": buffer.reserve(2 * width),
         "states": buffer.put(states.view(float).tolist()),
@@ -266,6 +267,12 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
         "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
     }
+
+
+def known_values(s: Resolved) -> list[float]:
+    """Return the values of the plant's parameters as the law's model has them: true ones in the model "true"."""
+    known = s.plant.parameters if s.model != "true" else vars(s.plant.values(s.factors(0)))
+    return [known[name] for name in s.plant.parameters]
 
 
 def motors_at_start(s: Resolved) -> list[dict[str, float]]:
@@ -294,7 +301,7 @@ def _native_nominal(s: Resolved) -> Native | None:
     if not isinstance(s.plant.nominal, NominalModel):
         return None
     if not s.law.joint:
-        return s.plant.nominal.native(s.plant.parameters)
+        return s.plant.nominal.native(dict(zip(s.plant.parameters, known_values(s), strict=True)))
     if s.model == "none":
         return None
     at_rest = "g" in read_by(s.law.function)

@@ -22,7 +22,7 @@ from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Dynamics, Plant, Values
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation.controller import MAX_CONTROL
-from smc_mujoco.simulation.prepare import references
+from smc_mujoco.simulation.prepare import known_values, references
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Signal
 
@@ -46,10 +46,11 @@ class Controller:
         self.law, self.estimator = (PythonComponent(c, n) for c in (self.scenario.law, self.scenario.velocity))
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.limits, self.scale = np.array(scenario.limits), math.prod(part.scale for part in scenario.actuator)
-        self.values = Values(**scenario.plant.parameters)  # the nominal ones
+        self.values = Values(**dict(zip(scenario.plant.parameters, known_values(self.scenario), strict=True)))
         if isinstance(scenario.plant.nominal, NominalModel):  # compiles, while there is no Python callback
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.values)
         self.last_u = np.zeros(n)  # commands of the last sample
+        self.told = np.zeros(n)  # other forces on the joints, for a law with the true model
         self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)  # a: estimated accelerations, or NaN
         self.last_reading = np.zeros((n, 2))  # positions and velocities, of the last readings that were not lost
 
@@ -117,7 +118,7 @@ class Controller:
         xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
         y = Measurement(
             t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
-            float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.limits[i], float(scenario.model == "nominal"),
+            float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.limits[i], float(scenario.model != "none"),
         )  # fmt: skip
         if (j := i + len(scenario.limits)) < len(x):  # a joint without actuator, which moves with channel i
             fq, gq = self.model_at(x, v, j, i)
@@ -134,7 +135,7 @@ class Controller:
         """Return what a law of many joints reads, as `measurement` does for one."""
         scenario, (r, dr, ddr) = self.scenario, motion
         return JointMeasurement(
-            t, scenario.control_period, float(scenario.model == "nominal"), NominalDynamics(scenario, x, v), x.copy(),
+            t, scenario.control_period, float(scenario.model != "none"), NominalDynamics(scenario, x, v), x.copy(),
             v.copy(), x - r, v - dr, r, dr, ddr, np.where(np.isnan(self.a), ddr, self.a), self.limits.copy(),
             *dynamics(scenario, x, v),
         )  # fmt: skip
@@ -149,9 +150,9 @@ class Controller:
 
     def model_at(self, x: np.ndarray, v: np.ndarray, i: int, driven: int) -> tuple[float, float]:
         """Return nominal f and g of channel i, for the u of a driven channel."""
-        f, g = nominal(self.scenario.plant, x, v, i, self.values, self.last_u)
+        f, g = nominal(self.scenario.plant, x, v, i, self.values, self.last_u + self.told)
         gain, drag = self.scenario.nominal_drive
-        return f - drag * v[driven] * g, gain * g
+        return f - drag * v[driven] * g + self.told[i] * g, gain * g
 
 
 def gains_of(c: Component, n: int = 1) -> tuple:
@@ -229,7 +230,7 @@ class NominalDynamics:
     def nominal(self) -> NominalModel | None:
         """The nominal model of all joints, if the plant has one and the law may use it."""
         model = self.scenario.plant.nominal
-        return model if isinstance(model, NominalModel) and self.scenario.resolved.model == "nominal" else None
+        return model if isinstance(model, NominalModel) and self.scenario.resolved.model != "none" else None
 
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:

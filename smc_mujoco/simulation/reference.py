@@ -99,6 +99,7 @@ class Loop:
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
         self.streams = [scenario.noise_stream(j) for j in range(len(scenario.disturbance))]
         self.commands: list[np.ndarray] = []
+        self.d = np.zeros(n)  # disturbances at the last stage
         self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
         self.drive_step = scenario.drive_step
         if self.drive_step:  # both states of the drives
@@ -148,7 +149,7 @@ class Loop:
             fraction = (0.0, 0.5, 0.5, LAST_STAGE)[stage]
             k, within = divmod(step, self.scenario.steps)
             t = k * self.scenario.control_period + (within + fraction) * self.scenario.physics_step
-            d = self.apply_disturbances(data, t)
+            d = self.d = self.apply_disturbances(data, t)
             if self.scenario.formula_friction:
                 self.apply_friction(data, d, self.scenario.formula_friction)
             if stage == 0 and within == 0:
@@ -189,6 +190,8 @@ class Loop:
         if within == self.late(k) and not self.missed(k):
             t = k * self.scenario.control_period + within * self.scenario.physics_step
             at = self.channels
+            if self.scenario.model == "true":
+                self.controller.told = self.d + self.forces[1] / self.scenario.steps
             self.commands[k], s = self.controller(k, t, *(data.sensordata[at[one]] for one in ("x_sensor", "v_sensor")))
             for name, values in (("u", self.commands[k]), ("s", s), ("r", self.controller.r)):
                 self.log[name][k] = values

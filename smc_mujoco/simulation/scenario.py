@@ -75,7 +75,8 @@ class Scenario:
         list in the channels' order, or a mapping from the joints' names; u_max and reference take these forms, too.
         Default of all three: what the plant's channels suggest, see `smc.Channel`.
       model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "nominal"
-        for a law that requires it, else "none".
+        for a law that requires it, else "none". "true" is for controls, as no controller knows it: f and g of the true
+        parameters, with the forces of disturbances, friction and contacts on the joint in f.
       surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s between two runs of the law. The command is held in between.
@@ -582,13 +583,18 @@ def bodies(plant: Plant) -> tuple[str, ...]:
 def check_law(s: Resolved) -> None:
     """Check that the law suits the plant, and the surface the law."""
     check_channels(s)
+    if s.model == "true" and (s.law.joint or s.jump or s.stepper or s.clock.jitter):
+        raise ScenarioError(
+            "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave that out, or give "
+            "model='nominal'"
+        )
     for law in s.law.parts:
         if not suits(law, s.plant):
             paired = dataclasses.replace(s.plant, underactuated=True)
             listed = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
             cure = "give each channel a partner" if s.plant.own and suits(law, paired) else listed
             raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}")
-    if s.model == "nominal" and s.plant.unmodelled:
+    if s.model != "none" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
     for law in s.law.parts:
         if s.surface is not None:
@@ -634,7 +640,7 @@ def check_channels(s: Resolved) -> None:
 
 def check_inertia(s: Resolved) -> None:
     """Check that the nominal M of a law of many joints can be inverted at the start."""
-    if s.law.joint and s.model == "nominal" and isinstance(s.plant.nominal, NominalModel):
+    if s.law.joint and s.model != "none" and isinstance(s.plant.nominal, NominalModel):
         M = s.plant.nominal.dynamics(np.array(s.x0), np.array(s.v0), s.plant.values({})).M
         if not np.linalg.cond(M) < MAX_CONDITION_NUMBER:
             raise ScenarioError(
@@ -679,7 +685,7 @@ def check_stepper(s: Resolved) -> None:
     """Check that a stepper motor has the command itself, and a law of one channel or without a model."""
     if len([part for part in s.actuator if part.drives]) > 1:
         raise ScenarioError(f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that out")
-    if s.law.joint and s.model == "nominal":
+    if s.law.joint and s.model != "none":
         raise ScenarioError(
             f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a Stepper's u is an "
             "acceleration: give model='none', a law of one channel, or another actuator"

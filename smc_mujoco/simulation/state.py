@@ -110,6 +110,8 @@ SIMULATION = np.dtype(
         # functions, and whether the law may use the nominal model
         ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
         ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
+        # address of the other forces on the joints, (n,), which a law with the true model is told; 0: it is not
+        ("told", "i8"),
         # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`, or `reference`
         ("laws", "i8"), ("references", "i8"),
         # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and damping; 0: none

@@ -341,7 +341,7 @@ def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed
     bound = goal.u_max or default_u_max(first.plant)
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
-    scales = search_space.scales(first.plant, bound, first.model == "nominal", reach)
+    scales = search_space.scales(first.plant, bound, first.model != "none", reach)
     box = search_space.box(first.law, scales)
     return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
 

@@ -52,7 +52,7 @@ def law_to_fmu(
     velocity: Estimator | Template | str | None = None,
     control_period: Positive | None = None,
     u_max: float | Sequence[float] | None = None,
-    model: Annotated[str, OneOf(names=coerce.MODELS)] | None = None,
+    model: Annotated[str, OneOf(names=coerce.MODELS[:2])] | None = None,
     joint: Annotated[str, OneOf(names=(*description.JOINT_UNITS,))] | None = None,
     joints: int | None = None,
     binary: bool = True,
