@@ -1,59 +1,155 @@
 """The benchmark's targets, controls and rank correlations, from runs of the catalogue.
 
-    python benchmarks/problems.py measure --out measures.json            # visible instances
-    python benchmarks/problems.py measure --out hidden.json --number HEX # those of a number, 64 hex digits, or "random"
-    python benchmarks/problems.py freeze measures.json                   # writes the targets into the rules
-    python benchmarks/problems.py agree measures.json hidden.json        # rank correlations of the boards
+    python benchmarks/problems.py measure laws visible.json
+    python benchmarks/problems.py measure controls controls.json --number random --instances 48
+    python benchmarks/problems.py freeze visible.json controls.json   # writes the targets into the rules
+    python benchmarks/problems.py measure laws hidden.json --number random
+    python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
 
-`measure` runs every general law with its best shipped gains, and both controls, on every problem of the rules: about
-ten minutes of processor time for seven instances. It goes on where it was stopped.
+`measure laws` runs every general law with its best shipped gains on every problem of the paper's plants, `measure
+controls` the controls on all problems; ten minutes of processor time each. They go on where they were stopped.
 """
 
 import argparse
-import itertools
 import json
 import math
 import secrets
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.stats import kendalltau, rankdata, spearmanr
 
-from smc_mujoco.benchmark import controls
+from smc_mujoco.benchmark import controls, suite
 from smc_mujoco.benchmark import problem as problems
 from smc_mujoco.control import gain_sets
+from smc_mujoco.control.law import Law
+from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.run import stream
 
 INSTANCES = 7  # of each problem, for medians of laws
-BANDWIDTHS = (8.0, 16.0, 32.0)  # rad/s, of the oracle
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
-Runs = dict[str, dict[str, list[list[float]]]]  # problem -> law -> MEASURES of each instance
+MARGIN = 1.25  # of a target over the oracle's worst, and of zero's best over a target
+MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
+BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "itae", "calm": "calm"}
+Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURES)
 
 
 def cells(version: int = 1) -> list[str]:
     """List the problems of a version."""
-    of = problems.rules(version)
-    return [f"{p}/{c}@{version}" for p, c in itertools.product(of["plants"], of["conditions"])]
+    return [f"{cell}@{version}" for cell in problems.cells(version)]
 
 
-def measure(out: Path, number: str, instances: int) -> None:
-    """Run all laws and controls on all problems, and write their measures."""
+def laws_of(kind: str, plant: str) -> dict[str, Law]:
+    """Return the laws to run on a plant, by name."""
+    if kind == "controls":
+        of = problems.rules(1)
+        widths = of["more"].get(plant, {}).get("bandwidths", of["bandwidths"])
+        oracles = {f"oracle {w:g}": controls.oracle_of(plant, w) for w in widths}
+        return {"zero": controls.zero()} | oracles
+    return {
+        law: gain_sets.law(plant, law)
+        for law in gain_sets.general()
+        if gain_sets.in_set(find_plant(plant), law, "tuned")
+    }
+
+
+def measure(kind: str, out: Path, number: str, instances: int) -> None:
+    """Run laws or controls on all problems, and write their measures."""
     done: dict = json.loads(out.read_text()) if out.exists() else {"number": number, "runs": {}}
     number, runs = done["number"], done["runs"]
     for name in (name for name in cells() if name not in runs):
         one = problems.problem(name)
-        laws = {law: law for law in gain_sets.general() if gain_sets.in_set(one.plant, law, "tuned")}
-        laws |= {"zero": controls.laws()["zero"]}
-        laws |= {f"oracle {w:g}": controls.oracle(w=w) for w in BANDWIDTHS}
+        if not (laws := laws_of(kind, one.plant)):
+            continue
         scenarios = [s for law in laws.values() for s in one.scenarios(law, range(instances), number)]
         found = [[math.nan]] * len(scenarios)
         for i, trace in stream(scenarios):
             values = one.measures(trace)
-            found[i] = [values[name] for name in MEASURES]
-        runs[name] = dict(zip(laws, (found[i : i + instances] for i in range(0, len(found), instances)), strict=True))
+            found[i] = [values[measure] for measure in MEASURES]
+        runs[name] = {law: found[i * instances : (i + 1) * instances] for i, law in enumerate(laws)}
         out.write_text(json.dumps(done))
         print(name, file=sys.stderr, flush=True)
+
+
+def read(path: Path) -> Runs:
+    """Return what `measure` wrote."""
+    runs = json.loads(path.read_text())["runs"]
+    return {name: {law: np.array(values) for law, values in laws.items()} for name, laws in runs.items()}
+
+
+def levels(laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Mapping[str, Any]) -> list[float]:
+    """Return the levels of a measure in a problem, the hardest first, none harder than what the oracle reaches."""
+    if laws:
+        medians = [np.median(values[:, MEASURES.index(measure)]) for values in laws.values()]
+        chosen = np.quantile(medians, rules["quantiles"], method="higher")
+        chosen = np.minimum(chosen, max(filter(math.isfinite, medians)))  # laws of which half of the runs fail
+    else:
+        chosen = np.geomspace(worst, max(worst, rules["easiest"][measure] * (worst if measure != "accuracy" else 1)), 5)
+    chosen = np.maximum(chosen, worst)
+    return chosen.tolist()
+
+
+def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
+    """Return the targets of a problem and the oracle's bandwidth; None where a control forbids it."""
+    rules, best = problems.rules(int(name.partition("@")[2])), None
+    for label, oracle in runs.items():
+        if not label.startswith("oracle"):
+            continue
+        w = float(label.split()[1])
+        worst = {m: MARGIN * float(oracle[:, MEASURES.index(m)].max()) for m in problems.MEASURES}
+        if not all(map(math.isfinite, worst.values())):
+            continue
+        found = {m: levels(laws, m, worst[m], rules) for m in problems.MEASURES}
+        relaxed = sum(level == worst[m] for m in found for level in found[m])
+        if best is None or relaxed < best[0]:
+            best = relaxed, w, found, worst
+    if best is None:
+        return None
+    _, w, found, worst = best
+    bound = float(runs["zero"][:, MEASURES.index("accuracy")].min()) / MARGIN  # harder than what u = 0 reaches
+    if worst["accuracy"] > bound:
+        return None
+    found["accuracy"] = [min(level, bound) for level in found["accuracy"]]
+    return found | {"oracle": w}
+
+
+def freeze(visible: Runs, of_controls: Runs) -> None:
+    """Write targets and what is left out below the mark in the rules."""
+    path = problems.RULES / "1.toml"
+    lines, left_out = ["[targets]"], []
+    for name in cells():
+        if (found := targets(name, visible.get(name, {}), of_controls[name])) is None:
+            left_out.append(name.partition("@")[0])
+            continue
+        texts = [f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]" for m in problems.MEASURES]
+        lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]:g} }}')
+    text = path.read_text().partition(MARK)[0] + MARK
+    path.write_text(text + f"[frozen]\nleft_out = {json.dumps(left_out)}\n\n" + "\n".join(lines) + "\n")
+    print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
+
+
+def board(runs: Runs, names: Sequence[str], question: str) -> np.ndarray:
+    """Return the mean rank of each law's median over the problems of a board; equal medians share their rank."""
+    measure = MEASURES.index(BOARDS[question])
+    informing = [name for name in names if question in suite.boards(name)]
+    ranks = [rankdata([np.median(values[:, measure]) for values in runs[name].values()]) for name in informing]
+    return np.mean(ranks, axis=0)
+
+
+def agree(visible: Runs, hidden: Runs) -> None:
+    """Print the rank correlations of boards, visible with hidden, and those of smc-30 with the problems left out."""
+    chosen, whole = suite.suite("smc-30@1"), suite.suite("smc-50@1")
+    others = [name for name in whole if name not in chosen]
+    print("board | visible with hidden, tau (rho) | with the problems left out, tau (rho)")
+    for question in BOARDS:
+        mine = board(visible, chosen, question)
+        cells = [(kendalltau(mine, other)[0], spearmanr(mine, other)[0]) for other in (
+            board(hidden, chosen, question), board(visible, others, question),
+        )]  # fmt: skip
+        print(question, *(f"{tau:.3f} ({rho:.3f})" for tau, rho in cells), sep=" | ")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -61,9 +157,14 @@ def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = made.add_subparsers(dest="command", required=True)
     measured = commands.add_parser("measure")
-    measured.add_argument("--out", type=Path, required=True)
-    measured.add_argument("--number", default="")
+    measured.add_argument("kind", choices=("laws", "controls"))
+    measured.add_argument("out", type=Path)
+    measured.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
     measured.add_argument("--instances", type=int, default=INSTANCES)
+    for name, files in (("freeze", ("visible", "controls")), ("agree", ("visible", "hidden"))):
+        command = commands.add_parser(name)
+        for file in files:
+            command.add_argument(file, type=Path)
     return made
 
 
@@ -71,4 +172,8 @@ if __name__ == "__main__":
     given = parser().parse_args()
     if given.command == "measure":
         number = secrets.token_hex(32) if given.number == "random" else given.number
-        measure(given.out, number, given.instances)
+        measure(given.kind, given.out, number, given.instances)
+    elif given.command == "freeze":
+        freeze(read(given.visible), read(given.controls))
+    else:
+        agree(read(given.visible), read(given.hidden))

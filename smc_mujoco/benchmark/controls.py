@@ -9,7 +9,10 @@
                                         sgn(e) (sqrt(2 share a |e|) - share a / w) elsewhere
 
   Source: a proximate time-optimal servo, G. F. Franklin, J. D. Powell & M. L. Workman, Digital Control of Dynamic
-  Systems, 2nd ed., Addison-Wesley 1990, section 11.3. share and w are of the rules.
+  Systems, 2nd ed., Addison-Wesley 1990, section 11.3.
+
+  Where a joint without an actuator moves with it, near upright q'' = b (x'' - fall q) with b = gq / g, and x'' is the
+  state feedback that puts all four poles at -w (F. J. Ackermann, Regelungstechnik 20:297, 1972).
 """
 
 import math
@@ -17,6 +20,11 @@ from typing import Any
 
 from smc_mujoco.control.from_text import law
 from smc_mujoco.control.law import Law, law_function
+
+FALL = {
+    "cart_pole": 9.81,
+    "furuta": 9.81 / 0.085,
+}  # plant -> fall, in m/s^2, or of a rotary arm 1/s^2: gravity over its length
 
 
 @law_function(gains={"w": 20.0, "share": 0.5}, positive=("w", "share"), requires_model=True)
@@ -31,16 +39,32 @@ def oracle(y, gains, memory):
     return (y.ddr - y.f - 2.0 * w * s) / y.g, s
 
 
+@law_function(gains={"w": 4.0, "fall": 9.81}, positive=("w", "fall"), requires_model=True)
+def oracle_pair(y, gains, memory):
+    """Return u and the acceleration that a joint with an actuator is given, so that its partner stands, too."""
+    w, b = gains.w, y.gq / y.g  # the partner's acceleration is b times the joint's, and beside it that of its fall
+    a = -b * gains.fall
+    k1, k2 = w**4 / a, 4.0 * w**3 / a
+    k3, k4 = -(6.0 * w * w + k1 + a) / b, -(4.0 * w + k2) / b
+    s = k1 * y.e + k2 * y.de + k3 * y.q + k4 * y.dq
+    return (y.ddr - y.f + s) / y.g, s
+
+
+def oracle_of(plant: str, w: float) -> Law:
+    """Return the oracle for a plant."""
+    return oracle_pair(w=w, fall=FALL[plant]) if plant in FALL else oracle(w=w)
+
+
+def zero() -> Law:
+    """Return u = 0."""
+    return law("none").named("zero")
+
+
 def is_oracle(one: Law) -> bool:
-    """Return whether a law is the oracle, under any name, which no entry may be."""
-    return any(part.function is oracle.function for part in one.parts)
+    """Return whether a law is an oracle, under any name, which no entry may be."""
+    return any(part.function in (oracle.function, oracle_pair.function) for part in one.parts)
 
 
 def truth() -> dict[str, Any]:
     """Return the fields of a scenario that hand the oracle the truth."""
     return {"model": "true", "noise": None, "sensor": None, "velocity": None}
-
-
-def laws() -> dict[str, Law]:
-    """Return the controls by name."""
-    return {"zero": law("none").named("zero"), "oracle": oracle()}

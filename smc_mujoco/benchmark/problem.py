@@ -60,20 +60,39 @@ class Problem:
     Attributes:
       id: its name, such as "duffing/noise@1".
       plant, condition, version: the three parts of the name.
-      u_max: bound on |u|, N or N m.
-      duration: of every run, s.
       rules: the text of the version's rules.
-      targets: measure -> the levels that laws are to reach, the hardest first.
     """
 
     id: str
     plant: str
     condition: str
     version: int
-    u_max: float
-    duration: float
     rules: str
-    targets: Mapping[str, tuple[float, ...]]
+
+    @functools.cached_property
+    def _values(self) -> Mapping[str, Any]:
+        """The rules' values for the plant."""
+        return rules(self.version) | rules(self.version)["more"].get(self.plant, {})
+
+    @functools.cached_property
+    def _frozen(self) -> Mapping[str, Any]:
+        """The levels of each measure, and the oracle's bandwidth; {} before they are frozen."""
+        return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
+
+    @property
+    def u_max(self) -> float:
+        """Bound on |u|, N or N m."""
+        return self._values["u_max"]
+
+    @property
+    def duration(self) -> float:
+        """Length of every run, s."""
+        return self._values["duration"]
+
+    @property
+    def targets(self) -> dict[str, tuple[float, ...]]:
+        """Measure -> the levels that laws are to reach, the hardest first."""
+        return {name: tuple(self._frozen[name]) for name in MEASURES if self._frozen}
 
     def __repr__(self) -> str:
         return f"Problem({self.id!r})"
@@ -81,7 +100,7 @@ class Problem:
     @property
     def controls(self) -> dict[str, Law]:
         """The laws of the controls: "zero", which must reach no target."""
-        return controls.laws()
+        return {"zero": controls.zero(), "oracle": controls.oracle_of(self.plant, self._frozen["oracle"])}
 
     def instance(self, index: int, number: str = "") -> Instance:
         """Return what an instance has drawn; `number` as in `scenarios`."""
@@ -89,7 +108,7 @@ class Problem:
         index = whole("an instance", index, 0, MAX_INSTANCE)
         words = np.random.Philox(key=int.from_bytes(key), counter=STEP * index).random_raw(DRAWS).tolist()
         u = [(word >> 11) * 2.0**-53 for word in words]
-        of = rules(self.version)
+        of = self._values
         start, mass, disturbance = (
             low + (high - low) * u[i] for i, (low, high) in enumerate((of[name] for name in ("start", *FACTORS)), 1)
         )
@@ -111,7 +130,7 @@ class Problem:
         """
         if isinstance(instances, str):
             find("kind of instances", instances, {"visible": None})
-            instances = range(rules(self.version)["visible"])
+            instances = range(self._values["visible"])
         base = self._base(law)
         return tuple(self._place(base, self.instance(i, number)) for i in items_of("instances", instances))
 
@@ -120,21 +139,20 @@ class Problem:
         if isinstance(law, str) and law in known_laws():
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
             law = gain_sets.law(self.plant, law) if shipped else gain_sets.law(self.plant, law, "default")
-        of = rules(self.version)
-        changes = {"u_max": self.u_max, "control_period": of["control_period"]}
+        changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
         base = case(self.plant, law, self.condition, self.duration, changes=changes)
         return dataclasses.replace(base, **controls.truth()) if controls.is_oracle(base.law) else base
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
         """Return the scenario of an instance."""
-        plant, resolved = base.plant, base.resolved
+        plant, resolved, force = base.plant, base.resolved, drawn.disturbance * self._values.get("scale", 1.0)
         mismatch = dict(base.mismatch)
         mismatch["mass"] = drawn.mass * mismatch.pop("mass", mismatch.pop(plant.mass, 1.0))
         scenario = dataclasses.replace(
             base,
             x0=[drawn.side * drawn.start * x for x in resolved.x0],
             mismatch=mismatch,
-            disturbance=[_scaled(signal, drawn.disturbance) for signal in base.disturbance],
+            disturbance=[_scaled(signal, force) for signal in base.disturbance],
             seed=drawn.seed,
         )
         return scenario.named(self.condition)
@@ -158,7 +176,7 @@ class Problem:
         variation = np.abs(np.diff(trace.u[:, :driven], axis=0)).sum(axis=0) / np.array(trace.scenario.limits[:driven])
         values = {
             "failed": 0.0,
-            "accuracy": max(float(worst[conventions.last_part(trace)].max()), rules(self.version)["floor"]),
+            "accuracy": max(float(worst[conventions.last_part(trace)].max()), self._values["floor"]),
             "itae": float(np.trapezoid(trace.t * total, trace.t)),
             "settling": conventions.last_exit(trace.t, worst, conventions.SETTLING_BAND),
             "calm": float(variation.max() / self.duration),
@@ -192,19 +210,21 @@ def problem(name: str) -> Problem:
     plant, condition, version = parts.groups()
     find("version of the rules", version, dict.fromkeys(versions()))
     of = rules(int(version))
-    find("plant of the problems", plant, dict.fromkeys(of["plants"]))
-    find("condition of the problems", condition, dict.fromkeys(of["conditions"]))
-    targets = of.get("targets", {}).get(f"{plant}/{condition}", {})
-    return Problem(
-        id=name,
-        plant=plant,
-        condition=condition,
-        version=int(version),
-        u_max=of["u_max"],
-        duration=of["duration"],
-        rules=_text(int(version)),
-        targets={measure: tuple(levels) for measure, levels in targets.items()},
-    )
+    known = dict.fromkeys(cells(int(version)))
+    find("plant of the problems", plant, dict.fromkeys(cell.partition("/")[0] for cell in known))
+    conditions = [cell.partition("/")[2] for cell in known if cell.startswith(f"{plant}/")]
+    find(f"condition of problems of {plant}", condition, dict.fromkeys(conditions))
+    if f"{plant}/{condition}" in of.get("frozen", {}).get("left_out", ()):
+        raise ScenarioError(f"problem {name!r} is left out by rule, as a control forbids it: choose another")
+    return Problem(id=name, plant=plant, condition=condition, version=int(version), rules=_text(int(version)))
+
+
+def cells(version: int) -> list[str]:
+    """List every plant/condition of the rules, also those that are left out."""
+    of = rules(version)
+    each: dict[str, list[str]] = {plant: of["conditions"] for plant in of["plants"]}  # noqa: C420
+    each |= {plant: fields["conditions"] for plant, fields in of["more"].items()}
+    return [f"{plant}/{condition}" for plant, conditions in each.items() for condition in conditions]
 
 
 def versions() -> tuple[str, ...]:

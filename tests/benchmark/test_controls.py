@@ -1,0 +1,59 @@
+"""Controls: u = 0 must reach no target, and a law that is told everything must reach all."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.benchmark import controls
+from smc_mujoco.control.law import law_function
+from smc_mujoco.simulation import reference
+
+
+@law_function(requires_model=True)
+def told(y, gains, memory):
+    """Log f, and the command of one newton."""
+    return 1.0, y.f
+
+
+FRICTION = (smc.Coulomb(0.1), smc.Viscous(0.05))
+
+
+@pytest.mark.parametrize(("fields", "force"), [
+    ({"disturbance": smc.Constant(0.3)}, lambda trace: 0.3),
+    ({"disturbance": smc.Sine(amplitude=0.2, omega=5.0)}, lambda trace: 0.2 * np.sin(5.0 * trace.t[1:])),
+    ({"friction": smc.Coulomb(0.1)}, lambda trace: -0.1 * np.sign(trace.v[1:, 0])),
+])  # fmt: skip
+def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
+    """The force is that of the last instant before the sample, and friction's mean over the period before it."""
+    plant = smc.plant("duffing")
+    trace = smc.run(
+        smc.Scenario(plant=plant, law=told(), model="true", mismatch={"mass": 1.4}, duration=0.3, v0=0.5, **fields)
+    )
+    p, x, v = plant.values({}), trace.x[1:, 0], trace.v[1:, 0]
+    f = (-p.delta * v - p.alpha * x - p.beta * x**3 + force(trace)) / (1.4 * p.M)
+    np.testing.assert_allclose(trace.s[1:, 0], f, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["pendulum_network/friction@1", "duffing/process_noise@1", "duffing/missed@1"])
+def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
+    (scenario,) = smc.problem(name).scenarios(controls.oracle(), [1])
+    short = dataclasses.replace(scenario, duration=0.2)
+    compiled, plain = smc.run(short), reference.run(short)
+    np.testing.assert_allclose(compiled.u, plain.u, rtol=0, atol=1e-9)
+    assert scenario.checked
+
+
+def test_no_law_of_an_entry_is_told_anything():
+    """Not even one that asks for the model: only the oracle's own function gets it, under any name."""
+    (scenario,) = smc.problem("duffing/noise@1").scenarios(told(), [0])
+    assert (scenario.model, scenario.noise.position) == (None, 0.01)
+    assert controls.is_oracle(controls.oracle().named("mine"))
+    assert not controls.is_oracle(told())
+
+
+def test_what_the_true_model_has_not_is_refused():
+    for fields in ({"clock": smc.Clock(jitter=1e-4)}, {"jump": smc.Jump(time=0.1, factors={"mass": 2.0})}):
+        with pytest.raises(smc.ScenarioError, match="true"):
+            smc.Scenario(plant="duffing", law=told(), model="true", **fields)

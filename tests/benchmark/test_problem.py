@@ -1,0 +1,115 @@
+"""Problems: everybody draws the same instances, and measures say what they say."""
+
+import dataclasses
+import hashlib
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.benchmark import problem as problems
+from smc_mujoco.control.law import law_function
+
+pytestmark = pytest.mark.quick
+
+NUMBER = "0123456789abcdef" * 4
+WORD = 2**64
+
+
+def philox(key: int, counter: int) -> list[int]:
+    """The four words of a block of Philox4x64-10, from the paper: Salmon, Moraes, Dror, Shaw, SC 2011."""
+    c0, c1, c2, c3 = ((counter >> 64 * i) % WORD for i in range(4))
+    k0, k1 = key % WORD, key >> 64
+    for _ in range(10):
+        a, b = 0xD2E7470EE14C6C93 * c0, 0xCA5A826395121157 * c2
+        c0, c1, c2, c3 = (b >> 64) ^ c1 ^ k0, b % WORD, (a >> 64) ^ c3 ^ k1, a % WORD
+        k0, k1 = (k0 + 0x9E3779B97F4A7C15) % WORD, (k1 + 0xBB67AE8584CAA73B) % WORD
+    return [c0, c1, c2, c3]
+
+
+@pytest.mark.parametrize(("name", "index", "number"), [
+    ("duffing/noise@1", 0, ""), ("pendulum_network/heavy@1", 7, ""), ("duffing/sine@1", 123_456, NUMBER),
+])  # fmt: skip
+def test_an_instance_is_drawn_as_the_rules_say(name, index, number):
+    key = int(hashlib.sha256((name + number).encode()).hexdigest()[:32], 16)
+    side, start, mass, disturbance, seed, *_ = philox(key, 4096 * index + 1) + philox(key, 4096 * index + 2)
+    drawn = smc.problem(name).instance(index, number)
+    assert drawn == problems.Instance(
+        side=-1.0 if side < WORD // 2 else 1.0,
+        start=pytest.approx(0.7 + 0.6 * start / WORD, rel=1e-14),
+        mass=pytest.approx(0.85 + 0.3 * mass / WORD, rel=1e-14),
+        disturbance=pytest.approx(0.5 + disturbance / WORD, rel=1e-14),
+        seed=seed % 2**52,
+    )
+
+
+def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
+    for name, field in (("duffing/sine@1", "amplitude"), ("duffing/process_noise@1", "sigma")):
+        one = smc.problem(name)
+        drawn, (scenario,) = one.instance(5, NUMBER), one.scenarios("pid", [5], NUMBER)
+        assert scenario.x0 == (drawn.side * drawn.start * 1.5,)
+        assert (scenario.mismatch, scenario.seed) == ({"mass": drawn.mass}, drawn.seed)
+        assert getattr(scenario.disturbance[0], field) == 0.2 * drawn.disturbance
+        assert (scenario.u_max, scenario.duration, scenario.control_period, scenario.condition) == (
+            one.u_max, one.duration, 1e-3, one.condition,
+        )  # fmt: skip
+    (heavy,) = smc.problem("duffing/heavy@1").scenarios("pid", [3])
+    assert heavy.mismatch == {"mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)}
+
+
+def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains():
+    one = smc.problem("duffing/noise@1")
+    visible = one.scenarios("pid")
+    assert visible == one.scenarios("pid", range(15))
+    assert len({scenario.seed for scenario in visible}) == 15
+    assert visible[7].law.source.kind == "shipped"
+
+
+@pytest.mark.parametrize(("call", "thing"), [
+    (lambda: smc.problem("duffing/noise"), "plant/condition@version"),
+    (lambda: smc.problem("duffin/noise@1"), "plant"),
+    (lambda: smc.problem("duffing/noize@1"), "condition"),
+    (lambda: smc.problem("duffing/noise@99"), "version"),
+    (lambda: smc.problem("duffing/noise@1").scenarios("pid", "hidden"), "hidden"),
+    (lambda: smc.problem("duffing/noise@1").scenarios("pid", [-1]), "instance"),
+    (lambda: smc.problem("duffing/noise@1").scenarios("pid", [0], "abc"), "64 hex digits"),
+])  # fmt: skip
+def test_what_does_not_exist_is_refused_in_a_sentence(call, thing):
+    with pytest.raises(smc.ScenarioError, match=thing):
+        call()
+
+
+def made_trace(one: problems.Problem, e: np.ndarray, u: np.ndarray) -> smc.Trace:
+    """A trace of a problem's first instance with these errors, relative to the start, and commands."""
+    (scenario,) = one.scenarios("pid", [0])
+    whole = smc.run(scenario)
+    return dataclasses.replace(whole, x=(e * whole.x[0, 0])[:, None], u=u[:, None])
+
+
+def test_measures_by_hand():
+    one = smc.problem("duffing/noise@1")
+    vars(one)["_frozen"] = {"accuracy": [0.01, 0.1], "itae": [0.5, 0.6], "calm": [0.4, 0.6]}
+    e = np.where(np.arange(4001) < 1000, 1.0, 0.05)  # 5 % of the start from 1 s on
+    u = np.where(np.arange(4001) % 1000 < 500, 0.0, 1.5)  # eight changes by 1.5 in 4 s, of 6: 1/2 per second
+    found = one.measures(made_trace(one, e, u))
+    itae = 0.5 + 0.05 * (16 - 1) / 2  # the integral of t |e|
+    assert found == {
+        "failed": 0.0, "accuracy": pytest.approx(0.05), "itae": pytest.approx(itae, abs=1e-3), "settling": math.inf,
+        "calm": pytest.approx(0.5), "accuracy_1": pytest.approx(math.nan, nan_ok=True), "accuracy_2": 1.0,
+        "itae_1": pytest.approx(math.nan, nan_ok=True), "itae_2": pytest.approx(math.nan, nan_ok=True),
+        "calm_1": pytest.approx(math.nan, nan_ok=True), "calm_2": 1.0,
+    }  # fmt: skip
+    settled = one.measures(made_trace(one, e * np.where(np.arange(4001) < 2000, 1.0, 1e-9), u))
+    assert (settled["settling"], settled["accuracy"], settled["accuracy_1"]) == (2.0, 1e-6, 2.0)
+
+
+def test_a_failed_run_reaches_nothing():
+    @law_function
+    def broken(y, gains, memory):
+        return math.nan, 0.0
+
+    one = smc.problem("duffing/sine@1")
+    found = one.measures(smc.run(one.scenarios(broken(), [0])[0]))
+    assert (found.pop("failed"), found.pop("accuracy"), found.pop("calm")) == (1.0, math.inf, math.inf)
+    assert [name for name, value in found.items() if value < math.inf] == []
