@@ -22,7 +22,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Signals and time: Signal, Push, Jump, Clock
     Analyse: accuracy, basin, chattering, worst_case, sensitivity, Uncertainty
     Audit: audit, claims, certify, report
-    Benchmark: problem
+    Benchmark: problem, results
 
 What is needed less often is in modules: `smc.signals` (paths, gusts, series), `smc.hardware` (more friction, servos),
 `smc.design` (gains from theory), `smc.fidelity`, `smc.metrics` (of joints and tips), `smc.exchange` (laws from and to

@@ -14,6 +14,7 @@ from smc_mujoco.analysis.region_of_attraction import basin as basin
 from smc_mujoco.analysis.tuning.search import tune as tune
 from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty as Uncertainty
 from smc_mujoco.benchmark.problem import problem as problem
+from smc_mujoco.benchmark.results import results as results
 from smc_mujoco.cli.main import play as play
 from smc_mujoco.common.errors import ScenarioError as ScenarioError
 from smc_mujoco.control.estimator import estimator as estimator

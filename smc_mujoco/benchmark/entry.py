@@ -1,0 +1,215 @@
+"""Entries: laws that their authors enter in a suite. An entry is a folder with a law and a file about it.
+
+    entries/soft_relay/law.py       # or law.c, law.fmu: one law, see `smc.law`
+    entries/soft_relay/entry.toml
+
+    name = "soft relay"
+    authors = ["A. Author"]
+    source = "where the law comes from"
+    licence = "MIT"
+    division = "one set"
+
+    [gains.all]
+    k = 4.0
+
+Divisions differ in where gains may come from, see DIVISIONS. A folder is data until its law runs in a process of its
+own, see `entrant`.
+"""
+
+import ast
+import dataclasses
+import hashlib
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from smc_mujoco.benchmark.problem import rules, versions
+from smc_mujoco.common.errors import ScenarioError, find, number, shown
+from smc_mujoco.common.files import reading
+from smc_mujoco.control.from_text import law as law_of
+from smc_mujoco.control.law import Law, known_laws
+
+ABOUT, FILES = "entry.toml", ("law.py", "law.c", "law.fmu")
+TEXTS = "name", "source", "licence"
+DIVISIONS = {
+    "one set": "one set of gains, [gains.all], for all plants",
+    "search": "a set for each plant, found by the search of this project (smc-mujoco tune)",
+    "free": "a set for each plant, found in any way",
+}
+EVERYWHERE = "all"  # the set of gains of the division "one set"
+MODULES = {"__future__", "math", "numpy", "smc_mujoco"}  # that a checked law's file may import
+REFUSED_NAMES = {"__import__", "breakpoint", "compile", "delattr", "eval", "exec", "globals", "input", "locals", "open",
+                 "setattr", "vars"}  # fmt: skip
+# names in numpy that read, write or draw
+BEYOND_NAMES = {
+    "load",
+    "save",
+    "fromfile",
+    "tofile",
+    "memmap",
+    "ctypeslib",
+    "loadtxt",
+    "genfromtxt",
+    "savetxt",
+    "f2py",
+    "random",
+}
+LIBRARY_NAMES = {"law_function", "Measurement", "surface_function", "estimator_function"}  # that it may take from smc
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Entry:
+    """An entry, as its folder says.
+
+    Attributes:
+      name: of the entry, in tables and as the folder of its results.
+      authors, source, licence: who made the law, where it comes from, and what others may do with it.
+      division: a key of DIVISIONS.
+      gains: plant, or "all", -> gain -> value. Gains that are not named are the law's defaults.
+      file: of the law; None for one of the library, which has its shipped gains.
+      digest: sha256 of both files, or of the name.
+    """
+
+    name: str
+    authors: tuple[str, ...]
+    source: str
+    licence: str
+    division: str
+    gains: Mapping[str, Mapping[str, float]]
+    file: Path | None
+    digest: str
+
+    def law(self, plant: str) -> Law | str:
+        """Return the law with its gains for a plant, or the name of a law of the library. This runs its file's code."""
+        if self.file is None:
+            return self.name
+        return law_of(str(self.file), **self.gains.get(EVERYWHERE, self.gains.get(plant, {}))).named(self.name)
+
+    @property
+    def why_unread(self) -> str:
+        """Why importing a law's file of Python may do more than define functions; "" if it cannot."""
+        if self.file is None or self.file.suffix != ".py":
+            return ""
+        for node in ast.walk(ast.parse(self.file.read_text(encoding="utf-8"))):
+            if what := _beyond(node):
+                line = getattr(node, "lineno", 1)
+                return f"line {line} of {self.file.name} has {what}, which can do more than compute"
+        return ""
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """The entry as plain data, for its result."""
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.name != "file"}
+        return fields | {"authors": list(self.authors), "gains": {k: dict(v) for k, v in self.gains.items()}}
+
+
+def read(folder: str | os.PathLike[str]) -> Entry:
+    """Return the entry in a folder, without running any of its code; or that of a law's name in the library.
+
+    Raises:
+      ScenarioError: no or several laws, a missing or wrong line of entry.toml, or gains for a single problem.
+    """
+    if folder in known_laws() and not os.path.isdir(folder):
+        return _of_library(str(folder))
+    folder = Path(folder)
+    laws = [folder / name for name in FILES if (folder / name).is_file()]
+    if len(laws) != 1:
+        has = " and ".join(path.name for path in laws) or "none of them"
+        raise ScenarioError(f"entry {str(folder)!r} has {has}: give one of {', '.join(FILES)}")
+    with reading(folder / ABOUT, ABOUT, "write name, authors, source, licence and division in it") as file:
+        text = file.read_bytes()
+        try:
+            about = tomllib.loads(text.decode())
+        except tomllib.TOMLDecodeError as error:
+            raise ScenarioError(f"it is not TOML: {error}") from None
+        fields = _fields(about)
+    with reading(laws[0], "law", "give a file of at most 100 MB") as file:
+        code = file.read_bytes()
+        if file.suffix == ".py":
+            try:
+                ast.parse(code)
+            except (SyntaxError, ValueError) as error:
+                raise ScenarioError(f"it is not Python: {error}") from None
+    return Entry(**fields, file=laws[0], digest=hashlib.sha256(text + code).hexdigest())
+
+
+def _of_library(name: str) -> Entry:
+    """Return the entry of a law of the library, whose shipped gains were found by its search."""
+    about = {"authors": ("the authors of smc_mujoco",), "source": f"smc_mujoco, law {name}", "licence": "Apache-2.0"}
+    digest = hashlib.sha256(name.encode()).hexdigest()
+    return Entry(name=name, division="search", gains=MappingProxyType({}), file=None, digest=digest, **about)
+
+
+def _fields(about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of an Entry that a file about it gives."""
+    find_all = {*TEXTS, "authors", "division", "gains"}
+    for name in about:
+        find("line of entry.toml", name, dict.fromkeys(sorted(find_all)))
+    texts = {name: _text(name, about.get(name)) for name in TEXTS}
+    authors = about.get("authors")
+    if not isinstance(authors, list) or not authors:
+        raise ScenarioError(f'authors is {shown(authors)}: give names, as authors = ["A. Author"]')
+    division = find("division", about.get("division"), DIVISIONS)
+    return texts | {
+        "authors": tuple(_text("an author", author) for author in authors),
+        "division": about["division"],
+        "gains": _gains(about.get("gains", {}), about["division"] if division else ""),
+    }
+
+
+def _text(name: str, value: object) -> str:
+    """Return a text of entry.toml."""
+    if not isinstance(value, str) or not value.strip() or not value.isprintable():
+        raise ScenarioError(f'{name} is {shown(value)}: give a text, as {name.rpartition(" ")[2]} = "..."')
+    return value.strip()
+
+
+def _gains(sets: object, division: str) -> Mapping[str, Mapping[str, float]]:
+    """Return plant -> gain -> value, as a division allows them."""
+    plants = {plant for version in versions() for plant in rules(int(version))["plants"]}
+    known = {EVERYWHERE} if division == "one set" else plants
+    if not isinstance(sets, dict):
+        raise ScenarioError(f"gains is {shown(sets)}: write a table, as [gains.{sorted(known)[0]}]")
+    for name, values in sets.items():
+        if name not in known or not isinstance(values, dict):
+            raise ScenarioError(
+                f"gains for {shown(name)}: the division {division!r} takes {DIVISIONS[division]}, so write "
+                f"[gains.{sorted(known)[0]}]"
+            )
+    return MappingProxyType(
+        {
+            plant: MappingProxyType({gain: number(f"gain {gain}", value) for gain, value in values.items()})
+            for plant, values in sets.items()
+        }
+    )
+
+
+def _beyond(node: ast.AST) -> str:
+    """Return what a node of a law's file may do beside computing, in words; "" for nothing."""
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        return _beyond_import(node)
+    if isinstance(node, ast.Attribute):
+        of_library = isinstance(node.value, ast.Name) and node.value.id in ("smc", "smc_mujoco")
+        refused = (
+            node.attr not in LIBRARY_NAMES if of_library else node.attr.startswith("_") or node.attr in BEYOND_NAMES
+        )
+        return f".{node.attr}" if refused else ""
+    if isinstance(node, ast.Name):
+        return node.id if node.id in REFUSED_NAMES or node.id.startswith("__") else ""
+    return "a global that changes" if isinstance(node, ast.Global | ast.Nonlocal) else ""
+
+
+def _beyond_import(node: ast.Import | ast.ImportFrom) -> str:
+    """Return what an import brings that may do more than compute, in words; "" for nothing."""
+    if isinstance(node, ast.Import):
+        far = [name.name for name in node.names if name.name not in MODULES]
+        return f"import {far[0]}" if far else ""
+    module, names = node.module or ".", [name.name for name in node.names]
+    if module == "smc_mujoco":
+        names = [name for name in names if name not in LIBRARY_NAMES]
+    elif module in MODULES:
+        names = [name for name in names if name in BEYOND_NAMES or name.startswith("_")]
+    return f"from {module} import {names[0]}" if names else ""

@@ -1,0 +1,104 @@
+"""Static pages of results: an index, the boards of each suite, and a page for each entry.
+
+The pages are HTML and SVG in a few files, without scripts, and need neither network nor server.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco.benchmark.results import HIDDEN, MEASURE, RESULT, TITLES, WORDS, Board, Results
+from smc_mujoco.benchmark.results import results as load
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import replacing, slug
+from smc_mujoco.common.text import number
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TEMPLATES = Path(__file__).parent / "templates"
+CURVE = SimpleNamespace(width=320.0, height=120.0)  # of a picture of curves, in its own units
+ASKS = {
+    "forces": "Who stays nearest to the goal while something pushes?",
+    "sensors": "Who stays nearest to the goal with a poor sensor?",
+    "speed": "Who gets there first?",
+    "calm": "Who moves the actuator least?",
+}
+SHOWN = 5  # best and worst problems on an entry's page
+
+
+def build(results: Path, out: Path) -> Path:
+    """Write the pages of all results in a folder, and return the first page.
+
+    Raises:
+      ScenarioError: no results there, or a folder that cannot be written.
+    """
+    folders = sorted({file.parent.parent for file in results.rglob(RESULT)})
+    if not folders:
+        raise ScenarioError(f"no results in {str(results)!r}: enter a law first, with smc-mujoco enter FOLDER")
+    suites = [load(folder) for folder in folders]
+    made = _environment()
+    for found in suites:
+        hidden = load(results / found.suite, hidden=True) if any(results.rglob(HIDDEN[RESULT])) else None
+        _write(out / f"{found.suite}.html", made, "suite.jinja", found=found, hidden=hidden, up="", title=found.suite)
+        for name in found.entries:
+            page = out / found.suite / f"{slug(name)}.html"
+            _write(page, made, "entry.jinja", found=found, name=name, up="../", title=name)
+    _write(out / "index.html", made, "index.jinja", suites=suites, up="", title="Results")
+    return out / "index.html"
+
+
+def _write(path: Path, made: "Environment", template: str, **values: Any) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as file:
+        file.write_text(made.get_template(template).render(values), encoding="utf-8")
+
+
+def _environment() -> "Environment":
+    """Return the jinja2 environment of the templates."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    made = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    made.globals |= {
+        "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
+        "titles": TITLES, "words": WORDS, "measure": MEASURE, "asks": ASKS, "curves": curves, "scale": scale,
+        "extremes": extremes, "number": number, "slug": slug, "curve": CURVE,
+    }  # fmt: skip
+    return made
+
+
+def scale(board: Board, rank: float) -> float:
+    """Return where a rank lies in a board's picture, % from the left."""
+    return round(100.0 * (rank - 0.5) / max(len(board.standings), 1), 2)
+
+
+def curves(found: Results, question: str, names: Sequence[str]) -> dict[str, str]:
+    """Return entry -> the points of its curve of targets, for an SVG polyline."""
+    made = {}
+    for name in names:
+        t, share = found.curve(name, question)
+        x, y = CURVE.width * t / t[-1], CURVE.height * (1.0 - share)
+        made[name] = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return made
+
+
+def extremes(found: Results, name: str) -> Mapping[str, list[tuple[str, str, int, float]]]:
+    """Return "best" and "worst" -> where an entry stands so: question, problem, place among the entries, median."""
+    names = list(found.entries)
+    rows = []
+    for question in found.boards():
+        ranks = found.ranks(question, names)[names.index(name)]
+        for cell, rank in zip(found.on(question), ranks, strict=True):
+            rows.append((question, cell, int(np.ceil(rank)), found.entries[name].medians[cell][MEASURE[question]]))
+    rows.sort(key=lambda row: row[2])
+    return {"best": rows[:SHOWN], "worst": rows[::-1][:SHOWN]}

@@ -1,0 +1,274 @@
+"""Results: what entries did on a suite, read from a folder or an archive, ranked by question, and compared.
+
+    found = smc.results("smc-30@1")           # of ./results, or a folder, or a .zip of one
+    print(found.boards()["speed"])
+    print(found.compare(smc.results("older.zip")))
+
+There is no single number. A board is a question: accuracy under forces, accuracy under sensors, speed, calm. An entry
+has the mean rank of its medians over the board's problems, with an interval over problems, and the share of the targets
+that it reaches and keeps. On hidden instances only checked laws have places.
+"""
+
+import dataclasses
+import functools
+import hashlib
+import os
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from smc_mujoco.benchmark import runs, suite
+from smc_mujoco.benchmark.enter import HIDDEN, RESULT, TABLE
+from smc_mujoco.benchmark.problem import problem
+from smc_mujoco.common.errors import ScenarioError, find, shown
+from smc_mujoco.common.files import read_json, reading
+
+MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "itae", "calm": "calm"}  # of each board
+TITLES = {"forces": "Accuracy under forces", "sensors": "Accuracy under sensors", "speed": "Speed", "calm": "Calm"}
+WORDS = {"accuracy": "largest error of the last fifth", "itae": "ITAE", "calm": "variation of u"}
+DRAWS, LEVEL = 4000, 90.0  # resamples of the problems; %, of the intervals
+CHANGE = 0.01  # a median that changes by less counts as the same; chosen
+MOMENTS = 81  # of a curve of targets
+MAX_UNPACKED = 4 * 10**9  # bytes of an archive; chosen
+NEEDED = "suite", "instances", "entry", "checked", "marks", "hashes"
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Standing:
+    """The place of an entry on a board."""
+
+    entry: str
+    place: int | None  # None: beside the others, as its law is not checked and the instances are hidden
+    rank: float  # the mean over the problems, 1 is best
+    low: float  # ends of the interval over problems
+    high: float
+    level: bool  # with the first: the interval of the difference of their ranks holds 0
+    reached: float  # share of the targets of all runs that are reached and kept
+
+
+@dataclasses.dataclass(frozen=True)
+class Board:
+    """A question and the entries' places."""
+
+    question: str
+    problems: tuple[str, ...]
+    standings: tuple[Standing, ...]
+
+    def __str__(self) -> str:
+        head = f"{TITLES[self.question]}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"
+        lines = [
+            f"{one.place or '-':>3} {one.entry:<28} {one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}] "
+            f"{100 * one.reached:4.0f} %{' level' if one.level and one.place != 1 else ''}"
+            for one in self.standings
+        ]
+        return "\n".join([head, *lines])
+
+
+class Result:
+    """What an entry did. Its runs are read when they are asked for."""
+
+    def __init__(self, folder: Path, hidden: bool):
+        self.folder, self.hidden = folder, hidden
+        self.table = folder / (HIDDEN[TABLE] if hidden else TABLE)
+        with reading(folder / (HIDDEN[RESULT] if hidden else RESULT), "result", "enter the law again") as file:
+            self.about: dict[str, Any] = read_json(file)
+            if not isinstance(self.about, dict) or not {*NEEDED} <= {*self.about}:
+                raise ScenarioError(f"it has no {', '.join(NEEDED)}")
+        with reading(self.table, "table of runs", "enter the law again") as file:
+            digest = hashlib.sha256(file.read_bytes()).hexdigest()
+        if digest != self.about["hashes"]["table"]:
+            raise ScenarioError(f"{self.table} is not the table that its result was written for: enter the law again")
+
+    @property
+    def name(self) -> str:
+        """The entry's name."""
+        return self.about["entry"]["name"]
+
+    @functools.cached_property
+    def runs(self) -> runs.Runs:
+        """The table of the runs."""
+        return runs.Runs(self.table)
+
+    @functools.cached_property
+    def medians(self) -> dict[str, dict[str, float]]:
+        """Problem -> measure -> the median over its instances."""
+        return self.runs.medians()
+
+    def targets(self, problems: Sequence[str], measure: str) -> np.ndarray:
+        """Return the times from which the targets of a measure are reached and kept, s, inf for never, (targets,)."""
+        columns = [f"{measure}_{i}" for i in range(1, runs.LEVELS + 1)]
+        known = [(name, columns[: len(problem(name).targets.get(measure, ()))]) for name in problems]
+        times = [self.runs.columns(name)[column] for name, targets in known for column in targets]
+        return np.nan_to_num(np.concatenate(times), nan=np.inf) if times else np.zeros(0)
+
+
+class Results:
+    """What entries did on a suite."""
+
+    def __init__(self, name: str, entries: Mapping[str, Result], hidden: bool):
+        self.suite, self.entries, self.hidden = name, dict(entries), hidden
+        self.problems = suite.suite(name)
+
+    def __repr__(self) -> str:
+        return f"results of {len(self.entries)} entries on {self.suite}" + ", hidden instances" * self.hidden
+
+    def on(self, question: str) -> tuple[str, ...]:
+        """Return the problems that inform a board."""
+        return tuple(name for name in self.problems if question in suite.boards(name))
+
+    def ranks(self, question: str, names: Sequence[str]) -> np.ndarray:
+        """Return the ranks of entries on each problem of a board, (entries, problems); equal medians share a rank."""
+        from scipy.stats import rankdata
+
+        measure = MEASURE[question]
+        medians = [[self.entries[name].medians[cell][measure] for cell in self.on(question)] for name in names]
+        return rankdata(np.array(medians), axis=0)
+
+    def boards(self) -> dict[str, Board]:
+        """Return question -> Board, of the questions that the suite's problems inform."""
+        return {question: self.board(question) for question in MEASURE if self.on(question)}
+
+    def board(self, question: str) -> Board:
+        """Return the board of a question."""
+        find("board", question, MEASURE)
+        ranked = [name for name, one in self.entries.items() if one.about["checked"] or not self.hidden]
+        beside = [name for name in self.entries if name not in ranked]
+        standings = self._places(question, ranked) if ranked else []
+        for name in beside:
+            rank = float(self.ranks(question, [*ranked, name])[-1].mean())
+            place = {"place": None, "low": np.nan, "high": np.nan, "level": False}
+            standings.append(Standing(entry=name, rank=rank, reached=self.reached(name, question), **place))
+        return Board(question, self.on(question), tuple(standings))
+
+    def _places(self, question: str, names: Sequence[str]) -> list[Standing]:
+        """Return the places of entries on a board, the best first."""
+        ranks = self.ranks(question, names)
+        count, means = ranks.shape[1], ranks.mean(axis=1)
+        draws = np.random.default_rng(0).integers(count, size=(DRAWS, count))
+        drawn = ranks[:, draws].mean(axis=2)  # (entries, DRAWS)
+        order, tails = np.argsort(means, kind="stable"), (50.0 - LEVEL / 2, 50.0 + LEVEL / 2)
+        standings = []
+        for i in order.tolist():
+            low, high = np.percentile(drawn[i], tails).tolist()
+            standings.append(
+                Standing(
+                    entry=str(names[i]),
+                    place=1 + int((means < means[i] - 1e-9).sum()),
+                    rank=float(means[i]),
+                    low=low,
+                    high=high,
+                    level=bool(np.percentile(drawn[i] - drawn[order[0]], tails[0]) <= 0.0),
+                    reached=self.reached(str(names[i]), question),
+                )
+            )
+        return standings
+
+    def reached(self, entry: str, question: str) -> float:
+        """Return the share of a board's targets that an entry reaches and keeps, over all runs."""
+        return float(self.curve(entry, question)[1][-1])
+
+    def curve(self, entry: str, question: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return times, s, and the share of a board's targets that are reached by then and kept, (MOMENTS,) each."""
+        times = np.sort(self.entries[entry].targets(self.on(question), MEASURE[question]))
+        moments = np.linspace(0.0, problem(self.problems[0]).duration, MOMENTS)
+        return moments, np.searchsorted(times, moments, side="right") / max(len(times), 1)
+
+    def compare(self, other: "Results") -> "Changes":
+        """Return what changed from other results on the suite to these, of the entries that both have."""
+        if other.suite != self.suite:
+            raise ScenarioError(f"these are results on {self.suite}, the others on {other.suite}: give the same suite")
+        both = [name for name in self.entries if name in other.entries]
+        return Changes(
+            tuple(_change(self, other, name, question) for name in both for question in MEASURE if self.on(question))
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Change:
+    """How the medians of an entry on a board's problems changed: problem -> the new one over the old one."""
+
+    entry: str
+    question: str
+    worse: Mapping[str, float]
+    better: Mapping[str, float]
+    count: int  # problems of the board
+
+    def __str__(self) -> str:
+        told = []
+        for word, found, pick in (("worse", self.worse, max), ("better", self.better, min)):
+            if found:
+                where = pick(found, key=found.__getitem__)
+                ratio = found[where]
+                amount = f"{ratio:.3g} times" if ratio >= 2.0 else f"{100 * abs(ratio - 1):.2g} %"
+                told.append(f"{word} on {len(found)} of {self.count}, by up to {amount} ({where})")
+        return f"{self.entry}, {TITLES[self.question].lower()}: {'; '.join(told) or 'the same'}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Changes:
+    """What changed between two results on a suite, by entry and board."""
+
+    changes: tuple[Change, ...]
+
+    @property
+    def worse(self) -> bool:
+        """Whether any median became worse."""
+        return any(change.worse for change in self.changes)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.changes)) or "no entry is in both"
+
+
+def _change(new: Results, old: Results, name: str, question: str) -> Change:
+    """Return how an entry changed on a board."""
+    measure, ratios = MEASURE[question], {}
+    for cell in new.on(question):
+        now, before = (one.entries[name].medians[cell][measure] for one in (new, old))
+        ratios[cell] = 1.0 if now == before else (now / before if before else np.inf)
+    worse = {cell: ratio for cell, ratio in ratios.items() if ratio > 1.0 + CHANGE}
+    better = {cell: ratio for cell, ratio in ratios.items() if ratio < 1.0 / (1.0 + CHANGE)}
+    return Change(entry=name, question=question, worse=worse, better=better, count=len(ratios))
+
+
+def results(source: str | os.PathLike[str] = "smc-30@1", hidden: bool = False) -> Results:
+    """Return the results on a suite.
+
+    Args:
+      source: a suite's name, whose results are in the folder "results"; or the folder of a suite's results, such as
+        "results/smc-30@1"; or a .zip of such a folder.
+      hidden: whether those on hidden instances, in place of the visible ones.
+
+    Raises:
+      ScenarioError: no results there, results on several suites, or a table that was changed since it was written.
+    """
+    path = Path("results") / source if source in suite.suites() else Path(source)
+    folder = _unpacked(path) if path.suffix == ".zip" else path
+    wanted = HIDDEN[RESULT] if hidden else RESULT
+    found = [Result(file.parent, hidden) for file in sorted(folder.rglob(wanted))] if folder.is_dir() else []
+    if not found:
+        raise ScenarioError(f"no results at {shown(str(path))}: enter a law first, with smc-mujoco enter FOLDER")
+    names = {one.about["suite"] for one in found}
+    if len(names) > 1:
+        raise ScenarioError(f"{shown(str(path))} has results on {' and '.join(sorted(names))}: give a folder of one")
+    return Results(names.pop(), {one.name: one for one in found}, hidden)
+
+
+_UNPACKED: list[TemporaryDirectory[str]] = []  # archives, which are read until the process ends
+
+
+def _unpacked(path: Path) -> Path:
+    """Return a temporary folder with the content of an archive."""
+    with reading(path, "archive of results", "give a .zip of a folder of results") as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                if sum(one.file_size for one in archive.infolist()) > MAX_UNPACKED:
+                    raise ScenarioError(f"it unpacks to more than {MAX_UNPACKED / 1e9:g} GB")
+                _UNPACKED.append(TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True))
+                archive.extractall(_UNPACKED[-1].name)
+        except zipfile.BadZipFile as error:
+            raise ScenarioError(f"it is no archive: {error}") from None
+    return Path(_UNPACKED[-1].name)

@@ -1,0 +1,82 @@
+"""The table of an entry's runs: a parquet file with a row a run and a row group a problem, which is read by itself.
+
+Columns: `problem`, `instance`, the measures of `Problem.measures`, and the time of each target, s, NaN for never. The
+same runs give the same bytes.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from smc_mujoco.benchmark.problem import MEASURES, Problem
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.simulation.run import stream
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies import table as tables
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+VALUES = "failed", "accuracy", "itae", "settling", "calm"
+LEVELS = 5  # targets of a measure
+COLUMNS = (*VALUES, *(f"{measure}_{i}" for measure in MEASURES for i in range(1, LEVELS + 1)))
+Row = dict[str, Any]
+
+
+def rows(problem: Problem, scenarios: Sequence[Scenario], instances: Sequence[int], failures: list[str]) -> list[Row]:
+    """Run the scenarios of a problem's instances. Return their rows; add how runs failed to `failures`."""
+    found: list[Row] = [{} for _ in scenarios]
+    for i, trace in stream(scenarios):
+        found[i] = {"problem": problem.id, "instance": instances[i]} | problem.measures(trace)
+        if found[i]["failed"]:
+            why = trace.failure or f"it diverged at {trace.diverged_at:.3g} s"
+            failures.append(f"{problem.id}#{instances[i]:02d}: {why}")
+    return found
+
+
+def write(path: Path, groups: Iterable[list[Row]]) -> None:
+    """Write the rows of each problem as they come."""
+    import pyarrow as pa
+
+    kinds = [("problem", pa.string()), ("instance", pa.int64()), *((name, pa.float64()) for name in COLUMNS)]
+    schema = pa.schema(kinds)
+    filled = ([{name: row.get(name, math.nan) for name, _ in kinds} for row in group] for group in groups)
+    tables.write(path, schema, (pa.Table.from_pylist(group, schema=schema) for group in filled))
+
+
+class Runs:
+    """A table of runs, read a problem at a time."""
+
+    def __init__(self, path: Path):
+        import pyarrow.parquet as pq
+
+        self.path, self.file = path, pq.ParquetFile(path)
+        self.groups = {self._problem(i): i for i in range(self.file.num_row_groups)}
+
+    def _problem(self, group: int) -> str:
+        """Return the problem of a row group, from its statistics."""
+        statistics = self.file.metadata.row_group(group).column(0).statistics
+        return statistics.min if statistics is not None else ""
+
+    def __len__(self) -> int:
+        return self.file.metadata.num_rows
+
+    def columns(self, problem: str) -> "Mapping[str, np.ndarray]":
+        """Return the columns of a problem's runs, (instances,) each, in the order of the instances."""
+        data: pa.Table = self.file.read_row_group(self.groups[problem]).sort_by("instance")
+        return {name: data[name].to_numpy() for name in ("instance", *COLUMNS)}
+
+    def medians(self) -> "dict[str, dict[str, float]]":
+        """Return problem -> measure -> median over its instances."""
+        return {name: {value: float(np.median(self.columns(name)[value])) for value in VALUES} for name in self.groups}
+
+
+def check(path: Path) -> None:
+    """Raise ScenarioError for a table that is damaged or was changed since it was written."""
+    try:
+        tables.read(path, sealed=True)
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"{path} is no table of runs: {error}") from None
