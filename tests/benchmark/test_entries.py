@@ -123,7 +123,7 @@ def test_a_law_that_keeps_something_between_runs_is_marked(tmp_path, small):
 def test_a_law_that_never_ends_is_stopped(tmp_path, small, monkeypatch):
     monkeypatch.setattr(entering, "TRIAL_TIME", 45.0)
     code = PLAIN.replace("    return", "    while y.e == y.e:\n        pass\n    return")
-    with pytest.raises(ScenarioError, match="is not done with .* duffing.* within 45 s: let its law end"):
+    with pytest.raises(ScenarioError, match=r"is not done .* duffing.* within 45 s: let its law end"):
         entering.enter(written(tmp_path / "entry", code), out=tmp_path / "results", instances=1)
 
 
