@@ -98,12 +98,17 @@ def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
 
 
 def _of_python(path: str) -> list[Law]:
-    """Return the laws that a file of Python makes with @smc.law_function, with their default gains."""
+    """Return the laws that a file of Python makes with @smc.law_function, with their default gains, or smc.law_from."""
     values = execute(Path(path)).values()
     templates = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
+    bound = {value.name: value for value in values if isinstance(value, Law) and value.kind == "law"}
+    made = {template.function for template in (*templates.values(), *known_laws().values())}  # bound ones are the same
     laws = [template() for name, template in templates.items() if template is not known_laws().get(name)]
+    laws += [law for law in bound.values() if not made & {part.function for part in law.parts}]
     if not laws:
-        raise ScenarioError(f"{path} has no law: write @smc.law_function above a function (y, gains, memory)")
+        raise ScenarioError(
+            f"{path} has no law: write @smc.law_function above a function (y, gains, memory), or law = smc.law_from(...)"
+        )
     return laws
 
 

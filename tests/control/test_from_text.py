@@ -20,12 +20,24 @@ def mine(y, gains, memory):
     return -gains.k * s, s
 """
 
+FROM_ELSEWHERE = """
+import smc_mujoco as smc
+
+def other(observation):
+    return [-2.0 * observation[0]]
+
+usual = smc.law("pid")
+law = its = smc.law_from(other, name="theirs")
+"""
+
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
     """Files of laws, in the working folder."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.py").write_text(MINE)
+    (tmp_path / "theirs.py").write_text(FROM_ELSEWHERE)
+    (tmp_path / "bound.py").write_text(MINE + "law = mine(k=3.0)\n")
     (tmp_path / "two.py").write_text(MINE + MINE.replace("mine", "other"))
     (tmp_path / "notes.txt").write_text("pid")
     (tmp_path / "empty.json").write_text("{}")
@@ -45,6 +57,8 @@ def tuned():
         ("slow: twisting(r1=5)", "slow", {"r1": 5.0}),
         ("twisting(r1=(5, 6))", "twisting", {"r1": (5.0, 6.0)}),
         ("mine.py", "mine", {"k": 2.0}),
+        ("bound.py", "mine", {"k": 2.0}),
+        ("theirs.py", "theirs", {}),
         ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}),
         ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
     ],
@@ -53,7 +67,7 @@ def test_a_text_is_its_law(files, text, name, gains):
     law = smc.law(text)
     assert law.name == name
     assert {each: law.gains[each] for each in gains} == gains
-    assert law.source.kind == ("yours" if "(" in text else "default")
+    assert law.source.kind == ("yours" if "(" in text else "default" if law.gains else "none")
 
 
 @pytest.mark.slow
