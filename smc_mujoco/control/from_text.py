@@ -107,7 +107,7 @@ def _of_python(path: str) -> list[Law]:
     laws += [law for law in bound.values() if not made & {part.function for part in law.parts}]
     if not laws:
         raise ScenarioError(
-            f"{path} has no law: write @smc.law_function above a function (y, gains, memory), or law = smc.law_from(...)"
+            f"{path} has no law: write @smc.law_function above a function (y, gains, memory), or law = smc.law_from(..)"
         )
     return laws
 
