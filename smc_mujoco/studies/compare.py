@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.law_time import LawTime, law_time
 from smc_mujoco.analysis.ranking import RELEVANT, Relevant
-from smc_mujoco.analysis.tuning import search
+from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
 from smc_mujoco.common.errors import number as checked
@@ -184,7 +184,7 @@ def compare(
     laws: str | Law | Template | Sequence[str | Law | Template] | None = None,
     plants: str | Plant | Sequence[str | Plant] | None = None,
     conditions: str | Condition | Sequence[str | Condition] | None = None,
-    seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = search.SEARCHES,
+    seeds: Annotated[int, Whole(low=1, high=MAX_ITEMS)] = SEARCHES,
     tune: bool = True,
     worst: "bool | Uncertainty" = False,
     executor: "executors.Workers | None" = None,
@@ -194,8 +194,8 @@ def compare(
     duration: Positive | None = None,
     starts: Starts | None = None,
     gains: gain_sets.NameOfSet = "tuned",
-    searches: search.Searches | None = None,
-    budget: search.Budget = search.BUDGET,
+    searches: Searches | None = None,
+    budget: Budget = BUDGET,
     quick: bool = False,
     defaults: bool = False,
     unchecked: bool = False,
@@ -240,7 +240,7 @@ def compare(
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     _check_worst(worst)
     trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
-    number = (QUICK_SEARCHES if quick else search.SEARCHES) if searches is None else searches
+    number = (QUICK_SEARCHES if quick else SEARCHES) if searches is None else searches
     options = {"tune": tune and gains == "tuned", "gains": gains, "searches": number, "budget": budget}
     candidates = trial.gains(_checked(trial, laws), defaults, **options)
     table = trial.run(candidates, seeds, executor=workers, traces=traces, noise_key=noise_key)

@@ -16,9 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.analysis.tuning import result, search, search_space
-from smc_mujoco.analysis.tuning.evaluator import objectives
-from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
@@ -40,6 +38,7 @@ from smc_mujoco.studies.study import REPEATED_SEEDS, study
 from smc_mujoco.studies.table import Table
 
 if TYPE_CHECKING:
+    from smc_mujoco.analysis.tuning.result import Tuned
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.studies.worst_case import WorstCase
 
@@ -62,6 +61,8 @@ class Candidate(NamedTuple):
         self, plant: Plant, goal: Objective, count: int, noise_key: int, threads: int | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return J on instances 0, 1, ..., that of one in four at half the physics step, and the sets' numbers."""
+        from smc_mujoco.analysis.tuning.evaluator import objectives
+
         instances, again = range(count), range(0, count, REPEATED_SEEDS)
         options = {"threads": threads, "noise_key": noise_key}
         values = objectives(plant, [self(i) for i in instances], goal, instances, **options)
@@ -101,8 +102,10 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
     return Candidate(made, (made,), remark)
 
 
-def _candidate(default: Component, tuned: result.Tuned) -> Candidate:
+def _candidate(default: Component, tuned: "Tuned") -> Candidate:
     """Return a law, given with its defaults, with the gains of a search."""
+    from smc_mujoco.analysis.tuning import search_space
+
     its = tuned.law.source
     if tuned.before < tuned.objective:
         default = default.sourced(its.kind, its.search)
@@ -146,8 +149,8 @@ class Trial(NamedTuple):
         self,
         plant: Plant,
         laws: Sequence[Component | Template],
-        searches: int = search.SEARCHES,
-        budget: int = search.BUDGET,
+        searches: int = SEARCHES,
+        budget: int = BUDGET,
         tune: bool = True,
         gains: str = "tuned",
     ) -> list[Candidate]:
@@ -182,7 +185,7 @@ class Trial(NamedTuple):
         for law, candidate in zip(laws, known, strict=True):
             if candidate is not None and not candidate.remark.startswith(UNTUNABLE):
                 return
-            if not (why := candidate.remark if candidate else search.why_not(plant, law, self._goal(plant, starts))):
+            if not (why := candidate.remark if candidate else self._why_not(plant, law, starts)):
                 return
             reasons.append(why)
         raise ScenarioError(f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default gains")
@@ -190,8 +193,8 @@ class Trial(NamedTuple):
     def _announce(
         self,
         laws: Mapping[str, Sequence[Component | Template]],
-        searches: int = search.SEARCHES,
-        budget: int = search.BUDGET,
+        searches: int = SEARCHES,
+        budget: int = BUDGET,
         tune: bool = True,
         gains: str = "tuned",
     ) -> None:
@@ -199,11 +202,13 @@ class Trial(NamedTuple):
         seconds, named = 0.0, dict[str, list[str]]()
         for plant in self.plants if tune else ():
             known, starts = self._known(plant, laws[plant.name], gains)
-            goal = self._goal(plant, starts)
             new = [law for law, candidate in zip(laws[plant.name], known, strict=True) if candidate is None]
             files = [self._file(plant, law, searches, budget) for law in new]
             new = [law for law, file in zip(new, files, strict=True) if not any(file.parent.glob(f"{file.stem}-*"))]
-            if new := [law for law in new if not search.why_not(plant, law, goal)]:
+            if new := [law for law in new if not self._why_not(plant, law, starts)]:
+                from smc_mujoco.analysis.tuning import search
+
+                goal = self._goal(plant, starts)
                 seconds += searches * search.expected_seconds(plant, new, goal, budget, self.threads)
                 for law in new:
                     named.setdefault(law.name, []).append(plant.name)
@@ -214,13 +219,19 @@ class Trial(NamedTuple):
             what = "; ".join(f"{first_of(its)} on {plants}" for plants, its in groups.items())
             each = f"{searches} searches each" if searches > 1 else "1 search each"
             cures = ["name some of the laws (laws=, --law)"] * (len(named) > 1)
-            cures += ["quick=True (--quick)"] * (searches >= search.SEARCHES)
+            cures += ["quick=True (--quick)"] * (searches >= SEARCHES)
             less = f". For less time: {' or '.join(cures)}" * (seconds > LONG and bool(cures))
             note(f"tuning {what}: {each}, {about(seconds)}{less}")
 
     def _file(self, plant: Plant, law: Component | Template, searches: int, budget: int) -> Path:
         """Return the path of a tuning, without its hashes."""
         return self.folder / "gains" / f"{plant.name}-{law.name}-{searches}-{budget}.json"
+
+    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
+        """Return why a law cannot be tuned on a plant, "" if it can."""
+        from smc_mujoco.analysis.tuning import search
+
+        return search.why_not(plant, law, self._goal(plant, starts))
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
@@ -232,6 +243,8 @@ class Trial(NamedTuple):
         self, plant: Plant, law: Component | Template, starts: Starts | None, searches: int, budget: int
     ) -> Candidate:
         """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
+        from smc_mujoco.analysis.tuning import result, search
+
         goal, default = self._goal(plant, starts), coerce.law(law)
         try:
             (first, *_) = goal.scenarios(plant, default)

@@ -17,11 +17,11 @@ any other run costs, and decreases with t. With a bound on predicted chattering,
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from smc_mujoco.common.constraints import Natural, Positive, constrain
+from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
@@ -35,7 +35,13 @@ DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settl
 CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
 DEFAULT_STARTS = Starts()
 SEEDS_PER_SEARCH = 1000  # each condition uses one of them
-MAX_SEARCHES = 1000  # of a tuning
+SEARCHES, MAX_SEARCHES = (
+    12,
+    1000,
+)  # of a tuning: with twelve, twelve runs of two laws decide between them, see `ranking`
+BUDGET, MAX_BUDGET = 64, 10_000  # evaluations of a search, for each gain
+Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
+Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]
 MAX_TUNING_SEED = 10**9
 UNSEEN = MAX_SEARCHES * (MAX_TUNING_SEED + 1)  # instances from this one on belong to no search
 FAILURE_COST = 1e9  # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05

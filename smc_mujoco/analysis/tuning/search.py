@@ -37,12 +37,15 @@ import numpy as np
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, PYTHON, Evaluator, with_gains
 from smc_mujoco.analysis.tuning.objective import (
+    BUDGET,
     FAILURE_COST,
-    MAX_SEARCHES,
     MAX_TUNING_SEED,
     OBJECTIVES,
+    SEARCHES,
+    Budget,
     Evaluation,
     Objective,
+    Searches,
 )
 from smc_mujoco.analysis.tuning.result import Found, Tuned, load_found
 from smc_mujoco.analysis.tuning.search_space import Box
@@ -66,12 +69,7 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario, default_u_max, stepped_by_mujoco
 from smc_mujoco.simulation.trace import Trace
 
-SEARCHES = 12  # of a tuning: then twelve runs of two laws decide between them, see `ranking`
-BUDGET = 64  # evaluations of a search, for each gain
-MAX_BUDGET = 10_000
 Gains = tuple[float, ...]
-Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
-Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]
 SCREENED_SHARE, EVOLVED_SHARE = 1 / 8, 1 / 2  # of the evaluations; the rest descend
 FIRST_DEVIATION = 0.3  # decades: first standard deviation of the evolution; chosen
 FIRST_RADIUS, LAST_RADIUS = 0.1, 0.005  # decades, of the descent's trust region; chosen
