@@ -1,0 +1,104 @@
+"""The pages of results: complete, small, without scripts or network, and with links that lead somewhere."""
+
+import hashlib
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from smc_mujoco.benchmark import pages, runs, suite
+from smc_mujoco.benchmark.enter import RESULT, TABLE
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import write_json
+
+pytestmark = pytest.mark.quick
+PROBLEMS = suite.suite("smc-30@1")
+VOID = {"meta", "line", "rect", "polyline", "br", "img", "link"}
+
+
+def entered(folder, name, factor, marks=()):
+    """Write what an entry did: every measure of every run is a factor times that of the others."""
+    target = folder / "smc-30@1" / name
+    target.mkdir(parents=True)
+    rng = np.random.default_rng(3)
+    groups = [
+        [
+            {"problem": cell, "instance": i, "failed": 0.0}
+            | {column: factor * rng.uniform(0.1, 1.0) for column in runs.COLUMNS[1:]}
+            for i in range(3)
+        ]
+        for cell in PROBLEMS
+    ]
+    runs.write(target / TABLE, groups)
+    table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()
+    entry = {
+        "name": name,
+        "authors": ["A <b>"],
+        "source": "here",
+        "licence": "MIT",
+        "division": "one set",
+        "digest": "0",
+    }
+    about = {"suite": "smc-30@1", "instances": 3, "entry": entry, "checked": not marks, "marks": list(marks)}
+    about |= {"sample": [1e-8, 2e-8, 1.5], "hashes": {"table": table, "rules": "1"}, "machine": "m", "versions": {}}
+    write_json(target / RESULT, about)
+
+
+class Page(HTMLParser):
+    """The tags, ids and links of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.links, self.tags = [], [], [], set()
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.tags.add(tag)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values["href"]] if "href" in values else []
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    for name, factor, marks in (("slow", 2.0, ()), ("fast", 1.0, ()), ("odd", 3.0, ("unchecked: it is in Python",))):
+        entered(folder / "results", name, factor, marks)
+    return pages.build(folder / "results", folder / "site").parent
+
+
+def test_pages_are_complete_and_their_links_lead_to_pages(site):
+    files = sorted(site.rglob("*.html"))
+    assert [str(file.relative_to(site)) for file in files] == [
+        "index.html", "smc-30@1/fast.html", "smc-30@1/odd.html", "smc-30@1/slow.html", "smc-30@1.html",
+    ]  # fmt: skip
+    for file in files:
+        page = Page(file.read_text(encoding="utf-8"))
+        assert page.open == []
+        assert len(page.ids) == len(set(page.ids))
+        assert not page.tags & {"script", "img", "link"}
+        assert all((file.parent / link).exists() for link in page.links), page.links
+    assert sum(file.stat().st_size for file in files) < 200_000
+
+
+def test_a_board_lists_the_better_law_first_and_its_page_says_where_it_is_best(site):
+    text = (site / "smc-30@1.html").read_text(encoding="utf-8")
+    for board in re.findall(r"<tbody>.*?</tbody>", text, re.DOTALL):
+        assert re.findall(r'/(\w+)\.html"', board) == ["fast", "slow", "odd"]
+    page = (site / "smc-30@1" / "odd.html").read_text(encoding="utf-8")
+    assert "unchecked: it is in Python" in page
+    assert "A &lt;b&gt;" in page
+    assert "Where it is best" in page
+    assert "Where it is worst" in page
+
+
+def test_a_folder_without_results_is_told(tmp_path):
+    with pytest.raises(ScenarioError, match="enter a law first"):
+        pages.build(tmp_path, tmp_path / "site")
