@@ -6,7 +6,7 @@ UV ?= uv
 LOCK := $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes \
 	--no-emit-index-url --no-annotate --custom-compile-command "make lock"
 
-.PHONY: help demo promised test slow quick attack check docs lowest tagged build report live gains gallery bench lock setup
+.PHONY: help demo promised test slow quick attack check docs lowest entered tagged build report live gains gallery bench lock setup
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -54,6 +54,10 @@ lowest: ## the quick tests under the oldest versions that pyproject.toml allows,
 	@.cache/lowest/bin/python -m pip install --quiet uv
 	@VIRTUAL_ENV=.cache/lowest .cache/lowest/bin/uv pip install --quiet --resolution lowest-direct -e ".[all]" --group test
 	.cache/lowest/bin/python -m pytest --quick
+
+entered: setup ## the one entry that differs from the commit BASE, or that of NAME, in a suite
+	@test -z "$$BASE" || git fetch --quiet --depth=1 origin "$$BASE"
+	$(BIN)/python .github/entered.py
 
 tagged: ## whether TAG, such as v0.1.0, is the tag of this version
 	@version=v$$(sed -n 's/^__version__ = "\(.*\)"$$/\1/p' smc_mujoco/common/version.py); test "$$TAG" = "$$version" || \

@@ -1,5 +1,6 @@
 """The workflows run what the Makefile and the pages say, and nothing else, so that neither can go stale alone."""
 
+import importlib.util
 import os
 import re
 import shutil
@@ -14,8 +15,9 @@ import smc_mujoco
 pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[1]
+HIDDEN = ROOT / ".github" / "workflows" / "hidden.yml"
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-PAGES = ("docs/install.md", "CONTRIBUTING.md")
+PAGES = ("docs/install.md", "CONTRIBUTING.md", "docs/enter.md")
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 SHARED = re.compile(r"sudo | --yes")  # what a machine needs that nobody sits at
 
@@ -78,7 +80,8 @@ def test_a_workflow_may_read_and_no_more_and_pins_what_it_uses(workflow):
     data = yaml.safe_load(workflow.read_text(encoding="utf-8"))
     assert data["permissions"] == {"contents": "read"}
     for job in data["jobs"].values():
-        assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations"}
+        more = {"contents"} if job == jobs(HIDDEN)["write"] else set()
+        assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations", *more}
         for used in [step["uses"] for step in job["steps"] if "uses" in step]:
             assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|[0-9a-f]{40})", used)
             assert used.startswith("actions/") or len(used.partition("@")[2]) == 40  # of others, the very commit
@@ -95,3 +98,60 @@ def test_a_release_has_the_tag_of_its_version():
             ["make", "tagged"], check=False, cwd=ROOT, env=environment, capture_output=True, text=True
         )
         assert (done.returncode, f"the tag is '{tag}'" in done.stderr) == (code, code != 0)
+
+
+def test_a_stranger_s_code_meets_no_secret_that_it_could_tell_and_nothing_that_it_could_write():
+    """Pull requests get no secret; a job that may write has no checkout, so no code, and no secret but its token."""
+    for workflow in WORKFLOWS:
+        text = workflow.read_text(encoding="utf-8")
+        events = yaml.safe_load(text)[True]
+        assert "pull_request_target" not in events
+        assert "workflow_run" not in events
+        if "pull_request" in events:
+            assert "secrets." not in text
+        for job in jobs(workflow).values():
+            uses = [step.get("uses", "").partition("@")[0] for step in job["steps"]]
+            if "contents" in job.get("permissions", {}):
+                assert uses[0] == "actions/download-artifact"
+                assert "secrets." not in yaml.safe_dump(job)
+                assert not any("make" in step.get("run", "") for step in job["steps"])
+
+
+SPEC = importlib.util.spec_from_file_location("entered", ROOT / ".github" / "entered.py")
+assert SPEC
+assert SPEC.loader
+ENTERED = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(ENTERED)
+
+
+@pytest.mark.parametrize(
+    ("paths", "found"),
+    [
+        (["entries/soft_relay/law.py", "entries/soft_relay/entry.toml"], "entries/soft_relay"),
+        (["entries/one/law.py", "entries/two/law.py"], None),
+        (["entries/one/law.py", "smc_mujoco/benchmark/rules/1.toml"], None),
+        (["entries/one; id/law.py"], None),
+        (["entries/../law.py"], None),
+        ([], None),
+    ],
+)
+def test_a_change_brings_one_entry_and_nothing_else(paths, found, monkeypatch):
+    told = subprocess.CompletedProcess([], 0, "".join(f"{path}\0" for path in paths))
+    monkeypatch.setattr(subprocess, "run", lambda *arguments, **options: told)
+    if found:
+        assert ENTERED.changed("0" * 40) == found
+    else:
+        with pytest.raises(SystemExit, match="one folder entries/NAME"):
+            ENTERED.changed("0" * 40)
+    with pytest.raises(SystemExit, match="40 hex digits"):
+        ENTERED.changed("--output=x")
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0 or not shutil.which("unshare"), reason="needs root")
+def test_an_entry_runs_without_network_rights_and_environment(monkeypatch):
+    monkeypatch.setenv("TOKEN", "a secret")
+    command = ENTERED.alone(["sh", "-c", "cat /proc/net/dev /proc/self/status; env"])
+    seen = subprocess.run(command[command.index("unshare") :], check=True, capture_output=True, text=True).stdout
+    assert re.findall(r"^ *(\w+):.*\d$", seen.partition("Name:")[0], re.MULTILINE) == ["lo"]
+    assert "NoNewPrivs:\t1" in seen
+    assert "a secret" not in seen
