@@ -13,6 +13,7 @@ from smc_mujoco.common.errors import ScenarioError, items_of, one_line, shown
 from smc_mujoco.common.files import from_json
 from smc_mujoco.common.text import counted
 from smc_mujoco.control.source import Source, restore
+from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE, metrics
 from smc_mujoco.metrics.conventions import groups as channel_groups
 from smc_mujoco.simulation.scenario import Scenario
@@ -224,6 +225,12 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
         with contextlib.suppress(ScenarioError):
             scenarios[k] = table.scenario(int(rows[rows >= 0].min()))
     return scenarios
+
+
+def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
+    """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not known."""
+    known = [catalogue().get(plant), *(one.plant for one in ran if one)]
+    return next((one.unit for one in known if one), "")
 
 
 def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:

@@ -175,6 +175,21 @@ def constrain(data: Any) -> None:
         object.__setattr__(data, name, constraint(f"{type(data).__name__}'s {name}", getattr(data, name)))
 
 
+def suggesting(kind: type[T]) -> type[T]:
+    """Make the TypeError for a field that a class of data does not have say which may be meant."""
+    make, names = kind.__init__, [one.name for one in dataclasses.fields(kind) if one.init]  # pyright: ignore[reportArgumentType] a class of data
+
+    def made(self: T, *args: Any, **fields: Any) -> None:
+        if foreign := next((name for name in fields if name not in names), ""):
+            hint = str(unknown("field", foreign, names)).partition(": ")[2]
+            raise TypeError(f"{kind.__name__}() got an unexpected keyword argument {foreign!r}: {hint}")
+        make(self, *args, **fields)
+
+    vars(made)["__signature__"] = inspect.signature(make)
+    kind.__init__ = made
+    return kind
+
+
 def constrained(function: Callable[P, T]) -> Callable[P, T]:
     """Check the arguments of each call whose parameters declare a constraint, before the function runs."""
     constraints, signature = of_parameters(function), inspect.signature(function)

@@ -15,8 +15,10 @@ import contextlib
 import ctypes
 import functools
 import os
+import re
 import threading
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
@@ -26,6 +28,8 @@ CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn",
 _lock = threading.RLock()  # held while callbacks are replaced
 _given: list[dict[str, Any]] = []  # the callbacks of the with blocks of `installed`, the innermost last
 _python_lock = threading.RLock()  # held while no Python callback may be installed; its holder never waits
+# MuJoCo warns of a model with each of its many compilations: once is enough, when a plant is made of it
+warnings.filterwarnings("ignore", category=UserWarning, module=re.escape(__name__), append=True)
 
 
 def _after_fork() -> None:
@@ -74,17 +78,17 @@ def no_clock() -> Any:
     return jit.compiled(types.float64(), zero, cache=True).ctypes
 
 
-def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a spec.
+def compiled(spec: mujoco.MjSpec, build: Callable[[mujoco.MjSpec], mujoco.MjModel] | None = None) -> mujoco.MjModel:
+    """Compile a spec; MuJoCo's warnings are shown if `build`, which compiles it, is a function of another module.
 
     A Python callback is removed meanwhile. The thread that installed it does not wait, so that a policy can make an
     environment during a run. Other threads wait until that run is over. No thread waits for native callbacks.
     """
     with _python_lock:
         if not any(map(_python, _callbacks().values())):
-            return spec.compile()
+            return build(spec) if build else spec.compile()
     with installed(None):
-        return spec.compile()
+        return build(spec) if build else spec.compile()
 
 
 def _callbacks() -> dict[str, Any]:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from smc_mujoco.analysis.bootstrap import MIN_INTERVAL_SAMPLES, Interval, median_of, share_interval
-from smc_mujoco.analysis.paired_runs import GROUPS, SETTLES, Columns, by_row, groups, sources
+from smc_mujoco.analysis.paired_runs import GROUPS, SETTLES, Columns, by_row, groups, scenarios, sources, unit_of_x
 from smc_mujoco.analysis.ranking import linked
 from smc_mujoco.common.errors import ScenarioError, items_of, shown, unknown
 from smc_mujoco.draw import page as pages
@@ -19,7 +19,6 @@ from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
 from smc_mujoco.draw.pareto import MARKS
-from smc_mujoco.mechanisms.plant import catalogue as plants_catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 
@@ -66,6 +65,8 @@ def plot(
     colours = dict(zip(laws, style.law_colours(laws), strict=True))
     marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
     intervals = _intervals(table, names)
+    by_plant = {group.name["plant"]: scenarios(table, group) for group in groups(table, GROUPS[:1])}
+    units = {plant: unit_of_x(plant, its) for plant, its in by_plant.items()}
     ran = set(zip(table.column("plant").tolist(), table.column("condition").tolist(), strict=True))
     conditions_of = {plant: [name for name in conditions if (plant, name) in ran] for plant in plants}
     with style.page(width):
@@ -76,7 +77,7 @@ def plot(
         axes = page.subplots(len(plants), len(names), squeeze=False, height_ratios=tall)
         room = 72 * width / len(names) - style.points(50)  # what the axis' numbers and the space beside it leave
         for i, plant in enumerate(plants):
-            for k, (name, label) in enumerate(zip(names, _labels(names, plant, room), strict=True)):
+            for k, (name, label) in enumerate(zip(names, _labels(names, units[plant], room), strict=True)):
                 of_panel = {cell[2:]: its for cell, its in intervals.items() if cell[:2] == (name, plant)}
                 _panel(axes[i, k], of_panel, conditions_of[plant], colours, marks, name != SETTLES)
                 axes[i, k].set_xlabel(label)
@@ -174,18 +175,17 @@ def _dot(ax: Axes, interval: Interval, line: int, look: dict) -> None:
         ax.annotate("", (1.0, line), (low, line), ("axes fraction", "data"), "data", arrowprops=look)
 
 
-def _labels(metrics: Sequence[str], plant: str, room: float) -> list[str]:
-    """Return the labels of a row of panels, all in two lines if one is wider than `room`, in points."""
-    labels = [_label(metric, plant) for metric in metrics]
+def _labels(metrics: Sequence[str], x: str, room: float) -> list[str]:
+    """Return the labels of a row of panels, positions in x; all in two lines if one is wider than `room`, in points."""
+    labels = [_label(metric, x) for metric in metrics]
     if any(style.width(label, style.points(pages.TEXT_SIZE)) > room for label in labels):
         return [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
     return labels
 
 
-def _label(metric: str, plant: str) -> str:
-    """Return a metric's label with its unit on a plant."""
+def _label(metric: str, x: str) -> str:
+    """Return a metric's label with its unit where positions are in x."""
     if metric == SETTLES:
         return "share of runs that settle"
-    known = plants_catalogue().get(plant)
-    unit = CATALOGUE[metric].unit_for(known.unit).replace("^2", "²").replace(" ", "·") if known else ""
-    return CATALOGUE[metric].label + (f" ({unit})" if unit not in ("", "1") else "")
+    label, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
+    return label + bracket + unit.replace("^2", "²").replace(" ", "·")

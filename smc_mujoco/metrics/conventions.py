@@ -151,6 +151,11 @@ class Metric:
         text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
         return text.format(x=x, u=u, force=EFFORT[x])
 
+    def heading(self, x: str) -> str:
+        """Return the label with the unit where positions are in x; x="" where that is not known."""
+        unit = self.unit_for(x) if x else "" if "{" in self.unit else self.unit
+        return self.label + f" ({unit})" * (unit not in ("", "1"))
+
     def unit_in(self, machine: Plant | Scenario, group: str = "") -> str:
         """Return the unit in the group of that name, such as "free"; without a name, that of the first driven group."""
         of_plant = groups(machine)

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import html
-from smc_mujoco.common.constraints import MAX_SEED, Number, OneOf, Seed, of_fields
+from smc_mujoco.common.constraints import MAX_SEED, Number, OneOf, Seed, of_fields, suggesting
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control import design
@@ -65,6 +65,7 @@ def field(convert: Callable[..., Out], default: Any = dataclasses.MISSING) -> Ou
     return dataclasses.field(default=default, metadata={"convert": convert})
 
 
+@suggesting
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Scenario:
     """Everything that defines a run. SI units; angles in radians.

@@ -15,7 +15,6 @@ from smc_mujoco.common.tabular import Cell, Tables, Tabular
 from smc_mujoco.common.text import capital, counted, every, joined, number
 from smc_mujoco.control.source import Source, in_words, kinds
 from smc_mujoco.draw import style
-from smc_mujoco.mechanisms.plant import catalogue
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
 if TYPE_CHECKING:
@@ -124,6 +123,7 @@ class Board(Tables):
     relevant: float  # share of a value that is relevant
     resolution: float  # the largest lower bound on the least relevant difference, in the unit of the board
     by_step: bool  # whether halving the physics step may change its numbers, and no run was repeated with it
+    x: str = ""  # the unit of positions, "rad" or "m"; "" where it is not known
 
     @property
     def best(self) -> tuple[str, ...]:
@@ -379,10 +379,7 @@ def heading(board: Board) -> str:
         return "settles (%)"
     if board.metric == OBJECTIVE:
         return "J (s^2)"
-    plant = catalogue().get(board.group["plant"])
-    metric = dataclasses.replace(CATALOGUE[board.metric], unit=board.unit)  # in V where commands are voltages
-    unit = metric.unit_for(plant.unit) if plant else "" if "{" in metric.unit else metric.unit
-    return metric.label + (f" ({unit})" if unit not in ("", "1") else "")
+    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit).heading(board.x)  # in V for voltages
 
 
 def _table(

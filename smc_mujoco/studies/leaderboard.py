@@ -181,6 +181,7 @@ def _board(
         relevant=comparison.relevant,
         resolution=float(comparison.floors.max()),
         by_step=bool(np.isnan(comparison.halves).all()) and any(map(repeats_all, filter(None, ran))),
+        x=paired_runs.unit_of_x(group.name["plant"], ran),
     )
 
 

@@ -526,3 +526,16 @@ def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(ref
                 smc.Scenario(plant="duffing", law="none", duration=0.01, actuator=[smc.Lag(0.01)], **field)
             )
         )
+
+
+@pytest.mark.parametrize(
+    ("make", "meant"),
+    [
+        (lambda: smc.Scenario(plant="duffing", delay=0.02), "'input_delay'"),
+        (lambda: dataclasses.replace(smc.Scenario(plant="duffing", law="pid"), noize=1), "'noise'"),
+        (lambda: smc.Uncertainty(delai=(0.0, 0.01)), "'delay'"),
+    ],
+)
+def test_a_field_that_there_is_not_suggests_the_one_that_is_meant(make, meant):
+    with pytest.raises(TypeError, match=f"unexpected keyword argument .*: did you mean {meant}"):
+        make()

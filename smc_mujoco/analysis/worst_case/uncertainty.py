@@ -19,7 +19,7 @@ from typing import Annotated
 import numpy as np
 
 from smc_mujoco.common import constraints
-from smc_mujoco.common.constraints import Natural, Positive, constrain
+from smc_mujoco.common.constraints import Natural, Positive, constrain, suggesting
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.text import joined
@@ -45,6 +45,7 @@ DEFAULT_FRICTION_SCALE = (0.5, 1.5)  # of the default class; chosen
 Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
 
 
+@suggesting
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Uncertainty:
     """What may happen: bounds on disturbance, noise, delay and parameters. Everything left out is as in the scenario.

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, scene
 from smc_mujoco.draw.film.act import Motion, Push
 from smc_mujoco.draw.states import shapes
@@ -85,6 +86,9 @@ class Puppet:
         model, moved, others, world = self.shapes[0].model, [], [], np.empty((0, 8, 3))
         plane, fixed = model.geom_type == scene.PLANE, model.body_weldid[model.geom_bodyid] == 0
         links = np.isin(model.geom_bodyid, self.links) & ~plane
+        if not links.any():
+            cure = "give its bodies geoms, or its links <visual>"
+            raise ScenarioError(f"nothing that moves on {trace.scenario.plant.name} has a shape to be filmed: {cure}")
         for part in np.linspace(0.0, 1.0, POSES) ** 2:  # most of the motion is early
             sample = round(part * (len(trace.t) - 1))
             time = float(trace.t[sample])

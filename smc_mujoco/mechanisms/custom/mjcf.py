@@ -77,9 +77,13 @@ class Source:
     def compiled(self, spec: mujoco.MjSpec) -> mujoco.MjModel:
         """Return the spec of this model, compiled."""
         try:
-            return mjcb.compiled(spec)
+            return mjcb.compiled(spec, _built)
         except ValueError as error:
             raise broken(self.path or self.label, str(error)) from None
+
+
+def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    return spec.compile()
 
 
 def _of_urdf(path: Path) -> mujoco.MjSpec:

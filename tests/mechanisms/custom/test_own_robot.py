@@ -1,6 +1,8 @@
 """A robot of one's own: what a text says of its channels, bounds, mistakes in laws, and the shapes of a URDF."""
 
 import re
+import subprocess
+import sys
 import warnings
 
 import mujoco
@@ -177,3 +179,38 @@ def test_what_no_tuning_can_answer_is_refused_before_the_first_run(folder, text,
         smc.which(text, laws=["classical", "pid"], conditions="noise", seeds=1, duration=0.05, out=folder / "out")
     assert "defaults=True" in str(refused.value)
     assert not list(folder.glob("out/**/*.parquet"))
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("text", "heads"),
+    [
+        ("arm.urdf:j1(motor)+j2(motor)", ["settling time (s)", "ultimate bound (rad)", "TV rate (N·m/s)"]),
+        ("mine.xml:lift(motor,u_max=60)+tilt(motor,u_max=9)", ["settling time (s)"]),
+    ],
+)
+def test_tables_and_figures_of_two_joints_have_units(folder, text, heads):
+    metrics = ["settling_time", "ultimate_bound", "tv_rate"][: len(heads)]
+    runs = [smc.Scenario(plant=as_plant(text), law=law, duration=0.02, x0=0.1) for law in ("pid", "classical")]
+    table = smc.study(runs, "study", progress=False)
+    (told,) = smc.leaderboard(table, metrics).tables
+    assert told.headings[1:] == [head.replace("·", " ") for head in heads]
+    assert [" ".join(ax.get_xlabel().split()) for ax in smc.plot(table, metrics=metrics).axes] == heads
+
+
+def test_what_mujoco_warns_of_a_model_is_told_once(folder):
+    (folder / "old.xml").write_text(MODEL.replace("<mujoco>", '<mujoco><compiler settotalmass="5"/>'))
+    script = """import dataclasses, smc_mujoco as smc
+trace = smc.run(smc.Scenario(plant="old.xml:tilt(motor,u_max=9)", law="pid", duration=0.01, x0=0.1))
+smc.worst_case(trace.scenario, budget=2, within=smc.Uncertainty(mass=(0.9, 1.1)))
+smc.tune("duffing", "pid", budget=1, searches=1, progress=False)
+smc.worst_case(dataclasses.replace(trace.scenario, law="classical"), budget=2)"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stderr.count("settotalmass") == 1
+
+
+def test_a_machine_without_shapes_cannot_be_filmed_and_says_so(folder):
+    (folder / "bare.urdf").write_text(re.sub(r"<(visual|collision)>.*?</\1>", "", ARM, flags=re.DOTALL))
+    trace = smc.run(smc.Scenario(plant=as_plant("bare.urdf:j1(motor)+j2(motor)"), **RUN))
+    with pytest.raises(smc.ScenarioError, match=r"nothing that moves on bare.* has a shape to be filmed: give"):
+        smc.film(trace, "a.png", at=0.0, size=(320, 180))
