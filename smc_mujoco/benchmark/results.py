@@ -27,9 +27,9 @@ from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import read_json, reading
 
-MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "itae", "calm": "calm"}  # of each board
+MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}  # of each board
 TITLES = {"forces": "Accuracy under forces", "sensors": "Accuracy under sensors", "speed": "Speed", "calm": "Calm"}
-WORDS = {"accuracy": "largest error of the last fifth", "itae": "ITAE", "calm": "variation of u"}
+WORDS = {"accuracy": "largest error of the last fifth", "settling": "settling time", "calm": "variation of u"}
 DRAWS, LEVEL = 4000, 90.0  # resamples of the problems; %, of the intervals
 CHANGE = 0.01  # a median that changes by less counts as the same; chosen
 MOMENTS = 81  # of a curve of targets
@@ -95,7 +95,7 @@ class Result:
 
     @functools.cached_property
     def medians(self) -> dict[str, dict[str, float]]:
-        """Problem -> measure -> the median over its instances."""
+        """Problem -> measure -> the median over its instances; calm counts where the easiest accuracy is kept."""
         return self.runs.medians()
 
     def targets(self, problems: Sequence[str], measure: str) -> np.ndarray:

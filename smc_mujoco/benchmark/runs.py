@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.benchmark.problem import MEASURES, Problem
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.benchmark.problem import MEASURES, Problem, problem
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import table as tables
@@ -26,14 +25,14 @@ COLUMNS = (*VALUES, *(f"{measure}_{i}" for measure in MEASURES for i in range(1,
 Row = dict[str, Any]
 
 
-def rows(problem: Problem, scenarios: Sequence[Scenario], instances: Sequence[int], failures: list[str]) -> list[Row]:
+def rows(one: Problem, scenarios: Sequence[Scenario], instances: Sequence[int], failures: list[str]) -> list[Row]:
     """Run the scenarios of a problem's instances. Return their rows; add how runs failed to `failures`."""
     found: list[Row] = [{} for _ in scenarios]
     for i, trace in stream(scenarios):
-        found[i] = {"problem": problem.id, "instance": instances[i]} | problem.measures(trace)
+        found[i] = {"problem": one.id, "instance": instances[i]} | one.measures(trace)
         if found[i]["failed"]:
             why = trace.failure or f"it diverged at {trace.diverged_at:.3g} s"
-            failures.append(f"{problem.id}#{instances[i]:02d}: {why}")
+            failures.append(f"{one.id}#{instances[i]:02d}: {why}")
     return found
 
 
@@ -64,19 +63,22 @@ class Runs:
     def __len__(self) -> int:
         return self.file.metadata.num_rows
 
-    def columns(self, problem: str) -> "Mapping[str, np.ndarray]":
+    def columns(self, name: str) -> Mapping[str, np.ndarray]:
         """Return the columns of a problem's runs, (instances,) each, in the order of the instances."""
-        data: pa.Table = self.file.read_row_group(self.groups[problem]).sort_by("instance")
-        return {name: data[name].to_numpy() for name in ("instance", *COLUMNS)}
+        data: pa.Table = self.file.read_row_group(self.groups[name]).sort_by("instance")
+        return {column: data[column].to_numpy() for column in ("instance", *COLUMNS)}
 
-    def medians(self) -> "dict[str, dict[str, float]]":
-        """Return problem -> measure -> median over its instances."""
-        return {name: {value: float(np.median(self.columns(name)[value])) for value in VALUES} for name in self.groups}
+    def medians(self) -> dict[str, dict[str, float]]:
+        """Return problem -> measure -> median over its instances.
 
+        The variation of u, `calm`, counts as infinite in a run that does not keep the easiest accuracy, as who does
+        nothing is calm.
+        """
+        return {name: self._medians(name) for name in self.groups}
 
-def check(path: Path) -> None:
-    """Raise ScenarioError for a table that is damaged or was changed since it was written."""
-    try:
-        tables.read(path, sealed=True)
-    except (OSError, ValueError) as error:
-        raise ScenarioError(f"{path} is no table of runs: {error}") from None
+    def _medians(self, name: str) -> dict[str, float]:
+        """Return measure -> median over a problem's instances."""
+        columns = dict(self.columns(name))
+        if count := len(problem(name).targets.get("accuracy", ())):
+            columns["calm"] = np.where(np.isnan(columns[f"accuracy_{count}"]), np.inf, columns["calm"])
+        return {value: float(np.median(columns[value])) for value in VALUES}
