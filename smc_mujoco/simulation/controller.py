@@ -34,6 +34,7 @@ from smc_mujoco.mechanisms.hardware.friction import coulomb_step
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
+from smc_mujoco.simulation.signals import after_pauses
 from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, motor_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
@@ -93,7 +94,11 @@ def control(address, sim, data):
 @njit(error_model="numpy", inline="always")
 def _late(sim, k):
     """Return by how many physics steps sample k is late."""
-    if sim.jitter == 0 or k == 0 or k == sim.samples - 1:
+    if k == 0 or k == sim.samples - 1:
+        return 0
+    if sim.pause != 0:
+        return max(0, after_pauses(k, sim.steps, sim.pause, sim.pause_samples, sim.pause_phase))
+    if sim.jitter == 0:
         return 0
     return int(philox.uniform(sim.seed, 0, philox.JITTER, k) * (sim.jitter + 1))
 
@@ -101,9 +106,11 @@ def _late(sim, k):
 @njit(error_model="numpy", inline="always")
 def _missed(sim, k):
     """Return whether sample k does not run."""
-    if sim.missed == 0.0 or k == 0 or k == sim.samples - 1:
+    if k == 0 or k == sim.samples - 1:
         return False
-    return philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed
+    if sim.pause != 0 and after_pauses(k, sim.steps, sim.pause, sim.pause_samples, sim.pause_phase) < 0:
+        return True
+    return sim.missed != 0.0 and philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed
 
 
 @njit(error_model="numpy", inline="always")

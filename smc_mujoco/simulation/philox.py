@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise and of the first process noise; the second has 2, and so on
 DROPOUT = 1 << 32  # stream that decides which readings are lost
 JITTER, MISSED = 1 << 33, 1 << 34  # streams that decide which samples are late, and which are missed
+PAUSE = 1 << 36  # stream that decides when the controller has its first pause
 REFILL = 1 << 35  # stream that decides when the generators of stepper motors look at their queues
 
 _M0, _M1 = np.uint64(0xD2E7470EE14C6C93), np.uint64(0xCA5A826395121157)

@@ -217,12 +217,16 @@ def _signal(signal: Signal, buffer: state.Buffer, channels: int = 1) -> dict[str
 def _settings(s: Resolved) -> dict[str, Any]:
     """Return the numbers of a record that set clock, sensor and drives."""
     sensor, drives = s.sensor or IDEAL_SENSOR, s.drive_step
+    pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
         "steps": s.steps,
         "stages": s.stages,
         "step": s.physics_step,
         "period": s.control_period,
         "jitter": s.clock.jitter_steps(s.physics_step),
+        "pause": pause,
+        "pause_samples": samples,
+        "pause_phase": pause_phase(s),
         "missed": s.clock.missed,
         "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
@@ -247,7 +251,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
 def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     """Return the arrays of a record in which the callback keeps measurements, commands and states."""
     n, width = s.plant.n, s.plant.n if s.law.joint else 1
-    late = bool(s.clock.jitter_steps(s.physics_step))  # a late command may take effect after the next sample began
+    late = not s.clock.regular  # a late command may take effect after the next sample began
     slots = s.delay_steps // s.steps + 1 + late
     states = np.zeros(n, state.CHANNEL_STATE)  # at the start of a run
     motors = {}
@@ -273,6 +277,12 @@ def known_values(s: Resolved) -> list[float]:
     """Return the values of the plant's parameters as the law's model has them: true ones in the model "true"."""
     known = s.plant.parameters if s.model != "true" else vars(s.plant.values(s.factors(0)))
     return [known[name] for name in s.plant.parameters]
+
+
+def pause_phase(s: Resolved) -> int:
+    """Return by how many samples the first pause of the controller comes earlier than the others."""
+    samples = s.clock.pauses(s.control_period, s.physics_step)[1]
+    return int(philox.random_words(s.noise_seed, 0, philox.PAUSE, 0)[0] * 2.0**-53 * samples)
 
 
 def motors_at_start(s: Resolved) -> list[dict[str, float]]:

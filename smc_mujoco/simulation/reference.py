@@ -20,7 +20,7 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation import philox, trace
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.controller import LAST_STAGE, MAX_STATE
-from smc_mujoco.simulation.prepare import motors_at_start
+from smc_mujoco.simulation.prepare import motors_at_start, pause_phase
 from smc_mujoco.simulation.python_controller import (
     USER_EXCEPTIONS,
     Controller,
@@ -94,6 +94,7 @@ class Loop:
         self.has_friction, self.has_drive = self.channels["friction_force"] >= 0, self.channels["force"] >= 0
         models.put_initial_state(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
+        self.loops = self.with_pauses()
         self.calls = 0
         self.controller = Controller(scenario)
         self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
@@ -233,16 +234,38 @@ class Loop:
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late."""
         steps = self.scenario.clock.jitter_steps(self.scenario.physics_step)
-        if not steps or k in (0, self.scenario.samples):
+        if k in (0, self.scenario.samples):
+            return 0
+        if self.loops is not None:
+            return self.loops.get(k, 0)
+        if not steps:
             return 0
         return int(philox.random_words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
 
     def missed(self, k: int) -> bool:
         """Return whether sample k does not run."""
-        probability = self.scenario.clock.missed
-        if not probability or k in (0, self.scenario.samples):
+        if k in (0, self.scenario.samples):
+            return False
+        if self.loops is not None and k not in self.loops:
+            return True
+        if not (probability := self.scenario.clock.missed):
             return False
         return philox.random_words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < probability
+
+    def with_pauses(self) -> dict[int, int] | None:
+        """Return the samples of a loop with pauses, and by how many physics steps each is late; None without pauses."""
+        s, late, step = self.scenario, {}, 0
+        length, samples = s.clock.pauses(s.control_period, s.physics_step)
+        if not length:
+            return None
+        count = pause_phase(s)  # samples since the last pause
+        while step <= self.total:
+            late[step // s.steps] = step % s.steps
+            count += 1
+            step += s.steps
+            if count == samples:
+                step, count = step + length, 0
+        return late
 
     def apply_disturbances(self, data: mujoco.MjData, t: float) -> np.ndarray:
         """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""

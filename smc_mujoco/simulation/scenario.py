@@ -364,7 +364,7 @@ class Scenario:
     @property
     def readings(self) -> int:
         """How many delayed readings of the sensor MuJoCo keeps."""
-        return 0 if self.sensor is None else self.sensor.readings(self.resolved.physics_step)
+        return 0 if self.sensor is None else self.sensor.readings(self.resolved.physics_step, self.plant.n)
 
     @functools.cached_property
     def delay_steps(self) -> int:

@@ -18,6 +18,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from smc_mujoco.common.constraints import Natural, Number, Positive, constrain
 from smc_mujoco.common.errors import ScenarioError, number, shown
@@ -406,6 +407,18 @@ def parameter_factors(name: str, value: object) -> Frozen[float]:
     return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})
 
 
+@register_jitable
+def after_pauses(k, steps, length, samples, phase):
+    """Return by how many physics steps sample k of the grid is late in a loop with pauses; -1 if a pause covers it.
+
+    A period has `steps` physics steps, a pause `length`; one follows every `samples` samples, the first `phase` fewer.
+    """
+    cycle, end = samples * steps + length, (k + 1 + phase) * steps - 1
+    within = end % cycle
+    sample = within // steps
+    return -1 if sample >= samples else steps - 1 - (within - sample * steps)
+
+
 @dataclasses.dataclass(frozen=True)
 class Clock:
     """The timer of the controller. A sensor with a clock of its own is an `Encoder` with a `period`.
@@ -417,23 +430,39 @@ class Clock:
     or not at all: then neither estimator nor law sees that sample. The first and the last sample are on time. Which
     samples are late or missed depends on the seed and k alone.
 
+    A loop without a real-time system waits until a period is over, and has a pause when it does something else, such as
+    writing a line of text. All later samples are then later by the pause: sample k T of the grid runs where the loop's
+    next sample falls, and one that a pause covers is missed.
+
     Attributes:
       jitter: s, the largest delay of a sample; shorter than the control period. Each sample is late by a whole number
         of physics steps, all equally probable. The law reads the true time in `y.t` and the nominal period in `y.dt`,
         as on a machine whose task does not measure its period.
       missed: probability that a sample is missed, 0 .. 0.99. The last command then stays.
+      pause: s of a pause, 0 (none) or more; not with `jitter`. Times are rounded to whole physics steps.
+      pause_every: s between two pauses, without these, at least a control period. The first comes after a part of it
+        that depends on the seed.
     """
 
     jitter: Natural = 0.0
     missed: Annotated[float, Number(low=0.0, high=MAX_MISSED)] = 0.0
+    pause: Natural = 0.0
+    pause_every: Positive = 1.0
 
     def __post_init__(self):
         constrain(self)
+        if self.pause and self.jitter:
+            raise ScenarioError(f"Clock has jitter {self.jitter:g} and pause {self.pause:g} s: give one of them")
 
     @property
     def regular(self) -> bool:
         """Whether all samples run, and on time."""
-        return not (self.jitter or self.missed)
+        return not (self.jitter or self.missed or self.pause)
+
+    def pauses(self, control_period: float, physics_step: float) -> tuple[int, int]:
+        """Return the length of a pause in physics steps, and the samples from one to the next; 0, 1 without pauses."""
+        length = round(self.pause / physics_step)
+        return (length, max(1, round(self.pause_every / control_period))) if length else (0, 1)
 
     def jitter_steps(self, physics_step: float) -> int:
         """Return the largest delay of a sample in physics steps."""

@@ -97,6 +97,8 @@ SIMULATION = np.dtype(
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
         # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
         ("jitter", "i8"), ("missed", "f8"),
+        # pauses: physics steps of one, samples from one to the next, and by how many the first comes earlier
+        ("pause", "i8"), ("pause_samples", "i8"), ("pause_phase", "i8"),
         # drives in the callback: whether there are, and what a physics step does to them
         ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
         # stepper motors: their numbers, the address of the first MOTOR, whose queue follows it, 0 without any, and the

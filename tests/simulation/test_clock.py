@@ -57,6 +57,26 @@ def test_as_many_samples_are_missed_as_asked_and_hold_the_command_before():
     assert (trace.s[1:][missed[1:]] == trace.s[:-1][missed[1:]]).all()
 
 
+def test_a_pause_makes_all_later_samples_later_and_covers_some():
+    """The times at which the law runs are those of a loop that waits for a period, and has a pause of 1.3 of them."""
+    clock = smc.Clock(pause=1.3 * PERIOD, pause_every=7.0 * PERIOD)
+    compiled = smc.run(scenario(clock))
+    ran = np.round(np.unique(compiled.u[1:-1, 0]) / (PERIOD / STEPS)).astype(int)
+    gaps = np.diff(ran)
+    paused = np.flatnonzero(gaps == 23)
+    assert set(gaps) == {10, 23}
+    assert set(np.diff(paused)) == {7}
+    assert paused[0] < 7
+    assert_same(compiled, reference.run(scenario(clock)))
+    delayed = scenario(clock, input_delay=0.007)
+    assert_same(smc.run(delayed), reference.run(delayed))
+    seeds = [dataclasses.replace(scenario(clock, duration=0.3), seed=i) for i in range(9)]
+    firsts = {int(np.argmax(np.diff(np.unique(trace.u[1:-1, 0])) > 0.02)) for trace in smc.run(seeds)}
+    assert len(firsts) > 3  # the first depends on the seed
+    with pytest.raises(smc.ScenarioError, match=r"jitter 0\.001 and pause 0\.01"):
+        smc.Clock(jitter=1e-3, pause=1e-2)
+
+
 @pytest.mark.parametrize("delay", [0, 3, 14])
 def test_a_command_acts_from_its_own_time_on(delay):
     """The mean force of a period is the sum of the commands in it, each from its late sample plus the delay on."""

@@ -39,6 +39,9 @@ class Encoder(Part):
       delay: s until a reading arrives, 0 or more, a whole number of physics steps. Until the first arrives, the
         controller reads x0.
 
+      skew: s, 0 or more, a whole number of physics steps: a reading of each channel is older by it than that of the
+        channel before, as on a bus on which the last channel is read first. Not with `period`.
+
     With the velocity estimator "measured" there is also a tachometer, with the same period, delay and losses.
     """
 
@@ -47,16 +50,23 @@ class Encoder(Part):
     dropout: Probability = 0.0
     period: Positive | None = None
     delay: Natural = 0.0
+    skew: Natural = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.skew and self.period:
+            raise ScenarioError(f"Encoder has period {self.period:g} and skew {self.skew:g} s: give one of them")
 
     def quantum(self, hinge: bool) -> float:
         """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""
         return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
 
-    def readings(self, step: float) -> int:
-        """Return how many readings MuJoCo must keep at physics steps of `step` s; 0 without delay and period."""
-        if not self.delay and not self.period:
+    def readings(self, step: float, channels: int = 1) -> int:
+        """Return how many readings MuJoCo must keep at physics steps of `step` s; 0 without delay, skew and period."""
+        longest = self.delay + (channels - 1) * self.skew
+        if not longest and not self.period:
             return 0
-        needed = math.ceil(self.delay / (self.period or step) - 1e-9) + 2
+        needed = math.ceil(longest / (self.period or step) - 1e-9) + 2
         return READINGS_STEP * math.ceil(needed / READINGS_STEP)
 
     def check(self, step: float) -> None:
@@ -65,7 +75,7 @@ class Encoder(Part):
         if self.delay / (self.period or step) > MAX_READINGS:
             long = f"{self.delay:g} s is more than {MAX_READINGS:,} readings long"
             raise ScenarioError(f"Encoder's delay {long}: give a shorter one")
-        for name, time in (("delay", self.delay), ("period", self.period or 0.0)):
+        for name, time in (("delay", self.delay), ("skew", self.skew), ("period", self.period or 0.0)):
             count = time / step
             if math.isinf(count) or abs(count - round(count)) > 1e-6 or 0.0 < count < 0.5:
                 steps = f"a whole number of physics steps of {step:g} s: give a physics_step that divides it"
@@ -75,7 +85,9 @@ class Encoder(Part):
         """Yield the fields of delay and period of every channel's two sensors."""
         if model.nhistory:
             at = sensor_ids(model)
-            yield Field("sensor_delay", at, max(0.0, self.delay - EARLY_SHARE * model.opt.timestep))
+            channels = joint_ids(model).tolist()
+            delays = self.delay + self.skew * np.array([channels.index(joint) for joint in model.sensor_objid[at]])
+            yield Field("sensor_delay", at, np.maximum(0.0, delays - EARLY_SHARE * model.opt.timestep))
             yield Field("sensor_interval", (at, 0), self.period or 0.0)
 
 

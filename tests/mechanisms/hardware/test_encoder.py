@@ -415,10 +415,22 @@ def test_every_channel_of_a_network_has_its_encoder():
     np.testing.assert_array_equal(x, q * np.floor(held / q + 0.5))
 
 
+def test_a_skew_reads_each_channel_earlier_than_the_channel_before():
+    plant = smc.plant("pendulum_network", n=3)
+    trace, x, _ = read(smc.Encoder(math.inf, delay=2e-3, skew=3e-3), plant=plant, v0=(0.5, -0.5, 1.0))
+    for i, delay in enumerate((2, 5, 8)):
+        late = np.append(trace.x[:1, i].repeat(delay), trace.x[:-delay, i])
+        np.testing.assert_array_equal(x[:, i], late)
+    with pytest.raises(smc.ScenarioError, match=r"period 0\.01 and skew 0\.003"):
+        smc.Encoder(period=0.01, skew=3e-3)
+
+
 def test_a_sensor_keeps_as_many_readings_as_are_under_way_in_parts_of_64():
     for times, count in (({}, 0), ({"period": 0.02}, 64), ({"delay": 0.062}, 64), ({"delay": 0.063}, 128)):
         assert smc.Encoder(**times).readings(1e-3) == count
     assert smc.Encoder(delay=0.1265, period=1e-3).readings(5e-4) == 192
+    assert smc.Encoder(delay=0.04, skew=0.011).readings(1e-3, 3) == 64
+    assert smc.Encoder(delay=0.04, skew=0.012).readings(1e-3, 3) == 128
 
 
 # bad values
