@@ -21,9 +21,13 @@ def rig(
         ),
     ],
     files: Annotated[
-        list[Path],
-        typer.Argument(metavar="FILE...", help="Records: CSV or npz files of columns; with --fit also traces."),
-    ],
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE...",
+            help="Records: CSV or npz files of columns; with --fit also traces. None: predictions of a rig that has "
+            "figures instead of records.",
+        ),
+    ] = None,
     columns: options.Columns = None,
     figure: Annotated[Path | None, options.picture("the (first) record and its residuals")] = None,
     sets: Annotated[
@@ -50,6 +54,7 @@ def rig(
     json: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Fit: also write the result to a file.")
     ] = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Predictions: runs of each law on each parameter set.")] = 4,
 ) -> None:
     """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to records.
 
@@ -63,13 +68,22 @@ def rig(
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The
     first line of a CSV file has the names of the columns.
 
+    Without a file, the figures of a bursty machine are predicted, whose records cannot be repeated: those that were
+    fitted on, those of other laws, and which parts of the twin they need.
+
+    Example: smc-mujoco rig stepper_furuta
+
     Example: smc-mujoco rig qube_servo run.csv --sets driver --duration 6 --film run.mp4
 
     Example: smc-mujoco rig servo_axis run.csv --fit --set M=5,b=8 --columns x=position,u=force
     """
     options.only_for(ctx, ("sets", "start", "duration", "film"), not fit, "a record beside its twin: leave out --fit")
     options.only_for(ctx, ("quantities", "given", "starts", "seed", "json"), fit, "--fit")
-    named = options.columns(columns)
+    options.only_for(ctx, ("seeds",), not files, "predictions: leave the file out")
+    if not files and not fit:
+        _predict(name, seeds)
+        return
+    files, named = files or [], options.columns(columns)
     if fit:
         values = options.numbers(given, "--set", "M=5,b=8")
         _fit(name, files, named, options.names(quantities), values, starts, seed, figure, json)
@@ -77,6 +91,21 @@ def rig(
     if len(files) != 1:
         raise ScenarioError(f"{len(files)} records: give one, or --fit")
     _repeat(name, files[0], named, options.names(sets), start, duration, figure, film)
+
+
+def _predict(name: str, seeds: int) -> None:
+    """Show what a rig's twin predicts of its machine."""
+    with delay_ctrl_c():
+        from smc_mujoco.evidence.commands import tables
+        from smc_mujoco.evidence.rigs.predictions import predicted
+        from smc_mujoco.evidence.rigs.rig import rig as find_rig
+
+    terminal, twin = Terminal(), find_rig(name)
+    told = predicted(twin, seeds)
+    for table in tables.predicted(told):
+        terminal.print(table)
+    terminal.note(told.prediction.about, wrap=True)
+    terminal.note(f"{len(twin.members())} parameter sets, {seeds} seeds each, {terminal.seconds:.0f} s")
 
 
 def _fit(

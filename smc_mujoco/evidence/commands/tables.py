@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from statistics import median_low
 
+import numpy as np
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Column, Table
@@ -18,6 +19,7 @@ from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.boards.published import RobustnessRow, Row
 from smc_mujoco.evidence.certificates.certificate import Certificate
 from smc_mujoco.evidence.rigs.identify import Identified
+from smc_mujoco.evidence.rigs.predictions import Told, percentiles
 
 BOARDS = {  # board of RealAIGym -> title and headings of columns
     "simulation": ("simulation", ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score")),
@@ -122,6 +124,47 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     for name, fit in by_name.items():
         table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
     return table
+
+
+def predicted(told: Told) -> list[Table]:
+    """Return three tables of predictions: what was fitted on, what is predicted, and which parts decide the order."""
+    about = told.prediction
+    right = {"justify": "right"}
+    heads = [Column(f"{name},\n{who}", **right) for name in about.recorded for who in ("machine", "twin")]
+    fitted = titled(f"Fitted on: {about.fitted_on}, median (5 to 95 %) of seeds and sets", "figure", *heads, "unit")
+    for figure in about.recorded[next(iter(about.recorded))]:
+        cells = [
+            cell
+            for name, figures in about.recorded.items()
+            for cell in (number(figures[figure]), _spread(told.of(about.fitted_on, name, figure)))
+        ]
+        fitted.add_row(figure, *cells, about.units[figure])
+    shown = [Column(f"{figure}\n{about.units[figure]}", **right) for figure in about.shown]
+    laws = titled("Predicted, but for the law fitted on", "law", "condition", *shown, Column("falls\n%", **right))
+    for law in about.order:
+        for name in about.conditions:
+            cells = [_spread(told.of(law, name, figure)) for figure in about.shown]
+            laws.add_row(law, name, *cells, f"{100.0 * told.falls(law, name):.0f}")
+    first = next(iter(about.conditions))
+    medians = [Column(f"{law}\n{about.rank}", **right) for law in about.order]
+    title = f"What of the twin decides it: {first}, median (5 to 95 %)"
+    parts = titled(title, "twin", *medians, Column("sets in the\nmachine's order", **right), Column("tau", **right))
+    for without in dict.fromkeys(key[0] for key in told.values):
+        cells = [_spread(told.of(law, first, about.rank, without)) for law in about.order]
+        falls = [told.falls(law, first, without) for law in about.order]
+        cells = [f"{cell}, {100 * fell:.0f} % fall" if fell else cell for cell, fell in zip(cells, falls, strict=True)]
+        count, sets = told.ordered(first, without)
+        label = f"without {without}" if without else "whole"
+        parts.add_row(label, *cells, f"{count} of {sets}", f"{told.correlation(first, without):z.2f}")
+    return [fitted, laws, parts]
+
+
+def _spread(values: np.ndarray) -> str:
+    """Return the median of a figure and its range, as "0.44 (0.21 to 0.9)"."""
+    if not len(values):
+        return "all fall"
+    middle, low, high = (number(float(f"{value:.3g}")) for value in percentiles(values))
+    return f"{middle} ({low} to {high})"
 
 
 def _to_error(value: float, error: float) -> str:

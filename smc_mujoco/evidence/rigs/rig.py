@@ -21,6 +21,7 @@ from smc_mujoco.common.errors import ScenarioError, find, number
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs import inverse, records
+from smc_mujoco.evidence.rigs.predictions import Prediction
 from smc_mujoco.evidence.rigs.records import Columns, Record
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.run import run
@@ -108,6 +109,7 @@ class Rig:
       ensemble: other parameter sets that fit about as well, each by name.
       laws: laws with gains for this machine, which a ranking compares by default.
       x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
+      prediction: figures that are predicted where records cannot be replayed, see `evidence.rigs.predictions`.
       reached: how well it fits records that the package does not contain.
       about: licence and history of the data, and what the twin predicts well or badly.
     """
@@ -129,6 +131,7 @@ class Rig:
     ensemble: tuple[Mapping[str, float], ...] = ()
     laws: tuple[Law, ...] = ()
     x0: tuple[float, ...] | None = None
+    prediction: Prediction | None = None
     reached: tuple[Reached, ...] = ()
     about: str = ""
 

@@ -32,6 +32,13 @@ REST = 0.2  # s, of the shortest rest
 SEGMENT = 256  # samples of Welch's method, Hann, half overlap: as the machine's figures were made
 BAND = 2.0, 9.0  # Hz, of centroid and peak
 MIN_ROWS = 1000
+UNITS = {  # of the figures
+    **dict.fromkeys(("alpha_rms", "alpha_max", "theta_rms", "theta_std", "theta_max", "phase", "lag"), "deg"),
+    **dict.fromkeys(("alpha_rate_rms", "theta_rate_rms"), "deg/s"),
+    **dict.fromkeys(("acceleration_rms", "acceleration_max"), "steps/s^2"),
+    **dict.fromkeys(("centroid", "peak"), "Hz"), **dict.fromkeys(("running", "resting", "ratio", "gain"), ""),
+    "speed_rms": "steps/s", "starts": "1/min",
+}  # fmt: skip
 
 Seen = namedtuple("Seen", "t x q r")
 Gains = namedtuple("Gains", "kind top speed")
@@ -107,7 +114,7 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
     runs = np.abs(speed) >= STOP_BAND
     edges = np.flatnonzero(np.diff(np.concatenate(([True], runs, [True])).astype(int)))
     rests = np.diff(edges)[::2] if len(edges) else np.zeros(0)
-    row = float(np.median(np.diff(t)))
+    row, starts = float(np.median(np.diff(t))), np.sum(np.diff(runs.astype(int)) == 1)
     settings = {"fs": 1.0 / row, "window": "hann", "nperseg": SEGMENT, "noverlap": SEGMENT // 2}
     f, power = signal.welch(alpha, **settings)
     inside = (f >= BAND[0]) & (f <= BAND[1])
@@ -123,9 +130,10 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
         "theta_std": float(theta.std()), "theta_max": float(np.abs(theta).max()), "alpha_rate_rms": rms(alpha_rate),
         "theta_rate_rms": rms(theta_rate), "acceleration_rms": rms(acceleration),
         "acceleration_max": float(np.abs(acceleration).max()), "speed_rms": rms(speed),
-        "running": float(runs.mean()), "starts": float(np.sum(np.diff(runs.astype(int)) == 1) * 60.0 / (len(runs) * row)),
+        "running": float(runs.mean()), "starts": float(60.0 * starts / (len(runs) * row)),
         "resting": float(rests[rests * row >= REST].sum() / len(runs)),
-        "centroid": float((f * power)[inside].sum() / power[inside].sum()), "peak": float(f[at]),
+        "centroid": float(np.average(f[inside], weights=power[inside])) if power[at] > 0.0 else np.nan,
+        "peak": float(f[at]),
         "ratio": abs(tilt), "phase": float(np.degrees(np.angle(tilt)) % 360.0 - 360.0),
         "gain": abs(follow), "lag": float(np.degrees(np.angle(follow))),
     }  # fmt: skip

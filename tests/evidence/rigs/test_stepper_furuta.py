@@ -1,0 +1,204 @@
+"""The pendulum on a stepper: its firmware's laws are those that are told, and its figures those of known signals."""
+
+import csv
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from helpers.runs import assert_same
+
+import smc_mujoco as smc
+from smc_mujoco.evidence.rigs import firmware, predictions, stepper_record
+from smc_mujoco.evidence.rigs.firmware import FOUR_STATES, LINEAR, STEPS, TICK, TWO_STATES
+from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS, PREDICTION
+from smc_mujoco.simulation import reference
+
+RECORDS = Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"  # of the machine; not part of the package
+
+
+def memory(**values):
+    m = np.zeros(15)
+    for name, value in values.items():
+        m[getattr(firmware, name)] = value
+    return m
+
+
+# theta'' per alpha, alpha', theta and theta' as read from the firmware, 1/s^2 and 1/s
+LAYER = {LINEAR: (163.3, 16.5, 7.1, 6.4), TWO_STATES: (174.6, 15.9, 7.1, 6.4), FOUR_STATES: (234.7, 21.3, 18.1, 12.6)}
+
+
+@pytest.mark.parametrize("kind", LAYER)
+def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
+    at, h = {"ALPHA": 0.6, "ALPHA_RATE": 2.0, "THETA": 1.0, "THETA_RATE": -3.0}, 1e-3
+
+    def of(**moved):
+        return firmware.acceleration(kind, moved["ALPHA"], memory(**moved), 1.0, 0.0)[0] / STEPS
+
+    slopes = [(of(**at | {name: at[name] + h}) - of(**at | {name: at[name] - h})) / (2.0 * h) for name in at]
+    assert slopes == pytest.approx(LAYER[kind], abs=0.1)
+
+
+def test_the_linear_law_has_a_dead_band_and_the_sliding_modes_a_gate():
+    assert firmware.acceleration(LINEAR, 0.49, memory(), 1.0, 0.0)[0] == 0.0
+    tilted = memory(THETA=10.0)
+    for kind, gate in ((TWO_STATES, 150.0), (FOUR_STATES, 250.0)):
+        inside, outside = (
+            firmware.acceleration(kind, 0.0, memory(THETA=10.0, ALPHA_RATE=rate), 1.0, 0.0)[0]
+            - firmware.acceleration(kind, 0.0, memory(THETA=0.0, ALPHA_RATE=rate), 1.0, 0.0)[0]
+            for rate in (gate - 1.0, gate + 1.0)
+        )
+        assert inside - outside == pytest.approx(315.0)
+        early = [firmware.acceleration(kind, 0.0, m, 0.0, 0.0)[0] for m in (tilted, memory())]
+        assert early[0] == early[1]
+
+
+def test_rates_are_tustins_filter_with_the_nominal_period():
+    from scipy.signal import bilinear
+
+    b, a = bilinear([1.0, 0.0], [1.0 / 450.0, 1.0], 1.0 / TICK)
+    assert (pytest.approx(b[0], rel=1e-5), pytest.approx(a[1], abs=1e-4)) == (firmware.SLOPE, firmware.OLD_RATE)
+    m = memory(STARTED=1.0, ALPHA=1.0, ALPHA_RATE=10.0)
+    passed = firmware.measure(SimpleNamespace(q=math.radians(1.1), x=0.0, t=0.0123), m)
+    assert passed == 0.0123
+    assert m[firmware.ALPHA_RATE] == pytest.approx(211.7647 * 0.1 - 0.588)
+
+
+def test_a_move_is_a_trapezoid_that_ends_at_its_target():
+    m, rates = memory(), []
+    for k in range(600):
+        target = 20.0 if k < 400 else 19.0
+        firmware.move(target, m, TICK)
+        rates.append(m[firmware.REF_RATE])
+        if k == 399:
+            assert m[firmware.REF] == 20.0
+    assert max(rates) == 12.0
+    assert np.abs(np.diff(rates)).max() <= 3.0 * 60.0 * TICK
+    assert (m[firmware.REF], m[firmware.REF_RATE]) == (19.0, 0.0)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_the_compiled_run_is_that_of_the_reference_loop(law):
+    fields = {"x0": PREDICTION.start(3), "seed": 3, "duration": 2.5} | {"reference": smc.Step(0.2, 1.0)}
+    one = smc.rig("stepper_furuta").scenario(law, **fields)
+    trace = smc.run(one)
+    assert_same(trace, reference.run(one))
+    assert np.abs(trace.x[-200:, 1]).max() < 0.2  # it stands
+    assert np.ptp(trace.x[:, 0]) > 0.02  # and moves
+
+
+def test_a_machine_that_tips_stops_its_motor():
+    rig = smc.rig("stepper_furuta", holding_torque=1e-3, arm_friction=0.05)  # too weak to move the arm
+    trace = smc.run(rig.scenario(x0=(0.0, 0.03), duration=2.0))
+    assert abs(trace.x[-1, 1]) > 1.0
+    assert (trace.u[-100:] == 0.0).all()
+    assert PREDICTION.fallen(stepper_record.figures(record(alpha=lambda t: 40.0 + 0.0 * t)))
+
+
+def record(alpha=lambda t: 0.0 * t, theta=lambda t: 0.0 * t, speed=lambda t: 0.0 * t, duration=60.0):
+    """A record of known signals, degrees and steps/s, in rows of 20 ms."""
+    t, h = 0.02 * np.arange(round(duration / 0.02)), 1e-6
+    rates = ((f(t + h) - f(t - h)) / (2.0 * h) for f in (alpha, theta))
+    measured = (alpha(t), next(rates), theta(t), next(rates))
+    columns = (1e3 * t, *measured, 10.0 + 0.0 * t, speed(t), STEPS * theta(t), 0.0 * t)
+    return dict(zip(stepper_record.COLUMNS, columns, strict=True))
+
+
+def test_the_figures_of_known_signals_are_theirs():
+    """In degrees, alpha = 2 sin(5.08 Hz) is opposite to theta = sin; theta' lags the speed command by 80 degrees."""
+    w = 2.0 * math.pi * 50.0 * 26.0 / 256.0
+    lag = math.radians(80.0)
+    found = stepper_record.figures(
+        record(
+            lambda t: 2.0 * np.sin(w * t),
+            lambda t: -np.sin(w * t),
+            lambda t: STEPS / 1.2 * w * -np.cos(w * t + lag),
+        )
+    )
+    assert found["alpha_rms"] == pytest.approx(math.sqrt(2.0), rel=1e-3)
+    assert found["centroid"] == pytest.approx(50.0 * 26.0 / 256.0, abs=0.02)
+    assert (found["ratio"], found["phase"]) == (pytest.approx(2.0, rel=1e-6), pytest.approx(-180.0, abs=1e-6))
+    assert (found["gain"], found["lag"]) == (pytest.approx(1.2, rel=1e-3), pytest.approx(-80.0, abs=0.1))
+    assert found["acceleration_rms"] == 10.0
+
+
+def test_rests_count_from_a_fifth_of_a_second():
+    """Runs of 0.1 s after 0.14 s and after 0.3 s of rest: only the long rests count."""
+
+    def speed(t):
+        phase = np.round(t / 0.02) % 32
+        return np.where((phase < 5) | ((phase >= 12) & (phase < 17)), 60.0, 49.0)
+
+    found = stepper_record.figures(record(speed=speed, duration=67.0))
+    assert found["running"] == pytest.approx(10 / 32, abs=0.01)
+    assert found["resting"] == pytest.approx(15 / 32, abs=0.01)
+    assert found["starts"] == pytest.approx(60.0 * 2 / 0.64, rel=0.02)
+
+
+def test_a_run_is_logged_as_the_firmware_sees_it():
+    """Its rows are every fourth tick, its angles rounded and trimmed, its speed the sum of its accelerations."""
+    one = smc.rig("stepper_furuta").scenario(x0=PREDICTION.start(1), seed=1, duration=25.0)
+    trace = smc.run(one)
+    rows = stepper_record.logged(trace)
+    gaps = np.diff(rows["timestamp_ms"])
+    assert pytest.approx(np.median(gaps)) == 20.0
+    assert np.sum(gaps > 25.0) == pytest.approx(25, abs=2)  # a pause a second
+    assert gaps.max() == pytest.approx(27.25, abs=0.01)  # 7.3 ms in whole physics steps
+    theta = np.degrees(np.interp(rows["timestamp_ms"] / 1e3 - 2e-3, trace.t, trace.x[:, 0]))
+    assert np.abs(rows["theta_deg"] - theta).max() < 0.5 * 360.0 / 4096 + 0.02
+    assert np.abs(rows["vel_cmd_steps_s"]).max() > 50.0
+    loop = stepper_record.figures(rows)
+    assert loop["alpha_rms"] < 2.0
+
+
+def test_a_recording_is_loaded_and_a_bad_one_refused(tmp_path):
+    rows, path = record(np.sin), tmp_path / "hold.csv"
+
+    def write(names):
+        with path.open("w", newline="") as file:
+            out = csv.writer(file)
+            out.writerow(names)
+            out.writerows(np.column_stack([rows[name] for name in names]).tolist())
+
+    write(stepper_record.COLUMNS)
+    loaded = stepper_record.load(path)
+    assert all(np.array_equal(loaded[name], rows[name]) for name in rows)
+    write(stepper_record.COLUMNS[:-1])
+    with pytest.raises(smc.ScenarioError, match="lacks the column position_clamped"):
+        stepper_record.load(path)
+    path.write_text(",".join(stepper_record.COLUMNS) + "\n" + ",".join("x" * 9) + "\n")
+    with pytest.raises(smc.ScenarioError, match="no number"):
+        stepper_record.load(path)
+    with pytest.raises(smc.ScenarioError, match="5 rows: give at least 1000"):
+        stepper_record.figures({name: values[:5] for name, values in rows.items()})
+
+
+@pytest.mark.parametrize("condition", PREDICTION.recorded)
+def test_the_recorded_figures_are_those_of_the_machines_file(condition):
+    file = RECORDS / f"linear_{condition}.csv"
+    if not file.exists():
+        pytest.skip("the recordings have no licence, and are not here")
+    found = stepper_record.figures(stepper_record.load(file))
+    for name, value in PREDICTION.recorded[condition].items():
+        assert found[name] == pytest.approx(value, rel=0.05), name
+
+
+def told(by_law, falls=()):
+    """Figures of one set whose laws have these alpha_rms, at all seeds; runs of `falls` fell."""
+    made = {
+        ("", "set 1", law, "hold"): [{"alpha_rms": value, "alpha_max": 99.0 if law in falls else 1.0}] * 3
+        for law, value in zip(PREDICTION.order, by_law, strict=True)
+    }
+    return predictions.Told(smc.rig("stepper_furuta"), PREDICTION, made)
+
+
+def test_laws_are_in_the_machines_order_or_not():
+    assert (told((1, 2, 3)).ordered("hold"), told((1, 2, 3)).correlation("hold")) == ((1, 1), 1.0)
+    assert (told((3, 2, 1)).ordered("hold"), told((3, 2, 1)).correlation("hold")) == ((0, 1), -1.0)
+    assert told((1, 3, 2)).correlation("hold") == pytest.approx(1 / 3)
+    fallen = told((1, 2, 0), falls=PREDICTION.order[2:])
+    assert (fallen.ordered("hold"), fallen.falls(PREDICTION.order[2], "hold")) == ((1, 1), 1.0)  # a fall is the worst
+    assert len(fallen.of(PREDICTION.order[2], "hold", "alpha_rms")) == 0
+    with pytest.raises(smc.ScenarioError, match="emps has no figures to predict: give a record"):
+        predictions.predicted(smc.rig("emps"))
