@@ -94,7 +94,9 @@ class Told:
 def predicted(
     rig: "Rig", seeds: int = 4, sets: int = 0, ablate: bool = True, report: Callable[[int], None] = lambda count: None
 ) -> Told:
-    """Run every law on every parameter set from every seed, in all conditions; without parts, in the first condition.
+    """Run every law on every parameter set from every seed, in all conditions.
+
+    Without parts of the twin, only in the first condition, and from a quarter of the seeds.
 
     `sets`: only so many of the ensemble; 0: all. `report` is called with the number of runs after each batch.
     """
@@ -109,10 +111,11 @@ def predicted(
         for member, one in members.items():
             changed = one.with_values(changes, "left out")
             keys = [(law, under) for law in laws for under in (prediction.conditions if not without else (first,))]
-            scenarios = [_scenario(changed, laws[law], under, seed) for law, under in keys for seed in range(seeds)]
+            count = max(1, seeds // 4) if without else seeds
+            scenarios = [_scenario(changed, laws[law], under, seed) for law, under in keys for seed in range(count)]
             found = [prediction.figures(trace) for trace in run(scenarios)]
             for i, (law, under) in enumerate(keys):
-                values[without, member, law, under] = found[i * seeds : (i + 1) * seeds]
+                values[without, member, law, under] = found[i * count : (i + 1) * count]
             report(len(scenarios))
     return Told(rig, prediction, values)
 
