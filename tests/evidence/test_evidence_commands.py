@@ -19,6 +19,8 @@ from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.rigs.identify import Identified
+from smc_mujoco.evidence.rigs.machines.stepper_furuta import PREDICTION
+from smc_mujoco.evidence.rigs.predictions import Told
 from smc_mujoco.evidence.rigs.rig import Fall
 
 ROWS = (boards.Row("mine", 1.234, 8.08, 1.8, 0.0104, 88.52, 0.6549), boards.Row("SAC", 2.5, 10.0, 3.0, 0.1, 99.0, 0.5))
@@ -111,13 +113,24 @@ def audited(about, ids, sets, quick, threads, report):
 def repeated(name):
     """A twin whose replays are texts."""
     twin = SimpleNamespace(name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated)
-    twin.columns = SimpleNamespace(time="t")
+    twin.columns, twin.members = SimpleNamespace(time="t"), lambda: {"set 1": twin}
     twin.fit, twin.idle = (lambda _: {"x": 99.04, "u": 1.25}), (lambda _: {"x": -0.04, "u": 0.0})
     twin.fits = lambda _: [{"x": Fall(8.44), "u": -20.0}]
     twin.predictions = lambda _: [(f"{name} predicted", "measured", "times")]
     twin.replay = lambda record, start, duration: f"{name} from {start} for {duration}"
     twin.measured = lambda record, start, duration: f"measured from {start} for {duration}"
     return twin
+
+
+def predicted(twin, seeds):
+    """Predictions in which the first law has its recorded figures, the second twice these, and the third falls."""
+    about, values = PREDICTION, {}
+    for without in ("", "queue"):
+        for i, law in enumerate(about.order):
+            for condition in ("hold",) if without else about.conditions:
+                made = {name: (i + 1) * value for name, value in about.recorded[condition].items()}
+                values[without, "set 1", law, condition] = [made | {"alpha_max": 90.0} if i == 2 else made] * seeds
+    return Told(twin, about, values)
 
 
 FOUND = SimpleNamespace(tried=40, value=0.3125, scenario=smc.Scenario(plant="duffing", law="pid"))
@@ -146,6 +159,7 @@ STUBS = {  # of each command: the functions replaced, and what they give
     "rig": {
         "evidence.rigs.identify.identify": lambda of, many, *_, **__: identified(len(many)),
         "evidence.rigs.rig.rig": repeated,
+        "evidence.rigs.predictions.predicted": predicted,
         "evidence.rigs.records.load": lambda file, names: {"t": np.array([3.0, 4.0])},
         "evidence.rigs.figure.residual_figure": [Path("run.svg")],
         "simulation.run.run": lambda runs: runs,
@@ -162,6 +176,7 @@ REFUSED = (
     "rig --fit emps a.csv --set mass=much",
     "rig emps a.csv b.csv",
     "rig emps a.csv --starts 3",
+    "rig emps a.csv --seeds 3",
 )
 AXIS = ("mass 120.500 0.021 95.1 kg", "offset 6.000 7 -3.16 N", "a.csv 99.0 (99.0) 81.0 (81.5)", "(correlation -0.999)")
 AXIS += ("0 N s/m", "0 (6 ± 7)", "0.0981 times")
@@ -214,6 +229,11 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         "run(['emps from 1.5 for 6.0', 'driver from 1.5 for 6.0', 'quanser from 1.5 for 6.0'])",
         "filmed(['measured from 1.5 for 6.0', 'emps from 1.5 for 6.0',", "'emps: run, from 4.5 s of the record'",
         "['measured', 'twin', 'driver', 'quanser']", "driver falls at 8.4 s -20.0", "wrote run.svg wrote film.mp4"]),
+    "rig stepper_furuta --seeds 2": (0, [
+        "rig('stepper_furuta') predicted(", "Fitted on: linear", "alpha rms 0.439 0.439 0.844 0.844 deg",
+        "resting 0.800 0.800", "two states hold 0.878 2132 0.128 9.46 0", "four states nudges all fall all fall",
+        "whole 0.439 0.878 all fall 1 of 1 1.00", "0.439…0.439 0.878…0.878", "without 0.439 0.878 all fall",
+        "the order of the three laws on", "2 seeds each"]),
     "rig emps run.csv --film film.mp4": (0, ["run(['emps from None for None'])", "from 5 s of the record'"]),
 }  # fmt: skip
 

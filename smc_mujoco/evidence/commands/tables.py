@@ -131,40 +131,50 @@ def predicted(told: Told) -> list[Table]:
     about = told.prediction
     right = {"justify": "right"}
     heads = [Column(f"{name},\n{who}", **right) for name in about.recorded for who in ("machine", "twin")]
-    fitted = titled(f"Fitted on: {about.fitted_on}, median (5 to 95 %) of seeds and sets", "figure", *heads, "unit")
+    fitted = titled(f"Fitted on: {about.fitted_on}; median, and 5 to 95 % of seeds and sets", "figure", *heads, "unit")
     for figure in about.recorded[next(iter(about.recorded))]:
         cells = [
             cell
             for name, figures in about.recorded.items()
-            for cell in (number(figures[figure]), _spread(told.of(about.fitted_on, name, figure)))
+            for cell in _fitted(told, name, figure, figures.get(figure))
         ]
-        fitted.add_row(figure, *cells, about.units[figure])
-    shown = [Column(f"{figure}\n{about.units[figure]}", **right) for figure in about.shown]
-    laws = titled("Predicted, but for the law fitted on", "law", "condition", *shown, Column("falls\n%", **right))
+        fitted.add_row(figure.replace("_", " "), *cells, about.units[figure])
+    shown = [Column(f"{figure.replace('_', ' ')}\n{about.units[figure]}", **right) for figure in about.shown]
+    heads = [Column("law", no_wrap=True), "", *shown, Column("falls\n%", **right)]
+    laws = titled("Predicted, but for the law fitted on", *heads, pad_edge=False)
     for law in about.order:
         for name in about.conditions:
             cells = [_spread(told.of(law, name, figure)) for figure in about.shown]
-            laws.add_row(law, name, *cells, f"{100.0 * told.falls(law, name):.0f}")
+            laws.add_row(law.replace("_", " "), name, *cells, f"{100.0 * told.falls(law, name):.0f}")
     first = next(iter(about.conditions))
-    medians = [Column(f"{law}\n{about.rank}", **right) for law in about.order]
-    title = f"What of the twin decides it: {first}, median (5 to 95 %)"
+    medians = [Column(law.replace("_", " "), **right) for law in about.order]
+    title = f"What of the twin decides it: {about.rank.replace('_', ' ')} in {first}, {about.units[about.rank]}"
     parts = titled(title, "twin", *medians, Column("sets in the\nmachine's order", **right), Column("tau", **right))
     for without in dict.fromkeys(key[0] for key in told.values):
         cells = [_spread(told.of(law, first, about.rank, without)) for law in about.order]
-        falls = [told.falls(law, first, without) for law in about.order]
-        cells = [f"{cell}, {100 * fell:.0f} % fall" if fell else cell for cell, fell in zip(cells, falls, strict=True)]
+        for i, law in enumerate(about.order):
+            if 0.0 < (fell := told.falls(law, first, without)) < 1.0:
+                cells[i] += f"\n{100.0 * fell:.0f} % fall"
         count, sets = told.ordered(first, without)
         label = f"without {without}" if without else "whole"
         parts.add_row(label, *cells, f"{count} of {sets}", f"{told.correlation(first, without):z.2f}")
     return [fitted, laws, parts]
 
 
+def _fitted(told: Told, condition: str, figure: str, recorded: float | None) -> tuple[str, str]:
+    """Return the machine's figure and the twin's, empty if none was recorded."""
+    if recorded is None:
+        return "", ""
+    return number(recorded), _spread(told.of(told.prediction.fitted_on, condition, figure))
+
+
 def _spread(values: np.ndarray) -> str:
-    """Return the median of a figure and its range, as "0.44 (0.21 to 0.9)"."""
+    """Return the median of a figure, and its range in a second line, as "0.21…0.9"."""
     if not len(values):
         return "all fall"
-    middle, low, high = (number(float(f"{value:.3g}")) for value in percentiles(values))
-    return f"{middle} ({low} to {high})"
+    middle, *ends = percentiles(values)
+    low, high = (f"{float(f'{value:.3g}'):g}" for value in ends)
+    return f"{number(middle)}\n{low}…{high}"
 
 
 def _to_error(value: float, error: float) -> str:

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.quick
 
 MACHINES = (
     *("emps", "ip02", "qube_servo", "qube_servo_2", "qube_servo_3", "realaigym_acrobot", "simple_pendulum_ak80"),
-    "srv02",
+    *("srv02", "stepper_furuta"),
 )
 
 

@@ -28,8 +28,8 @@ ABLATED = "its number here is the machine's; 0 leaves it out"
 STEP = 2.5e-4  # s
 LAWS = (
     firmware(kind=LINEAR).named("linear"),
-    firmware(kind=TWO_STATES).named("sliding_two_states"),
-    firmware(kind=FOUR_STATES, top=12e3, speed=2e3).named("sliding_four_states"),
+    firmware(kind=TWO_STATES).named("two_states"),
+    firmware(kind=FOUR_STATES, top=12e3, speed=2e3).named("four_states"),
 )
 
 
@@ -140,7 +140,7 @@ PREDICTION = Prediction(
         },
     },
     fitted_on="linear",
-    order=("linear", "sliding_two_states", "sliding_four_states"),
+    order=("linear", "two_states", "four_states"),
     rank="alpha_rms",
     fallen=lambda found: not found["alpha_max"] < 30.0,
     left_out={
