@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from statistics import median_low
@@ -129,8 +130,8 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
 def predicted(told: Told) -> list[Table]:
     """Return three tables of predictions: what was fitted on, what is predicted, and which parts decide the order."""
     about = told.prediction
-    right = {"justify": "right"}
-    heads = [Column(f"{name},\n{who}", **right) for name in about.recorded for who in ("machine", "twin")]
+    right = functools.partial(Column, justify="right")
+    heads = [right(f"{name},\n{who}") for name in about.recorded for who in ("machine", "twin")]
     fitted = titled(f"Fitted on: {about.fitted_on}; median, and 5 to 95 % of seeds and sets", "figure", *heads, "unit")
     for figure in about.recorded[next(iter(about.recorded))]:
         cells = [
@@ -139,17 +140,17 @@ def predicted(told: Told) -> list[Table]:
             for cell in _fitted(told, name, figure, figures.get(figure))
         ]
         fitted.add_row(figure.replace("_", " "), *cells, about.units[figure])
-    shown = [Column(f"{figure.replace('_', ' ')}\n{about.units[figure]}", **right) for figure in about.shown]
-    heads = [Column("law", no_wrap=True), "", *shown, Column("falls\n%", **right)]
+    shown = [right(f"{figure.replace('_', ' ')}\n{about.units[figure]}") for figure in about.shown]
+    heads = [Column("law", no_wrap=True), "", *shown, right("falls\n%")]
     laws = titled("Predicted, but for the law fitted on", *heads, pad_edge=False)
     for law in about.order:
         for name in about.conditions:
             cells = [_spread(told.of(law, name, figure)) for figure in about.shown]
             laws.add_row(law.replace("_", " "), name, *cells, f"{100.0 * told.falls(law, name):.0f}")
     first = next(iter(about.conditions))
-    medians = [Column(law.replace("_", " "), **right) for law in about.order]
+    medians = [right(law.replace("_", " ")) for law in about.order]
     title = f"What of the twin decides it: {about.rank.replace('_', ' ')} in {first}, {about.units[about.rank]}"
-    parts = titled(title, "twin", *medians, Column("sets in the\nmachine's order", **right), Column("tau", **right))
+    parts = titled(title, "twin", *medians, right("sets in the\nmachine's order"), right("tau"))
     for without in dict.fromkeys(key[0] for key in told.values):
         cells = [_spread(told.of(law, first, about.rank, without)) for law in about.order]
         for i, law in enumerate(about.order):

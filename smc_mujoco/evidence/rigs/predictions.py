@@ -127,8 +127,6 @@ def _scenario(rig: "Rig", law: Any, condition: str, seed: int) -> Any:
     return rig.scenario(law, x0=prediction.start(seed), seed=seed, **prediction.conditions[condition])
 
 
-def percentiles(values: np.ndarray) -> tuple[float, float, float]:
-    """Return the median of a figure, and the ends of its RANGE; NaN without values."""
-    if not len(values):
-        return (np.nan,) * 3
-    return float(np.median(values)), *(float(np.percentile(values, p)) for p in RANGE)
+def percentiles(values: np.ndarray) -> list[float]:
+    """Return the median of a figure, and the ends of its RANGE."""
+    return [float(np.percentile(values, p)) for p in (50.0, *RANGE)]

@@ -17,7 +17,7 @@ from numba import njit
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.evidence.rigs import firmware
-from smc_mujoco.simulation.prepare import pause_phase
+from smc_mujoco.simulation.prepare import IDEAL_SENSOR, pause_phase
 from smc_mujoco.simulation.signals import after_pauses
 from smc_mujoco.simulation.trace import Trace
 
@@ -79,11 +79,12 @@ def logged(trace: Trace) -> dict[str, np.ndarray]:
     late = [after_pauses(k, s.steps, pause, samples, pause_phase(s)) if pause else 0 for k in range(s.samples)]
     ran = np.flatnonzero(np.array(late) >= 0)
     t = s.control_period * ran + s.physics_step * np.array(late)[ran]
-    sensor, places = s.sensor, []
+    sensor, places = s.sensor or IDEAL_SENSOR, []
     for i in range(2):
         x = np.interp(t - sensor.delay - i * sensor.skew, trace.t, trace.x[:, i]) + sensor.bias
-        places.append(np.round(x / sensor.quantum(True)) * sensor.quantum(True))
-    rows = _replayed(t, *places, trace.r[ran, 0], Gains(**s.law.gains))
+        count = sensor.quantum(True)
+        places.append(count * np.round(x / count) if count else x)
+    rows = _replayed(t, places[0], places[1], trace.r[ran, 0], Gains(**s.law.gains))
     steps = firmware.STEPS * firmware.DEGREES
     rate = steps * trace.u[ran, 0]  # of the speed
     speed = np.cumsum(rate * np.diff(t, prepend=t[0]))
