@@ -130,7 +130,7 @@ def predicted(twin, seeds):
             for condition in ("hold",) if without else about.conditions:
                 made = {name: (i + 1) * value for name, value in about.recorded[condition].items()}
                 values[without, "set 1", law, condition] = [made | {"alpha_max": 90.0} if i == 2 else made] * seeds
-    return Told(twin, about, values)
+    return Told(about, values)
 
 
 FOUND = SimpleNamespace(tried=40, value=0.3125, scenario=smc.Scenario(plant="duffing", law="pid"))

@@ -10,16 +10,13 @@ predicted.
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.trace import Trace
-
-if TYPE_CHECKING:
-    from smc_mujoco.evidence.rigs.rig import Rig
 
 RANGE = 5.0, 95.0  # percentiles that are told of a figure
 Figures = dict[str, float]  # figure -> value
@@ -47,7 +44,6 @@ class Prediction:
 class Told:
     """The figures of many runs: (left out, set, law, condition) -> those of each seed."""
 
-    rig: "Rig"
     prediction: Prediction
     values: Mapping[tuple[str, str, str, str], Sequence[Figures]]
 
@@ -92,9 +88,9 @@ class Told:
 
 
 def predicted(
-    rig: "Rig", seeds: int = 4, sets: int = 0, ablate: bool = True, report: Callable[[int], None] = lambda count: None
+    rig: Any, seeds: int = 4, sets: int = 0, ablate: bool = True, report: Callable[[int], None] = lambda count: None
 ) -> Told:
-    """Run every law on every parameter set from every seed, in all conditions.
+    """Run every law of a Rig on every parameter set from every seed, in all conditions.
 
     Without parts of the twin, only in the first condition, and from a quarter of the seeds.
 
@@ -117,14 +113,13 @@ def predicted(
             for i, (law, under) in enumerate(keys):
                 values[without, member, law, under] = found[i * count : (i + 1) * count]
             report(len(scenarios))
-    return Told(rig, prediction, values)
+    return Told(prediction, values)
 
 
-def _scenario(rig: "Rig", law: Any, condition: str, seed: int) -> Any:
+def _scenario(rig: Any, law: Any, condition: str, seed: int) -> Any:
     """Return the run of a law from a seed's start in a condition."""
-    prediction = rig.prediction
-    assert prediction is not None
-    return rig.scenario(law, x0=prediction.start(seed), seed=seed, **prediction.conditions[condition])
+    about = rig.prediction
+    return rig.scenario(law, x0=about.start(seed), seed=seed, **about.conditions[condition])
 
 
 def percentiles(values: np.ndarray) -> list[float]:
