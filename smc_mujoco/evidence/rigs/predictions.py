@@ -56,7 +56,8 @@ class Told:
             for figures in runs
             if not self.prediction.fallen(figures)
         ]
-        return np.array(chosen)
+        values = np.array(chosen)
+        return values[np.isfinite(values)]  # a spectrum of an arm that rests has no phase
 
     def falls(self, law: str, condition: str, without: str = "") -> float:
         """Return the share of runs that fell."""
