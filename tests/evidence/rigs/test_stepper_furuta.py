@@ -138,14 +138,16 @@ def test_rests_count_from_a_fifth_of_a_second():
 
 def test_a_run_is_logged_as_the_firmware_sees_it():
     """Its rows are every fourth tick, its angles rounded and trimmed, its speed the sum of its accelerations."""
-    one = smc.rig("stepper_furuta").scenario(x0=PREDICTION.start(1), seed=1, duration=25.0)
+    rig = smc.rig("stepper_furuta")
+    one = rig.scenario(x0=PREDICTION.start(1), seed=1, duration=25.0)
     trace = smc.run(one)
     rows = stepper_record.logged(trace)
     gaps = np.diff(rows["timestamp_ms"])
     assert pytest.approx(np.median(gaps)) == 20.0
     assert np.sum(gaps > 25.0) == pytest.approx(25, abs=2)  # a pause a second
     assert gaps.max() == pytest.approx(27.25, abs=0.01)  # 7.3 ms in whole physics steps
-    theta = np.degrees(np.interp(rows["timestamp_ms"] / 1e3 - 2e-3, trace.t, trace.x[:, 0]) + one.sensor.bias)
+    arm = np.interp(rows["timestamp_ms"] / 1e3 - 2e-3, trace.t, trace.x[:, 0])
+    theta = np.degrees(arm + rig.values["upright_error"])
     assert np.abs(rows["theta_deg"] - theta).max() < 0.5 * 360.0 / 4096 + 0.02
     assert np.abs(rows["vel_cmd_steps_s"]).max() > 50.0
     loop = stepper_record.figures(rows)
