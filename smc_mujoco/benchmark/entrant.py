@@ -19,6 +19,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 MODULE = "smc_mujoco.benchmark.entrant"
 POLL = 0.2  # s, between two looks at how many runs are done
+AT_ONCE = 256  # runs of a problem whose scenarios are in memory: chosen
 MAX_FAILURES = 3  # that are told
 
 
@@ -34,15 +35,17 @@ def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any
         for name in order["problems"]:
             one = problem(name)
             say(f"making its law for {one.plant}")
-            law = entry.law(one.plant)
-            scenarios = one.scenarios(law, instances, order["number"])
-            if not about:
-                about.update(_about(entry, scenarios[0], timed=order["timed"]))
-            say(f"running {name}")
-            start = time.process_time()
-            found = runs.rows(one, scenarios, instances, failures)
-            spent, done = spent + time.process_time() - start, done + len(found)
-            Path(order["count"]).write_text(str(done), encoding="utf-8")
+            law, found = entry.law(one.plant), list[runs.Row]()
+            for i in range(0, len(instances), AT_ONCE):
+                part = instances[i : i + AT_ONCE]
+                scenarios = one.scenarios(law, part, order["number"])
+                if not about:
+                    about.update(_about(entry, scenarios[0], timed=order["timed"]))
+                say(f"running {name}")
+                start = time.process_time()
+                found += runs.rows(one, scenarios, part, failures)
+                spent, done = spent + time.process_time() - start, done + len(part)
+                Path(order["count"]).write_text(str(done), encoding="utf-8")
             yield found
 
     runs.write(Path(order["rows"]), groups())

@@ -108,6 +108,21 @@ def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path
     assert str(found.compare(smc.results(archive))).count("the same") == 4
 
 
+def test_a_table_does_not_depend_on_how_many_runs_are_in_memory_at_once(tmp_path, monkeypatch):
+    most, tables = [], []
+    rows = runs.rows
+    monkeypatch.setattr(runs, "rows", lambda one, part, *rest: (most.append(len(part)), rows(one, part, *rest))[1])
+    order = {"folder": "pid", "number": "", "problems": PROBLEMS, "instances": [*range(5)], "timed": False}
+    for at_once in (2, 5):
+        monkeypatch.setattr(entrant, "AT_ONCE", at_once)
+        table = tmp_path / f"{at_once}.parquet"
+        entrant.attempt(order | {"rows": str(table), "count": str(tmp_path / "count")}, lambda stage: None)
+        tables.append(table.read_bytes())
+    assert most == [2, 2, 1, 2, 2, 1, 5, 5]
+    assert tables[0] == tables[1]
+    assert (tmp_path / "count").read_text() == "10"
+
+
 STATEFUL = HEAD + "SEEN = []\n\n\n" + LAW % "-gains.k * y.e - 1e-4 * (SEEN.append(y.e) or len(SEEN))"
 
 
