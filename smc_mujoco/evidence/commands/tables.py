@@ -140,7 +140,8 @@ def predicted(told: Told) -> list[Table]:
             for cell in _fitted(told, name, figure, figures.get(figure))
         ]
         fitted.add_row(figure.replace("_", " "), *cells, about.units[figure])
-    shown = [right(f"{figure.replace('_', ' ')}\n{about.units[figure]}") for figure in about.shown]
+    words = [figure.replace("_", " ").replace("acceleration", "accel.") for figure in about.shown]
+    shown = [right(f"{name}\n{about.units[figure]}") for name, figure in zip(words, about.shown, strict=True)]
     heads = [Column("law", no_wrap=True), "", *shown, right("falls\n%")]
     laws = titled("Predicted, but for the law fitted on", *heads, pad_edge=False)
     for law in about.order:
@@ -170,12 +171,12 @@ def _fitted(told: Told, condition: str, figure: str, recorded: float | None) -> 
 
 
 def _spread(values: np.ndarray) -> str:
-    """Return the median of a figure, and its range in a second line, as "0.21…0.9"."""
+    """Return the median of a figure, and in a second line its range, if it has one, as "0.21…0.9"."""
     if not len(values):
         return "all fall"
     middle, *ends = percentiles(values)
-    low, high = (f"{float(f'{value:.3g}'):g}" for value in ends)
-    return f"{number(middle)}\n{low}…{high}"
+    low, high = (f"{float(f'{value:.{2 if abs(value) < 1.0 else 3}g}'):g}" for value in ends)
+    return number(middle) if low == high else f"{number(middle)}\n{low}…{high}"
 
 
 def _to_error(value: float, error: float) -> str:
