@@ -17,14 +17,17 @@ own, see `entrant`.
 """
 
 import ast
+import builtins
 import dataclasses
 import hashlib
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from smc_mujoco.benchmark.problem import rules, versions
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
@@ -40,22 +43,46 @@ DIVISIONS = {
     "free": "a set for each plant, found in any way",
 }
 EVERYWHERE = "all"  # the set of gains of the division "one set"
-MODULES = {"__future__", "math", "numpy", "smc_mujoco"}  # that a checked law's file may import
-REFUSED_NAMES = {"__import__", "breakpoint", "compile", "delattr", "eval", "exec", "globals", "input", "locals", "open",
-                 "setattr", "vars"}  # fmt: skip
-# names in numpy that read, write or draw
-BEYOND_NAMES = {
-    "load",
-    "save",
-    "fromfile",
-    "tofile",
-    "memmap",
-    "ctypeslib",
-    "loadtxt",
-    "genfromtxt",
-    "savetxt",
-    "f2py",
-    "random",
+MODULES = {"math", "numpy", "smc_mujoco"}  # that a checked law's file may import
+BUILTINS = {
+    *(
+        "abs",
+        "all",
+        "any",
+        "bool",
+        "dict",
+        "divmod",
+        "enumerate",
+        "float",
+        "int",
+        "isinstance",
+        "len",
+        "list",
+        "max",
+        "min",
+    ),
+    *("pow", "range", "reversed", "round", "set", "sorted", "str", "sum", "tuple", "zip"),
+    *("ArithmeticError", "ValueError", "ZeroDivisionError", "__name__"),
+}
+FRAMES = {"gi_frame", "cr_frame", "ag_frame", "tb_frame"}  # from which all names of Python can be reached
+WRITERS = {"tofile", "dump"}  # of arrays
+NUMPY_NAMES = {
+    *(
+        "arange",
+        "argmax",
+        "argmin",
+        "array",
+        "asarray",
+        "clip",
+        "cross",
+        "diag",
+        "dot",
+        "empty",
+        "eye",
+        "float64",
+        "full",
+    ),
+    *("interp", "linspace", "max", "min", "ndarray", "ones", "sum", "trapezoid", "zeros"),
 }
 LIBRARY_NAMES = {"law_function", "Measurement", "surface_function", "estimator_function"}  # that it may take from smc
 
@@ -93,10 +120,8 @@ class Entry:
         """Why importing a law's file of Python may do more than define functions; "" if it cannot."""
         if self.file is None or self.file.suffix != ".py":
             return ""
-        for node in ast.walk(ast.parse(self.file.read_text(encoding="utf-8"))):
-            if what := _beyond(node):
-                line = getattr(node, "lineno", 1)
-                return f"line {line} of {self.file.name} has {what}, which can do more than compute"
+        for line, what in _beyond(ast.parse(self.file.read_text(encoding="utf-8"))):
+            return f"line {line} of {self.file.name} has {what}, which can do more than compute"
         return ""
 
     @property
@@ -187,29 +212,41 @@ def _gains(sets: object, division: str) -> Mapping[str, Mapping[str, float]]:
     )
 
 
-def _beyond(node: ast.AST) -> str:
-    """Return what a node of a law's file may do beside computing, in words; "" for nothing."""
-    if isinstance(node, ast.Import | ast.ImportFrom):
-        return _beyond_import(node)
-    if isinstance(node, ast.Attribute):
-        of_library = isinstance(node.value, ast.Name) and node.value.id in ("smc", "smc_mujoco")
-        refused = (
-            node.attr not in LIBRARY_NAMES if of_library else node.attr.startswith("_") or node.attr in BEYOND_NAMES
-        )
-        return f".{node.attr}" if refused else ""
-    if isinstance(node, ast.Name):
-        return node.id if node.id in REFUSED_NAMES or node.id.startswith("__") else ""
-    return "a global that changes" if isinstance(node, ast.Global | ast.Nonlocal) else ""
+def _beyond(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Yield the line and the words of all in a law's file that may do more than compute: what is not known not to."""
+    nodes = [*ast.walk(tree)]
+    named = [name for node in nodes if isinstance(node, ast.Import) for name in node.names]
+    modules = {name.asname or name.name: name.name for name in named}
+    bases = {id(node.value) for node in nodes if isinstance(node, ast.Attribute)}
+    for node in nodes:
+        what = ""
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            what = _imported(node)
+        elif isinstance(node, ast.Attribute):
+            module = modules.get(node.value.id) if isinstance(node.value, ast.Name) else None
+            what = "" if _computes(module, node.attr) else f".{node.attr}"
+        elif isinstance(node, ast.Name):
+            known = node.id in BUILTINS or not (hasattr(builtins, node.id) or node.id.startswith("__"))
+            what = "" if known and (node.id not in modules or id(node) in bases) else node.id
+        elif isinstance(node, ast.Global | ast.Nonlocal | ast.Match):  # a pattern reads attributes by name
+            what = f"a {type(node).__name__.lower()} statement"
+        if what:
+            yield getattr(node, "lineno", 1), what
 
 
-def _beyond_import(node: ast.Import | ast.ImportFrom) -> str:
+def _imported(node: ast.Import | ast.ImportFrom) -> str:
     """Return what an import brings that may do more than compute, in words; "" for nothing."""
     if isinstance(node, ast.Import):
         far = [name.name for name in node.names if name.name not in MODULES]
         return f"import {far[0]}" if far else ""
-    module, names = node.module or ".", [name.name for name in node.names]
-    if module == "smc_mujoco":
-        names = [name for name in names if name not in LIBRARY_NAMES]
-    elif module in MODULES:
-        names = [name for name in names if name in BEYOND_NAMES or name.startswith("_")]
-    return f"from {module} import {names[0]}" if names else ""
+    far = [name.name for name in node.names if node.module not in MODULES or not _computes(node.module, name.name)]
+    return f"from {node.module or '.'} import {far[0]}" if far and node.module != "__future__" else ""
+
+
+def _computes(module: str | None, name: str) -> bool:
+    """Return whether a name in a module, or of any other object (None), is known to do no more than compute."""
+    if name.startswith("_"):
+        return False
+    if module == "numpy":
+        return name in NUMPY_NAMES or isinstance(getattr(np, name, None), np.ufunc | float)
+    return name in LIBRARY_NAMES if module == "smc_mujoco" else name not in FRAMES | WRITERS

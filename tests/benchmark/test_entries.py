@@ -1,5 +1,6 @@
 """Entries, entering and results: what is taken, refused and marked, and where entries stand."""
 
+import re
 import shutil
 
 import numpy as np
@@ -80,12 +81,22 @@ def test_an_entry_has_one_law(tmp_path):
         ("RUN = math.__loader__", ".__loader__"),
         ("import numpy as np\nZ = np.load('z.npy')", ".load"),
         ("exec('import os')", "exec"),
+        ("OPEN = getattr(math, 'x')", "getattr"),  # any name from a text
+        ("import smc_mujoco as lib\nSEED = lib.problem('duffing/noise@1').instance(0).seed", ".problem"),
+        ("lib = smc\nSEED = lib.problem('duffing/noise@1').instance(0).seed", "smc"),
+        ("import numpy as np\nnp.savez('z')", ".savez"),
+        ("from numpy import *", r"from numpy import \*"),
+        ("import numpy.ctypeslib", "import numpy.ctypeslib"),
+        ("ALL = (i for i in []).gi_frame.f_builtins", ".gi_frame"),
+        ("match math:\n    case object(__loader__=loader):\n        pass", "a match statement"),
     ],
 )
 def test_a_file_that_can_do_more_than_compute_is_told(line, words, tmp_path):
     cheat = entry.read(written(tmp_path / "entry", PLAIN.replace("\n\n\n", f"\n\n{line}\n\n", 1)))
-    assert f"has {words}, which can do more than compute" in cheat.why_unread
-    assert entry.read(written(tmp_path / "plain")).why_unread == ""
+    assert re.search(f"has {words}, which can do more than compute", cheat.why_unread)
+    fair = "import numpy as np\nfrom math import pi\nK = np.array([np.sqrt(pi), np.inf])"
+    first, main = "from __future__ import annotations", "if __name__ == '__main__':\n    K = max(K)\n"
+    assert entry.read(written(tmp_path / "fair", f"{first}\n{fair}\n{PLAIN}\n{main}")).why_unread == ""
 
 
 def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path, small):
