@@ -1,6 +1,7 @@
 """The pendulum on a stepper: its firmware's laws are those that are told, and its figures those of known signals."""
 
 import csv
+import dataclasses
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -204,3 +205,27 @@ def test_laws_are_in_the_machines_order_or_not():
     assert len(fallen.of(PREDICTION.order[2], "hold", "alpha_rms")) == 0
     with pytest.raises(smc.ScenarioError, match="emps has no figures to predict: give a record"):
         predictions.predicted(smc.rig("emps"))
+
+
+@pytest.mark.slow
+def test_the_plain_twin_has_the_machines_order_reversed():
+    """Every law runs in every condition, without a part only in the first, and from a quarter of the seeds."""
+    plain = "all of these, noise and vibration"
+    short = dataclasses.replace(
+        PREDICTION,
+        conditions={name: {**fields, "duration": 22.0} for name, fields in PREDICTION.conditions.items()},
+        left_out={plain: PREDICTION.left_out[plain]},
+    )
+    rig = dataclasses.replace(smc.rig("stepper_furuta"), prediction=short, ensemble=())
+    done = []
+    found = predictions.predicted(rig, seeds=2, report=done.append)
+    counts = {key: len(values) for key, values in found.values.items()}
+    assert counts == {
+        **{("", "set 1", law, name): 2 for law in short.order for name in ("hold", "nudges")},
+        **{(plain, "set 1", law, "hold"): 1 for law in short.order},
+    }
+    assert done == [12, 3]
+    assert found.correlation("hold", plain) == -1.0
+    alone = {law: found.of(law, "hold", "alpha_rms", plain) for law in short.order}
+    assert alone["linear"] > 100.0 * max(alone["two_states"], alone["four_states"])
+    assert found.of("two_states", "hold", "alpha_rms").min() > 100.0 * alone["two_states"]
