@@ -103,9 +103,13 @@ class Objective:
         """
         return self._instance(plant, law, MAX_SEARCHES * seed + search)
 
-    def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
+    def undisturbed(self, plant: Plant | str, law: Component) -> Scenario:
+        """Return the run that all conditions change, from the plant's own start."""
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
-        first = Scenario(plant=plant, law=law, **common)
+        return Scenario(plant=plant, law=law, **common)
+
+    def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
+        first = self.undisturbed(plant, law)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]
         cases = []
         for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):

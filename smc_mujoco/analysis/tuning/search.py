@@ -335,7 +335,13 @@ class Task(NamedTuple):
 
 def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
-    first, *_ = goal.scenarios(plant, law, seed)
+    goal.scenarios(plant, law, seed)  # raises for one that cannot be
+    return _planned(plant, law, goal, budget, seed, threads)
+
+
+def _planned(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
+    """Return the same without a check of the conditions."""
+    first = goal.undisturbed(plant, law)
     bound = goal.u_max or default_u_max(first.plant)
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
@@ -344,10 +350,13 @@ def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed
     return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
 
 
-def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
-    """Return why a law cannot be tuned on a plant, in a sentence; "" if it can. BrokenLawError: no run of it can be."""
+def why_not(plant: Plant, law: Component | Template, goal: Objective, conditions: bool = True) -> str:
+    """Return why a law cannot be tuned on a plant, in a sentence; "" if it can. BrokenLawError: no run of it can be.
+
+    `conditions`: whether those of the objective are checked, too.
+    """
     try:
-        _task(plant, coerce.law(law), goal, BUDGET, 0, None)
+        (_task if conditions else _planned)(plant, coerce.law(law), goal, BUDGET, 0, None)
     except BrokenLawError:
         raise
     except ScenarioError as error:
@@ -363,7 +372,7 @@ def expected_seconds(
     Most of an evaluation's time is the mechanism's. So the first of the library's laws stands for all of them; a law of
     the user's, which may not compile, is evaluated itself.
     """
-    tasks = [_task(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
+    tasks = [_planned(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
     seconds, of_library = 0.0, None
     for task in tasks:
         if catalogue().get(task.law.name) is not task.law.template:
