@@ -36,6 +36,9 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "passivity_based": {"c": (3.0, 40.0), "K": (0.01, 1.0), "k": (0.003, 0.3), "width": (0.03, 1.0)},
     "time_delay_sliding": {"c": (3.0, 40.0), "k": (3.0, 300.0), "width": (0.03, 1.0), "m": (0.03, 1.0)},
     "observer_free_joint": {"k1": (3.0, 40.0), "lam": (0.1, 1.0)},
+    "adrc_computed_torque": {"wc": (3.0, 40.0), "w": (10.0, 400.0)},
+    "pd_observer_computed_torque": {"wc": (3.0, 40.0), "l": (3.0, 400.0)},
+    "lqi_computed_torque": {"q0": (1e2, 1e9), "q1": (1e2, 3e6), "q2": (1.0, 6e3)},
 }
 
 

@@ -36,6 +36,7 @@ WALL_POSE = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which
 
 BY_LIMIT = {"passivity_based": ("K", "k"), "observer_free_joint": ("lam",)}  # gains: factor times a motor's limit
 BY_INERTIA = {"time_delay_sliding": ("m",)}  # gains: factor times a joint's inertia in the ready pose
+OUTER = {f"{name}_computed_torque": name for name in ("adrc", "pd_observer", "lqi")}  # rivals without a sliding mode
 GAINS: Mapping[str, Mapping[str, float]] = {  # law -> gain, or its factor, as the search found them
     "computed_torque_sliding": {"c": 36.0, "k": 67.0, "width": 0.4},
     "super_twisting_computed_torque": {"c": 16.0, "k1": 28.0, "k2": 340.0},
@@ -71,7 +72,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
         values[gain] = [values[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
     for gain in BY_INERTIA.get(name, ()):
         values[gain] = [values[gain] * joint for joint in inertia()]  # pyright: ignore[reportArgumentType]
-    made = law(name, **values)
+    made = law(name, **values) if name not in OUTER else law(OUTER[name], **values).on_computed_torque()
     return made if gains else made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
 
 

@@ -144,6 +144,10 @@ class Component:
         """Whether its compiled code reads its arguments and constants alone, see `smc_mujoco.control.checked`."""
         return not self.why_unchecked
 
+    def on_computed_torque(self) -> "Component":
+        """Return a law of many joints with this law, of one channel, as the outer law of computed torque."""
+        return importlib.import_module("smc_mujoco.control.outer_law").on_computed_torque(self)  # which imports this
+
     def of_channel(self, i: int) -> "Component":
         """Return the component of channel i, with one number for each gain."""
         if self.joint:
