@@ -167,8 +167,7 @@ class Extent:
     duration: float = DURATION
 
 
-# Without `mpc`, which has no gains on networks yet: twelve searches take it some ten minutes of processor time on each.
-FULL = Extent(laws=tuple(law for law in COMPARED if law != "mpc"), conditions=IDEAL + REAL, seeds=24)
+FULL = Extent(conditions=IDEAL + REAL, seeds=24)
 # It takes a minute on 2 cores.
 QUICK = Extent(
     plants=("inverted_pendulum", "van_der_pol", "duffing"),
