@@ -31,6 +31,8 @@ from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.control import gain_sets
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
+from smc_mujoco.evidence.report.families import FAMILIES
+from smc_mujoco.evidence.report.families import told as told_by
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
@@ -40,14 +42,6 @@ from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Noise, Sine
 
-FAMILIES = {
-    "switching": (
-        *("classical", "adaptive", "super_twisting", "conditioned_super_twisting", "implicit_first_order"),
-        *("twisting", "terminal"),
-    ),
-    "smoothed": ("observer_free", "boundary_layer"),  # the same surface, and a steep slope in place of the sign
-    "rivals": ("pid", "extended_state", "adrc", "pd_observer", "lqi", "mpc", "loop_shaping"),
-}
 RUNS, DURATION, U_MAX, LOAD = 12, 8.0, 6.0, 1.0  # runs a cell; s; N or N m
 VELOCITY_NOISE_RATIO = 5.0  # 1/s, as in margins
 LEVELS = {
@@ -118,15 +112,6 @@ def scores(made: Sequence[Scenario]) -> np.ndarray:
     return values
 
 
-def chosen(values: np.ndarray) -> tuple[np.ndarray, list[int]]:
-    """Return a family's score in each run, (RUNS,), of the law that the other half of the runs chose, and both laws."""
-    told, best = np.empty(RUNS), []
-    for half in (0, 1):
-        best.append(int(np.median(values[:, 1 - half :: 2], axis=1).argmin()))
-        told[half::2] = values[best[-1], half::2]
-    return told, best
-
-
 def cells(plant: str, axis: str, level: float, families: dict[str, list[str]]) -> Iterator[dict]:
     """Yield the lead of sliding mode at a level, of each kind in each score: above 1, it is that many times better."""
     made = {law: list(scenarios(plant, axis, level, law)) for laws in families.values() for law in laws}
@@ -135,7 +120,7 @@ def cells(plant: str, axis: str, level: float, families: dict[str, list[str]]) -
     for k, score in enumerate(SCORES):
         told, best, told_fine = {}, {}, {}
         for family, laws in families.items():
-            told[family], picked = chosen(np.array([values[law][k] for law in laws]))
+            told[family], picked = told_by(np.array([values[law][k] for law in laws]))
             best[family] = [laws[i] for i in picked]
             for law in set(best[family]) - set(fine):
                 fine[law] = scores([halved(one) for one in made[law]])

@@ -68,7 +68,8 @@ class Training(VecEnv):
         self.last, done = self.actions.copy(), ended | cut
         its, infos = self.observed(seen), [{} for _ in range(COPIES)]
         if done.any():
-            assert done.all() and not ended.any()
+            assert done.all()
+            assert not ended.any()
             infos = [{"terminal_observation": one, "TimeLimit.truncated": True} for one in its]
             its = self.reset()
         return its, -cost.astype(np.float32), done, infos
@@ -125,8 +126,8 @@ def trained(seed: int, steps: int, path: Path) -> list[tuple[np.ndarray, np.ndar
     if not path.exists():
         torch.set_num_threads(1)
         start = time.process_time()
-        network = {"net_arch": [32, 32], "log_std_init": -1.0}
-        model = PPO("MlpPolicy", Training(seed), n_steps=50, batch_size=800, n_epochs=8, learning_rate=lambda left: 1e-3 * left,
+        network, rate = {"net_arch": [32, 32], "log_std_init": -1.0}, lambda left: 1e-3 * left
+        model = PPO("MlpPolicy", Training(seed), n_steps=50, batch_size=800, n_epochs=8, learning_rate=rate,
                     gamma=0.98, policy_kwargs=network, seed=seed, device="cpu")  # fmt: skip
         model.learn(steps)
         parts = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]

@@ -44,6 +44,9 @@ GAINS: Mapping[str, Mapping[str, float]] = {  # law -> gain, or its factor, as t
     "passivity_based": {"c": 34.0, "K": 0.25, "k": 0.0056, "width": 0.1},
     "time_delay_sliding": {"c": 36.0, "k": 67.0, "width": 0.4, "m": 0.14},
     "observer_free_joint": {"k1": 39.0, "lam": 0.78},
+    "adrc_computed_torque": {"wc": 34.0, "w": 130.0},
+    "pd_observer_computed_torque": {"wc": 34.0, "l": 93.0},
+    "lqi_computed_torque": {"q0": 5.2e8, "q1": 1.1e5, "q2": 630.0},
 }
 
 

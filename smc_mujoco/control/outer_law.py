@@ -2,9 +2,9 @@
 
     smc.law("adrc", wc=12.0).on_computed_torque()
 
-u = M(x) (v + r'') + h(x, v) with the nominal M and h, and v_i the outer law's command for joint i. With the perfect model
-each joint obeys e'' = v + d_a, d_a = M^-1 d, whatever the others do, so the outer law meets the double integrator of
-its theorem: its b is 1, and what it estimates or integrates is friction, payload and the model's error, as an
+u = M(x) (v + r'') + h(x, v) with the nominal M and h, and v_i the outer law's command for joint i. With the perfect
+model each joint obeys e'' = v + d_a, d_a = M^-1 d, whatever the others do, so the outer law meets the double integrator
+of its theorem: its b is 1, and what it estimates or integrates is friction, payload and the model's error, as an
 acceleration. The bound that it is told of is the acceleration that its motor can still give while the others rest,
 (u_max - |h_i|) / M_ii, so its anti-windup is right for one joint that saturates, and approximate for several.
 """
@@ -19,7 +19,6 @@ from smc_mujoco.common.jit import named
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.joint_law import torque
 from smc_mujoco.control.law import Measurement, law_function
-
 
 _templates: dict[Callable, Template] = {}  # function of an outer law -> its law of many joints
 
@@ -58,7 +57,9 @@ def _template(outer: Template) -> Template:
         return torque(y, v), s
 
     law.__name__ = law.__qualname__ = f"{outer.name}_computed_torque"
-    law.__doc__ = f"Computed torque with {outer.label or outer.name} as its outer law, see smc_mujoco.control.outer_law."
+    law.__doc__ = (
+        f"Computed torque with {outer.label or outer.name} as its outer law, see smc_mujoco.control.outer_law."
+    )
     made = law_function(
         joint=True, family=outer.family, continuous=outer.continuous, requires_model=True, gains=own,
         memory=outer.memory, label=f"{outer.label or outer.name} on computed torque",

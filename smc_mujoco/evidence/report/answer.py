@@ -14,6 +14,7 @@ from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable
 from smc_mujoco.evidence.accuracy.scaling import ORDER_BAND
 from smc_mujoco.evidence.audit.verdict import totals
 from smc_mujoco.evidence.report import words
+from smc_mujoco.evidence.report.families import FAMILIES, METRIC, Lead, counted
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.studies.adviser import MIN_SETTLED
 from smc_mujoco.studies.worst_case import WorstCase, WorstCases
@@ -191,6 +192,16 @@ def first(findings: "Findings", metrics: Sequence[str]) -> str:
     if len(wins) > 1:
         return "No law is the best in every respect, nor in every condition: it depends on what is asked, and where."
     return "No law is shown to be the best in every respect and condition."
+
+
+def families(leads: Sequence[Lead]) -> str:
+    """Return in how many cells each family of laws is first."""
+    counts = counted(leads)
+    shares = [
+        f"{words.FAMILY[name]} in {counts[name] or 'none'}" for name in sorted(FAMILIES, key=lambda f: -counts[f])
+    ]
+    where = f"First in {words.metric(METRIC)}, in {len(leads)} plants and conditions"
+    return f"{where}: {joined(shares)}; in {counts[''] or 'none'} it is open."
 
 
 def sure(findings: "Findings", metrics: Sequence[str]) -> str:

@@ -30,7 +30,7 @@ from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import about, families, films, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -87,6 +87,7 @@ class Findings:
 
     medians: bytes  # SVG, of the laws under the first condition
     scores: tuple[Score, ...]
+    leads: tuple[families.Lead, ...]  # of families of laws, in each cell that has two of them
     boards: Sequence[Board]  # of each plant and metric, over the conditions
     claims: Sequence[Claim]
     fields: tuple[Field, ...]
@@ -137,6 +138,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
         return Findings(
             medians=films.medians(table, plan.conditions[0]),
             scores=scores.scores(table, boards),
+            leads=tuple(families.leads(table)),
             boards=boards,
             claims=claims,
             fields=fields(plan),

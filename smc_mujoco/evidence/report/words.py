@@ -27,6 +27,7 @@ SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "^2": "²", "alphadot": "α′",
 SIGNS |= {"Vdot": "V′", "xdot": "x′"}
 
 __all__ = ["MARKS", "law", "short", "style"]
+FAMILY = {"switching": "sliding mode that switches", "smoothed": "smoothed sliding mode", "rivals": "no sliding mode"}
 
 
 def number(value: float) -> str:

@@ -20,6 +20,7 @@ from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.report import answer, charts, page, rigs, words
 from smc_mujoco.evidence.report.about import About, Gains
+from smc_mujoco.evidence.report.families import Lead
 from smc_mujoco.evidence.report.films import Scene
 from smc_mujoco.evidence.report.oscillation import Oscillation
 from smc_mujoco.evidence.report.plan import Plan
@@ -259,6 +260,12 @@ def oscillations():
             )
 
 
+def leads():
+    """In one cell a family is surely first, in another it may not be; others have none."""
+    yield Lead(PLANTS[0], CONDITIONS[0], "rivals", "switching", 1.5, 1.2, 1.9, ("adrc", "mpc"))
+    yield Lead(PLANTS[1], CONDITIONS[0], "switching", "smoothed", 2.0, 0.8, 9.0, ("terminal",))
+
+
 def machines():
     """The QUBE-Servo, on which one law wins in one metric, several in another and none in a third."""
     twin = smc.rig("qube_servo")
@@ -326,7 +333,7 @@ def about():
 @pytest.fixture(scope="module")
 def findings():
     found = tuple(margins())
-    made = scores, boards, claims, fields, fronts, oscillations, basins, machines, repeated, scenes
+    made = scores, leads, boards, claims, fields, fronts, oscillations, basins, machines, repeated, scenes
     return Findings(
         **{one.__name__: tuple(one()) for one in made}, medians=b"<svg></svg>", worst=tuple(worst_cases()),
         margins=found, by_set={"tuned": found[:6], "study": found[:4]}, accuracies=AccuracyTable(accuracies()),
