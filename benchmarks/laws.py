@@ -4,7 +4,8 @@
 
 "call" is the law's compiled C function alone, on states that vary from sample to sample. "sample" is all that the
 callback does once a control period in a channel - read, estimate, nominal model, law, clip, log - with that law in it,
-for a row of 100 pendulums; the target, 3x the classical law, is held to it. Only ratios within one run mean anything on
+for a row of 100 pendulums; the target, 3x the classical law, is held to it, but for `mpc`, which solves a program where
+its bounds come and go, as on these states: the median over a run's samples is held to 4x pid. Only ratios within one run mean anything on
 a shared machine; each number is the least of several rounds, for what else runs only adds to it.
 """
 
@@ -22,6 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.law_time import law_time
 from smc_mujoco.common.jit import call
 from smc_mujoco.control.component import Component
 from smc_mujoco.control.estimator import catalogue as estimators
@@ -29,6 +31,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.callback import callback, installed
+from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.state import FINE
@@ -36,7 +39,7 @@ from smc_mujoco.simulation.state import FINE
 QUICK = "--quick" in sys.argv
 CALLS, ROUNDS = (50_000, 5) if QUICK else (200_000, 15)
 SAMPLES, PENDULUMS = (200, 100) if QUICK else (500, 100)
-MOST = 3.0  # times the classical law
+MOST, SOLVERS, MOST_OF_PID = 3.0, ("mpc",), 4.0  # times the classical law; other laws; times pid, in a run
 AT = {name: i for i, name in enumerate(Measurement._fields)}
 E, DE, A = AT["e"], AT["de"], AT["a"]
 
@@ -131,7 +134,7 @@ def main() -> None:
     for name in laws():
         blind, seeing = (nanoseconds(smc.law(name), drive, model) for model in (0.0, 1.0))
         whole = sample(name) if general(name) else np.nan
-        worst = max(worst, whole / sample_base if general(name) else 0.0)
+        worst = max(worst, whole / sample_base if general(name) and name not in SOLVERS else 0.0)
         rows.append((blind, name, seeing, whole))
     for blind, name, seeing, whole in sorted(rows):
         shown = ("", "") if np.isnan(whole) else (f"{whole:.0f}", f"{whole / sample_base:.2f}")
@@ -139,6 +142,12 @@ def main() -> None:
     console.print(table)
     verdict = "held" if worst <= MOST else "missed"
     console.print(f"largest time per sample: {worst:.2f}x classical, target <= {MOST:g}x: {verdict}", highlight=False)
+    for name in SOLVERS:
+        its = law_time(case("duffing", name, "nominal", 2.0, "tuned", 0))
+        assert its is not None
+        verdict = "held" if its.ratio <= MOST_OF_PID else "missed"
+        words = f"{1e9 * its.median:.0f} ns, 99 % {1e9 * its.high:.0f} ns, {its.ratio:.2f}x pid"
+        console.print(f"{name} in a run: {words}, target <= {MOST_OF_PID:g}x: {verdict}", highlight=False)
     table = Table(box=box.SIMPLE_HEAD, title="Velocity estimators, ns", title_justify="left")
     for head in ("estimator", "call", "x classical", "sample", "x measured"):
         table.add_column(head, justify="left" if head == "estimator" else "right", no_wrap=True)
