@@ -9,6 +9,8 @@ the comparison and under constant torques of up to 1 N m, with a period of 10 ms
 ms. Bound, plant, starts, noise and loads of the comparison are the same for all. No seed is left out.
 """
 
+# pyright: reportMissingImports=false
+# (torch and stable-baselines3 are installed for this script alone)
 import argparse
 import json
 import math

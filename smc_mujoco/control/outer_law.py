@@ -9,6 +9,8 @@ acceleration. The bound that it is told of is the acceleration that its motor ca
 (u_max - |h_i|) / M_ii, so its anti-windup is right for one joint that saturates, and approximate for several.
 """
 
+# pyright: reportCallIssue=false
+# (the fields of a law's gains are known when it is made)
 import dataclasses
 from collections.abc import Callable
 

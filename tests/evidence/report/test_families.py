@@ -1,6 +1,7 @@
 """The lead of a family of laws over the next, by hand."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ pytestmark = pytest.mark.quick
 RUNS = 12
 
 
-def lead(sets=None, floor=0.0, **scores):
+def lead(sets=None, floor=0.0, **scores) -> Any:
     its = {law: np.broadcast_to(np.asarray(values, float), RUNS).copy() for law, values in scores.items()}
     return families.lead(its, {law: np.arange(RUNS) if sets is None else sets for law in its}, floor)
 
