@@ -1,7 +1,7 @@
 """The benchmark's targets, controls and rank correlations, from runs of the catalogue.
 
     python benchmarks/problems.py measure laws visible.json
-    python benchmarks/problems.py measure controls controls.json --number random --instances 48
+    python benchmarks/problems.py measure controls controls.json --number random --instances 24
     python benchmarks/problems.py freeze visible.json controls.json   # writes the targets into the rules
     python benchmarks/problems.py measure laws hidden.json --number random
     python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
@@ -31,7 +31,8 @@ from smc_mujoco.simulation.run import stream
 
 INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
-MARGIN = 1.25  # of a target over the oracle's worst, and of zero's best over a target
+ATTACKED = 2  # instances against an adversary
+MARGIN = 1.25  # of a target over the oracle's worst, and of zero's best over a target; 2 against an adversary
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
 BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "itae", "calm": "calm"}
 Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURES)
@@ -42,18 +43,13 @@ def cells(version: int = 1) -> list[str]:
     return [f"{cell}@{version}" for cell in problems.cells(version)]
 
 
-def laws_of(kind: str, plant: str) -> dict[str, Law]:
-    """Return the laws to run on a plant, by name."""
+def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
+    """Return the laws to run on a problem, by name."""
     if kind == "controls":
-        of = problems.rules(1)
-        widths = of["more"].get(plant, {}).get("bandwidths", of["bandwidths"])
-        oracles = {f"oracle {w:g}": controls.oracle_of(plant, w) for w in widths}
+        oracles = {f"oracle {w:g}": controls.oracle_of(one.plant, w) for w in one.bandwidths}
         return {"zero": controls.zero()} | oracles
-    return {
-        law: gain_sets.law(plant, law)
-        for law in gain_sets.general()
-        if gain_sets.in_set(find_plant(plant), law, "tuned")
-    }
+    plant = find_plant(one.plant)
+    return {law: gain_sets.law(plant, law) for law in gain_sets.general() if gain_sets.in_set(plant, law, "tuned")}
 
 
 def measure(kind: str, out: Path, number: str, instances: int) -> None:
@@ -61,15 +57,16 @@ def measure(kind: str, out: Path, number: str, instances: int) -> None:
     done: dict = json.loads(out.read_text()) if out.exists() else {"number": number, "runs": {}}
     number, runs = done["number"], done["runs"]
     for name in (name for name in cells() if name not in runs):
-        one = problems.problem(name)
-        if not (laws := laws_of(kind, one.plant)):
+        one, attacked = problems.problem(name), "/worst" in name
+        laws, count = laws_of(kind, one), min(instances, ATTACKED) if attacked else instances
+        if not laws or (attacked and kind == "laws"):
             continue
-        scenarios = [s for law in laws.values() for s in one.scenarios(law, range(instances), number)]
+        scenarios = [s for law in laws.values() for s in one.scenarios(law, range(count), number)]
         found = [[math.nan]] * len(scenarios)
         for i, trace in stream(scenarios):
             values = one.measures(trace)
             found[i] = [values[measure] for measure in MEASURES]
-        runs[name] = {law: found[i * instances : (i + 1) * instances] for i, law in enumerate(laws)}
+        runs[name] = {law: found[i * count : (i + 1) * count] for i, law in enumerate(laws)}
         out.write_text(json.dumps(done))
         print(name, file=sys.stderr, flush=True)
 
@@ -94,12 +91,12 @@ def levels(laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Ma
 
 def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
     """Return the targets of a problem and the oracle's bandwidth; None where a control forbids it."""
-    rules, best = problems.rules(int(name.partition("@")[2])), None
+    rules, best, margin = problems.rules(int(name.partition("@")[2])), None, 2.0 if "/worst" in name else MARGIN
     for label, oracle in runs.items():
         if not label.startswith("oracle"):
             continue
         w = float(label.split()[1])
-        worst = {m: MARGIN * float(oracle[:, MEASURES.index(m)].max()) for m in problems.MEASURES}
+        worst = {m: margin * float(oracle[:, MEASURES.index(m)].max()) for m in problems.MEASURES}
         if not all(map(math.isfinite, worst.values())):
             continue
         found = {m: levels(laws, m, worst[m], rules) for m in problems.MEASURES}
@@ -109,7 +106,7 @@ def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.nda
     if best is None:
         return None
     _, w, found, worst = best
-    bound = float(runs["zero"][:, MEASURES.index("accuracy")].min()) / MARGIN  # harder than what u = 0 reaches
+    bound = float(runs["zero"][:, MEASURES.index("accuracy")].min()) / margin  # harder than what u = 0 reaches
     if worst["accuracy"] > bound:
         return None
     found["accuracy"] = [min(level, bound) for level in found["accuracy"]]

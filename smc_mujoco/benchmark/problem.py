@@ -71,8 +71,14 @@ class Problem:
 
     @functools.cached_property
     def _values(self) -> Mapping[str, Any]:
-        """The rules' values for the plant."""
-        return rules(self.version) | rules(self.version)["more"].get(self.plant, {})
+        """The rules' values for the plant and the condition."""
+        of = rules(self.version)
+        return of | of["more"].get(self.plant, {}) | (of["worst"] if self._attacked else {})
+
+    @property
+    def _attacked(self) -> bool:
+        """Whether an adversary chooses the runs of each law."""
+        return self.condition in rules(self.version)["worst"]["conditions"]
 
     @functools.cached_property
     def _frozen(self) -> Mapping[str, Any]:
@@ -88,6 +94,11 @@ class Problem:
     def duration(self) -> float:
         """Length of every run, s."""
         return self._values["duration"]
+
+    @property
+    def bandwidths(self) -> tuple[float, ...]:
+        """Those from which the oracle's is chosen, rad/s."""
+        return tuple(self._values["bandwidths"])
 
     @property
     def targets(self) -> dict[str, tuple[float, ...]]:
@@ -140,7 +151,7 @@ class Problem:
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
             law = gain_sets.law(self.plant, law) if shipped else gain_sets.law(self.plant, law, "default")
         changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
-        base = case(self.plant, law, self.condition, self.duration, changes=changes)
+        base = case(self.plant, law, "nominal" if self._attacked else self.condition, self.duration, changes=changes)
         return dataclasses.replace(base, **controls.truth()) if controls.is_oracle(base.law) else base
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
@@ -155,7 +166,16 @@ class Problem:
             disturbance=[_scaled(signal, force) for signal in base.disturbance],
             seed=drawn.seed,
         )
-        return scenario.named(self.condition)
+        return (self._worst(scenario) if self._attacked else scenario).named(self.condition)
+
+    def _worst(self, scenario: Scenario) -> Scenario:
+        """Return the worst run that an adversary finds for the scenario's law."""
+        from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
+        from smc_mujoco.studies.worst_case import worst_case
+
+        within = Uncertainty(**self._values["conditions"][self.condition])
+        found = worst_case(scenario, within=within, budget=self._values["budget"], seed=scenario.seed).scenario
+        return dataclasses.replace(found, **controls.truth()) if controls.is_oracle(scenario.law) else found
 
     def measures(self, trace: Trace) -> dict[str, float]:
         """Return the measures of a run, and the time from which each target is reached and kept, s (NaN for never).
@@ -224,7 +244,8 @@ def cells(version: int) -> list[str]:
     of = rules(version)
     each: dict[str, list[str]] = {plant: of["conditions"] for plant in of["plants"]}  # noqa: C420
     each |= {plant: fields["conditions"] for plant, fields in of["more"].items()}
-    return [f"{plant}/{condition}" for plant, conditions in each.items() for condition in conditions]
+    of_each = [f"{plant}/{condition}" for plant, conditions in each.items() for condition in conditions]
+    return of_each + [f"{plant}/{condition}" for plant in of["plants"] for condition in of["worst"]["conditions"]]
 
 
 def versions() -> tuple[str, ...]:
