@@ -34,7 +34,7 @@ MEASURES = "failed", "accuracy", "itae", "settling", "calm"
 ATTACKED = 2  # instances against an adversary
 MARGIN = 1.25  # of a target over the oracle's worst, and of zero's best over a target; 2 against an adversary
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
-BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "itae", "calm": "calm"}
+BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURES)
 
 
@@ -123,9 +123,25 @@ def freeze(visible: Runs, of_controls: Runs) -> None:
             continue
         texts = [f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]" for m in problems.MEASURES]
         lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]:g} }}')
+    write_suites(left_out)
     text = path.read_text().partition(MARK)[0] + MARK
     path.write_text(text + f"[frozen]\nleft_out = {json.dumps(left_out)}\n\n" + "\n".join(lines) + "\n")
     print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
+
+
+def write_suites(left_out: Sequence[str]) -> None:
+    """Write the lists of the suites, without the problems that are left out."""
+    every = [name for name in cells() if name.partition("@")[0] not in left_out]
+    lists = {
+        "smc-30@1": ("Those that the pattern of version 1 chooses, 3 of 5, see suite.py.", suite.pattern(1, 3)),
+        "smc-50@1": ("All problems of the pattern's plants and conditions.", suite.pattern(1, 5)),
+        "smc-arm@1": ("The arm of two links.", [name for name in every if name.startswith("double_pendulum")]),
+        "smc-carts@1": ("A joint without an actuator.", [n for n in every if n.startswith(("cart_pole", "furuta"))]),
+        "smc-worst@1": ("The paper's plants against an adversary.", [name for name in every if "/worst" in name]),
+    }
+    for name, (words, chosen) in lists.items():
+        text = "".join(f"{one}\n" for one in chosen if one in every)
+        (suite.SUITES / f"{name}.txt").write_text(f"# {words}\n{text}")
 
 
 def board(runs: Runs, names: Sequence[str], question: str) -> np.ndarray:

@@ -38,7 +38,7 @@ NUMBER = re.compile(r"[0-9a-f]{64}|")
 DRAWS = 8  # of an instance, see the rules
 STEP = 4096  # of the generator's counter from one instance to the next
 MAX_INSTANCE = 10**9  # chosen
-MEASURES = "accuracy", "itae", "calm"  # that have targets
+MEASURES = "accuracy", "settling", "calm"  # that have targets
 FACTORS = "mass", "disturbance"
 
 
@@ -110,7 +110,7 @@ class Problem:
 
     @property
     def controls(self) -> dict[str, Law]:
-        """The laws of the controls: "zero", which must reach no target."""
+        """The laws of the controls: "zero", which reaches no target, and "oracle", which reaches all."""
         return {"zero": controls.zero(), "oracle": controls.oracle_of(self.plant, self._frozen["oracle"])}
 
     def instance(self, index: int, number: str = "") -> Instance:
@@ -182,8 +182,8 @@ class Problem:
 
         failed: 1 for a run that failed, whose other measures are infinite. accuracy, itae [s^2], settling [s] into 2 %
         and calm [1/s], the variation of u per second over its bound, are of the whole trace; "accuracy_1" is the time
-        of the first target, the hardest. A level of itae or calm counts from the time from which the easiest accuracy
-        holds, because effort counts only where the error does.
+        of the first target, the hardest. A level of calm counts from the time from which the easiest accuracy holds,
+        because effort counts only where the error does.
         """
         if trace.failure is not None or trace.diverged_at is not None:
             values = {"failed": 1.0} | dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
@@ -198,19 +198,19 @@ class Problem:
             "failed": 0.0,
             "accuracy": max(float(worst[conventions.last_part(trace)].max()), self._values["floor"]),
             "itae": float(np.trapezoid(trace.t * total, trace.t)),
-            "settling": conventions.last_exit(trace.t, worst, conventions.SETTLING_BAND),
+            "settling": _kept(trace, worst, conventions.SETTLING_BAND),
             "calm": float(variation.max() / self.duration),
         }
         return values | self._times(trace, worst, values)
 
     def _times(self, trace: Trace, worst: np.ndarray, values: Mapping[str, float]) -> dict[str, float]:
         """Return the time of each target, by name."""
-        reached = [conventions.last_exit(trace.t, worst, level) for level in self.targets.get("accuracy", ())]
+        reached = [_kept(trace, worst, level) for level in self.targets.get("accuracy", ())]
         times = dict(zip(self._names(), map(_or_never, reached), strict=False))
-        holds = _or_never(reached[-1]) if reached else math.nan
-        for measure in MEASURES[1:]:
+        counted = {"settling": _or_never(values["settling"]), "calm": _or_never(reached[-1]) if reached else math.nan}
+        for measure, time in counted.items():
             for i, level in enumerate(self.targets.get(measure, ()), 1):
-                times[f"{measure}_{i}"] = holds if values[measure] <= level else math.nan
+                times[f"{measure}_{i}"] = time if values[measure] <= level else math.nan
         return times
 
     def _names(self) -> list[str]:
@@ -275,6 +275,12 @@ def _scaled(signal: Any, factor: float) -> Any:
     """Return a disturbance times a factor."""
     name = "sigma" if hasattr(signal, "sigma") else "amplitude"
     return dataclasses.replace(signal, **{name: factor * getattr(signal, name)})
+
+
+def _kept(trace: Trace, error: np.ndarray, level: float) -> float:
+    """Return the time from which an error, (K + 1,), is kept below a level, s; inf if that is in the last fifth."""
+    time = conventions.last_exit(trace.t, error, level)
+    return time if time <= trace.t[conventions.last_part(trace)][0] else math.inf
 
 
 def _or_never(time: float) -> float:

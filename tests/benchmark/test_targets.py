@@ -1,0 +1,88 @@
+"""Targets are quantiles of the catalogue's medians, which the oracle reaches and u = 0 does not; and suites."""
+
+import collections
+import math
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from benchmarks import problems as script
+from smc_mujoco.benchmark import problem, suite
+
+CELL = "duffing/noise@1"
+FRESH = "5d" * 32  # a number from which nothing was frozen
+
+
+def runs(accuracy: list[float], settling: float = 1.0, calm: float = 1.0) -> np.ndarray:
+    """The measures of some runs, which differ in accuracy."""
+    return np.array([[0.0, one, 1.0, settling, calm] for one in accuracy])
+
+
+LAWS = {f"law{i}": runs([1e-9, 0.01 * i, 1e9], settling=0.1 * i, calm=float(i)) for i in range(1, 22)}
+
+
+def frozen(oracle: np.ndarray, zero: list[float]) -> dict | None:
+    return script.targets(CELL, LAWS, {"zero": runs(zero, math.inf, 0.0), "oracle 16": oracle})
+
+
+@pytest.mark.quick
+def test_levels_are_the_quantiles_of_the_medians():
+    """Of 1, 2, ... 21 the quantiles at 10, 25, 50, 75 and 90 % are 3, 6, 11, 16 and 19."""
+    found = frozen(runs([1e-6], 0.01, 0.01), [1.0])
+    assert found is not None
+    for measure, unit in (("accuracy", 0.01), ("settling", 0.1), ("calm", 1.0)):
+        assert found[measure] == pytest.approx([unit * i for i in (3, 6, 11, 16, 19)])
+    assert found["oracle"] == 16.0
+
+
+@pytest.mark.quick
+def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing():
+    found = frozen(runs([0.01, 0.08], 0.01, 0.01), [0.3, 0.2])
+    assert found is not None
+    assert found["accuracy"] == pytest.approx([0.1, 0.1, 0.11, 0.16, 0.16])  # 0.08 x 1.25, and 0.2 / 1.25
+    assert frozen(runs([0.08]), [0.12]) is None
+    assert frozen(runs([math.inf]), [1.0]) is None
+
+
+@pytest.mark.quick
+def test_a_suite_takes_each_plant_and_condition_equally_often_and_no_law_has_a_say():
+    thirty, fifty = suite.suite("smc-30@1"), suite.suite("smc-50@1")
+    rules = problem.rules(1)
+    chosen = [
+        f"{plant}/{condition}@1"
+        for j, plant in enumerate(rules["plants"])
+        for i, condition in enumerate(rules["conditions"])
+        if (i + 2 * j + 1) % 5 < 3 and f"{plant}/{condition}" not in rules["frozen"]["left_out"]
+    ]
+    assert list(thirty) == chosen
+    assert set(thirty) < set(fifty)
+    plants, conditions = (
+        collections.Counter(p) for p in zip(*(i.split("@")[0].split("/") for i in thirty), strict=True)
+    )
+    assert set(plants.values()) | set(conditions.values()) <= {5, 6, 3, 2}
+
+
+@pytest.mark.quick
+def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_board():
+    for name in {name for one in suite.suites() for name in suite.suite(one)}:
+        targets = smc.problem(name).targets
+        assert set(targets) == set(problem.MEASURES), name
+        assert all(len(levels) == 5 and list(levels) == sorted(levels) for levels in targets.values()), name
+        assert {"speed", "calm"} <= set(suite.boards(name))
+    assert suite.boards("duffing/sine@1") == ("forces", "speed", "calm")
+    assert suite.boards("duffing/encoder@1") == ("sensors", "speed", "calm")
+    with pytest.raises(smc.ScenarioError, match="smc-31"):
+        suite.suite("smc-31@1")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted({name for one in suite.suites() for name in suite.suite(one)}))
+def test_both_controls_on_instances_that_nobody_saw(name):
+    one = smc.problem(name)
+    instances = range(1) if "/worst" in name else range(4)
+    for control, reached in (("zero", False), ("oracle", True)):
+        for trace in smc.run(one.scenarios(one.controls[control], instances, FRESH)):
+            times = {key: time for key, time in one.measures(trace).items() if key.rpartition("_")[2].isdigit()}
+            assert len(times) == 15
+            assert {key for key, time in times.items() if math.isnan(time) == reached} == set(), control
