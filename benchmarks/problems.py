@@ -32,7 +32,8 @@ from smc_mujoco.simulation.run import stream
 INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
 ATTACKED = 2  # instances against an adversary
-MARGIN = 1.25  # of a target over the oracle's worst, and of zero's best over a target; 2 against an adversary
+MARGIN = 1.25  # of a target over the oracle's worst; 2 against an adversary
+NEAR = 0.1  # of its start: a problem in which u = 0 ends there is left out
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
 BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURES)
@@ -106,8 +107,8 @@ def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.nda
     if best is None:
         return None
     _, w, found, worst = best
-    bound = float(runs["zero"][:, MEASURES.index("accuracy")].min()) / margin  # harder than what u = 0 reaches
-    if worst["accuracy"] > bound:
+    best_of_nothing = float(runs["zero"][:, MEASURES.index("accuracy")].min())
+    if worst["accuracy"] > (bound := best_of_nothing / 2.0) or best_of_nothing < NEAR:
         return None
     found["accuracy"] = [min(level, bound) for level in found["accuracy"]]
     return found | {"oracle": w}

@@ -73,7 +73,8 @@ class Problem:
     def _values(self) -> Mapping[str, Any]:
         """The rules' values for the plant and the condition."""
         of = rules(self.version)
-        return of | of["more"].get(self.plant, {}) | (of["worst"] if self._attacked else {})
+        of_plant = of["more"].get(self.plant, {}) | of["special"].get(self.plant, {})
+        return of | of_plant | (of["worst"] if self._attacked else {})
 
     @property
     def _attacked(self) -> bool:

@@ -29,7 +29,7 @@ def philox(key: int, counter: int) -> list[int]:
 
 
 @pytest.mark.parametrize(("name", "index", "number"), [
-    ("duffing/noise@1", 0, ""), ("pendulum_network/heavy@1", 7, ""), ("duffing/sine@1", 123_456, NUMBER),
+    ("van_der_pol/noise@1", 0, ""), ("pendulum_network/heavy@1", 7, ""), ("furuta/sine@1", 123_456, NUMBER),
 ])  # fmt: skip
 def test_an_instance_is_drawn_as_the_rules_say(name, index, number):
     key = int(hashlib.sha256((name + number).encode()).hexdigest()[:32], 16)

@@ -38,9 +38,10 @@ def test_levels_are_the_quantiles_of_the_medians():
 
 @pytest.mark.quick
 def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing():
-    found = frozen(runs([0.01, 0.08], 0.01, 0.01), [0.3, 0.2])
+    found = frozen(runs([0.01, 0.08], 0.01, 0.01), [0.4, 0.3])
     assert found is not None
-    assert found["accuracy"] == pytest.approx([0.1, 0.1, 0.11, 0.16, 0.16])  # 0.08 x 1.25, and 0.2 / 1.25
+    assert found["accuracy"] == pytest.approx([0.1, 0.1, 0.11, 0.15, 0.15])  # 0.08 x 1.25, and 0.3 / 2
+    assert frozen(runs([1e-6]), [1.0, 0.09]) is None
     assert frozen(runs([0.08]), [0.12]) is None
     assert frozen(runs([math.inf]), [1.0]) is None
 
