@@ -33,7 +33,7 @@ INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
 ATTACKED = 2  # instances against an adversary
 MARGIN = 1.25  # of a target over the oracle's worst; 2 against an adversary
-NEAR = 0.1  # of its start: a problem in which u = 0 ends there is left out
+NEAR = 0.1  # of the start: no target is easier, and a problem in which u = 0 ends there is left out
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
 BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
 Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURES)
@@ -47,7 +47,7 @@ def cells(version: int = 1) -> list[str]:
 def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
     """Return the laws to run on a problem, by name."""
     if kind == "controls":
-        oracles = {f"oracle {w:g}": controls.oracle_of(one.plant, w) for w in one.bandwidths}
+        oracles = {f"oracle {w:g} {share:g}": controls.oracle_of(one.plant, w, share) for w, share in one.oracles}
         return {"zero": controls.zero()} | oracles
     plant = find_plant(one.plant)
     return {law: gain_sets.law(plant, law) for law in gain_sets.general() if gain_sets.in_set(plant, law, "tuned")}
@@ -96,22 +96,22 @@ def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.nda
     for label, oracle in runs.items():
         if not label.startswith("oracle"):
             continue
-        w = float(label.split()[1])
+        setting = [float(word) for word in label.split()[1:]]
         worst = {m: margin * float(oracle[:, MEASURES.index(m)].max()) for m in problems.MEASURES}
         if not all(map(math.isfinite, worst.values())):
             continue
         found = {m: levels(laws, m, worst[m], rules) for m in problems.MEASURES}
-        relaxed = sum(level == worst[m] for m in found for level in found[m])
-        if best is None or relaxed < best[0]:
-            best = relaxed, w, found, worst
+        ease = sum(math.log(level) for measure in found.values() for level in measure)
+        if best is None or ease < best[0]:
+            best = ease, setting, found, worst
     if best is None:
         return None
-    _, w, found, worst = best
+    _, setting, found, worst = best
     best_of_nothing = float(runs["zero"][:, MEASURES.index("accuracy")].min())
-    if worst["accuracy"] > (bound := best_of_nothing / 2.0) or best_of_nothing < NEAR:
+    if worst["accuracy"] > (bound := min(best_of_nothing / 2.0, NEAR)) or best_of_nothing < NEAR:
         return None
     found["accuracy"] = [min(level, bound) for level in found["accuracy"]]
-    return found | {"oracle": w}
+    return found | {"oracle": setting}
 
 
 def freeze(visible: Runs, of_controls: Runs) -> None:
@@ -123,7 +123,7 @@ def freeze(visible: Runs, of_controls: Runs) -> None:
             left_out.append(name.partition("@")[0])
             continue
         texts = [f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]" for m in problems.MEASURES]
-        lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]:g} }}')
+        lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]} }}')
     write_suites(left_out)
     text = path.read_text().partition(MARK)[0] + MARK
     path.write_text(text + f"[frozen]\nleft_out = {json.dumps(left_out)}\n\n" + "\n".join(lines) + "\n")

@@ -50,9 +50,9 @@ def oracle_pair(y, gains, memory):
     return (y.ddr - y.f + s) / y.g, s
 
 
-def oracle_of(plant: str, w: float) -> Law:
-    """Return the oracle for a plant."""
-    return oracle_pair(w=w, fall=FALL[plant]) if plant in FALL else oracle(w=w)
+def oracle_of(plant: str, w: float, share: float) -> Law:
+    """Return the oracle for a plant; that of a pair of joints has no share."""
+    return oracle_pair(w=w, fall=FALL[plant]) if plant in FALL else oracle(w=w, share=share)
 
 
 def zero() -> Law:

@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from smc_mujoco.benchmark import controls
 from smc_mujoco.benchmark.problem import rules, versions
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
@@ -113,7 +114,10 @@ class Entry:
         """Return the law with its gains for a plant, or the name of a law of the library. This runs its file's code."""
         if self.file is None:
             return self.name
-        return law_of(str(self.file), **self.gains.get(EVERYWHERE, self.gains.get(plant, {}))).named(self.name)
+        law = law_of(str(self.file), **self.gains.get(EVERYWHERE, self.gains.get(plant, {}))).named(self.name)
+        if controls.is_oracle(law):
+            raise ScenarioError(f"entry {self.name!r} is the oracle, which is told what no law knows: give another law")
+        return law
 
     @property
     def why_unread(self) -> str:

@@ -12,6 +12,7 @@ ID and a number of 256 bits that is told later.
 import dataclasses
 import functools
 import hashlib
+import itertools
 import math
 import re
 import tomllib
@@ -83,7 +84,7 @@ class Problem:
 
     @functools.cached_property
     def _frozen(self) -> Mapping[str, Any]:
-        """The levels of each measure, and the oracle's bandwidth; {} before they are frozen."""
+        """The levels of each measure, and the oracle's bandwidth and share; {} before they are frozen."""
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
 
     @property
@@ -97,9 +98,9 @@ class Problem:
         return self._values["duration"]
 
     @property
-    def bandwidths(self) -> tuple[float, ...]:
-        """Those from which the oracle's is chosen, rad/s."""
-        return tuple(self._values["bandwidths"])
+    def oracles(self) -> tuple[tuple[float, float], ...]:
+        """The bandwidths, rad/s, and shares from which the oracle's are chosen."""
+        return tuple(itertools.product(self._values["bandwidths"], self._values["shares"]))
 
     @property
     def targets(self) -> dict[str, tuple[float, ...]]:
@@ -112,7 +113,7 @@ class Problem:
     @property
     def controls(self) -> dict[str, Law]:
         """The laws of the controls: "zero", which reaches no target, and "oracle", which reaches all."""
-        return {"zero": controls.zero(), "oracle": controls.oracle_of(self.plant, self._frozen["oracle"])}
+        return {"zero": controls.zero(), "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"])}
 
     def instance(self, index: int, number: str = "") -> Instance:
         """Return what an instance has drawn; `number` as in `scenarios`."""

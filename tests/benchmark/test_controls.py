@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.benchmark import controls
+from smc_mujoco.benchmark import controls, entry
 from smc_mujoco.control.law import law_function
 from smc_mujoco.simulation import reference
 
@@ -51,6 +51,16 @@ def test_no_law_of_an_entry_is_told_anything():
     assert (scenario.model, scenario.noise.position) == (None, 0.01)
     assert controls.is_oracle(controls.oracle().named("mine"))
     assert not controls.is_oracle(told())
+
+
+def test_an_entry_is_not_the_oracle(tmp_path):
+    code = "from smc_mujoco.benchmark import controls\n\nmine = controls.oracle(w=9.0)\n"
+    (tmp_path / "law.py").write_text(code)
+    about = {"name": "mine", "source": "here", "licence": "MIT", "division": "one set"}
+    lines = [f'{key} = "{value}"' for key, value in about.items()]
+    (tmp_path / "entry.toml").write_text("\n".join([*lines, 'authors = ["A"]']))
+    with pytest.raises(smc.ScenarioError, match="oracle"):
+        entry.read(tmp_path).law("duffing")
 
 
 def test_what_the_true_model_has_not_is_refused():

@@ -23,7 +23,7 @@ LAWS = {f"law{i}": runs([1e-9, 0.01 * i, 1e9], settling=0.1 * i, calm=float(i)) 
 
 
 def frozen(oracle: np.ndarray, zero: list[float]) -> dict | None:
-    return script.targets(CELL, LAWS, {"zero": runs(zero, math.inf, 0.0), "oracle 16": oracle})
+    return script.targets(CELL, LAWS, {"zero": runs(zero, math.inf, 0.0), "oracle 16 0.5": oracle})
 
 
 @pytest.mark.quick
@@ -33,14 +33,14 @@ def test_levels_are_the_quantiles_of_the_medians():
     assert found is not None
     for measure, unit in (("accuracy", 0.01), ("settling", 0.1), ("calm", 1.0)):
         assert found[measure] == pytest.approx([unit * i for i in (3, 6, 11, 16, 19)])
-    assert found["oracle"] == 16.0
+    assert found["oracle"] == [16.0, 0.5]
 
 
 @pytest.mark.quick
 def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing():
-    found = frozen(runs([0.01, 0.08], 0.01, 0.01), [0.4, 0.3])
+    found = frozen(runs([0.01, 0.05], 0.01, 0.01), [0.4, 0.3])
     assert found is not None
-    assert found["accuracy"] == pytest.approx([0.1, 0.1, 0.11, 0.15, 0.15])  # 0.08 x 1.25, and 0.3 / 2
+    assert found["accuracy"] == pytest.approx([0.0625, 0.0625, 0.1, 0.1, 0.1])  # 0.05 x 1.25, and 10 %
     assert frozen(runs([1e-6]), [1.0, 0.09]) is None
     assert frozen(runs([0.08]), [0.12]) is None
     assert frozen(runs([math.inf]), [1.0]) is None
