@@ -19,31 +19,32 @@ def runs(accuracy: list[float], settling: float = 1.0, calm: float = 1.0) -> np.
     return np.array([[0.0, one, 1.0, settling, calm] for one in accuracy])
 
 
-LAWS = {f"law{i}": runs([1e-9, 0.01 * i, 1e9], settling=0.1 * i, calm=float(i)) for i in range(1, 22)}
-
-
-def frozen(oracle: np.ndarray, zero: list[float]) -> dict | None:
-    return script.targets(CELL, LAWS, {"zero": runs(zero, math.inf, 0.0), "oracle 16 0.5": oracle})
+def frozen(unit: float, oracle: list[float], zero: list[float]) -> dict | None:
+    """The targets for laws whose medians are 1, 2, ... 21 times a unit, and for measures of the controls."""
+    laws = {f"{i}": runs([1e-9, unit * i, 1e9], settling=0.1 * i, calm=float(i)) for i in range(1, 22)}
+    of_controls = {"zero": runs(zero, math.inf, 0.0), "oracle 16 0.5": runs(oracle, 0.01, 0.01)}
+    return script.targets(CELL, laws, of_controls)
 
 
 @pytest.mark.quick
 def test_levels_are_the_quantiles_of_the_medians():
     """Of 1, 2, ... 21 the quantiles at 10, 25, 50, 75 and 90 % are 3, 6, 11, 16 and 19."""
-    found = frozen(runs([1e-6], 0.01, 0.01), [1.0])
+    found = frozen(0.001, [1e-6], [1.0])
     assert found is not None
-    for measure, unit in (("accuracy", 0.01), ("settling", 0.1), ("calm", 1.0)):
+    for measure, unit in (("accuracy", 0.001), ("settling", 0.1), ("calm", 1.0)):
         assert found[measure] == pytest.approx([unit * i for i in (3, 6, 11, 16, 19)])
     assert found["oracle"] == [16.0, 0.5]
 
 
 @pytest.mark.quick
-def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing():
-    found = frozen(runs([0.01, 0.05], 0.01, 0.01), [0.4, 0.3])
-    assert found is not None
-    assert found["accuracy"] == pytest.approx([0.0625, 0.0625, 0.1, 0.1, 0.1])  # 0.05 x 1.25, and 10 %
-    assert frozen(runs([1e-6]), [1.0, 0.09]) is None
-    assert frozen(runs([0.08]), [0.12]) is None
-    assert frozen(runs([math.inf]), [1.0]) is None
+@pytest.mark.parametrize(("oracle", "zero", "levels"), [
+    ([0.01, 0.04], [0.9, 0.8], [0.05, 0.06, 0.1, 0.1, 0.1]),  # 0.04 x 1.25, and a tenth of the start
+    ([1e-6], [0.9, 0.12], [0.03, 0.06, 0.06, 0.06, 0.06]),  # 0.12 / 2
+    ([0.06], [0.9, 0.12], None), ([1e-6], [0.9, 0.09], None), ([math.inf], [0.9], None),
+])  # fmt: skip
+def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing(oracle, zero, levels):
+    found = frozen(0.01, oracle, zero)
+    assert (found and found["accuracy"]) == (levels and pytest.approx(levels))
 
 
 @pytest.mark.quick
