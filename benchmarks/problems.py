@@ -149,7 +149,8 @@ def board(runs: Runs, names: Sequence[str], question: str) -> np.ndarray:
     """Return the mean rank of each law's median over the problems of a board; equal medians share their rank."""
     measure = MEASURES.index(BOARDS[question])
     informing = [name for name in names if question in suite.boards(name)]
-    ranks = [rankdata([np.median(values[:, measure]) for values in runs[name].values()]) for name in informing]
+    everywhere = [law for law in runs[names[0]] if all(law in runs[name] for name in runs)]
+    ranks = [rankdata([np.median(runs[name][law][:, measure]) for law in everywhere]) for name in informing]
     return np.mean(ranks, axis=0)
 
 
