@@ -32,7 +32,7 @@ from smc_mujoco.simulation.run import stream
 INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
 ATTACKED = 2  # instances against an adversary
-MARGIN = 1.25  # of a target over the oracle's worst; 2 against an adversary
+MARGIN = 1.25  # of a target over the oracle's worst; 2 where no catalogue sets the levels
 NEAR = 0.1  # of the start: no target is easier, and a problem in which u = 0 ends there is left out
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
 BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}
@@ -92,12 +92,13 @@ def levels(laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Ma
 
 def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
     """Return the targets of a problem and the oracle's bandwidth; None where a control forbids it."""
-    rules, best, margin = problems.rules(int(name.partition("@")[2])), None, 2.0 if "/worst" in name else MARGIN
+    rules, best, margin = problems.rules(int(name.partition("@")[2])), None, MARGIN if laws else 2.0
     for label, oracle in runs.items():
         if not label.startswith("oracle"):
             continue
         setting = [float(word) for word in label.split()[1:]]
         worst = {m: margin * float(oracle[:, MEASURES.index(m)].max()) for m in problems.MEASURES}
+        worst["accuracy"] = max(worst["accuracy"], 0.0 if laws else rules["hardest"])
         if not all(map(math.isfinite, worst.values())):
             continue
         found = {m: levels(laws, m, worst[m], rules) for m in problems.MEASURES}

@@ -36,7 +36,9 @@ def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
     np.testing.assert_allclose(trace.s[1:, 0], f, rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["pendulum_network/friction@1", "duffing/process_noise@1", "duffing/missed@1"])
+@pytest.mark.parametrize(
+    "name", ["inverted_pendulum_network/friction@1", "duffing/process_noise@1", "duffing/missed@1"]
+)
 def test_the_compiled_oracle_is_the_one_of_the_reference_loop(name):
     (scenario,) = smc.problem(name).scenarios(controls.oracle(), [1])
     short = dataclasses.replace(scenario, duration=0.2)
