@@ -22,7 +22,7 @@ OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have 
     },
     "repr": {
         *("Tuned", "Frames", "Held", "TimeSeries", "Waypoints"),
-        *("Board", "Advice", "Compared", "StepResponse", "Robustness"),
+        *("board.Board", "Advice", "Compared", "StepResponse", "Robustness"),
     },
     "slots": {"Functions", "Packed", "Prepared"},
 }

@@ -54,7 +54,7 @@ class Instance:
     seed: int
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Problem:
     """A problem. It is made by `problem`.
 

@@ -50,7 +50,7 @@ class Standing:
     reached: float  # share of the targets of all runs that are reached and kept
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Board:
     """A question and the entries' places."""
 
@@ -142,7 +142,7 @@ class Results:
             rank = float(self.ranks(question, [*ranked, name])[-1].mean())
             place = {"place": None, "low": np.nan, "high": np.nan, "level": False}
             standings.append(Standing(entry=name, rank=rank, reached=self.reached(name, question), **place))
-        return Board(question, self.on(question), tuple(standings))
+        return Board(question=question, problems=self.on(question), standings=tuple(standings))
 
     def _places(self, question: str, names: Sequence[str]) -> list[Standing]:
         """Return the places of entries on a board, the best first."""
@@ -183,7 +183,9 @@ class Results:
             raise ScenarioError(f"these are results on {self.suite}, the others on {other.suite}: give the same suite")
         both = [name for name in self.entries if name in other.entries]
         return Changes(
-            tuple(_change(self, other, name, question) for name in both for question in MEASURE if self.on(question))
+            changes=tuple(
+                _change(self, other, name, question) for name in both for question in MEASURE if self.on(question)
+            )
         )
 
 
@@ -208,7 +210,7 @@ class Change:
         return f"{self.entry}, {TITLES[self.question].lower()}: {'; '.join(told) or 'the same'}"
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Changes:
     """What changed between two results on a suite, by entry and board."""
 

@@ -47,6 +47,7 @@ TRIM_RATE, TRIM_ANGLE, TRIM_SPEED, MAX_TRIM = 0.2, 3.0, 50.0, 1.5  # 1/s, deg, d
 
 @register_jitable
 def clip(value, bound):
+    """Return a value held within -bound .. bound."""
     return min(max(value, -bound), bound)
 
 

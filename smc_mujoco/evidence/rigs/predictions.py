@@ -40,7 +40,7 @@ class Prediction:
     about: str
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Told:
     """The figures of many runs: (left out, set, law, condition) -> those of each seed."""
 
@@ -114,7 +114,7 @@ def predicted(
             for i, (law, under) in enumerate(keys):
                 values[without, member, law, under] = found[i * count : (i + 1) * count]
             report(len(scenarios))
-    return Told(prediction, values)
+    return Told(prediction=prediction, values=values)
 
 
 def _scenario(rig: Any, law: Any, condition: str, seed: int) -> Any:

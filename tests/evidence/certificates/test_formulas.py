@@ -376,7 +376,7 @@ def test_what_is_left_out_is_said_in_full():
         "delay": {"input_delay": {"time": 0.004}},
         "noise": {
             "noise": {"position": 0.01, "velocity": 0.02}, "levant": {},
-            "Encoder": {"counts": 2000.0, "bias": 0.0, "dropout": 0.0, "delay": 0.0},
+            "Encoder": {"counts": 2000.0, "bias": 0.0, "dropout": 0.0, "delay": 0.0, "skew": 0.0},
         },
         "dry friction": {"Coulomb": {"level": 0.3}}, "contact": {}, "drive": {"Lag": {"tau": 0.01}},
         "other parameters": {"jump": {"time": 1.0, "M": 1.2}}, "rounding": {"RK4": {"step": 0.00025}},

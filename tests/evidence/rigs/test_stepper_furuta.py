@@ -193,7 +193,7 @@ def told(by_law, falls=()):
         ("", "set 1", law, "hold"): [{"alpha_rms": value, "alpha_max": 99.0 if law in falls else 1.0}] * 3
         for law, value in zip(PREDICTION.order, by_law, strict=True)
     }
-    return predictions.Told(PREDICTION, made)
+    return predictions.Told(prediction=PREDICTION, values=made)
 
 
 def test_laws_are_in_the_machines_order_or_not():

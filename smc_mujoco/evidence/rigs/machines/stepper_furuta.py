@@ -23,7 +23,9 @@ MACHINE = "Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa (no licence stated)"
 FORMULA = f"{MACHINE}: from formulas, not identified"
 LIBRARY = "FastAccelStepper 0.33.9 (MIT) on an ATmega2560"
 MEMORY = "from memory of a data sheet, not verified"
-FOUND = "a draw whose runs under the linear law have the recorded figures, benchmarks/stepper_furuta.py"
+FOUND = (
+    "identified here: a draw whose runs under the linear law have the recorded figures, benchmarks/stepper_furuta.py"
+)
 ABLATED = "its number here is the machine's; 0 leaves it out"
 STEP = 2.5e-4  # s
 LAWS = (
@@ -105,7 +107,7 @@ QUANTITIES = {
     "sensor_noise": Quantity(BEST["sensor_noise"], "rad", FOUND, 0.0, 0.01),
     "vibration": Quantity(BEST["vibration"], "N m", f"{FOUND}; rms on the arm, correlated over 0.05 s", 0.0, 1.0),
     "counts": Quantity(4096.0, "", f"{MACHINE}; {ABLATED}", 0.0, 1e6),
-    "sensor_delay": Quantity(2e-3, "s", f"AS5600's default filter, {MEMORY}", 0.0, 0.01),
+    "sensor_delay": Quantity(2e-3, "s", f"chosen: AS5600's default filter, {MEMORY}", 0.0, 0.01),
     "sensor_skew": Quantity(5e-4, "s", f"{MACHINE}: one bus, the pendulum's sensor is read first", 0.0, 0.01),
     "pause": Quantity(7.3e-3, "s", f"{MACHINE}: its longest ticks; a line of text a second", 0.0, 0.1),
     "steps": Quantity(1600.0, "", f"{MACHINE}; {ABLATED}", 0.0, 1e6),
