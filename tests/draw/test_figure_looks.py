@@ -395,6 +395,9 @@ class Rows:
         cells = itertools.product(("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds))
         self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
 
+    def scenario(self, row):
+        raise smc.ScenarioError("its runs were never made")
+
     def column(self, name):
         if name in ("scenario", "source", "search", "gains"):
             raise smc.ScenarioError(f"it has no column {name}")
