@@ -5,7 +5,7 @@ has no advantage. A lead is the ratio of two families' scores, run by run; runs 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -75,9 +75,9 @@ def lead(scores: Mapping[str, np.ndarray], sets: Mapping[str, np.ndarray], floor
     return Lead("", "", first, second, times, low, high, laws)
 
 
-def leads(table: "Table") -> Iterator[Lead]:
-    """Yield the lead in every cell of a study's table that has one."""
-    by_row = paired_runs.by_row(table, METRIC)
+def leads(table: "Table") -> tuple[Lead, ...]:
+    """Return the lead in every cell of a study's table that has one."""
+    found, by_row = [], paired_runs.by_row(table, METRIC)
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
@@ -85,8 +85,9 @@ def leads(table: "Table") -> Iterator[Lead]:
             continue
         there = ~np.isnan(np.array([row[0] for row in its.values.values()])).any(axis=0)
         values, sets = ({law: row[0][there] for law, row in of.items()} for of in (its.values, its.sets))
-        if found := lead(values, sets, paired_runs.floor(ran, METRIC)):
-            yield found._replace(plant=plant, condition=condition)
+        if one := lead(values, sets, paired_runs.floor(ran, METRIC)):
+            found.append(one._replace(plant=plant, condition=condition))
+    return tuple(found)
 
 
 def counted(cells: Sequence[Lead]) -> dict[str, int]:

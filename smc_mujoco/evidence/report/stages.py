@@ -138,7 +138,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
         return Findings(
             medians=films.medians(table, plan.conditions[0]),
             scores=scores.scores(table, boards),
-            leads=tuple(families.leads(table)),
+            leads=families.leads(table),
             boards=boards,
             claims=claims,
             fields=fields(plan),
