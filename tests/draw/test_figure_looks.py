@@ -395,7 +395,7 @@ class Rows:
         cells = itertools.product(("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds))
         self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
 
-    def scenario(self, row):
+    def scenario(self, i):
         raise smc.ScenarioError("its runs were never made")
 
     def column(self, name):
