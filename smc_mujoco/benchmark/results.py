@@ -250,7 +250,7 @@ def results(source: str | os.PathLike[str] = "smc-30@1", hidden: bool = False) -
     path = Path("results") / source if source in suite.suites() else Path(source)
     folder = _unpacked(path) if path.suffix == ".zip" else path
     wanted = HIDDEN[RESULT] if hidden else RESULT
-    found = [Result(file.parent, hidden) for file in sorted(folder.rglob(wanted))] if folder.is_dir() else []
+    found = [Result(file.parent, hidden) for file in sorted(folder.rglob(wanted))] if os.path.isdir(folder) else []
     if not found:
         raise ScenarioError(f"no results at {shown(str(path))}: enter a law first, with smc-mujoco enter FOLDER")
     names = {one.about["suite"] for one in found}

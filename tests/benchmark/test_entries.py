@@ -115,6 +115,8 @@ def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path
         smc.results(target.parent)
     with pytest.raises(ScenarioError, match="not what"):
         entering.enter(folder, out=out, instances=2, verify=True)
+    with pytest.raises(ScenarioError, match="no results at"):
+        smc.results("x" * 5000)  # a name that no file system takes
     archive = shutil.make_archive(str(tmp_path / "packed"), "zip", other)
     assert str(found.compare(smc.results(archive))).count("the same") == 4
 

@@ -21,6 +21,8 @@ from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, Positive, dri
 from smc_mujoco.mechanisms.plant import Field
 
 MAX_QUEUED = 100_000  # steps of one motor; chosen, 1.6 MB
+MAX_RATE = 1e7  # steps/s; chosen, drivers take 1e6 or so
+MIN_REFILL = 1e-5  # s between two looks of the generator; chosen, that a run ends
 ROUNDING = 1e-9  # steps/s: a rate that is less than this below a whole number is that number
 
 
@@ -62,8 +64,8 @@ class Stepper(Actuator):
       ramp: rad/s^2 (m/s^2), of the generator's ramp, and the default of u_max; greater than 0.
       stop_band: rad/s (m/s): a slower command means stop; 0 or more. A rate below 1 step/s does, too.
       queue: s of steps that are queued, 0 or more.
-      refill: s between two looks of the generator at its queue, 0 or more. The first comes after a part of it that
-        depends on the seed. If it is 0, each step is computed when it is due, and `queue` has no effect.
+      refill: s between two looks of the generator at its queue, 0 or more; 0 or at least 1e-5. The first comes after a
+        part of it that depends on the seed. If it is 0, each step is computed when it is due, and `queue` has no effect.
       spread: share of the last interval over which the driver spreads a step, 0 .. 1; a step is a jump if it is 0.
       longest_spread: s, the longest interval that the driver measures, 0 or more; chosen: a step at 50 Hz.
     """
@@ -87,6 +89,11 @@ class Stepper(Actuator):
         if self.queued > MAX_QUEUED:
             long = f"queue {self.queue:g} s at a speed of {self.speed:g} is {self.queued:,} steps"
             raise ScenarioError(f"Stepper's {long}: give at most {MAX_QUEUED:,}, by a shorter queue or a lower speed")
+        if self.steps < math.inf and self.speed * self.per_unit > MAX_RATE:
+            fast = f"speed {self.speed:g} is {self.speed * self.per_unit:g} steps/s"
+            raise ScenarioError(f"Stepper's {fast}: give at most {MAX_RATE:g}, by a lower speed or fewer steps")
+        if 0.0 < self.refill < MIN_REFILL:
+            raise ScenarioError(f"Stepper's refill is {self.refill:g} s: give 0, or {MIN_REFILL:g} or more")
 
     @property
     def per_unit(self) -> float:

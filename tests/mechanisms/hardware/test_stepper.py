@@ -260,6 +260,8 @@ def test_the_default_bound_is_the_ramp_and_a_weak_motor_warns():
 REFUSED = {
     "lagged": (lambda: scenario((smc.Lag(0.01), MOTOR), SLOW), "leave that out"),
     "long": (lambda: Stepper(queue=1e3), "queue 1000 s"),
+    "fast": (lambda: Stepper(queue=0.0, refill=0.0, speed=1e9), "speed 1e.09 is 2.5.*e.11 steps/s"),
+    "often": (lambda: Stepper(refill=9e-6), "refill is 9e-06 s: give 0, or 1e-05 or more"),
     "joint": (
         lambda: scenario(MOTOR, None, "pendulum_network", law="computed_torque_sliding", x0=0.1),
         "computed_torque_sliding.*model='none'",
