@@ -132,7 +132,7 @@ def predicted(twin, seeds):
                 values[without, "set 1", law, condition] = [
                     made | ({"alpha_max": 90.0} if i == 2 else {"centroid": 4.0 + k}) for k in range(seeds)
                 ]
-    return Told(about, values)
+    return Told(prediction=about, values=values)
 
 
 FOUND = SimpleNamespace(tried=40, value=0.3125, scenario=smc.Scenario(plant="duffing", law="pid"))
