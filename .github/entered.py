@@ -4,7 +4,8 @@
     NAME=soft_relay NUMBER=... make entered     # on hidden instances, too, if its law is checked
 
 In a workflow (CI=true) the law runs without network, without a way to gain rights, and without the environment, which
-has the workflow's tokens. A law that is not checked could tell the number, so it never runs while that is a secret.
+has the workflow's tokens. A law whose file can do more than compute could read the number in the environment of the
+processes around it. So where there is a number, it does not run at all.
 """
 
 import json
@@ -15,6 +16,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from smc_mujoco.benchmark import entry as entries
 
 FOLDER = re.compile(r"entries/[a-z][a-z0-9_]{0,40}")
 COMMIT = re.compile(r"[0-9a-f]{40}")
@@ -47,10 +50,20 @@ def alone(command: list[str]) -> list[str]:
     return ["sudo", "--non-interactive", "unshare", "--net", "--", *inside]
 
 
+def unread(place: str) -> str:
+    """Return why nothing of an entry may run beside the number, from its files alone; "" if it may."""
+    entry = entries.read(place)
+    if entry.file is not None and entry.file.suffix != ".py":
+        return f"{entry.file.name} is machine code, or becomes it"
+    return entry.why_unread
+
+
 def main() -> None:
     """Run it, on the visible instances first."""
     name, base, number = (os.environ.pop(key, "") for key in ("NAME", "BASE", "NUMBER"))
     place = folder({f"entries/{name}"}) if name else changed(base)
+    if number and (why := unread(place)):
+        sys.exit(f"{place} runs on no hidden instances before their number is published: {why}")
     command = [str(Path(sys.executable).with_name("smc-mujoco")), "enter", place, "--results", str(RESULTS)]
     runs = alone if os.environ.get("CI") else list
     if code := subprocess.run(runs(command), check=False).returncode:

@@ -5,9 +5,11 @@
     python benchmarks/problems.py freeze visible.json controls.json   # writes the targets into the rules
     python benchmarks/problems.py measure laws hidden.json --number random
     python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
+    python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's plants, `measure
-controls` the controls on all problems; ten minutes of processor time each. They go on where they were stopped.
+controls` the controls on all problems; ten minutes of processor time each. They and `enter` go on where they were
+stopped. `smc-mujoco site` shows the results of `enter`.
 """
 
 import argparse
@@ -22,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import kendalltau, rankdata, spearmanr
 
-from smc_mujoco.benchmark import controls, suite
+from smc_mujoco.benchmark import controls, enter, suite
 from smc_mujoco.benchmark import problem as problems
 from smc_mujoco.control import gain_sets
 from smc_mujoco.control.law import Law
@@ -168,6 +170,13 @@ def agree(visible: Runs, hidden: Runs) -> None:
         print(question, *(f"{tau:.3f} ({rho:.3f})" for tau, rho in cells), sep=" | ")
 
 
+def enter_all(out: Path) -> None:
+    """Enter every general law in smc-30@1, of those that are not in the folder of results yet."""
+    for law in gain_sets.general():
+        if not (out / "smc-30@1" / law / enter.RESULT).exists():
+            print(enter.enter(law, out=out), file=sys.stderr, flush=True)
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the command line."""
     made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -181,6 +190,7 @@ def parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name)
         for file in files:
             command.add_argument(file, type=Path)
+    commands.add_parser("enter").add_argument("results", type=Path)
     return made
 
 
@@ -191,5 +201,7 @@ if __name__ == "__main__":
         measure(given.kind, given.out, number, given.instances)
     elif given.command == "freeze":
         freeze(read(given.visible), read(given.controls))
+    elif given.command == "enter":
+        enter_all(given.results)
     else:
         agree(read(given.visible), read(given.hidden))

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -155,3 +156,23 @@ def test_an_entry_runs_without_network_rights_and_environment(monkeypatch):
     assert re.findall(r"^ *(\w+):.*\d$", seen.partition("Name:")[0], re.MULTILINE) == ["lo"]
     assert "NoNewPrivs:\t1" in seen
     assert "a secret" not in seen
+
+
+@pytest.mark.parametrize("name", ["soft_relay", "pd_in_c", "reader"])
+def test_no_code_that_could_read_the_number_runs_beside_it(name, monkeypatch, tmp_path):
+    """A process can read the environment of those that started it: in the job with the number only read laws run."""
+    shutil.copytree(ROOT / "examples" / "entries", tmp_path / "entries")
+    shutil.copytree(tmp_path / "entries" / "soft_relay", tmp_path / "entries" / "reader")
+    with (tmp_path / "entries" / "reader" / "law.py").open("a", encoding="utf-8") as file:
+        file.write("\nNUMBER = open('/proc/self/environ').read()\n")
+    ran = list[list[str]]()
+    monkeypatch.setattr(
+        subprocess, "run", lambda command, check: (ran.append(command), SimpleNamespace(returncode=9))[1]
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NAME", name)
+    monkeypatch.setenv("NUMBER", "5d" * 32)
+    with pytest.raises(SystemExit) as ended:
+        ENTERED.main()
+    assert (ended.value.code == 9, len(ran)) == ((True, 1) if name == "soft_relay" else (False, 0))
+    assert name == "soft_relay" or "before their number is published" in str(ended.value.code)

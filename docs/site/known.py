@@ -50,14 +50,14 @@ OTHERS = {  # title -> names of modules that are no public names
     """,
     "Boards, the paper, tests": """
     evidence.papers.gaber.scenarios
-    evidence.boards
-    evidence.boards.entries.entry
-    evidence.boards.entries.on_board
-    evidence.boards.scoring.criteria
-    evidence.boards.scoring.score
-    evidence.boards.simulator.robustness
-    evidence.boards.standings.board
-    evidence.boards.standings.experiments
+    benchmark.realaigym
+    benchmark.realaigym.entries.entry
+    benchmark.realaigym.entries.on_board
+    benchmark.realaigym.scoring.criteria
+    benchmark.realaigym.scoring.score
+    benchmark.realaigym.simulator.robustness
+    benchmark.realaigym.standings.board
+    benchmark.realaigym.standings.experiments
     testing.plugin.step_response
     testing.plugin.smc_golden
     testing.response.StepResponse

@@ -81,11 +81,13 @@ def enter(
 
 def site(
     results: Results = Path("results"),
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the pages.")] = Path("site"),
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Folder of the pages; none: the folder of the results, site.")
+    ] = None,
 ) -> None:
     """Build static pages of all results: the boards of each suite, and a page for each entry.
 
-    The pages need no network and no server: open site/index.html, or copy the folder to any host.
+    The pages need no network and no server: open results/site/index.html, or copy the folder to any host.
 
     Example: smc-mujoco site --results results --out public
     """
@@ -95,7 +97,7 @@ def site(
     terminal = Terminal()
     if not results.is_dir():
         raise ScenarioError(f"no folder {str(results)!r}: enter a law first, with smc-mujoco enter FOLDER")
-    terminal.wrote(pages.build(results, out))
+    terminal.wrote(pages.build(results, results / "site" if out is None else out))
 
 
 GROUPS = {"Benchmark": [enter, site]}  # heading in the help -> commands

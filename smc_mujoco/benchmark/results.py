@@ -100,9 +100,10 @@ class Result:
 
     def targets(self, problems: Sequence[str], measure: str) -> np.ndarray:
         """Return the times from which the targets of a measure are reached and kept, s, inf for never, (targets,)."""
-        columns = [f"{measure}_{i}" for i in range(1, runs.LEVELS + 1)]
-        known = [(name, columns[: len(problem(name).targets.get(measure, ()))]) for name in problems]
-        times = [self.runs.columns(name)[column] for name, targets in known for column in targets]
+        times = []
+        for name in problems:
+            columns = self.runs.columns(name)
+            times += [columns[f"{measure}_{i}"] for i, _ in enumerate(problem(name).targets.get(measure, ()), 1)]
         return np.nan_to_num(np.concatenate(times), nan=np.inf) if times else np.zeros(0)
 
 
@@ -118,7 +119,23 @@ class Results:
 
     def on(self, question: str) -> tuple[str, ...]:
         """Return the problems that inform a board."""
-        return tuple(name for name in self.problems if question in suite.boards(name))
+        return self._informing[question]
+
+    @functools.cached_property
+    def _informing(self) -> dict[str, tuple[str, ...]]:
+        """Question -> the problems that inform its board."""
+        informed = {name: suite.boards(name) for name in self.problems}
+        return {question: tuple(name for name in informed if question in informed[name]) for question in MEASURE}
+
+    @functools.cached_property
+    def _boards(self) -> dict[str, Board]:
+        """Question -> Board, of those that were asked for."""
+        return {}
+
+    @functools.cached_property
+    def _curves(self) -> dict[tuple[str, str], np.ndarray]:
+        """(entry, question) -> shares of the targets, of those that were asked for."""
+        return {}
 
     def ranks(self, question: str, names: Sequence[str]) -> np.ndarray:
         """Return the ranks of entries on each problem of a board, (entries, problems); equal medians share a rank."""
@@ -135,6 +152,12 @@ class Results:
     def board(self, question: str) -> Board:
         """Return the board of a question."""
         find("board", question, MEASURE)
+        if question not in self._boards:
+            self._boards[question] = self._made(question)
+        return self._boards[question]
+
+    def _made(self, question: str) -> Board:
+        """Return the board of a question, from the runs."""
         ranked = [name for name, one in self.entries.items() if one.about["checked"] or not self.hidden]
         beside = [name for name in self.entries if name not in ranked]
         standings = self._places(question, ranked) if ranked else []
@@ -173,9 +196,11 @@ class Results:
 
     def curve(self, entry: str, question: str) -> tuple[np.ndarray, np.ndarray]:
         """Return times, s, and the share of a board's targets that are reached by then and kept, (MOMENTS,) each."""
-        times = np.sort(self.entries[entry].targets(self.on(question), MEASURE[question]))
         moments = np.linspace(0.0, problem(self.problems[0]).duration, MOMENTS)
-        return moments, np.searchsorted(times, moments, side="right") / max(len(times), 1)
+        if (entry, question) not in self._curves:
+            times = np.sort(self.entries[entry].targets(self.on(question), MEASURE[question]))
+            self._curves[entry, question] = np.searchsorted(times, moments, side="right") / max(len(times), 1)
+        return moments, self._curves[entry, question]
 
     def compare(self, other: "Results") -> "Changes":
         """Return what changed from other results on the suite to these, of the entries that both have."""

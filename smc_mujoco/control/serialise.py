@@ -10,7 +10,7 @@ from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws
 
-EVIDENCE = "smc_mujoco.evidence"  # an annex with laws that are not in the catalogue, such as those of rigs
+ANNEXES = ("smc_mujoco.evidence", "smc_mujoco.benchmark")  # with laws that are not in the catalogue, as those of rigs
 
 
 def describe(c: Component) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
     if "each" in data:
         made = by_channel([law(item, source) for item in data["each"]])
     else:
-        made = restore(data, "law", known_laws() | _laws_of_evidence(data["module"]))
+        made = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
     restored = sources.Source(kind=sources.YOURS) if source is None else sources.restore(source)
     return made.sourced(restored.kind, restored.search)
 
@@ -45,9 +45,10 @@ def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> C
     return Component(kind=kind, relative_degree=data["degree"], function=None, **stored)
 
 
-def _laws_of_evidence(module: str) -> dict[str, Template]:
-    """Return the laws of a module of the evidence annex, by name; none of another module."""
-    if not module.startswith(EVIDENCE) or not importlib.util.find_spec(EVIDENCE):
+def _laws_of_annex(module: str) -> dict[str, Template]:
+    """Return the laws of a module of an annex, by name; none of another module."""
+    annex = ".".join(module.split(".")[:2])
+    if annex not in ANNEXES or not importlib.util.find_spec(annex):
         return {}
     values = vars(importlib.import_module(module)).values()
     return {value.name: value for value in values if isinstance(value, Template)}

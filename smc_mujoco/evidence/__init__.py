@@ -1,1 +1,1 @@
-"""Audits, published boards, certificates, real machines, the report. An annex: nothing in the core imports it."""
+"""Audits, certificates, real machines, the report. An annex: nothing in the core imports it."""

@@ -18,7 +18,8 @@ from smc_mujoco.simulation.scenario import U_MAX, Scenario
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
 NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
-    "evidence/audit", "evidence/boards", "evidence/papers", "exchange/live", "draw", "testing", "control/tuned_gains",
+    "benchmark/realaigym", "evidence/audit", "evidence/papers", "exchange/live", "draw", "testing",
+    "control/tuned_gains",
 )  # fmt: skip
 MAX_NAME = 60  # characters of a condition's name
 

@@ -237,3 +237,18 @@ def test_the_process_of_an_entry_tells_which_run_differs(tmp_path):
     assert entrant.same(tmp_path / "a.parquet", tmp_path / "b.parquet", [one.id]) == ""
     runs.write(tmp_path / "c.parquet", [[rows[0], rows[1] | {"itae": 0.1}, rows[2]]])
     assert entrant.same(tmp_path / "a.parquet", tmp_path / "c.parquet", [one.id]) == f"{one.id}#01"
+
+
+def test_variation_of_u_counts_only_where_the_easiest_accuracy_is_kept(tmp_path):
+    """Else who does nothing is the calmest: here three runs of five keep no accuracy, and one of five in the other."""
+    groups = []
+    for name, kept in zip(PROBLEMS, (2, 4), strict=True):
+        easiest = f"accuracy_{len(smc.problem(name).targets['accuracy'])}"
+        groups.append([
+            {"problem": name, "instance": i, "failed": 0.0, "accuracy": 0.01, "itae": 1.0, "settling": 1.0}
+            | {"calm": 0.1 * (i + 1), easiest: 1.0 if i < kept else np.nan}
+            for i in range(5)
+        ])  # fmt: skip
+    runs.write(tmp_path / "runs.parquet", groups)
+    medians = runs.Runs(tmp_path / "runs.parquet").medians()
+    assert [medians[name]["calm"] for name in PROBLEMS] == [np.inf, pytest.approx(0.3)]

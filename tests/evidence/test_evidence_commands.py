@@ -15,7 +15,6 @@ from rich.console import Console
 import smc_mujoco as smc
 from smc_mujoco.cli import main
 from smc_mujoco.common.progress import Bar
-from smc_mujoco.evidence import boards
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.commands import tables
 from smc_mujoco.evidence.rigs.identify import Identified
@@ -23,8 +22,6 @@ from smc_mujoco.evidence.rigs.machines.stepper_furuta import PREDICTION
 from smc_mujoco.evidence.rigs.predictions import Told
 from smc_mujoco.evidence.rigs.rig import Fall
 
-ROWS = (boards.Row("mine", 1.234, 8.08, 1.8, 0.0104, 88.52, 0.6549), boards.Row("SAC", 2.5, 10.0, 3.0, 0.1, 99.0, 0.5))
-TESTS = tuple(boards.RobustnessRow(name, 90.04, 80.0, 70.0, 60.0, 50.0, 40.06, 0.6505) for name in ("mine", "SAC"))
 CHECKS = {
     "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
     "largest step of u in the period, over that of the classical law (TV rate)": {
@@ -96,11 +93,6 @@ class Notes(list):
         drawn.reached = lambda done, whole: self.append(f"  reached {done} of {whole}")
         drawn.advance = lambda work: self.append(f"  advance {work}")
         yield drawn
-
-
-def half_done(scenario, report):
-    report(1, 2)
-    return f"robustness of {scenario}"
 
 
 def audited(about, ids, sets, quick, threads, report):

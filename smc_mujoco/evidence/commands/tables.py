@@ -1,10 +1,10 @@
-"""Tables of the commands on boards, claims and rigs."""
+"""Tables of the commands on claims, certificates and rigs."""
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median_low
 
 import numpy as np
@@ -17,36 +17,14 @@ from smc_mujoco.cli.tables import plain, titled
 from smc_mujoco.common.text import capital, number
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import Claim
-from smc_mujoco.evidence.boards.published import RobustnessRow, Row
 from smc_mujoco.evidence.certificates.certificate import Certificate
 from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.predictions import Told, percentiles
 
-BOARDS = {  # board of RealAIGym -> title and headings of columns
-    "simulation": ("simulation", ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score")),
-    "robustness": (
-        "survived",
-        ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
-    ),
-}
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to questions have their own.
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
-
-
-def board(robot: str, rows: Sequence[Row] | Sequence[RobustnessRow], bold: Collection[str]) -> Table:
-    """Return RealAIGym's simulation board or robustness board of a robot, with the rows named in `bold` in bold."""
-    tests = isinstance(rows[0], RobustnessRow)
-    title, heads = BOARDS["robustness" if tests else "simulation"]
-    columns = [Column(head, justify="right") for head in heads]
-    table = titled(f"{robot}, {title}, version 2", "controller", *columns, pad_edge=False)
-    for row in rows:
-        values = row[1:8] if tests else row[1:7]
-        digits = (1,) * 6 + (3,) if tests else (2, 2, 2, 3, 1, 3)
-        cells = [f"{value:.{places}f}" for value, places in zip(values, digits, strict=True)]
-        table.add_row(row.name, *cells, style="bold" if row.name in bold else None)
-    return table
 
 
 def certificate(made: Certificate) -> Table:

@@ -29,11 +29,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from smc_mujoco.benchmark.realaigym.scoring import shoulder_first
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.common.jit import NotCompilable, call
 from smc_mujoco.control.law import Measurement
-from smc_mujoco.evidence.boards.scoring import shoulder_first
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1, accelerations
 from smc_mujoco.simulation import cfunctions
 from smc_mujoco.simulation.coerce import REST
@@ -48,7 +48,7 @@ MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s;
 SCALED_PARAMETERS = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
 MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(SCALED_PARAMETERS, (0.75, 1.25))  # parameter -> ends of its values
 MODEL_LEVELS |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
-MEASUREMENT_SIZE = len(Measurement._fields)
+MEASUREMENT_SIZE, ROOM = len(Measurement._fields), 11
 T, DT, LIMIT, USES_MODEL, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
     Measurement._fields.index(name)
     for name in ("t", "dt", "limit", "model", "x", "v", "e", "de", "q", "dq", "f", "g", "fq", "gq")
@@ -224,6 +224,40 @@ def _moved(x, k, h):
 
 
 @njit(error_model="numpy")
+def stepped(x, u1, u2, p):
+    """Return the state after a step of RK4 under constant torques."""
+    k1 = _slope(x, u1, u2, p)
+    k2 = _slope(_moved(x, k1, STEP / 2), u1, u2, p)
+    k3 = _slope(_moved(x, k2, STEP / 2), u1, u2, p)
+    k4 = _slope(_moved(x, k3, STEP), u1, u2, p)
+    return _moved(_moved(_moved(_moved(x, k1, STEP / 6), k2, STEP / 3), k3, STEP / 3), k4, STEP / 6)
+
+
+@njit(error_model="numpy")
+def answered(functions, gains, tuning, memory, memories, known, driven, seen, y, room):
+    """Return a law's answer to a measured state, (4,), and whether it or its estimator raised an exception.
+
+    `y` has t, dt, limit and model, and gets the rest of the measurement; `room` is ROOM numbers to work in.
+    """
+    control, reading, estimate, position, velocity = room[:2], room[2:5], room[5:7], room[7:9], room[9:]
+    for joint in range(2):
+        reading[0], reading[1], reading[2] = STEP, seen[joint], seen[2 + joint]
+        if call(functions[1], reading.ctypes.data, tuning.ctypes.data, memories[joint].ctypes.data,
+                estimate.ctypes.data) != 0:  # fmt: skip
+            return 0.0, True
+        position[joint], velocity[joint] = seen[joint], estimate[0]
+    f1, f2, W11, W12, W22 = accelerations(
+        position[0], position[1], velocity[0], velocity[1], known[0], known[1], known[2], known[3], known[4], known[5],
+        known[6], known[7], known[8], known[9], known[10], known[13],
+    )  # fmt: skip
+    f, fq, g, free = (f1, f2, W11, 1) if driven == 0 else (f2, f1, W22, 0)
+    y[X], y[V], y[E], y[DE] = position[driven], velocity[driven], position[driven], velocity[driven]
+    y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
+    raised = call(functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data) != 0
+    return control[0], raised
+
+
+@njit(error_model="numpy")
 def _simulate(
     functions, gains, tuning, memory, memories, known, true, driven, limit, uses_model, noise, pulse, response, delay,
     states, torque,
@@ -231,36 +265,22 @@ def _simulate(
     """Run a case; states and torque are written. Return whether the law or its estimator raised an exception."""
     parameters = (true[0], true[1], true[2], true[3], true[4], true[5], true[6], true[7], true[8], true[9], true[10],
                   true[11], true[12], true[13])  # fmt: skip
-    y, reading, estimate, control = np.zeros(MEASUREMENT_SIZE), np.zeros(3), np.zeros(2), np.zeros(2)
-    x, motor, free = (0.0, 0.0, 0.0, 0.0), 0.0, 1 - driven
-    position, velocity = np.zeros(2), np.zeros(2)
+    x, motor, seen = (0.0, 0.0, 0.0, 0.0), 0.0, np.zeros(4)
+    y, room = np.zeros(MEASUREMENT_SIZE), np.zeros(ROOM)
+    y[DT], y[LIMIT], y[USES_MODEL] = STEP, limit, uses_model
     for k in range(len(torque)):
-        seen = states[max(0, k - delay)]
-        for joint in range(2):
-            reading[0], reading[1], reading[2] = STEP, seen[joint], seen[2 + joint] + noise[k, joint]
-            if call(functions[1], reading.ctypes.data, tuning.ctypes.data, memories[joint].ctypes.data,
-                    estimate.ctypes.data) != 0:  # fmt: skip
-                return True
-            position[joint], velocity[joint] = seen[joint], estimate[0]
-        f1, f2, W11, W12, W22 = accelerations(
-            position[0], position[1], velocity[0], velocity[1], known[0], known[1], known[2], known[3], known[4],
-            known[5], known[6], known[7], known[8], known[9], known[10], known[13],
-        )  # fmt: skip
-        f, fq, g = (f1, f2, W11) if driven == 0 else (f2, f1, W22)
-        y[T], y[DT], y[LIMIT], y[USES_MODEL] = k * STEP, STEP, limit, uses_model
-        y[X], y[V], y[E], y[DE] = position[driven], velocity[driven], position[driven], velocity[driven]
-        y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
-        if call(functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data) != 0:
+        seen[:] = states[max(0, k - delay)]
+        seen[2] += noise[k, 0]
+        seen[3] += noise[k, 1]
+        y[T] = k * STEP
+        wanted, raised = answered(functions, gains, tuning, memory, memories, known, driven, seen, y, room)
+        if raised:
             return True
-        motor += response * (min(max(control[0], -limit), limit) - motor)
+        motor += response * (min(max(wanted, -limit), limit) - motor)
         motor = min(max(motor + noise[k, 2], -limit), limit)
         u = motor + pulse[k]
         u1, u2 = (u, 0.0) if driven == 0 else (0.0, u)
-        k1 = _slope(x, u1, u2, parameters)
-        k2 = _slope(_moved(x, k1, STEP / 2), u1, u2, parameters)
-        k3 = _slope(_moved(x, k2, STEP / 2), u1, u2, parameters)
-        k4 = _slope(_moved(x, k3, STEP), u1, u2, parameters)
-        x = _moved(_moved(_moved(_moved(x, k1, STEP / 6), k2, STEP / 3), k3, STEP / 3), k4, STEP / 6)
+        x = stepped(x, u1, u2, parameters)
         torque[k] = motor
         states[k + 1, 0], states[k + 1, 1], states[k + 1, 2], states[k + 1, 3] = x
         if not abs(x[2]) + abs(x[3]) < 1e6:

@@ -1,14 +1,14 @@
 """The boards as tables: published rows with your own among them, best score first."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from smc_mujoco.benchmark.realaigym.entries import FEEDBACKS, entry, on_board
+from smc_mujoco.benchmark.realaigym.published import GLOBAL, ROBUSTNESS, SIMULATION, GlobalRow, RobustnessRow, Row
+from smc_mujoco.benchmark.realaigym.scoring import criteria, score, shoulder_first
+from smc_mujoco.benchmark.realaigym.simulator import Robustness
 from smc_mujoco.common import errors
-from smc_mujoco.evidence.boards.entries import FEEDBACKS, entry, on_board
-from smc_mujoco.evidence.boards.published import ROBUSTNESS, SIMULATION, RobustnessRow, Row
-from smc_mujoco.evidence.boards.scoring import criteria, score, shoulder_first
-from smc_mujoco.evidence.boards.simulator import Robustness
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -54,6 +54,12 @@ def robustness_board(robot: str, results: Mapping[str, Robustness]) -> tuple[Rob
     shoulder_first(robot)
     rows = [RobustnessRow(name=name, score=result.score, **result.percent) for name, result in results.items()]
     return _ranked(ROBUSTNESS[robot], rows)
+
+
+def global_board(robot: str, rows: Sequence[GlobalRow]) -> tuple[GlobalRow, ...]:
+    """Return the rows of the board of 2025 of a robot, with these among them."""
+    shoulder_first(robot)
+    return _ranked(GLOBAL[robot], [*rows])
 
 
 def _ranked(published: tuple[Any, ...], rows: list[Any]) -> tuple[Any, ...]:

@@ -13,11 +13,11 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 import smc_mujoco as smc
-from smc_mujoco.evidence import boards
-from smc_mujoco.evidence.boards import entries, simulator, standings
-from smc_mujoco.evidence.boards.__main__ import app as command
-from smc_mujoco.evidence.boards.scoring import VERSIONS
-from smc_mujoco.evidence.boards.simulator import Case, Machine
+from smc_mujoco.benchmark import realaigym as boards
+from smc_mujoco.benchmark.realaigym import entries, simulator, standings
+from smc_mujoco.benchmark.realaigym.__main__ import app as command
+from smc_mujoco.benchmark.realaigym.scoring import VERSIONS
+from smc_mujoco.benchmark.realaigym.simulator import Case, Machine
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_1
 
 ROBOTS = pytest.mark.parametrize("robot", boards.ROBOTS)

@@ -24,9 +24,9 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from smc_mujoco.benchmark.realaigym.published import Row
 from smc_mujoco.common.constraints import OneOf, constrained
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
-from smc_mujoco.evidence.boards.published import Row
 from smc_mujoco.mechanisms.plants.double_pendulum import L2
 from smc_mujoco.simulation.trace import Trace
 

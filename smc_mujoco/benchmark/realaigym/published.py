@@ -1,8 +1,9 @@
 """Published rows of RealAIGym's simulation boards of pendubot and acrobot.
 
 Sources: the boards of github.com/dfki-ric-underactuated-lab/real_ai_gym_leaderboard (the double pendulum's software and
-boards are BSD-3-Clause), as they stood after the AI Olympics at IROS 2024; archived_leaderboards/ has version 1. The
-machines of version 2 are design C.1, model 1.1, and so are this package's. Those of version 1 had other parameters.
+boards are BSD-3-Clause), as they stood after the AI Olympics at IROS 2024; archived_leaderboards/ has version 1, and
+leaderboards/icra2025 version 3, of April 2025. The machines of versions 2 and 3 are design C.1, model 1.1, and so are
+this package's. Those of version 1 had other parameters.
 """
 
 from collections.abc import Mapping
@@ -35,6 +36,15 @@ class RobustnessRow(NamedTuple):
     torque_response: float
     delay: float
     perturbations: float
+    score: float
+
+
+class GlobalRow(NamedTuple):
+    """An entry of a board of 2025: how often the tip rose above the line, how long it was there, s, and the score."""
+
+    name: str
+    swing_ups: float
+    uptime: float
     score: float
 
 
@@ -99,5 +109,21 @@ ROBUSTNESS: Mapping[str, tuple[RobustnessRow, ...]] = {
         RobustnessRow("iLQR MPC stabilization", 31.9, 90.5, 100.0, 100.0, 38.1, 44.0, 0.674),
         RobustnessRow("mcpilco", 24.8, 76.2, 61.9, 95.2, 28.6, 82.0, 0.614),
         RobustnessRow("iLQR Riccati Gains", 5.2, 38.1, 9.5, 85.7, 14.3, 0.0, 0.255),
+    ),
+}
+GLOBAL: Mapping[str, tuple[GlobalRow, ...]] = {
+    "acrobot": (
+        GlobalRow("AR-EAPO", 21, 39.484, 0.658),
+        GlobalRow("VIMPPI", 16, 38.882, 0.648),
+        GlobalRow("AcadosMpc", 21, 37.798, 0.630),
+        GlobalRow("mcpilco", 34, 18.408, 0.307),
+        GlobalRow("prx_analytical", 14, 7.002, 0.117),
+    ),
+    "pendubot": (
+        GlobalRow("VIMPPI", 16, 47.926, 0.799),
+        GlobalRow("AR-EAPO", 16, 45.538, 0.759),
+        GlobalRow("AcadosMpc", 16, 43.554, 0.726),
+        GlobalRow("mcpilco", 23, 30.550, 0.509),
+        GlobalRow("prx_analytical", 13, 14.396, 0.240),
     ),
 }
