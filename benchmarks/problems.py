@@ -3,6 +3,7 @@
     python benchmarks/problems.py measure laws visible.json
     python benchmarks/problems.py measure controls controls.json --number random --instances 24
     python benchmarks/problems.py freeze visible.json controls.json   # writes the targets into the rules
+    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of the rules? all of it
     python benchmarks/problems.py measure laws hidden.json --number random
     python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
     python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
@@ -33,7 +34,9 @@ from smc_mujoco.simulation.run import stream
 
 INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
+CONTROLLED = 24  # of each problem, for the controls
 ATTACKED = 2  # instances against an adversary
+LATER = {"pendulum_network/mpc", "inverted_pendulum_network/mpc"}  # got shipped gains after the freeze of version 1
 MARGIN = 1.25  # of a target over the oracle's worst; 2 where no catalogue sets the levels
 NEAR = 0.1  # of the start: no target is easier, and a problem in which u = 0 ends there is left out
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
@@ -55,12 +58,15 @@ def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
     return {law: gain_sets.law(plant, law) for law in gain_sets.general() if gain_sets.in_set(plant, law, "tuned")}
 
 
-def measure(kind: str, out: Path, number: str, instances: int) -> None:
-    """Run laws or controls on all problems, and write their measures."""
+def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[str]) -> None:
+    """Run laws or controls on some problems, and write their measures."""
     done: dict = json.loads(out.read_text()) if out.exists() else {"number": number, "runs": {}}
     number, runs = done["number"], done["runs"]
-    for name in (name for name in cells() if name not in runs):
-        one, attacked = problems.problem(name), "/worst" in name
+    for name in (name for name in names if name not in runs):
+        plant, condition, version = str(name).replace("@", "/").split("/")
+        text = (problems.RULES / f"{version}.toml").read_text(encoding="utf-8")  # as problem(), also where left out
+        one = problems.Problem(id=name, plant=plant, condition=condition, version=int(version), rules=text)
+        attacked = "/worst" in name
         laws, count = laws_of(kind, one), min(instances, ATTACKED) if attacked else instances
         if not laws or (attacked and kind == "laws"):
             continue
@@ -117,7 +123,27 @@ def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.nda
     return found | {"oracle": setting}
 
 
-def freeze(visible: Runs, of_controls: Runs) -> None:
+def repeat(folder: Path, names: Sequence[str]) -> bool:
+    """Run all that the targets of problems were frozen from, and tell whether they are those of the rules."""
+    rules = problems.rules(1)
+    measure("laws", folder / "laws.json", "", INSTANCES, names)
+    measure("controls", folder / "controls.json", rules["frozen"]["number"], CONTROLLED, names)
+    visible, of_controls = read(folder / "laws.json"), read(folder / "controls.json")
+    differ = 0
+    for name in names:
+        cell = name.partition("@")[0]
+        laws = {
+            law: runs for law, runs in visible.get(name, {}).items() if f"{cell.partition('/')[0]}/{law}" not in LATER
+        }
+        found, stored = targets(name, laws, of_controls[name]), rules["targets"].get(cell)
+        if found is not None:
+            found |= {m: [float(f"{level:.3g}") for level in found[m]] for m in problems.MEASURES}
+        differ += found != stored
+        print(name, "the same" if found == stored else f"differs: {found}, and in the rules {stored}", flush=True)
+    return not differ
+
+
+def freeze(visible: Runs, of_controls: Runs, number: str) -> None:
     """Write targets and what is left out below the mark in the rules."""
     path = problems.RULES / "1.toml"
     lines, left_out = ["[targets]"], []
@@ -129,7 +155,8 @@ def freeze(visible: Runs, of_controls: Runs) -> None:
         lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]} }}')
     write_suites(left_out)
     text = path.read_text().partition(MARK)[0] + MARK
-    path.write_text(text + f"[frozen]\nleft_out = {json.dumps(left_out)}\n\n" + "\n".join(lines) + "\n")
+    head = f'[frozen]\nnumber = "{number}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
+    path.write_text(text + head + "\n".join(lines) + "\n")
     print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
 
 
@@ -190,6 +217,9 @@ def parser() -> argparse.ArgumentParser:
         command = commands.add_parser(name)
         for file in files:
             command.add_argument(file, type=Path)
+    repeated = commands.add_parser("repeat")
+    repeated.add_argument("folder", type=Path)
+    repeated.add_argument("problems", nargs="*")
     commands.add_parser("enter").add_argument("results", type=Path)
     return made
 
@@ -198,9 +228,12 @@ if __name__ == "__main__":
     given = parser().parse_args()
     if given.command == "measure":
         number = secrets.token_hex(32) if given.number == "random" else given.number
-        measure(given.kind, given.out, number, given.instances)
+        measure(given.kind, given.out, number, given.instances, cells())
+    elif given.command == "repeat":
+        given.folder.mkdir(parents=True, exist_ok=True)
+        sys.exit(not repeat(given.folder, given.problems or cells()))
     elif given.command == "freeze":
-        freeze(read(given.visible), read(given.controls))
+        freeze(read(given.visible), read(given.controls), json.loads(given.controls.read_text())["number"])
     elif given.command == "enter":
         enter_all(given.results)
     else:

@@ -90,7 +90,8 @@ def tried(order: Mapping[str, Any], limit: float, reached: Callable[[int], None]
                 reached(int(count.read_text(encoding="utf-8")))
     if isinstance(failed := outcome[0], guard.Failed):
         if failed.fault or failed.code is not None:
-            raise ScenarioError(f"the entry failed while {failed.stage}: {failed}") from failed
+            why = entries.read(order["folder"]).why_unread
+            raise ScenarioError(f"the entry failed while {failed.stage}: {failed}{why and f' ({why})'}") from failed
         raise ScenarioError(
             f"the entry is not done with {failed.stage} within {limit:.0f} s: let its law end"
         ) from failed

@@ -9,6 +9,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.benchmark import enter as entering
 from smc_mujoco.benchmark import entrant, entry, results, runs, suite
+from smc_mujoco.common import guard
 from smc_mujoco.common.errors import ScenarioError
 
 HEAD = "import math\n\nimport smc_mujoco as smc\n\n\n"
@@ -252,3 +253,16 @@ def test_variation_of_u_counts_only_where_the_easiest_accuracy_is_kept(tmp_path)
     runs.write(tmp_path / "runs.parquet", groups)
     medians = runs.Runs(tmp_path / "runs.parquet").medians()
     assert [medians[name]["calm"] for name in PROBLEMS] == [np.inf, pytest.approx(0.3)]
+
+
+def test_a_failure_of_a_file_that_can_do_more_than_compute_is_told_with_what_it_has(tmp_path, monkeypatch):
+    """As of one that forks: two processes then write one table, and the failure itself says little."""
+    folder = written(tmp_path / "entry", PLAIN.replace("\n\n\n", "\n\nimport os\n\nos.fork()\n\n\n", 1))
+
+    def fails(module, order, timeout):
+        raise guard.Failed("unloading", "cannot write runs.parquet", None, timeout)
+
+    monkeypatch.setattr(guard, "tried", fails)
+    order = {"folder": str(folder), "number": "", "problems": PROBLEMS, "instances": [0], "timed": False}
+    with pytest.raises(ScenarioError, match=r"cannot write runs.parquet \(line . of law.py has import os, which can"):
+        entrant.tried(order | {"rows": str(tmp_path / "rows")}, 1.0)
