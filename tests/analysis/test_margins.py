@@ -270,6 +270,16 @@ def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
     assert margin.kind == "mass"
 
 
+def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
+    """Of a delay one control period, of jitter an eighth of one; others may have any level."""
+    for kind, least in {"delay": BASE.control_period, "jitter": 0.125}.items():
+        search = margins.MARGIN_KINDS[kind].search(BASE, FINE)
+        assert search.rounded(0.6 * least) == search.rounded(1.4 * least) == least
+        assert search.rounded(1.6 * least) == 2.0 * least
+        assert np.allclose(search.levels, np.round(np.divide(search.levels, least)) * least, rtol=1e-12, atol=0.0)
+        assert search.resolution(0.0) % least == pytest.approx(0.0)
+
+
 # files and the command
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.benchmark import commands, entrant, entry, results, runs, suite
 from smc_mujoco.benchmark import enter as entering
-from smc_mujoco.benchmark import entrant, entry, results, runs, suite
 from smc_mujoco.common import guard
 from smc_mujoco.common.errors import ScenarioError
 
@@ -266,3 +266,17 @@ def test_a_failure_of_a_file_that_can_do_more_than_compute_is_told_with_what_it_
     order = {"folder": str(folder), "number": "", "problems": PROBLEMS, "instances": [0], "timed": False}
     with pytest.raises(ScenarioError, match=r"cannot write runs.parquet \(line . of law.py has import os, which can"):
         entrant.tried(order | {"rows": str(tmp_path / "rows")}, 1.0)
+
+
+def test_the_command_tells_the_place_and_the_share_of_targets_of_each_question(tmp_path, monkeypatch, capsys):
+    found = made({"own law": np.linspace(0.1, 1.0, 30), "other": np.ones(30)})
+    found.entries["own law"].folder = tmp_path
+    found.entries["own law"].about["instances"] = 2
+    for one in found.entries.values():
+        one.targets = lambda problems, measure: np.array([0.5, np.inf])  # half of them
+    monkeypatch.setattr(entering, "enter", lambda *_, **__: tmp_path)
+    monkeypatch.setattr(results, "results", lambda *_, **__: found)
+    commands.enter("own law", results=tmp_path)
+    said = [line for line in capsys.readouterr().out.splitlines() if line.endswith("of the targets")]
+    rows = [next(row for row in board.standings if row.entry == "own law") for board in found.boards().values()]
+    assert [re.findall(r"\d+", line) for line in said] == [[f"{r.place}", "2", f"{100 * r.reached:.0f}"] for r in rows]

@@ -336,6 +336,12 @@ def test_with_rendering_turned_off_only_the_film_is_missing(scene, folder):
     assert {path.name for path in (folder / "out" / "mine").iterdir()} == TRACES
 
 
+def test_a_word_in_mujoco_gl_that_is_no_backend_stops_no_command(folder):
+    done = python("-m", "smc_mujoco", "show", "none.npz", cwd=folder, MUJOCO_GL="nonsense")
+    assert done.returncode == 2
+    assert "none.npz" in done.stderr.splitlines()[-1]
+
+
 def test_a_film_that_fails_leaves_the_list_of_what_was_written(call, undrawn, scene, folder, monkeypatch):
     def failing(*_):
         raise ScenarioError("cannot write mp4: no ffmpeg")
