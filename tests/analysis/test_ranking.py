@@ -259,60 +259,20 @@ def test_few_seeds_are_too_few_for_many_comparisons_and_the_board_says_so():
     assert leaderboard(stand(enough), ["itae"])[0].winner == "law00"
 
 
-def simulated(laws: int, seeds: int, bad: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Equal laws that share the effect of their seed, a fifth of the runs failing, and `bad` ones that are worse."""
-    own = rng.lognormal(sigma=0.5, size=(laws + bad, 1, seeds)) * rng.lognormal(size=(laws + bad, 3, seeds))
-    cells = rng.lognormal(size=(1, 1, seeds)) * own
-    cells[laws:] *= 30.0
-    cells[rng.random(cells.shape) < 0.2] = INF
-    return {f"law{i}": c for i, c in enumerate(cells)}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("laws", "seeds", "bad"), [(2, 17, 2)])
-def test_equal_laws_are_seldom_separated_in_any_block(laws, seeds, bad):
-    rng, runs, wrong = np.random.default_rng(laws + seeds), 400, 0
-    for _ in range(runs):
-        wrong += bool(Comparison(simulated(laws, seeds, bad, rng)).better[:, :laws, :laws].any())
-    assert stats.binomtest(wrong, runs, 0.05, alternative="greater").pvalue > 1e-3
-
-
-def spreading(laws: int, conditions: int, spread: float, rng: np.random.Generator, shape: str = "normal"):
+def spreading(laws: int, conditions: int, spread: float, rng: np.random.Generator, tails: bool = False):
     """Equal laws of 24 runs, whose own gain sets spread their scores; conditions share the gains, laws the starts."""
-    own = {
-        "normal": lambda size: rng.normal(size=size),
-        "tails": lambda size: rng.standard_t(1.5, size=size),
-        "skew": lambda size: rng.exponential(size=size) ** 2,
-        "ties": lambda size: rng.integers(-1, 2, size=size).astype(float),
-        "failing": lambda size: rng.normal(size=size),
-    }[shape]((laws, 1, 24))
+    size = (laws, 1, 24)
+    own = rng.standard_t(1.5, size=size) if tails else rng.normal(size=size)
     start = rng.normal(scale=0.1, size=(1, conditions, 24))
-    scores = np.exp(spread * own + start + rng.normal(scale=0.01, size=(laws, conditions, 24)))
-    return np.where((shape == "failing") & (rng.random((laws, 1, 24)) < 0.02), INF, scores)
+    return np.exp(spread * own + start + rng.normal(scale=0.01, size=(laws, conditions, 24)))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("laws", "conditions", "shape"),
-    [(2, 3, "tails"), (2, 3, "failing"), (4, 5, "skew"), (4, 5, "ties")],
-)
-def test_equal_laws_whose_gains_spread_have_a_false_winner_in_at_most_five_percent_of_boards(laws, conditions, shape):
-    rng, wrong, runs = np.random.default_rng(laws), 0, 60
-    for spread in (0.0, 0.05, 0.15):
-        for _ in range(runs):
-            cells = spreading(laws, conditions, spread, rng, shape)
-            found = Comparison({f"law{i}": own for i, own in enumerate(cells)})
-            wrong += any(found.winners)
-    assert stats.binomtest(wrong, 3 * runs, 0.05, alternative="greater").pvalue > 1e-3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("shape", ["tails"])
-def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_at_most_five_percent(shape):
+def test_two_laws_apart_by_the_least_relevant_difference_have_a_false_winner_in_at_most_five_percent():
     """The worst case of the hypothesis: a lead that just does not matter, and a third law far behind."""
     rng, wrong, runs = np.random.default_rng(1), 0, 800
     for _ in range(runs):
-        a, b, c = spreading(3, 1, 0.15, rng, shape)
+        a, b, c = spreading(3, 1, 0.15, rng, tails=True)
         wrong += any(Comparison({"a": (1 - RELEVANT) * a, "b": b, "c": 9 * c}).winners)
     assert stats.binomtest(wrong, runs, 0.05, alternative="greater").pvalue > 1e-3
     assert wrong > 0.01 * runs  # the test is not idle: one of its two sides is exact
@@ -432,7 +392,9 @@ def test_a_law_that_is_clearly_better_wins():
     rng = np.random.default_rng(3)
     wins = 0
     for _ in range(50):
-        scores = simulated(4, 20, 0, rng)
+        cells = rng.lognormal(sigma=0.5, size=(4, 1, 20)) * rng.lognormal(size=(4, 3, 20)) * rng.lognormal(size=20)
+        cells[rng.random(cells.shape) < 0.2] = INF
+        scores = {f"law{i}": own for i, own in enumerate(cells)}
         scores["better"] = 0.02 * scores.pop("law0")
         scores["better"][np.isinf(scores["better"])] = 0.01
         wins += Comparison(scores).best == [("better",)] * 3
@@ -611,16 +573,6 @@ def test_the_least_visible_lead_is_seen_with_a_probability_of_eighty_percent(uni
         limits = Limits(level, level, level)
         seen += Comparison({"a": (1 - lead) * c, "b": d}, limits=limits).winners == ["a"]
     assert 0.72 <= seen / runs <= 0.88
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("laws", "conditions", "spread"), [(2, 3, 0.05), (4, 5, 0.15), (11, 5, 0.5)])
-def test_equal_laws_of_twelve_searches_have_a_false_winner_in_at_most_five_percent_of_boards(laws, conditions, spread):
-    rng, wrong, runs = np.random.default_rng(laws), 0, 200
-    for _ in range(runs):
-        own = np.exp(spread * rng.normal(size=(laws, 1, 12)) + 0.02 * rng.normal(size=(laws, conditions, 12)))
-        wrong += any(Comparison({f"law{i}": y for i, y in enumerate(own)}).winners)
-    assert wrong / runs <= 0.05
 
 
 def test_over_several_conditions_only_what_holds_in_each_is_told():

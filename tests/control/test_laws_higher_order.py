@@ -288,7 +288,7 @@ def test_continuous_twisting_scales_with_the_slope_that_it_is_made_for():
     assert plant_b(law("continuous_twisting", L=1.0), sine(8.0, 2.0)).residual() > 1e-2
 
 
-@pytest.mark.parametrize(
+TERMINAL_LAWS = pytest.mark.parametrize(
     ("name", "speed"),
     [
         ("terminal", lambda g, e: g["b"] * e ** g["p"]),
@@ -296,6 +296,9 @@ def test_continuous_twisting_scales_with_the_slope_that_it_is_made_for():
         ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"])),
     ],
 )
+
+
+@TERMINAL_LAWS
 def test_terminal_laws_end_when_their_surface_says_whatever_the_disturbance(name, speed):
     rule = law(name)
     due = quad(lambda e: 1 / speed(rule.gains, e), 0.0, 1.0)[0]
@@ -338,14 +341,7 @@ def test_the_linear_term_of_the_fast_terminal_law_brings_it_in_from_afar():
     assert slow > 15.0
 
 
-@pytest.mark.parametrize(
-    ("name", "speed"),
-    [
-        ("terminal", lambda g, e: g["b"] * e ** g["p"]),
-        ("nonsingular_terminal", lambda g, e: (g["B"] * e) ** (1 / g["p"])),
-        ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"])),
-    ],
-)
+@TERMINAL_LAWS
 def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_too(name, speed):
     """From the surface, g = 3, |f| = 1: s stays where k g > |f| + |g - 1| |eq|, and leaves where k g > |f| alone."""
     e, f, g = 1.5, 1.0, 3.0
