@@ -445,3 +445,17 @@ def test_commands_refuse_in_one_sentence(arguments, words, tmp_path, monkeypatch
     said = done.output + capsys.readouterr().err
     assert done.exit_code == 2
     assert words in " ".join(said.split())
+
+
+class Silent:
+    """A value that cannot be shown."""
+
+    def __repr__(self):
+        raise RuntimeError("silent")
+
+
+def test_a_condition_whose_value_cannot_be_shown_still_has_a_text():
+    told = str(smc.condition("odd", friction=Silent(), input_delay=0.01))
+    assert told.startswith("odd: friction=")
+    assert "Silent" in told
+    assert "input_delay=0.01" in told
