@@ -195,10 +195,13 @@ def suits(law: Law | Template, plant: Plant) -> bool:
     """
     if isinstance(law, Template) and any(gain.plant for gain in law.gains.values()):
         return not (plant.unmodelled or plant.underactuated)
-    if not law.plants or plant.name in law.plants:
+    if not law.plants or plant.name in law.plants or (plant.pose and FREE_BODY in law.plants):
         return True
     plants = [plants_known()[name] for name in law.plants if name in plants_known()]
     return plant.own and plant.underactuated and any(known.underactuated for known in plants)
+
+
+FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channels are a pose
 
 
 KINDS = {  # of laws and of their parts -> the catalogue

@@ -114,6 +114,7 @@ class Plant:
     # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its
     # number to such a parameter, in this unit, instead of multiplying it
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    pose: bool = False  # whether its channels are the pose of a free body: x, y, z, and its rotation vector
     direct: bool = False  # whether disturbances act on its joints, not on the bodies that they carry
     smooth: bool = True  # whether its model has no limits, contacts, dry friction and equality constraints
     # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user may meet.

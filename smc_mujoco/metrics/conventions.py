@@ -89,8 +89,10 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     """Return the trace of a group's channels; the same trace if these are all. Its scenario has all channels."""
     if len(group.channels) == trace.x.shape[1]:
         return trace
-    columns = list(group.channels)
-    arrays = {name: array[:, columns] for name, array in trace.arrays().items() if name != "t"}
+    columns, whole = list(group.channels), trace.arrays()
+    if trace.scenario.plant.pose:  # metrics take x - r for the error
+        whole["x"] = trace.r + trace.e
+    arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
     return dataclasses.replace(trace, **arrays)
 
 

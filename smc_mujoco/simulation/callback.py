@@ -132,7 +132,8 @@ def callback():
             pointer(integers(data + at.xaxis)[0]), pointer(integers(data + at.actuator_force)[0]),
             pointer(integers(data + at.qfrc_constraint)[0]), pointer(integers(data + at.qfrc_bias)[0]),
             pointer(integers(data + at.qfrc_spring)[0]), pointer(integers(data + at.qfrc_passive)[0]),
-            pointer(integers(data + at.qLDiagInv)[0]), pointer(integers(model + at.dof_frictionloss)[0]),
+            pointer(integers(data + at.qfrc_actuator)[0]), pointer(integers(data + at.qLDiagInv)[0]),
+            pointer(integers(model + at.dof_frictionloss)[0]),
         )  # fmt: skip
         run_simulation(address, simulation_at(address, 0), arrays)
 

@@ -28,6 +28,7 @@ from numba import njit
 
 from smc_mujoco.common.jit import call, pointer
 from smc_mujoco.control.joint_law import head_at
+from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
@@ -35,7 +36,15 @@ from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.signals import after_pauses
-from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, motor_at, state_at
+from smc_mujoco.simulation.state import (
+    channel_at,
+    disturbance_at,
+    function_at,
+    log_at,
+    mixer_at,
+    motor_at,
+    state_at,
+)
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
@@ -46,7 +55,7 @@ MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis actuator_force qfrc_constraint qfrc_bias
-    qfrc_spring qfrc_passive qLDiagInv dof_frictionloss""",
+    qfrc_spring qfrc_passive qfrc_actuator qLDiagInv dof_frictionloss""",
 )
 
 
@@ -186,6 +195,15 @@ def _measurement_error(address, sim, function, t):
     return sim.motion.value
 
 
+@njit(error_model="numpy", inline="always")
+def _position(numbers, at, turn):
+    """Return a number, or of the quaternion that begins there, number `turn` of its rotation vector."""
+    if turn < 0:
+        return numbers[at]
+    vector = rotation.rotation_vector(numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3])
+    return vector[0] if turn == 0 else (vector[1] if turn == 1 else vector[2])
+
+
 @njit(error_model="numpy")
 def _measure(address, sim, data, k, t):
     """Measure position, and estimate velocity and acceleration, of every channel at sample k, at time t, s."""
@@ -198,7 +216,8 @@ def _measure(address, sim, data, k, t):
     v_error = _measurement_error(address, sim, sim.velocity_error, t)
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
-        position, velocity = data.sensordata[channel.x_sensor] + x_error, data.sensordata[channel.v_sensor] + v_error
+        position = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
+        velocity = data.sensordata[channel.v_sensor] + v_error
         reading.x, reading.v = _read_sensor(sim, state, i, position, velocity, j, channel.hinge_body >= 0)
         sim.seen.i = i
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
@@ -250,12 +269,35 @@ def update_law(address, sim, k, t):
             buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
             if sim.told != 0:
                 last_u[i] += pointer(sim.told)[i]
+    if sim.mixer != 0:
+        _mix(sim, pointer(sim.seen.x), last_u, buffer)
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
         buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
     for i in range(n if sim.told != 0 else 0):
         last_u[i] = log_at(sim.log, k * n + i).u
     return record.FINE
+
+
+@njit(error_model="numpy")
+def _mix(sim, x, u, controls):
+    """Write the controls of a free body's actuators for the force u[:3], in the axes of the world, and torque u[3:].
+
+    The force is turned into the axes of the body by the measured attitude. Where all actuators push one way and alike,
+    as rotors do, the excess of the largest over its bound is taken from all: that keeps the torques, and gives up
+    thrust, as the Crazyflie's firmware does.
+    """
+    fx, fy, fz = rotation.turned_back(rotation.quaternion(x[3], x[4], x[5]), u[0], u[1], u[2])
+    excess = 0.0
+    for j in range(sim.n):
+        controls[j] = 0.0
+    for j in range(sim.actuators):
+        row = mixer_at(sim.mixer, j)
+        controls[j] = row.fx * fx + row.fy * fy + row.fz * fz + row.mx * u[3] + row.my * u[4] + row.mz * u[5]
+        excess = max(excess, controls[j] - row.high)
+    for j in range(sim.actuators):
+        row = mixer_at(sim.mixer, j)
+        controls[j] = min(max(controls[j] - (excess if sim.keeps_torques != 0 else 0.0), row.low), row.high)
 
 
 @njit(error_model="numpy", inline="always")
@@ -320,6 +362,8 @@ def _measure_joints(address, sim, k, t):
         pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
         pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = motion.value, motion.rate, motion.acceleration
         pointer(y.a)[i], pointer(y.limit)[i] = motion.acceleration if math.isnan(a) else a, pointer(sim.limits)[i]
+    if sim.mixer != 0:
+        rotation.put_attitude_error(pointer(y.x), pointer(y.v), pointer(y.r), pointer(y.dr), pointer(y.e), pointer(y.de))
     return _measure_dynamics(address, sim)
 
 
@@ -375,7 +419,7 @@ def _actuate(sim, data, step):
         buffer = pointer(sim.delay_buffer + 8 * sim.n * (past // sim.steps % sim.delay_slots))
         for i in range(sim.n):
             state_at(sim.states, i).delayed = buffer[i]
-            if sim.has_drives == 0 and i < sim.driven:
+            if sim.has_drives == 0 and i < (sim.driven if sim.mixer == 0 else sim.actuators):
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
             if sim.motors != 0 and i < sim.driven and not _missed(sim, past // sim.steps):
                 _command_stepper(_motor_at(sim, i), sim.stepper, buffer[i], step * sim.step)
@@ -659,6 +703,8 @@ def _sum_forces(sim, data):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         if channel.force >= 0 and sim.drive_step.rise_first == 0.0 and sim.motors == 0:
             state.force += data.actuator_force[channel.force]
+        if channel.gathered >= 0:
+            state.force += data.qfrc_actuator[channel.gathered]
         state.reaction += data.qfrc_constraint[channel.qvel]
         if channel.friction_force >= 0:
             state.reaction += data.actuator_force[channel.friction_force]
@@ -670,9 +716,11 @@ def _log(sim, data, k):
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         sample = log_at(sim.log, k * sim.n + i)
-        sample.x, sample.v = data.qpos[channel.qpos], data.qvel[channel.qvel]
+        sample.x, sample.v = _position(data.qpos, channel.qpos, channel.turn), data.qvel[channel.qvel]
         if channel.ctrl < 0:
             sample.applied = 0.0
+        elif sim.mixer != 0:
+            sample.applied = data.ctrl[channel.ctrl]
         else:
             applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
             # the quotient may round to just beyond the limit

@@ -17,8 +17,19 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.common.frozen import frozen
+from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware import encoder
-from smc_mujoco.mechanisms.hardware.part import PASSIVE, Part, drive_ids, initial_pose, joint_ids
+from smc_mujoco.mechanisms.hardware.part import (
+    PASSIVE,
+    PLACES,
+    POSE,
+    Part,
+    drive_ids,
+    exerted,
+    free_joint,
+    initial_pose,
+    joint_ids,
+)
 from smc_mujoco.mechanisms.plant import DIRECT_TEXT, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
@@ -27,6 +38,7 @@ from smc_mujoco.simulation.state import CHANNEL
 USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
 SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
+POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}  # ends of the names of a free body's sensors
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
 MAX_OVERLAP = 1e-3  # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
 
@@ -85,6 +97,8 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    if free_joint(model) >= 0:
+        return _pose_channels(model)
     for i in drive_ids(model):
         if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
             raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")
@@ -110,6 +124,8 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
     computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
     xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
     indices = {
+        "turn": -1,
+        "gathered": -1,
         "qpos": model.jnt_qposadr[joint],
         "qvel": model.jnt_dofadr[joint],
         "xfrc": xfrc,
@@ -135,6 +151,34 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
             raise ScenarioError(f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one")
         indices[field] = model.sensor_adr[sensors[0]]
     return indices
+
+
+def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
+    """Return the channels of a free body, (6,) CHANNEL. The first ones have the ctrl of the actuators."""
+    joint, drives = free_joint(model), drive_ids(model)
+    table = np.full(len(PLACES), -1, [(name, "i8") for name in CHANNEL.names or ()])
+    at, turns = np.arange(len(PLACES)), np.arange(len(PLACES)) - 3
+    for name, kinds in POSE_SENSORS.items():
+        first, second = (int(model.sensor_adr[model.sensor(POSE + kind).id]) for kind in kinds)
+        table[name] = np.where(turns < 0, first + at, second + (turns if name == "v_sensor" else 0))
+    table["qpos"] = model.jnt_qposadr[joint] + np.minimum(at, 3)
+    table["qvel"] = table["qfrc"] = table["gathered"] = model.jnt_dofadr[joint] + at
+    table["xfrc"] = table["horizontal"] = 6 * model.jnt_bodyid[joint] + at
+    table["turn"], table["sign"] = np.where(turns < 0, -1, turns), 1
+    table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
+    return table.astype(CHANNEL)
+
+
+def mixer(model: mujoco.MjModel) -> np.ndarray:
+    """Return what the actuators of a free body get of a force and a torque, and their bounds, (actuators, 8).
+
+    It is the pseudoinverse of what they exert: exact for what they can exert together, else nearest to it.
+    """
+    drives = drive_ids(model)
+    forces = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives)
+    limited = model.actuator_ctrllimited[drives].astype(bool)[:, None]
+    bounds = np.where(limited, model.actuator_ctrlrange[drives], (-np.inf, np.inf))
+    return np.hstack([np.linalg.pinv(forces.T, rcond=1e-9), bounds])
 
 
 def spec(scenario: Scenario) -> mujoco.MjSpec:
@@ -233,6 +277,8 @@ def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray
 
 def moving_joints(model: mujoco.MjModel) -> np.ndarray:
     """Return the joints of the channels and those that their actuators drive, rotors or the same joints, (2, n)."""
+    if free_joint(model) >= 0:
+        return np.array([joint_ids(model)] * 2)
     joints, driven = joint_ids(model), model.actuator_trnid[drive_ids(model), 0]
     return np.array([joints, [*driven, *joints[len(driven) :]]])
 
@@ -240,6 +286,10 @@ def moving_joints(model: mujoco.MjModel) -> np.ndarray:
 def state_with(model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in `initial_pose`."""
     qpos, qvel = initial_pose(model), np.zeros(model.nv)
+    if (free := free_joint(model)) >= 0:
+        first, dof = model.jnt_qposadr[free], model.jnt_dofadr[free]
+        qpos[first : first + 7], qvel[dof : dof + 6] = [*x[:3], *rotation.quaternion(*x[3:])], v
+        return qpos, qvel
     qpos[model.jnt_qposadr[joints]], qvel[model.jnt_dofadr[joints]] = x, v
     return qpos, qvel
 
@@ -247,6 +297,8 @@ def state_with(model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any) -> tup
 def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
     """Write a scenario's state at t = 0 into the data of its model, with the past readings of delayed sensors."""
     data.qpos[:], data.qvel[:] = initial_state(model, scenario)
+    if scenario.plant.pose and model.nkey:  # thrust behind a lag
+        data.act[:] = model.key_act[0]
     if model.nhistory:
         encoder.remember(model, data)
 

@@ -28,7 +28,7 @@ from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
 from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import cfunctions, philox, state
-from smc_mujoco.simulation.model import Mechanism, check_start, mechanism, with_values
+from smc_mujoco.simulation.model import Mechanism, check_start, mechanism, mixer, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
@@ -75,6 +75,8 @@ def prepare(scenario: object) -> Prepared:
     key = shared, scenario.control_period, scenario.samples
     reason = why_not(scenario)
     _refuse_mistakes(scenario.resolved, reason)
+    if reason and scenario.plant.pose:
+        raise ScenarioError(f"{reason}, and the reference loop moves no free body: write what numba compiles")
     return Prepared(scenario, reason, shared, key)
 
 
@@ -136,6 +138,7 @@ class Packed:
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
+    mixer: np.ndarray  # (actuators,) MIXER of a free body; (0, 8) for other plants
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
 
 
@@ -160,9 +163,13 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {"n": s.plant.n, "driven": s.plant.driven, "nq": mechanism.model.nq, "nv": mechanism.model.nv}
+    rows = mixer(mechanism.model) if s.plant.pose else np.zeros((0, 8))
+    low, high = rows[:, 6], rows[:, 7]
+    alike = len(rows) > 0 and np.ptp(high) == 0.0 and np.all(low >= 0.0)
+    values |= {"actuators": len(rows), "mixer": state.address(rows) if len(rows) else 0, "keeps_torques": alike}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
-    return buffer.as_tuple(state.SIMULATION, values), Packed(numbers, **arrays, nominal=nominal)
+    return buffer.as_tuple(state.SIMULATION, values), Packed(numbers, **arrays, nominal=nominal, mixer=rows)
 
 
 def _function(compiled: Any, values: Any, buffer: state.Buffer, memory: int = 0, channels: int = 1) -> dict[str, int]:

@@ -43,6 +43,8 @@ class Controller:
 
     def __init__(self, scenario: Scenario):
         self.scenario, n = scenario.resolved, scenario.plant.n
+        if scenario.plant.pose:
+            raise ScenarioError(f"{scenario.plant.name} is a free body, which only smc.run moves: give it to smc.run")
         self.law, self.estimator = (PythonComponent(c, n) for c in (self.scenario.law, self.scenario.velocity))
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
         self.limits, self.scale = np.array(scenario.limits), math.prod(part.scale for part in scenario.actuator)

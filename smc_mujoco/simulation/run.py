@@ -278,7 +278,8 @@ class ScenarioBatch:
     def put_initial_states(self) -> None:
         """Put all simulations at t = 0, with the past readings of delayed sensors."""
         delayed = bool(self.model.nhistory)
-        arrays = {name: self.batch.bind(name) for name in ("qpos", "qvel", *["history"] * delayed)}
+        lagged = ["act"] * bool(self.scenarios[0].plant.pose and self.model.na)
+        arrays = {name: self.batch.bind(name) for name in ("qpos", "qvel", *lagged, *["history"] * delayed)}
         model, data = copy.copy(self.model) if delayed else self.model, self.scratch
         for i, scenario in enumerate(self.scenarios):
             if delayed:  # the periods of the readings differ between scenarios

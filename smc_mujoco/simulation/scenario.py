@@ -584,6 +584,7 @@ def bodies(plant: Plant) -> tuple[str, ...]:
 def check_law(s: Resolved) -> None:
     """Check that the law suits the plant, and the surface the law."""
     check_channels(s)
+    check_free_body(s)
     if s.model == "true" and (s.law.joint or s.jump or s.stepper or s.clock.jitter):
         raise ScenarioError(
             "model 'true' has no law of many joints, jump, Stepper or jitter of the clock: leave that out, or give "
@@ -637,6 +638,28 @@ def check_channels(s: Resolved) -> None:
     ):
         if refused:
             raise ScenarioError(f"law {s.law.name!r} is of many joints, and {why}")
+
+
+def check_free_body(s: Resolved) -> None:
+    """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three numbers."""
+    if not s.plant.pose:
+        return
+    if not s.law.joint:
+        raise ScenarioError(
+            f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose channels turn together: "
+            "give a law of many joints, such as 'geometric'"
+        )
+    for given, what in (
+        (s.friction, "friction"),
+        (s.actuator, "actuator"),
+        (s.sensor, "sensor"),
+        (s.feedforward, "feedforward"),
+        (not s.clock.regular, "clock with late or missed samples"),
+        (s.velocity.name != "measured", f"velocity {s.velocity.name!r}"),
+        (any(not isinstance(d, Push) for d in s.disturbance), "disturbance but a Push"),
+    ):
+        if given:
+            raise ScenarioError(f"{s.plant.name} is a free body, which takes no {what}: leave that out")
 
 
 def check_inertia(s: Resolved) -> None:

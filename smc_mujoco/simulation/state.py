@@ -39,12 +39,14 @@ FRICTION_INPUT, FRICTION_OUTPUT = floats(("v", "motor", "load")), floats(("f", "
 #   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
 #   friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the callback computes it
 #   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
+#   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
+#   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
 CHANNEL = np.dtype(
     [
         (name, "i8")
         for name in (
             "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "horizontal", "axis",
-            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc", "shaft_qpos",
+            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc", "shaft_qpos", "turn", "gathered",
         )
     ]
 )  # fmt: skip
@@ -61,6 +63,8 @@ CHANNEL = np.dtype(
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
 RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
+# What one actuator of a free body gets of a force and a torque in the axes of the body, and the bounds of its control.
+MIXER = floats(("fx", "fy", "fz", "mx", "my", "mz", "low", "high"))
 DRIVE_STEP, PULSING, MOTOR = floats(DriveStep._fields), floats(Pulsing._fields), floats(GENERATOR)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
@@ -95,6 +99,8 @@ SIMULATION = np.dtype(
         ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("disturbances", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (driven,), ctrl per u
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
+        # a free body: its actuators, the address of their MIXERs, 0 for other plants, and whether to keep the torques
+        ("actuators", "i8"), ("mixer", "i8"), ("keeps_torques", "i8"),
         # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
         ("jitter", "i8"), ("missed", "f8"),
         # pauses: physics steps of one, samples from one to the next, and by how many the first comes earlier
@@ -137,8 +143,8 @@ SIMULATION = np.dtype(
 )  # fmt: skip
 
 # How compiled code reads record i of an array at an address.
-simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at = map(
-    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION, MOTOR)
+simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at, mixer_at = map(
+    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION, MOTOR, MIXER)
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.

@@ -17,6 +17,7 @@ from smc_mujoco.common import annexes, html
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, one_line, users_stacklevel, words
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
+from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import column_ends, joint_names
 from smc_mujoco.mechanisms.plant import EFFORT
 from smc_mujoco.simulation import serialise
@@ -51,6 +52,11 @@ class Trace:
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. So that no blow is missed,
         force and reaction are means over the physics steps of the control period that ends at t_k; at t = 0 they are 0.
       scenario: the Scenario of the run.
+
+    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude; v its velocity in the
+    world's axes, and its angular velocity in its own. u, d, force and reaction are forces and torques in the same axes;
+    u is what the law asks for, and `applied` what its actuators get: the first has the first channel, and so on.
+
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
       held: time for which dry friction held the joint in the control period that ends at t_k, (K + 1, n), s, by the
@@ -75,6 +81,14 @@ class Trace:
     def __post_init__(self):
         for array in self.arrays().values():
             np.ndarray.setflags(array, write=False)  # a TypeError for what is no array
+
+    @property
+    def e(self) -> np.ndarray:
+        """Errors x - r, (K + 1, n); of an attitude, the rotation vector from the reference's to the body's, rad."""
+        e = self.x - self.r
+        if self.scenario.plant.pose and e.shape[1] > 3:  # a group's trace has x = r + e
+            e[:, 3:] = rotation.attitude_errors(self.x[:, 3:], self.r[:, 3:])
+        return e
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the arrays by name; `held` only if it is not None."""

@@ -43,7 +43,7 @@ class Puppet:
         rotors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(i).name) for i in ids]
         self.slides = model.jnt_type[ids] == SLIDE
         self.rail = scene.rail(self.scenario, model)  # m, on which a cart stays; inf without one
-        self._joints = model.jnt_qposadr[ids]
+        self._ids, self._joints = ids, model.jnt_qposadr[ids]
         self._rotors = [(k, model.jnt_qposadr[rotor]) for k, rotor in enumerate(rotors) if rotor >= 0]
         self.links = moved_bodies(model, ids)
         off_stage = not self.scenario.plant.on_stage
@@ -65,7 +65,10 @@ class Puppet:
         """
         pose = (self._start if rest is None else rest).copy()
         x = np.where(self.slides, np.clip(x, -self.rail / 2, self.rail / 2), x)
-        pose[self._joints] = x
+        if self.scenario.plant.pose:
+            pose = models.state_with(self.shapes[0].model, self._ids, x, 0.0)[0]
+        else:
+            pose[self._joints] = x
         for k, place in self._rotors:
             pose[place] = x[k] if ahead is None else x[k] + ahead[k]
         for first in self.free.tolist():

@@ -9,13 +9,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 import mujoco
+import numpy as np
 
 from smc_mujoco.common.constraints import Bound, Flag, Number, constrain
 from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
 from smc_mujoco.mechanisms.custom.mjcf import pick
-from smc_mujoco.mechanisms.hardware.part import PASSIVE
+from smc_mujoco.mechanisms.hardware.part import PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import Range
+from smc_mujoco.mechanisms.rotation import rotation_vector
 
+FREE = mujoco.mjtJoint.mjJNT_FREE
 UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE: "m"}
 
 Place = Annotated[float, Number(low=-1e6, high=1e6)]  # rad or m
@@ -113,6 +116,12 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
     names = [model.joint(i).name for i in range(model.njnt)]
     for joint in joints:
         kind = mujoco.mjtJoint(model.jnt_type[pick(label, "joint", joint, names)])
+        if kind == FREE and len(channels) == 1 and dict(channels)[joint] == Channel():
+            continue
+        if kind == FREE:
+            raise ScenarioError(
+                f"joint {joint!r} of {label} is a free joint: give it as the only channel, without motor, partner and x0"
+            )
         if kind not in UNIT_OF_JOINT:
             raise ScenarioError(
                 f"joint {joint!r} of {label} is a {kind.name[6:].lower()} joint: give one that is a hinge or slide"
@@ -149,6 +158,61 @@ def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
     return () if off or not any(math.isfinite(low) for _, low, _ in rows) else tuple(rows)
+
+
+def is_free(model: mujoco.MjModel, joint: str) -> bool:
+    """Return whether a joint is a free one."""
+    return model.joint(joint).type[0] == FREE
+
+
+def thrusters(model: mujoco.MjModel, joint: str) -> list[int]:
+    """Return the actuators that act at a site of what a free joint moves."""
+    root = model.body_rootid[model.joint(joint).bodyid[0]]
+    at_site = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
+    return [i for i in np.flatnonzero(at_site) if model.body_rootid[model.site_bodyid[model.actuator_trnid[i, 0]]] == root]
+
+
+def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]:
+    """Return the largest force in any direction, three times, N, and the largest torque about each axis, N m."""
+    drives = thrusters(model, joint)
+    if not 0 < len(drives) <= len(PLACES):
+        cure = "give it one to six"
+        raise ScenarioError(f"{len(drives)} actuators of {label} act at sites of the body of joint {joint!r}: {cure}")
+    plain = (NO_DYNAMICS, mujoco.mjtDyn.mjDYN_FILTER.value, mujoco.mjtDyn.mjDYN_FILTEREXACT.value)
+    for i in drives:
+        name = model.actuator(i).name or f"number {i}"
+        known = model.actuator_dyntype[i] in plain and model.actuator_trnid[i, 1] < 0
+        if not known or model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
+            raise ScenarioError(f"actuator {name!r} of {label} is more than a force behind a lag: make it a <general>")
+    ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[drives]
+    ends[model.actuator_ctrllimited[drives] == 0] = math.inf
+    clamped = np.clip(ends, *model.actuator_forcerange[drives].T[:, :, None])
+    ends[model.actuator_forcelimited[drives] == 1] = clamped[model.actuator_forcelimited[drives] == 1]
+    largest, forces = np.abs(ends).max(axis=1), exerted(model, model.joint(joint).id, drives)
+    sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
+    reached = [float(np.sum(largest[column > 0.0] * column[column > 0.0])) for column in sizes.T]
+    return (reached[0],) * 3 + tuple(reached[1:])
+
+
+def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> tuple[float, ...]:
+    """Return position, m, and rotation vector, rad, of a free body in the model or its keyframe, (6,)."""
+    qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
+    place = qpos[model.joint(joint).qposadr[0] :][:7].tolist()
+    return *place[:3], *rotation_vector(*place[3:])
+
+
+def add_pose(spec: mujoco.MjSpec, joint: str, drives: Sequence[int]) -> None:
+    """Add a free body's sensors, and keep the actuators that are not among its drives as passive parts."""
+    body = spec.joint(joint).parent
+    site = body.add_site(name=POSE, size=(1e-6,) * 3, group=5)
+    site.pos, site.quat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    kinds = mujoco.mjtSensor
+    for end, kind in (":x", kinds.mjSENS_FRAMEPOS), (":q", kinds.mjSENS_FRAMEQUAT), (":v", kinds.mjSENS_FRAMELINVEL):
+        spec.add_sensor(name=POSE + end, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE)
+    spec.add_sensor(name=f"{POSE}:w", type=kinds.mjSENS_GYRO, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE)
+    for i, actuator in enumerate(list(spec.actuators)):
+        if i not in drives:
+            actuator.name = f"{PASSIVE}smc:{i}"
 
 
 class Motor(NamedTuple):

@@ -44,8 +44,8 @@ from smc_mujoco.common import jit, libmujoco
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.common.jit import Function, floats, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
-from smc_mujoco.mechanisms import plant
-from smc_mujoco.mechanisms.hardware.part import drive_ids, joint_ids
+from smc_mujoco.mechanisms import plant, rotation
+from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids
 from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, compiled_for_runs, write
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
@@ -58,7 +58,7 @@ NOMINAL = floats(
 # The same for M, h and g; then the tip's site or -1, whether h is of passive forces alone, and whether to compute g.
 DYNAMICS = floats(
     ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves",
-     "site", "alone", "at_rest")
+     "site", "alone", "at_rest", "quaternion")
 )  # fmt: skip
 # Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels come first.
 PLACE = np.dtype([(name, "i8") for name in ("qpos", "qvel", "ctrl")])
@@ -100,6 +100,9 @@ class NominalModel:
         with _lock:
             data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
             data.qpos[places["qpos"]] = x
+            if (free := free_joint(model)) >= 0:
+                first = model.jnt_qposadr[free]
+                data.qpos[first : first + 7] = [*x[:3], *rotation.quaternion(*x[3:])]
             mujoco.mj_fwdPosition(model, data)
             yield model, places, data
 
@@ -161,6 +164,8 @@ class NominalModel:
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         site = model.site(tip).id if tip else -1
         values = (len(places), model.nv, *addresses, site, passive_alone(model), at_rest)
+        free = free_joint(model)
+        values += (model.jnt_qposadr[free] + 3 if free >= 0 else -1,)
         return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
 
 
@@ -190,7 +195,9 @@ def prepared(
     data.warning.number[:] = 1  # MuJoCo tells only the first; telling it inside a control callback would never end
     joints = joint_ids(model)
     ctrl, places = model.actuator_ctrladr[drive_ids(model)], np.full(len(joints), -1, PLACE)
-    places["qpos"], places["qvel"] = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    places["qpos"], places["qvel"] = model.jnt_qposadr[joints], dof_ids(model)
+    if free_joint(model) >= 0:
+        places["qpos"] += np.arange(len(joints))
     places["ctrl"][: len(ctrl)] = ctrl
     return model, places, data, []
 
@@ -211,7 +218,7 @@ def _mujoco(name: str, more: int = 0) -> Callable:
 
 def _on_disk(native: Callable) -> Function:
     """Return a C function of this file, kept on disk under a hash of the sources that it is made of."""
-    sources = b"".join(Path(str(module.__file__)).read_bytes() for module in (sys.modules[__name__], jit, plant))
+    sources = b"".join(Path(str(module.__file__)).read_bytes() for module in (sys.modules[__name__], jit, plant, rotation))
     return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
 
 
@@ -245,6 +252,9 @@ def native_dynamics() -> Function:
         for j in range(n):
             kept[j] = v[j]
             qpos[place_at(places, j).qpos] = x[j]
+        if at.quaternion >= 0.0:
+            first = int(at.quaternion)
+            qpos[first], qpos[first + 1], qpos[first + 2], qpos[first + 3] = rotation.quaternion(x[3], x[4], x[5])
         if at.alone != 0.0:
             kinematics(model, data)
             centres(model, data)

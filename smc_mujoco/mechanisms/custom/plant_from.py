@@ -51,21 +51,25 @@ class UserModel:
     channels: Pairs
     motors: tuple[Motor, ...]
     tip: str = ""
+    thrusters: tuple[int, ...] = ()  # indices of the actuators of a free joint, which is then the only channel
 
     def __call__(self, n: int) -> mujoco.MjSpec:
         """Return the model with a motor and two sensors per channel."""
         spec = self.source.read()
         while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
             spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them again
-        own.add_motors(spec, self.motors)
-        for joint in own.joints_of(self.channels):
+        if self.thrusters:
+            own.add_pose(spec, self.channels[0][0], self.thrusters)
+        else:
+            own.add_motors(spec, self.motors)
+        for joint in () if self.thrusters else own.joints_of(self.channels):
             for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
                 spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
                 spec.delete(key)
             else:
-                key.name, key.ctrl, key.act = START, [], []
+                key.name, key.ctrl, key.act = START, [], key.act if self.thrusters else []
         spec.add_text(name=DIRECT_TEXT, data="disturbances act on the joints")
         spec.option.disableflags &= ~SENSORS
         return spec
@@ -156,26 +160,34 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
         mjcf.pick(label, "keyframe", keyframe, [model.key(i).name for i in range(model.nkey)])
     if tip is not None:
         mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
-    motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
-    build = UserModel(source, keyframe, pairs, motors, tip or "")
+    pose = own.is_free(model, joints[0])
+    motors = () if pose else tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
+    build = UserModel(source, keyframe, pairs, motors, tip or "", tuple(own.thrusters(model, joints[0])) if pose else ())
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
-    units = tuple(own.UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
+    if pose and scenarios:
+        raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: give {', '.join(scenarios)} to the scenario")
+    if pose:
+        limits = own.reach_of(label, model, joints[0])
+    units = ("m",) * 3 + ("rad",) * 3 if pose else tuple(own.UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
     why_not, file = missing(model, joints, motors), label.removesuffix(".xml")
     file = label if catalogue().taken(file) else file  # a plant of the library has this name
     plant_name = file if name is None else name
-    x0, checked = own.starts(model, joints, pairs, keyframe)
-    check_ranges(plant_name, checked, [x0[joint] for joint, _, _ in checked])
+    start, checked = ({}, []) if pose else own.starts(model, joints, pairs, keyframe)
+    check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
+    x0 = own.pose_at_start(model, joints[0], keyframe) if pose else tuple(start.values())
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
         mass="m",
         unit=units[0],
         mixed=units if len(set(units)) > 1 else (),
-        x0=tuple(x0.values()),
-        n=len(joints),
-        sizes=(len(joints), len(joints)),
+        x0=x0,
+        rest=x0 if pose else (),
+        n=len(x0),
+        sizes=(len(x0), len(x0)),
+        pose=pose,
         build=build,
         fields=fields,
         nominal=without_model if why_not else NominalModel(build, fields),
@@ -185,7 +197,7 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
         smooth=smooth(model),
         unmodelled=why_not,
         limits=limits if any(limit < math.inf for limit in limits) else (),
-        ranges=own.ranges(model, joints),
+        ranges=() if pose else own.ranges(model, joints),
         tip=tip or "",
         suggested=scenarios,
         label=title if plant_name == file and title != UNNAMED else "",
@@ -219,8 +231,10 @@ def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...])
         return "equality constraints hold its joints together, and a nominal model has none: " + WITHOUT_MODEL
     if model.nplugin or model.nflex:
         return "it has plugins or flexible bodies: " + WITHOUT_MODEL
-    channel_dofs = [int(model.joint(joint).dofadr[0]) for joint in joints]
+    channel_dofs = [dof for dof in range(model.nv) if model.joint(int(model.dof_jntid[dof])).name in joints]
     idle = np.ones(model.nactuator, bool)
+    if own.is_free(model, joints[0]):
+        idle[own.thrusters(model, joints[0])] = False
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
         return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT_MODEL

@@ -10,7 +10,7 @@ channel's actuator drives, if it is not the channel's joint itself.
 
 import dataclasses
 import functools
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from typing import Annotated, ClassVar, NamedTuple
 
 import mujoco
@@ -26,7 +26,11 @@ PLAY = "play:"  # a tendon of length rotor - joint
 # The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two steps.
 HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
 HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; equal, so the rest has no effect
+POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
+
+# A pose: the position in the axes of the world, m, and the rotation vector of the attitude, rad, see rotation.py
+PLACES = "x", "y", "z", "rx", "ry", "rz"
 
 # Numbers of parts
 Offset = Annotated[float, Number(low=-MAX_PARAMETER, high=MAX_PARAMETER)]
@@ -112,8 +116,26 @@ def drive_ids(model: mujoco.MjModel) -> np.ndarray:
     return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
 
 
+def free_joint(model: mujoco.MjModel) -> int:
+    """Return the index of the free joint whose pose is the channels; -1 if each channel has a joint of its own."""
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, POSE)
+    return -1 if site < 0 else int(model.body_jntadr[model.site_bodyid[site]])
+
+
+def exerted(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndarray:
+    """Return the force and torque on a free joint for each actuator's unit of force, (drives, 6), in the body's axes."""
+    data, place, dof = mujoco.MjData(model), model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+    data.qpos[place : place + 7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    mujoco.mj_forward(model, data)
+    moments, rows = np.zeros((model.nout, model.nv)), (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
+    mujoco.mju_sparse2dense(moments, data.actuator_moment, *rows)
+    return moments[model.actuator_outadr[drives], dof : dof + 6]
+
+
 def driven_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the driven channels' joints, (driven,)."""
+    if (free := free_joint(model)) >= 0:
+        return np.full(len(PLACES), free)
     names = [model.joint(model.actuator_trnid[i, 0]).name for i in drive_ids(model)]
     return np.array([model.joint(name.removeprefix(ROTOR)).id for name in names], int)
 
@@ -121,6 +143,8 @@ def driven_ids(model: mujoco.MjModel) -> np.ndarray:
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' joints, (n,): first the driven ones, then those that are only measured."""
     first = driven_ids(model)
+    if free_joint(model) >= 0:
+        return first
     measured = model.sensor_objid[model.sensor_type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return np.array([*first, *(joint for joint in measured if joint not in first)], int)
 
@@ -129,7 +153,8 @@ def joint_ids(model: mujoco.MjModel) -> np.ndarray:
 def joint_names(plant: Plant) -> tuple[str, ...]:
     """Return the name of each channel's joint, (n,)."""
     model = compiled(plant.spec())
-    return tuple(model.joint(int(joint)).name for joint in joint_ids(model))
+    names = tuple(model.joint(int(joint)).name for joint in joint_ids(model))
+    return tuple(f"{name}_{place}" for name, place in zip(names, PLACES, strict=True)) if plant.pose else names
 
 
 @functools.lru_cache(maxsize=32)
@@ -158,7 +183,8 @@ def column_ends(plant: Plant) -> tuple[str, ...]:
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' degrees of freedom, (n,)."""
-    return model.jnt_dofadr[joint_ids(model)]
+    dofs = model.jnt_dofadr[joint_ids(model)]
+    return dofs if free_joint(model) < 0 else dofs + np.arange(len(PLACES))
 
 
 def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:

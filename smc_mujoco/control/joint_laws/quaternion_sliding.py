@@ -1,0 +1,56 @@
+"""Sliding mode on the attitude's quaternion, for a free body with one direction of thrust, such as a quadrotor.
+
+    sx = e' + c e,    F = m (r'' - c e' - Kx tanh(rhox sx)) + h,    thrust = F . R e3,    Rd e3 = F / |F|,
+    s = we + lam sgn(q0) qv,    torque = J (-lam sgn(q0) qv' - K tanh(rho s) - w x wd) + w x J w,
+
+with e the error of the position, (q0, qv) the quaternion from Rd to the attitude R, we = w - wd, and sgn(0) = 1. Rd and
+wd are those of `geometric`. q and -q are the same attitude, and sgn(q0) takes the shorter way, so that nothing unwinds.
+With K above the bound of the disturbance per inertia, s ends where tanh(rho s) holds it: under a constant torque t at
+s = atanh(t / (J K)) / rho, at the angle 2 asin(s / lam); under a constant force f at e = atanh(f / (m Kx)) / (rhox c).
+The sign is where the law is not continuous.
+Gains: c [1/s], Kx [m/s^2], rhox [s/m], of the position; lam [rad/s], K [rad/s^2], rho [s/rad], of the attitude.
+Defaults of the source for a Crazyflie, in which the yaw has K = 500 and rho = 0.5.
+Source: A. Yazdanshenas & R. Faieghi, "Quaternion-based sliding mode control for six degrees of freedom flight control
+of quadrotors", arXiv 2403.10934.
+"""
+
+import math
+
+import numpy as np
+
+from smc_mujoco.control.attitude import attitude_error, of_thrust, put_thrust, put_torque
+from smc_mujoco.control.joint_law import tanh
+from smc_mujoco.control.law import FREE_BODY, law_function
+from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
+
+
+@law_function(
+    joint=True,
+    family="smooth sliding mode",
+    requires_model=True,
+    plants=(FREE_BODY,),
+    gains={
+        "c": Gain(1.25, RATE, positive=True, shared=True),
+        "Kx": Gain(5.0, ACCELERATION, positive=True, shared=True),
+        "rhox": Gain(1.0, Unit(position=-1, time=1), positive=True, shared=True),
+        "lam": Gain(8.0, RATE, positive=True, shared=True),
+        "K": Gain(400.0, Unit(time=-2), positive=True, shared=True),
+        "rho": Gain(0.25, Unit(time=1), positive=True, shared=True),
+    },
+    label="Quaternion sliding",
+    memory=1,
+)
+def quaternion_sliding(y, gains, memory):
+    u, s, v = np.zeros(6), np.zeros(6), np.zeros(3)
+    s[:3] = y.de[:3] + gains.c * y.e[:3]
+    F = y.M[0, 0] * (y.ddr[:3] - gains.c * y.de[:3] - gains.Kx * tanh(gains.rhox * s[:3])) + y.h[:3]
+    q, w, moving = attitude_error(y, of_thrust(F, y.r[3:]), memory[:, 0])
+    sign = 1.0 if q[0] >= 0.0 else -1.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        s[3 + i] = w[i] + gains.lam * sign * q[1 + i]
+        turning = 0.5 * (q[0] * w[i] + q[1 + j] * w[k] - q[1 + k] * w[j])
+        v[i] = -gains.lam * sign * turning - gains.K * math.tanh(gains.rho * s[3 + i])
+    put_thrust(y, F, u)
+    put_torque(y, v, moving, u)
+    return u, s

@@ -1,0 +1,92 @@
+"""Attitudes: unit quaternions (w, x, y, z), body to world, and rotation vectors, the axis times the angle in rad.
+
+The rotation vector of an attitude has an angle of 0 to pi, and is the same for q and -q: a pose has six numbers, as many
+as velocities. Angular velocities are in the axes of the body, as those of MuJoCo's free joint.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(error_model="numpy")
+def rotation_vector(w, x, y, z):
+    """Return the rotation vector of a quaternion."""
+    sine = math.sqrt(x * x + y * y + z * z)
+    if sine == 0.0:
+        return 0.0, 0.0, 0.0
+    scale = 2.0 * math.atan2(sine, abs(w)) / sine
+    scale = -scale if w < 0.0 else scale
+    return scale * x, scale * y, scale * z
+
+
+@njit(error_model="numpy")
+def quaternion(x, y, z):
+    """Return the quaternion of a rotation vector."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    scale = 0.5 if angle == 0.0 else math.sin(0.5 * angle) / angle
+    return math.cos(0.5 * angle), scale * x, scale * y, scale * z
+
+
+@njit(error_model="numpy")
+def relative(p, q):
+    """Return conj(p) q: the attitude q as seen from p."""
+    return (
+        p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3],
+        p[0] * q[1] - p[1] * q[0] - p[2] * q[3] + p[3] * q[2],
+        p[0] * q[2] + p[1] * q[3] - p[2] * q[0] - p[3] * q[1],
+        p[0] * q[3] - p[1] * q[2] + p[2] * q[1] - p[3] * q[0],
+    )
+
+
+@njit(error_model="numpy")
+def turned(q, x, y, z):
+    """Return the vector R(q) (x, y, z)."""
+    w, a, b, c = q
+    s, t, u = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    return x + w * s + b * u - c * t, y + w * t + c * s - a * u, z + w * u + a * t - b * s
+
+
+@njit(error_model="numpy")
+def turned_back(q, x, y, z):
+    """Return the vector R(q)' (x, y, z)."""
+    return turned((q[0], -q[1], -q[2], -q[3]), x, y, z)
+
+
+@njit(error_model="numpy")
+def rate(x, y, z, dx, dy, dz):
+    """Return the angular velocity of an attitude whose rotation vector (x, y, z) changes by (dx, dy, dz) per second."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    half = math.sin(0.5 * angle)
+    first = 0.5 if angle < 1e-4 else 2.0 * half * half / (angle * angle)
+    second = 1.0 / 6.0 if angle < 1e-2 else (angle - math.sin(angle)) / angle**3
+    if 1e-4 <= angle < 1e-2:
+        second = (1.0 - angle * angle / 20.0) / 6.0
+    ax, ay, az = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
+    bx, by, bz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
+    return dx - first * ax + second * bx, dy - first * ay + second * by, dz - first * az + second * bz
+
+
+@njit(error_model="numpy")
+def put_attitude_error(x, v, r, dr, e, de):
+    """Write the last three numbers of the errors e and de of a pose x, v from a reference r, dr, (6,) each.
+
+    e is the rotation vector from the reference's attitude to the body's. de is the angular velocity relative to the
+    reference's, both in the axes of the body.
+    """
+    error = relative(quaternion(r[3], r[4], r[5]), quaternion(x[3], x[4], x[5]))
+    e[3], e[4], e[5] = rotation_vector(error[0], error[1], error[2], error[3])
+    own = rate(r[3], r[4], r[5], dr[3], dr[4], dr[5])
+    wx, wy, wz = turned_back(error, own[0], own[1], own[2])
+    de[3], de[4], de[5] = v[3] - wx, v[4] - wy, v[5] - wz
+
+
+@njit(error_model="numpy")
+def attitude_errors(x, r):
+    """Return the rotation vectors, (K, 3), from attitudes r to attitudes x, both as rotation vectors (K, 3)."""
+    errors = np.empty(x.shape)
+    for k in range(len(x)):
+        error = relative(quaternion(r[k, 0], r[k, 1], r[k, 2]), quaternion(x[k, 0], x[k, 1], x[k, 2]))
+        errors[k, 0], errors[k, 1], errors[k, 2] = rotation_vector(error[0], error[1], error[2], error[3])
+    return errors
