@@ -92,7 +92,8 @@ def posed(trace: Trace) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     whole = poses(trace, trace.t[samples]) if first.nq > len(channels) else None
     if whole is None:
         whole = np.tile(models.initial_state(first, trace.scenario)[0], (len(samples), 1))
-    whole[:, channels] = trace.x[samples]
+    if not trace.scenario.plant.pose:  # of which `poses` has all
+        whole[:, channels] = trace.x[samples]
     places, turns = np.empty((len(samples), first.nbody, 3)), np.empty((len(samples), first.nbody, 4))
     for i, k in enumerate(samples.tolist()):
         now = sum(trace.t[k] >= machine.time for machine in machines) - 1

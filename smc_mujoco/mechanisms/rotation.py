@@ -1,7 +1,7 @@
 """Attitudes: unit quaternions (w, x, y, z), body to world, and rotation vectors, the axis times the angle in rad.
 
-The rotation vector of an attitude has an angle of 0 to pi, and is the same for q and -q: a pose has six numbers, as many
-as velocities. Angular velocities are in the axes of the body, as those of MuJoCo's free joint.
+The rotation vector of an attitude has an angle of 0 to pi, and is the same for q and -q: a pose has six numbers, as a
+velocity has. Angular velocities are in the axes of the body, as those of MuJoCo's free joint.
 """
 
 import math

@@ -363,7 +363,9 @@ def _measure_joints(address, sim, k, t):
         pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = motion.value, motion.rate, motion.acceleration
         pointer(y.a)[i], pointer(y.limit)[i] = motion.acceleration if math.isnan(a) else a, pointer(sim.limits)[i]
     if sim.mixer != 0:
-        rotation.put_attitude_error(pointer(y.x), pointer(y.v), pointer(y.r), pointer(y.dr), pointer(y.e), pointer(y.de))
+        rotation.put_attitude_error(
+            pointer(y.x), pointer(y.v), pointer(y.r), pointer(y.dr), pointer(y.e), pointer(y.de)
+        )
     return _measure_dynamics(address, sim)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.common import jit
-from smc_mujoco.common.errors import one_line, shown
+from smc_mujoco.common.errors import ScenarioError, one_line, shown
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control.component import Component, gain_at
 from smc_mujoco.control.estimator import Reading

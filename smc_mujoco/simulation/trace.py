@@ -53,9 +53,9 @@ class Trace:
         force and reaction are means over the physics steps of the control period that ends at t_k; at t = 0 they are 0.
       scenario: the Scenario of the run.
 
-    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude; v its velocity in the
-    world's axes, and its angular velocity in its own. u, d, force and reaction are forces and torques in the same axes;
-    u is what the law asks for, and `applied` what its actuators get: the first has the first channel, and so on.
+    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude; v its velocity in
+    the world's axes, and its angular velocity in its own. u, d, force and reaction are forces and torques in the same
+    axes; u is what the law asks for, and `applied` what its actuators get, the first in the first channel, and so on.
 
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.

@@ -17,6 +17,7 @@ from smc_mujoco.control import law as laws
 from smc_mujoco.control.component import gain_text
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
+from smc_mujoco.control.law import FREE_BODY
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.simulation import python_controller
 
@@ -52,11 +53,17 @@ def measurements(model, has_surface):
         )  # fmt: skip
 
 
-def joint_measurements(model):
+def joints(component):
+    """The number of channels of a law of many joints: those of a free body are six."""
+    return 2 * JOINTS if FREE_BODY in component.plants else JOINTS
+
+
+def joint_measurements(model, n):
     turned = np.array([[0.0, 0.3, -0.2], [-0.3, 0.0, 0.5], [0.2, -0.5, 0.0]])
     dynamics = SimpleNamespace(coriolis=lambda w: turned @ w, jacobian=lambda: np.eye(JOINTS) + turned)
-    M, ones = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]]), np.ones(JOINTS)
-    for k, (e, de, other) in enumerate(seen((JOINTS,))):
+    M, ones = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]]), np.ones(n)
+    M = np.kron(np.eye(n // JOINTS), M)
+    for k, (e, de, other) in enumerate(seen((n,))):
         yield JointMeasurement(
             t=DT * k, dt=DT, model=model, dynamics=dynamics, x=e + 0.3, v=de - 0.2, e=e, de=de, r=0.3 * ones,
             dr=-0.2 * ones, ddr=0.7 * other, a=other, limit=3.0 * ones, M=M, h=0.5 * other - de, g=0.5 * other,
@@ -72,7 +79,8 @@ def ways(template):
     if template.kind == "estimator":
         return {"computes": readings()}
     if template.joint:
-        return {"alone": joint_measurements(0.0), "with the model": joint_measurements(1.0)}
+        n = joints(template)
+        return {"alone": joint_measurements(0.0, n), "with the model": joint_measurements(1.0, n)}
     both = {"alone": measurements(0.0, 0.0), "with the model": measurements(1.0, 0.0)}
     return both | {"on a surface": measurements(1.0, 1.0)} if template.kind == "law" else both
 
@@ -80,8 +88,8 @@ def ways(template):
 def computed(component, inputs):
     """Weighted sums of each result over all samples, and of the memory at the end."""
     function, joint = rebuild(component.function, lambda plain: plain), component.joint
-    memory = np.zeros((JOINTS, component.memory) if joint else component.memory)
-    gains = python_controller.gains_of(component, JOINTS)
+    memory = np.zeros((joints(component), component.memory) if joint else component.memory)
+    gains = python_controller.gains_of(component, joints(component))
     results = np.array([function(y, gains, memory) for y in inputs]).reshape(COUNT, -1)
     weights, last = np.random.default_rng(8).uniform(0.5, 1.5, results.shape), memory.ravel()
     sums = [*(weights * results).sum(axis=0), last @ np.linspace(0.5, 1.5, last.size)]

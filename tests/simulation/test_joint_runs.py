@@ -11,7 +11,8 @@ from helpers.runs import assert_same, plainly
 from numba import njit
 
 import smc_mujoco as smc
-from smc_mujoco.control.joint_law import coriolis, jacobian, norm, product, saturate, torque
+from smc_mujoco.control.joint_law import catalogue, coriolis, jacobian, norm, product, saturate, torque
+from smc_mujoco.control.law import FREE_BODY
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Values
 from smc_mujoco.simulation import reference
@@ -51,7 +52,7 @@ def cases(arm):
     """Scenarios that differ in all that the law's road touches, most in one Batch."""
     common = {"duration": 0.05, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2)}
     loaded = {"velocity": "levant", "input_delay": 2e-3, "mismatch": {"m": 1.4}, "feedforward": smc.Constant(0.3)}
-    for name in smc.laws(kind="joint"):
+    for name in (name for name, law in catalogue().items() if FREE_BODY not in law.plants):
         yield smc.Scenario(plant=arm, law=name, x0=(0.1, -0.3, 0.2), **common)
         if name != "hybrid_sliding":  # which needs a tip
             yield smc.Scenario(plant="double_pendulum", law=name, **common)

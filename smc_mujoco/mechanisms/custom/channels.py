@@ -120,7 +120,7 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
             continue
         if kind == FREE:
             raise ScenarioError(
-                f"joint {joint!r} of {label} is a free joint: give it as the only channel, without motor, partner and x0"
+                f"joint {joint!r} of {label} is a free joint: give it as the only channel, without fields of a Channel"
             )
         if kind not in UNIT_OF_JOINT:
             raise ScenarioError(
@@ -169,7 +169,8 @@ def thrusters(model: mujoco.MjModel, joint: str) -> list[int]:
     """Return the actuators that act at a site of what a free joint moves."""
     root = model.body_rootid[model.joint(joint).bodyid[0]]
     at_site = model.actuator_trntype == mujoco.mjtTrn.mjTRN_SITE
-    return [i for i in np.flatnonzero(at_site) if model.body_rootid[model.site_bodyid[model.actuator_trnid[i, 0]]] == root]
+    sites = {i: int(model.actuator_trnid[i, 0]) for i in np.flatnonzero(at_site).tolist()}
+    return [i for i, site in sites.items() if model.body_rootid[model.site_bodyid[site]] == root]
 
 
 def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]:

@@ -218,7 +218,8 @@ def _mujoco(name: str, more: int = 0) -> Callable:
 
 def _on_disk(native: Callable) -> Function:
     """Return a C function of this file, kept on disk under a hash of the sources that it is made of."""
-    sources = b"".join(Path(str(module.__file__)).read_bytes() for module in (sys.modules[__name__], jit, plant, rotation))
+    modules = sys.modules[__name__], jit, plant, rotation
+    sources = b"".join(Path(str(module.__file__)).read_bytes() for module in modules)
     return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
 
 

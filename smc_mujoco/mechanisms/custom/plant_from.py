@@ -162,15 +162,18 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
         mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
     pose = own.is_free(model, joints[0])
     motors = () if pose else tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
-    build = UserModel(source, keyframe, pairs, motors, tip or "", tuple(own.thrusters(model, joints[0])) if pose else ())
+    thrusters = tuple(own.thrusters(model, joints[0])) if pose else ()
+    build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
-    if pose and scenarios:
-        raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: give {', '.join(scenarios)} to the scenario")
+    if pose and (tip or scenarios):
+        cure = "leave the tip out" if tip else f"give {', '.join(scenarios)} to the scenario"
+        raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
     if pose:
         limits = own.reach_of(label, model, joints[0])
-    units = ("m",) * 3 + ("rad",) * 3 if pose else tuple(own.UNIT_OF_JOINT[mujoco.mjtJoint(model.joint(joint).type[0])] for joint in joints)
+    kinds = [mujoco.mjtJoint(model.joint(joint).type[0]) for joint in joints]
+    units = ("m",) * 3 + ("rad",) * 3 if pose else tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
     why_not, file = missing(model, joints, motors), label.removesuffix(".xml")
     file = label if catalogue().taken(file) else file  # a plant of the library has this name
     plant_name = file if name is None else name

@@ -106,6 +106,8 @@ def drives(spec: mujoco.MjSpec) -> list[mujoco.MjsActuator]:
 
 def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     """Return the channels' joints: first the driven ones, then those that are only measured."""
+    if (site := spec.site(POSE)) is not None:
+        return [site.parent.joints[0]] * len(PLACES)
     names = [actuator.target.removeprefix(ROTOR) for actuator in drives(spec)]
     measured = [sensor.objname for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS]
     return [spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]]
@@ -123,7 +125,7 @@ def free_joint(model: mujoco.MjModel) -> int:
 
 
 def exerted(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndarray:
-    """Return the force and torque on a free joint for each actuator's unit of force, (drives, 6), in the body's axes."""
+    """Return force and torque on a free joint, in the body's axes, for each actuator's unit of force, (drives, 6)."""
     data, place, dof = mujoco.MjData(model), model.jnt_qposadr[joint], model.jnt_dofadr[joint]
     data.qpos[place : place + 7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     mujoco.mj_forward(model, data)

@@ -1,0 +1,99 @@
+"""Laws of free bodies on a Crazyflie: the closed forms of steady errors, the shorter way, and a lemniscate."""
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+
+import smc_mujoco as smc
+from smc_mujoco.common.files import shipped
+from smc_mujoco.control.units import Gain
+
+TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
+J, G = 16.8e-6, 9.81
+TORQUE = 3e-4  # N m
+
+
+@pytest.fixture(scope="module")
+def drone():
+    return smc.plant_from(TEXT, channels=["body"], name="drone", keyframe="hover")
+
+
+def pushed(law):
+    """A law of the library with a constant torque about the roll axis added to what it commands."""
+    base = njit(law.function)
+    gains = {name: Gain(value, shared=True) for name, value in law.gains.items()}
+
+    @smc.law_function(joint=True, requires_model=True, plants=("a free body",), gains=gains, memory=1)
+    def with_torque(y, gains, memory):
+        u, s = base(y, gains, memory)
+        u[3] += TORQUE
+        return u, s
+
+    return with_torque
+
+
+def sag(K, rho, c, heavier):
+    return math.atanh((heavier - 1.0) * G / K) / (rho * c)
+
+
+@pytest.mark.parametrize(
+    ("law", "expected"),
+    [("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)), ("geometric", 0.19 * G / 7.0)],
+)
+def test_an_unknown_weight_sags_by_the_closed_form(drone, law, expected):
+    scenario = smc.Scenario(plant=drone, law=law, mismatch={"m": 1.19}, duration=12.0, control_period=2e-3)
+    assert -smc.run(scenario).e[-1, 2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_an_unknown_torque_turns_the_body_by_the_closed_form(drone):
+    """The body hovers level, so that the wanted attitude is the one that is off, and the position with it."""
+    law, common = smc.law("quaternion_sliding"), {"plant": drone, "duration": 10.0, "control_period": 2e-3}
+    s = math.atanh(TORQUE / (J * law.gains["K"])) / law.gains["rho"]
+    trace = smc.run(smc.Scenario(law=pushed(law), **common))
+    assert trace.s[-1, 3] == pytest.approx(s, rel=1e-6)
+    tilt = 2.0 * math.asin(s / law.gains["lam"])  # of the wanted thrust, m (c Kx rhox e) sideways and m g upwards
+    sideways = 5.0 * math.tanh(1.25 * abs(trace.e[-1, 1])) / G
+    assert math.atan(sideways) == pytest.approx(tilt, rel=1e-4)
+    law = smc.law("geometric")
+    trace = smc.run(smc.Scenario(law=pushed(law), **common))
+    assert math.atan(7.0 * abs(trace.e[-1, 1]) / G) == pytest.approx(math.asin(TORQUE / (J * 421.7)), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("law", "published"),
+    [(smc.law("quaternion_sliding"), (0.0016, 0.0068)), (smc.law("geometric", kv=2.0), (0.0038, 0.0148))],
+    ids=["quaternion_sliding", "geometric"],
+)
+def test_errors_on_a_lemniscate_are_of_the_size_of_another_coding(drone, law, published):
+    """Periods of 6 and 4 s, rms of the position's error in the second lap: that coding had other rotors."""
+    rms = []
+    for period in (6.0, 4.0):
+        w = math.tau / period
+        path = [smc.Sine(1.0, w), smc.Sine(0.5, 2.0 * w), smc.Constant(1.0), *[smc.Constant(0.0)] * 3]
+        start = {"v0": (w, w, 0.0, 0.0, 0.0, 0.0), "duration": 2.0 * period, "control_period": 2e-3}
+        trace = smc.run(smc.Scenario(plant=drone, law=law, reference=path, **start))
+        rms.append(float(np.sqrt(np.mean(np.sum(trace.e[len(trace.t) // 2 :, :3] ** 2, axis=1)))))
+    assert rms == pytest.approx(published, rel=0.25)
+
+
+@pytest.mark.parametrize("law", ["quaternion_sliding", "geometric"])
+def test_a_turn_across_the_back_takes_the_shorter_way(drone, law):
+    """From a heading of 170 to one of -170 degrees it turns by 20 degrees, not by 340."""
+    goal = [smc.Constant(value) for value in (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(-170.0))]
+    start = (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(170.0))
+    trace = smc.run(smc.Scenario(plant=drone, law=law, x0=start, reference=goal, duration=4.0))
+    turned = float(np.sum(np.abs(trace.v[:, 5])) * 1e-3)
+    assert np.abs(trace.e[-1]).max() < 0.01
+    assert math.radians(19.0) < turned < math.radians(45.0)
+
+
+@pytest.mark.parametrize("law", ["quaternion_sliding", "geometric"])
+def test_it_recovers_from_upside_down(drone, law):
+    """170 degrees of roll, turning, at rest in the air with room below."""
+    start = {"x0": (0.0, 0.0, 30.0, math.radians(170.0), 0.0, 0.0), "v0": (0.0, 0.0, 0.0, 10.0, 5.0, 3.0)}
+    goal = [smc.Constant(value) for value in (0.0, 0.0, 30.0, 0.0, 0.0, 0.0)]
+    trace = smc.run(smc.Scenario(plant=drone, law=law, reference=goal, duration=14.0, control_period=2e-3, **start))
+    assert np.abs(trace.e[-1]).max() < 0.05
+    assert trace.x[:, 2].min() > 15.0

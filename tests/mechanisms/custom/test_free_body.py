@@ -1,0 +1,224 @@
+"""A free body of a user's model: its pose, its mixer, and its motion, against an integration without MuJoCo."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import smc_mujoco as smc
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.files import shipped
+from smc_mujoco.control.attitude import of_thrust
+from smc_mujoco.mechanisms import rotation
+from smc_mujoco.simulation.python_controller import Controller
+
+TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
+MASS, LEVER, YAW, LAG, MOST, G = 0.0319, 0.03253, 0.00705, 0.0625, 0.12, 9.81
+J = np.diag([16.8e-6, 16.8e-6, 29.8e-6])
+
+
+@pytest.fixture(scope="module")
+def drone():
+    return smc.plant_from(TEXT, channels=["body"], name="drone", keyframe="hover")
+
+
+@smc.law_function(joint=True, plants=("a free body",), gains={"time": smc.control.units.Gain(0.0, shared=True)})
+def flip(y, gains, memory):
+    """A wrench of time alone: a roll, a pitch and a yaw while the thrust changes."""
+    u = np.zeros(6)
+    thrust = 0.3 + 0.05 * math.sin(9.0 * y.t)
+    q = rotation.quaternion(y.x[3], y.x[4], y.x[5])
+    u[0], u[1], u[2] = rotation.turned(q, 0.0, 0.0, thrust)
+    u[3] = 6e-4 * math.sin(5.0 * y.t)
+    u[4] = 3e-4 * math.cos(7.0 * y.t)
+    u[5] = 2e-4 * math.sin(3.0 * y.t + 1.0)
+    return u, np.zeros(6)
+
+
+@smc.law_function(joint=True, plants=("a free body",))
+def nothing(y, gains, memory):
+    return np.zeros(6), np.zeros(6)
+
+
+def newton_euler(duration, period):
+    """Return position, rotation matrix, velocities at the end of `flip`, by DOP853 between samples: no MuJoCo."""
+    state = np.concatenate([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6), np.full(4, 0.0782)])
+    for k in range(round(duration / period)):
+        t = k * period
+        F = 0.3 + 0.05 * math.sin(9.0 * t)
+        Mx, My, Mz = 6e-4 * math.sin(5.0 * t), 3e-4 * math.cos(7.0 * t), 2e-4 * math.sin(3.0 * t + 1.0)
+        signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])  # as in the firmware's power distribution
+        asked = F / 4 + signs @ np.array([Mx / LEVER, My / LEVER, Mz / YAW]) / 4
+        asked = np.clip(asked - max(0.0, asked.max() - MOST), 0.0, MOST)
+
+        def rates(t, y, asked=asked):
+            q, v, w, f = y[3:7] / np.linalg.norm(y[3:7]), y[7:10], y[10:13], y[13:]
+            turn = Rotation.from_quat(q, scalar_first=True)
+            places = LEVER * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
+            torque = np.array([f @ places[:, 1], -f @ places[:, 0], YAW * (-f[0] + f[1] - f[2] + f[3])])
+            dq = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
+            acceleration = turn.apply([0.0, 0.0, f.sum() / MASS]) - [0.0, 0.0, G]
+            return np.concatenate(
+                [v, dq, acceleration, np.linalg.solve(J, torque - np.cross(w, J @ w)), (asked - f) / LAG]
+            )
+
+        state = solve_ivp(rates, (0.0, period), state, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    return state[:3], Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(), state[7:10], state[10:13]
+
+
+def test_two_seconds_of_a_flip_are_those_of_an_integration_without_mujoco(drone):
+    """MuJoCo's step is of order two, as it turns the body by one rotation."""
+    place, turn, v, w = newton_euler(2.0, 4e-3)
+    misses = []
+    for step in (2e-3, 1e-3):
+        common = {"control_period": 4e-3, "physics_step": step, "duration": 2.0}
+        trace = smc.run(smc.Scenario(plant=drone, law=flip, **common))
+        attitude = Rotation.from_rotvec(trace.x[-1, 3:].copy()).as_matrix()
+        off = trace.x[-1, :3] - place, attitude - turn, trace.v[-1] - [*v, *w]
+        misses.append([np.abs(values).max() for values in off])
+    assert np.abs(trace.v[:, 3:]).max() > 10.0  # rad/s: it does turn over
+    assert max(misses[1][:2]) < 1e-4
+    assert np.all(np.array(misses[0]) > 3.6 * np.array(misses[1]))
+
+
+def test_a_tumbling_body_keeps_its_angular_momentum_and_energy_and_falls_on_a_parabola(drone):
+    start = {"x0": (0.0, 0.0, 3.0, 0.3, -0.2, 0.1), "v0": (1.0, -2.0, 3.0, 5.0, 20.0, 3.0)}
+    text = TEXT.replace('"16.8e-6 16.8e-6', '"16.8e-6 20e-6').replace('act="0.0782 0.0782 0.0782 0.0782"', "")
+    body = smc.plant_from(text, channels=["body"], name="body", keyframe="hover")
+    trace = smc.run(smc.Scenario(plant=body, law=nothing, duration=5.0, integrator="RK4", physics_step=1e-3, **start))
+    inertia, w = np.diag([16.8e-6, 20e-6, 29.8e-6]), trace.v[:, 3:]
+    momentum = Rotation.from_rotvec(trace.x[:, 3:].copy()).apply(w @ inertia)
+    size, energy = np.linalg.norm(momentum, axis=1), np.einsum("ki,ij,kj->k", w, inertia, w)
+    assert np.ptp(size) < 1e-10 * size[0]
+    assert np.ptp(energy) < 1e-10 * energy[0]
+    assert np.abs(momentum - momentum[0]).max() < 1e-4 * size[0]
+    t = trace.t[:, None]
+    fallen = np.array([0.0, 0.0, 3.0]) + t * [1.0, -2.0, 3.0] - 0.5 * t**2 * [0.0, 0.0, G]
+    np.testing.assert_allclose(trace.x[:, :3], fallen, atol=1e-9)
+
+
+def test_rotors_that_saturate_keep_the_torques_and_give_up_thrust(drone):
+    """The firmware takes the excess of the largest from all four, and then cuts at 0."""
+
+    @smc.law_function(joint=True, plants=("a free body",))
+    def much(y, gains, memory):
+        return np.array([0.0, 0.0, 0.44, 2e-3, 0.0, 0.0]), np.zeros(6)
+
+    trace = smc.run(smc.Scenario(plant=drone, law=much, duration=2e-3))
+    part = 2e-3 / LEVER / 4
+    np.testing.assert_allclose(trace.applied[0], [0.12 - 2 * part] * 2 + [0.12] * 2 + [0.0] * 2, rtol=1e-12)
+    assert trace.u[0, 2] == 0.44
+
+
+def test_rotation_vectors_and_quaternions_are_those_of_scipy():
+    random = np.random.default_rng(7)
+    for turn in [*Rotation.random(20, random), Rotation.identity(), Rotation.from_rotvec([3.1, 0.5, 0.0])]:
+        q, other = turn.as_quat(scalar_first=True), Rotation.random(rng=random)
+        np.testing.assert_allclose(rotation.rotation_vector(*q), turn.as_rotvec(), atol=1e-14)
+        assert rotation.rotation_vector(*-q) == pytest.approx(rotation.rotation_vector(*q), abs=1e-14)
+        error = rotation.relative(tuple(q), tuple(other.as_quat(scalar_first=True)))
+        np.testing.assert_allclose(rotation.rotation_vector(*error), (turn.inv() * other).as_rotvec(), atol=1e-13)
+        np.testing.assert_allclose(rotation.turned(tuple(q), 1.0, 2.0, 3.0), turn.apply([1.0, 2.0, 3.0]), atol=1e-14)
+        r, dr, h = turn.as_rotvec(), random.normal(size=3), 1e-6
+        ends = [Rotation.from_rotvec(r + sign * h * dr) for sign in (-0.5, 0.5)]
+        np.testing.assert_allclose(rotation.rate(*r, *dr), (ends[0].inv() * ends[1]).as_rotvec() / h, atol=1e-8)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-5, 9e-5, 2e-4, 5e-3, 2e-2], ids=str)
+def test_the_rate_of_a_small_rotation_vector_is_its_series(size):
+    r, dr = size * np.array([0.6, -0.8, 0.0]), np.array([0.3, 0.7, -1.1])
+    expected = dr - np.cross(r, dr) / 2 + np.cross(r, np.cross(r, dr)) / 6
+    np.testing.assert_allclose(rotation.rate(*r, *dr), expected, atol=1e-13 + size**3 / 12)
+
+
+@pytest.mark.parametrize(
+    "F", [(0.1, -0.2, 0.3), (0.0, 0.0, -1.0), (0.5, 0.1, -0.2), (1.0, 0.0, 0.0), (-0.3, 0.9, -2.0)]
+)
+def test_the_wanted_attitude_has_its_third_axis_along_the_thrust(F):
+    turn = Rotation.from_quat(of_thrust(np.array(F), np.array([0.0, 0.0, 0.4])), scalar_first=True).as_matrix()
+    np.testing.assert_allclose(turn[:, 2], np.array(F) / np.linalg.norm(F), atol=1e-12)
+    np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=1e-12)
+    heading = np.array([math.cos(0.4), math.sin(0.4), 0.0])
+    assert abs(turn[:, 1] @ heading) < 1e-12
+    assert turn[:, 0] @ heading > 0.0
+
+
+def test_the_error_of_an_attitude_is_the_rotation_from_its_reference(drone):
+    yaw = smc.Sine(0.5, 2.0)
+    scenario = smc.Scenario(
+        plant=drone, law="geometric", x0=(0.1, 0.0, 1.0, 0.2, 0.1, 0.3), duration=0.5,
+        reference=[smc.Constant(0.0), smc.Constant(0.0), smc.Constant(1.0), smc.Constant(0.0), smc.Constant(0.0), yaw],
+    )  # fmt: skip
+    trace = smc.run(scenario)
+    expected = (
+        Rotation.from_rotvec(trace.r[:, 3:].copy()).inv() * Rotation.from_rotvec(trace.x[:, 3:].copy())
+    ).as_rotvec()
+    np.testing.assert_allclose(trace.e, np.hstack([trace.x[:, :3] - trace.r[:, :3], expected]), atol=1e-13)
+    seen = smc.scores(trace)
+    assert list(seen) == ["driven m", "driven rad"]
+
+
+CF2 = """<mujoco model="cf2"><option timestep="0.001" density="1.225" viscosity="1.8e-5"/><worldbody>
+  <body name="cf2" pos="0 0 0.1"><freejoint name="flies"/>
+  <inertial pos="0 0 0" mass="0.027" diaginertia="2.3951e-5 2.3951e-5 3.2347e-5"/>
+  <geom type="box" size=".03 .03 .01" contype="0" conaffinity="0"/><site name="imu"/>
+  <site name="actuation"/></body></worldbody>
+  <actuator><motor ctrlrange="0 0.35" gear="0 0 1 0 0 0" site="actuation" name="body_thrust"/>
+  <motor ctrlrange="-1 1" gear="0 0 0 -0.00001 0 0" site="actuation" name="x_moment"/>
+  <motor ctrlrange="-1 1" gear="0 0 0 0 -0.00001 0" site="actuation" name="y_moment"/>
+  <motor ctrlrange="-1 1" gear="0 0 0 0 0 -0.00001" site="actuation" name="z_moment"/></actuator>
+  <sensor><gyro name="body_gyro" site="imu"/></sensor></mujoco>"""
+
+
+def test_a_model_with_thrust_and_moments_of_either_sign_holds_a_pose():
+    """The form of MuJoCo Menagerie's Crazyflie, with its bounds, which it calls arbitrary: a slow law holds it."""
+    plant = smc.plant_from(CF2, channels=["flies"], name="cf2")
+    law = smc.law("geometric", kx=0.2, kv=0.9, kR=6.0, kW=5.0)
+    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=(0.02, 0.0, 0.2, 0.0, 0.0, 0.1), duration=25.0))
+    assert trace.failure is None
+    assert np.abs(trace.e[-1]).max() < 1e-3
+    assert trace.applied[:, 4:].max() == 0.0
+
+
+THRUSTERS = """<mujoco><option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="floats"/>
+  <geom type="box" size=".2 .15 .1" mass="12"/><site name="c"/></body></worldbody><actuator>{}</actuator></mujoco>"""
+SIX = "".join(
+    f'<motor name="{i}" site="c" gear="{" ".join("1" if i == j else "0" for j in range(6))}" ctrlrange="-20 20"/>'
+    for i in range(6)
+)
+
+
+def test_a_floating_base_goes_to_a_pose_under_a_law_of_arms():
+    """Six thrusters give every force and torque, so that the laws of many joints need no law of flight."""
+    plant = smc.plant_from(THRUSTERS.format(SIX), channels=["floats"], name="base")
+    goal = [smc.Constant(value) for value in (0.3, -0.2, 0.1, 0.4, -0.3, 0.8)]
+    trace = smc.run(smc.Scenario(plant=plant, law="super_twisting_computed_torque", reference=goal, duration=8.0))
+    assert trace.failure is None
+    assert np.abs(trace.e[-1]).max() < 2e-3
+
+
+def refusals():
+    yield "law of one channel", {"law": "pid"}, "of many joints"
+    yield "disturbance", {"law": "geometric", "disturbance": smc.Sine(0.1, 1.0)}, "Push"
+    yield "friction", {"law": "geometric", "friction": smc.Coulomb(0.1)}, "friction"
+    yield "estimator", {"law": "geometric", "velocity": "levant"}, "levant"
+    yield "clock", {"law": "geometric", "clock": smc.Clock(missed=0.1)}, "clock"
+
+
+@pytest.mark.parametrize(("fields", "named"), [case[1:] for case in refusals()], ids=[case[0] for case in refusals()])
+def test_what_a_free_body_does_not_take_is_refused(drone, fields, named):
+    with pytest.raises(ScenarioError, match=named):
+        smc.Scenario(plant=drone, **fields)
+
+
+def test_other_uses_of_a_free_joint_are_refused(drone):
+    with pytest.raises(ScenarioError, match="only for a free body, not for panda"):
+        smc.Scenario(plant="panda", law="geometric")
+    with pytest.raises(ScenarioError, match=r"'body'.* only channel"):
+        smc.plant_from(TEXT, channels={"body": smc.Channel(x0=1.0)})
+    with pytest.raises(ScenarioError, match="0 actuators"):
+        smc.plant_from(THRUSTERS.format(""), channels=["floats"])
+    with pytest.raises(ScenarioError, match=r"smc\.run"):
+        Controller(smc.Scenario(plant=drone, law="geometric"))
