@@ -17,8 +17,7 @@ from smc_mujoco.control import law as laws
 from smc_mujoco.control.component import gain_text
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
-from smc_mujoco.control.law import FREE_BODY
-from smc_mujoco.control.law import Measurement
+from smc_mujoco.control.law import FREE_BODY, Measurement
 from smc_mujoco.simulation import python_controller
 
 pytestmark = pytest.mark.quick
