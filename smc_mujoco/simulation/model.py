@@ -175,7 +175,7 @@ def mixer(model: mujoco.MjModel) -> np.ndarray:
     It is the pseudoinverse of what they exert: exact for what they can exert together, else nearest to it.
     """
     drives = drive_ids(model)
-    forces = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives)
+    forces = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
     limited = model.actuator_ctrllimited[drives].astype(bool)[:, None]
     bounds = np.where(limited, model.actuator_ctrlrange[drives], (-np.inf, np.inf))
     return np.hstack([np.linalg.pinv(forces.T, rcond=1e-9), bounds])
