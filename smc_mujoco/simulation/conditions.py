@@ -13,7 +13,9 @@ The levels of the suite are those of a machine of the study's size. The dry fric
 viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn gear, the lag that of a
 hydraulic valve, and the counts, per revolution or metre, are those of an inexpensive encoder. The pulse of "contact" is
 as strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the suite's
-control period. Under "missed" one sample in ten does not run.
+control period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration, so gains
+for a force do not suit it: tune under it. Its rates are those of the firmware of rig stepper_furuta; it is 30 times as
+strong as other drives, near that machine's ratio of torque to inertia, because a weaker one loses steps at these rates.
 """
 
 import ast
@@ -41,10 +43,11 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, Part
+from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import Scenario, default_u_max
 from smc_mujoco.simulation.signals import Clock, Constant, Jump, Noise, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
@@ -297,6 +300,13 @@ def _contact(plant: Plant, duration: float) -> Fields:
     raise ScenarioError(f"condition 'contact' needs stops, and plant {plant.name!r} has none: choose another")
 
 
+def _stepper(plant: Plant, duration: float) -> Fields:
+    """Return a stepper motor with the pulse generator of rig stepper_furuta."""
+    second = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
+    motor = Stepper(torque=30.0 * default_u_max(plant), speed=15e3 * second, ramp=20e3 * second, stop_band=50.0 * second)
+    return {"actuator": motor, "u_max": motor.ramp}
+
+
 IDEAL: dict[str, Recipe] = {
     "nominal": {},
     "noise": {"noise": SENSOR_NOISE},
@@ -320,6 +330,7 @@ REAL: dict[str, Recipe] = {
     "lugre": {"friction": LuGre(coulomb=0.05, static=0.1, stribeck=0.05)},
     "lag_20ms": {"actuator": Lag(0.02)},
     "dc_motor": {"actuator": DCMotor()},
+    "stepper": _stepper,
     "backlash": {"actuator": Backlash(0.01)},
     "encoder": {"sensor": Encoder(counts=4096)},
     "jitter": {"clock": Clock(jitter=0.5e-3)},
