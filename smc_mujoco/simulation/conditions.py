@@ -303,7 +303,9 @@ def _contact(plant: Plant, duration: float) -> Fields:
 def _stepper(plant: Plant, duration: float) -> Fields:
     """Return a stepper motor with the pulse generator of rig stepper_furuta."""
     second = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
-    motor = Stepper(torque=30.0 * default_u_max(plant), speed=15e3 * second, ramp=20e3 * second, stop_band=50.0 * second)
+    motor = Stepper(
+        torque=30.0 * default_u_max(plant), speed=15e3 * second, ramp=20e3 * second, stop_band=50.0 * second
+    )
     return {"actuator": motor, "u_max": motor.ramp}
 
 

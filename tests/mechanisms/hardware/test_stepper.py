@@ -257,6 +257,18 @@ def test_the_default_bound_is_the_ramp_and_a_weak_motor_warns():
         scenario(dataclasses.replace(MOTOR, torque=0.01), None)
 
 
+def test_the_condition_has_the_rates_of_the_machine_s_firmware_and_a_motor_that_loses_no_step():
+    law = smc.law("observer_free", lam=7.5, k1=6.0)
+    (held,) = smc.grid(["duffing"], [law], ["stepper"], seeds=1, duration=4.0)
+    (motor,), machine = held.actuator, smc.rig("stepper_furuta").scenario("none").actuator[0]
+    for name in ("steps", "teeth", "speed", "ramp", "stop_band", "queue", "refill"):
+        assert getattr(motor, name) == pytest.approx(getattr(machine, name)), name
+    assert held.limits[0] == motor.ramp
+    assert np.abs(smc.run(held).e[-1000:]).max() < 0.03
+    weak = dataclasses.replace(motor, torque=motor.torque / 30.0)  # as strong as other drives
+    assert np.abs(smc.run(dataclasses.replace(held, actuator=weak)).e[-1000:]).max() > 0.5
+
+
 REFUSED = {
     "lagged": (lambda: scenario((smc.Lag(0.01), MOTOR), SLOW), "leave that out"),
     "long": (lambda: Stepper(queue=1e3), "queue 1000 s"),
