@@ -1,4 +1,4 @@
-"""Geometric tracking of a free body with one direction of thrust, such as a quadrotor.
+"""Geometric tracking: torque = J (-kR e_R - kW e_W) + ..., thrust = F . R e3, for a free body such as a quadrotor.
 
     F = m (r'' - kx e - kv e') + h,    thrust = F . R e3,    Rd e3 = F / |F|,
     torque = J (-kR e_R - kW e_W - w x wd) + w x J w,    e_R = vee(Rd' R - R' Rd) / 2,    e_W = w - wd,
@@ -34,6 +34,7 @@ from smc_mujoco.control.units import RATE, Gain, Unit
         "kR": Gain(421.7, Unit(time=-2), positive=True, shared=True),
         "kW": Gain(69.27, RATE, positive=True, shared=True),
     },
+    accuracy={"s": 0, "e": 0},
     label="Geometric",
     memory=1,
 )

@@ -1,4 +1,4 @@
-"""Sliding mode on the attitude's quaternion, for a free body with one direction of thrust, such as a quadrotor.
+"""Quaternion sliding mode: s = we + lam sgn(q0) qv, thrust = F . R e3, for a free body such as a quadrotor.
 
     sx = e' + c e,    F = m (r'' - c e' - Kx tanh(rhox sx)) + h,    thrust = F . R e3,    Rd e3 = F / |F|,
     s = we + lam sgn(q0) qv,    torque = J (-lam sgn(q0) qv' - K tanh(rho s) - w x wd) + w x J w,
@@ -37,6 +37,7 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
         "K": Gain(400.0, Unit(time=-2), positive=True, shared=True),
         "rho": Gain(0.25, Unit(time=1), positive=True, shared=True),
     },
+    accuracy={"s": 0, "e": 0},
     label="Quaternion sliding",
     memory=1,
 )

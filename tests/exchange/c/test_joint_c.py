@@ -15,7 +15,7 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.control.joint_law import JointMeasurement, catalogue, coriolis, norm, product, saturate, solve, torque
+from smc_mujoco.control.joint_law import JointMeasurement, coriolis, norm, product, saturate, solve, torque
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.simulation import python_controller, reference
@@ -24,7 +24,7 @@ from smc_mujoco.simulation.python_controller import gains_of
 pytestmark = needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
-LAWS = catalogue()
+LAWS = arms.LAWS
 TYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
 EACH = np.array([1.0, 0.25, 3.0])
 ORDER = np.array([2, 0, 1])

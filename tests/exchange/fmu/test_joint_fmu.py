@@ -15,7 +15,7 @@ from numba import njit  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.cli import main as cli  # noqa: E402
-from smc_mujoco.control.joint_law import catalogue, coriolis, jacobian, product  # noqa: E402
+from smc_mujoco.control.joint_law import coriolis, jacobian, product  # noqa: E402
 from smc_mujoco.exchange.c import build  # noqa: E402
 from smc_mujoco.simulation.python_controller import Controller  # noqa: E402
 
@@ -24,7 +24,7 @@ pytestmark = needs_compiler
 REFERENCE = smc.Sine(0.2, 5.0)
 JOINTS = (1, 2, 3)
 # Law -> what its scenario has besides: every law once, with and without the model, with an estimator, with own bounds.
-CASES = {name: {"model": "nominal"} for name in catalogue()} | {
+CASES = {name: {"model": "nominal"} for name in arms.LAWS} | {
     "time_delay_sliding": {"velocity": "levant", "v0": (0.1, -0.2, 0.3)},
     "observer_free_joint": {"velocity": "extended_state_observer", "u_max": (3.0, 1.5, 2.0)},
 }
