@@ -5,8 +5,9 @@
 
 Approximate Bayesian computation by rejection. The machine is bursty, so its one recording of a condition is one draw
 from a distribution: each draw of the quantities is run once from its own seed, in both recorded conditions, and kept if
-its figures are within tolerances of the recorded ones. The tolerances were fixed before any draw, and no figure of
-another law is looked at. A hold is burstier than nudges, so its tolerances are three times as wide, on fewer figures.
+its figures are within tolerances of the recorded ones. The tolerances were chosen while a pilot's draws ran, not
+before; no figure of another law is looked at. A hold is burstier than nudges, so its tolerances are three times as
+wide, on fewer figures.
 """
 
 import math
