@@ -57,7 +57,7 @@ WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "tip": "tip off its path (mm)",
     "contact": "force of contact (N)",
     "settling": "|x − r|",
-    "largest": "largest |u| of a joint",
+    "largest": "largest |u|",
 }
 PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels

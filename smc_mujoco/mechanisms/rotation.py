@@ -60,9 +60,7 @@ def rate(x, y, z, dx, dy, dz):
     angle = math.sqrt(x * x + y * y + z * z)
     half = math.sin(0.5 * angle)
     first = 0.5 if angle < 1e-4 else 2.0 * half * half / (angle * angle)
-    second = 1.0 / 6.0 if angle < 1e-2 else (angle - math.sin(angle)) / angle**3
-    if 1e-4 <= angle < 1e-2:
-        second = (1.0 - angle * angle / 20.0) / 6.0
+    second = (1.0 - angle * angle / 20.0) / 6.0 if angle < 1e-2 else (angle - math.sin(angle)) / angle**3
     ax, ay, az = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
     bx, by, bz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
     return dx - first * ax + second * bx, dy - first * ay + second * by, dz - first * az + second * bz

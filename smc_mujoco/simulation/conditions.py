@@ -15,7 +15,7 @@ hydraulic valve, and the counts, per revolution or metre, are those of an inexpe
 as strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the suite's
 control period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration, so gains
 for a force do not suit it: tune under it. Its rates are those of the firmware of rig stepper_furuta; it is 30 times as
-strong as other drives, near that machine's ratio of torque to inertia, because a weaker one loses steps at these rates.
+strong as other drives, near that machine's ratio of torque to inertia, as one of their strength loses steps here.
 """
 
 import ast
@@ -302,10 +302,8 @@ def _contact(plant: Plant, duration: float) -> Fields:
 
 def _stepper(plant: Plant, duration: float) -> Fields:
     """Return a stepper motor with the pulse generator of rig stepper_furuta."""
-    second = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
-    motor = Stepper(
-        torque=30.0 * default_u_max(plant), speed=15e3 * second, ramp=20e3 * second, stop_band=50.0 * second
-    )
+    rate = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
+    motor = Stepper(torque=30.0 * default_u_max(plant), speed=15e3 * rate, ramp=20e3 * rate, stop_band=50.0 * rate)
     return {"actuator": motor, "u_max": motor.ramp}
 
 

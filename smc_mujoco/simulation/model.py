@@ -95,10 +95,10 @@ def channels(model: mujoco.MjModel) -> np.ndarray:
     A disturbance d acts on the body of the joint, as a force along the axis of a slide or a torque about the axis of a
     hinge, so that its generalised force is d. A horizontal force acts on the body's centre of mass.
     """
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     if free_joint(model) >= 0:
         return _pose_channels(model)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     for i in drive_ids(model):
         if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
             raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")

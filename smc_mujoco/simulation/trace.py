@@ -52,15 +52,14 @@ class Trace:
       reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. So that no blow is missed,
         force and reaction are means over the physics steps of the control period that ends at t_k; at t = 0 they are 0.
       scenario: the Scenario of the run.
-
-    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude; v its velocity in
-    the world's axes, and its angular velocity in its own. u, d, force and reaction are forces and torques in the same
-    axes; u is what the law asks for, and `applied` what its actuators get, the first in the first channel, and so on.
-
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
       held: time for which dry friction held the joint in the control period that ends at t_k, (K + 1, n), s, by the
         friction's own state, if the scenario has `exact_friction`; None where dry friction is MuJoCo's, or none.
+
+    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude; v its velocity in
+    the world's axes, and its angular velocity in its own. u, d, force and reaction are forces and torques in the same
+    axes; u is what the law asks for, and `applied` what its actuators get, the first in the first channel, and so on.
     """
 
     t: np.ndarray

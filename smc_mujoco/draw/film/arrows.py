@@ -118,6 +118,8 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
         control, force, push, reaction = (_sizes(parts, name) for name in ("applied", "force", "d", "reaction"))
+        if traces[0].scenario.plant.pose:  # each actuator of a free body acts along several channels
+            control = 0.0, 0.0
         longest = min(reaction[0], control[1]) if control[1] and same else reaction[0]
         if drive:
             control = max(control[0], force[0]), max(control[1], force[1])

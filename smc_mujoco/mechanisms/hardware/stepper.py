@@ -64,8 +64,8 @@ class Stepper(Actuator):
       ramp: rad/s^2 (m/s^2), of the generator's ramp, and the default of u_max; greater than 0.
       stop_band: rad/s (m/s): a slower command means stop; 0 or more. A rate below 1 step/s does, too.
       queue: s of steps that are queued, 0 or more.
-      refill: s between two looks of the generator at its queue, 0 or more; 0 or at least 1e-5. The first comes after a
-        part of it that depends on the seed. If it is 0, each step is computed when it is due, whatever `queue` is.
+      refill: s between two looks of the generator at its queue, 0 or more, and not between 0 and 1e-5. The first comes
+        after a part of it that depends on the seed. If it is 0, each step is computed when due, whatever `queue` is.
       spread: share of the last interval over which the driver spreads a step, 0 .. 1; a step is a jump if it is 0.
       longest_spread: s, the longest interval that the driver measures, 0 or more; chosen: a step at 50 Hz.
     """

@@ -11,6 +11,7 @@ import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import shipped
 from smc_mujoco.control.attitude import of_thrust
+from smc_mujoco.draw.film import arrows
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.simulation.python_controller import Controller
 
@@ -222,3 +223,9 @@ def test_other_uses_of_a_free_joint_are_refused(drone):
         smc.plant_from(THRUSTERS.format(""), channels=["floats"])
     with pytest.raises(ScenarioError, match=r"smc\.run"):
         Controller(smc.Scenario(plant=drone, law="geometric"))
+
+
+def test_a_film_has_no_arrow_for_actuators_that_act_along_several_channels(drone):
+    trace = smc.run(smc.Scenario(plant=drone, law="geometric", model="nominal", duration=0.1))
+    assert np.abs(trace.applied).max() > 0.07  # of a rotor that carries its part of the weight
+    assert [scale.control for scale in arrows.scales([trace]).values()] == [0.0, 0.0]
