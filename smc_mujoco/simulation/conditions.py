@@ -268,13 +268,21 @@ def _frozen(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
 
+def _differ(first: Any, second: Any) -> bool:
+    """Return whether two values of a field differ, as those do that cannot be compared."""
+    try:
+        return bool(first != second)
+    except Exception:  # no scenario takes a value whose comparison fails; the caller's sentence names the field
+        return True
+
+
 def _joined_fields(pair: tuple[Condition, Condition], plant: Plant, duration: float) -> dict[str, Any]:
     """Return the fields of two conditions at once."""
     first, second = (condition.on(plant, duration) for condition in pair)
     for field in [name for name in second if name in first]:
         if field in ADDITIVE_FIELDS:
             second[field] = *coerce.as_tuple(first[field]), *coerce.as_tuple(second[field])
-        elif first[field] != second[field]:
+        elif _differ(first[field], second[field]):
             names = " and ".join(repr(condition.name) for condition in pair)
             raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
     return first | second

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import wild
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
@@ -97,6 +98,8 @@ def test_conditions_add_up(refused):
     assert both == {"disturbance": (smc.Sine(0.2, 5.0), smc.Constant(0.2)), "friction": smc.Coulomb(0.1)}
     assert find_condition("noise + noise").on(duffing, 4.0) == {"noise": smc.Noise(0.01, 0.05)}
     refused(lambda: find_condition("light + heavy").on(duffing, 4.0))
+    awkward = smc.condition("awkward", input_delay=wild.Awkward())
+    refused(lambda: (awkward + smc.condition("late", input_delay=1e-3)).on(duffing, 4.0))
     assert (WORN + find_condition("noise")).on(duffing, 4.0)["noise"] == smc.Noise(0.01, 0.05)
     assert (WORN + "noise").name == "worn gear + noise"
     refused(lambda: WORN + 3)  # pyright: ignore[reportOperatorIssue]
