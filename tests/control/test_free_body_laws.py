@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numba import njit
+from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
 from smc_mujoco.common.files import shipped
@@ -97,3 +98,65 @@ def test_it_recovers_from_upside_down(drone, law):
     trace = smc.run(smc.Scenario(plant=drone, law=law, reference=goal, duration=14.0, control_period=2e-3, **start))
     assert np.abs(trace.e[-1]).max() < 0.05
     assert trace.x[:, 2].min() > 15.0
+
+
+def attitude_of(F, heading):
+    """The rotation whose third axis is along F, and whose first is nearest to the heading."""
+    z = F / np.linalg.norm(F)
+    y = np.cross(z, Rotation.from_rotvec(heading).apply([1.0, 0.0, 0.0]))
+    y /= np.linalg.norm(y)
+    return Rotation.from_matrix(np.column_stack([np.cross(y, z), y, z]))
+
+
+def geometric_torque(error, turning):
+    E = error.as_matrix()
+    antisymmetric = 0.5 * (E - E.T)
+    return -421.7 * np.array([antisymmetric[2, 1], antisymmetric[0, 2], antisymmetric[1, 0]]) - 69.27 * turning
+
+
+def sliding_torque(error, turning):
+    q = error.as_quat(scalar_first=True, canonical=True)
+    rate = 0.5 * (q[0] * turning + np.cross(q[1:], turning))
+    return -8.0 * rate - 400.0 * np.tanh(0.25 * (turning + 8.0 * q[1:]))
+
+
+@pytest.mark.parametrize(
+    ("law", "force", "torque"),
+    [
+        ("geometric", lambda e, de: -7.0 * e - 4.0 * de, geometric_torque),
+        ("quaternion_sliding", lambda e, de: -1.25 * de - 5.0 * np.tanh(de + 1.25 * e), sliding_torque),
+    ],
+)
+def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law, force, torque):
+    """By rotation matrices, after a path that turns its heading. The inertia is not that of a ball, so w x J w counts."""
+    path = [smc.Sine(0.5, 2.0), smc.Sine(0.4, 3.0), smc.Sine(0.3, 1.0), *[smc.Constant(0.0)] * 2, smc.Sine(0.8, 4.0)]
+    start = {"x0": (0.3, -0.2, 1.0, 0.4, -0.3, 0.2), "v0": (0.5, -0.4, 0.3, 6.0, -9.0, 7.0)}
+    body = smc.plant_from(TEXT.replace('"16.8e-6 16.8e-6', '"12e-6 20e-6'), channels=["body"], keyframe="hover")
+    trace = smc.run(smc.Scenario(plant=body, law=law, reference=path, duration=0.1, control_period=2e-3, **start))
+    J, dt, before, limits = np.diag([12e-6, 20e-6, 29.8e-6]), 2e-3, None, np.array(trace.scenario.limits)
+    free = 0  # torques within their bounds
+    for k, t in enumerate(trace.t[:-1]):
+        r, dr, ddr = (np.array([of(one, t) for one in path[:3]]) for of in (value, rate, acceleration))
+        R, w = Rotation.from_rotvec(trace.x[k, 3:].copy()), trace.v[k, 3:]
+        F = 0.0319 * (ddr + force(trace.x[k, :3] - r, trace.v[k, :3] - dr) + [0.0, 0.0, G])
+        wanted = attitude_of(F, np.array([0.0, 0.0, value(path[5], t)]))
+        error, turning = wanted.inv() * R, np.zeros(3) if before is None else (before.inv() * wanted).as_rotvec() / dt
+        moving, before = error.inv().apply(turning), wanted
+        change = torque(error, w - moving) - np.cross(w, moving)
+        up = R.apply([0.0, 0.0, 1.0])
+        command = np.array([*(F @ up * up), *(J @ change + np.cross(w, J @ w))])
+        np.testing.assert_allclose(trace.u[k], np.clip(command, -limits, limits), rtol=1e-6, atol=1e-11)
+        free += np.sum(np.abs(command[3:]) < limits[3:])
+    assert free > 50
+
+
+def value(path, t):
+    return getattr(path, "amplitude", 0.0) * math.sin(getattr(path, "omega", 0.0) * t)
+
+
+def rate(path, t):
+    return path.amplitude * path.omega * math.cos(path.omega * t)
+
+
+def acceleration(path, t):
+    return -path.amplitude * path.omega**2 * math.sin(path.omega * t)

@@ -161,6 +161,23 @@ def test_the_error_of_an_attitude_is_the_rotation_from_its_reference(drone):
     assert list(seen) == ["driven m", "driven rad"]
 
 
+@smc.law_function(joint=True, plants=("a free body",))
+def watch(y, gains, memory):
+    """No wrench; s is the error's rate, as laws see it."""
+    return np.zeros(6), y.de.copy()
+
+
+def test_the_rate_of_an_attitudes_error_is_that_of_the_rotation_from_a_moving_reference(drone):
+    path = [smc.Constant(0.0)] * 3 + [smc.Sine(0.9, 2.0), smc.Sine(0.7, 3.0), smc.Sine(0.8, 4.0)]
+    start = {"x0": (0.0, 0.0, 3.0, 0.3, -0.2, 0.1), "v0": (1.0, -2.0, 3.0, 3.0, 5.0, -2.0)}
+    trace = smc.run(smc.Scenario(plant=drone, law=watch, reference=path, duration=0.5, **start))
+    bodies, references = (Rotation.from_rotvec(values[:, 3:].copy()) for values in (trace.x, trace.r))
+    errors = references.inv() * bodies
+    turned = (errors[:-2].inv() * errors[2:]).as_rotvec() / 2e-3  # by central differences of 1 ms
+    np.testing.assert_allclose(trace.s[1:-2, 3:], turned[:-1], atol=1e-3)
+    np.testing.assert_allclose(trace.s[:, :3], trace.v[:, :3], atol=1e-14)
+
+
 CF2 = """<mujoco model="cf2"><option timestep="0.001" density="1.225" viscosity="1.8e-5"/><worldbody>
   <body name="cf2" pos="0 0 0.1"><freejoint name="flies"/>
   <inertial pos="0 0 0" mass="0.027" diaginertia="2.3951e-5 2.3951e-5 3.2347e-5"/>
