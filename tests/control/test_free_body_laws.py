@@ -128,7 +128,7 @@ def sliding_torque(error, turning):
     ],
 )
 def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law, force, torque):
-    """By rotation matrices, after a path that turns its heading. The inertia is not that of a ball, so w x J w counts."""
+    """By rotation matrices, on a path that turns its heading. The inertia is not that of a ball, so w x J w counts."""
     path = [smc.Sine(0.5, 2.0), smc.Sine(0.4, 3.0), smc.Sine(0.3, 1.0), *[smc.Constant(0.0)] * 2, smc.Sine(0.8, 4.0)]
     start = {"x0": (0.3, -0.2, 1.0, 0.4, -0.3, 0.2), "v0": (0.5, -0.4, 0.3, 6.0, -9.0, 7.0)}
     body = smc.plant_from(TEXT.replace('"16.8e-6 16.8e-6', '"12e-6 20e-6'), channels=["body"], keyframe="hover")
