@@ -23,7 +23,7 @@ from smc_mujoco.draw.page import Size
 
 PAGE_HEIGHT = 4.8  # inches on a full page
 MIN_VARIATION = 1e-6  # 1/s: smaller ones are drawn here, because the axis may be logarithmic
-MARKS = "osD^vPX"  # one for each law, for readers who see no colours
+MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve they begin again
 
 
 def pareto(
