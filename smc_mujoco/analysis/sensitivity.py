@@ -152,7 +152,8 @@ def indices(
             some = np.stack([parts[:, at]] * 2)  # twice: scipy fails on one axis of one output, and centres in place
             outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}
             found = sobol_indices(func=outputs, n=points)
-            return np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0]
+            alone, whole = np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0]
+            return np.stack([np.minimum(alone, whole), whole])  # the first is never larger, its estimate may be
 
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
         resampled = np.array([of(at) for at in draws if np.ptp(parts[:2, at])])

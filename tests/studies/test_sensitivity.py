@@ -42,6 +42,17 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
     assert axes[3].total[:3] == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_no_axis_explains_more_alone_than_with_others(seed):
+    """Few points, and an axis that tells all but 1 %: the estimates of the others' first indices are up to 0.1."""
+    n, k = 64, 4
+    designs = module.designs(n, k, seed)
+    scores = designs[:, 0] + 0.1 * designs[:, 1:].sum(axis=1) - 1.0
+    axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], seed)
+    assert all(one <= more for axis in axes for one, more in zip(axis.first[:3], axis.total[:3], strict=True))
+    assert axes[0].first.median > 0.8
+
+
 def test_positive_scores_are_compared_by_their_ratio():
     designs = module.designs(1024, 2, 0)
     scores = 10.0 ** (3.0 * designs[:, 0] + 2.0 * designs[:, 1])
