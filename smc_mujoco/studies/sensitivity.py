@@ -183,7 +183,7 @@ def sensitivity(
         random within it. Default: mass, friction, delay, noise, encoder, period and bound, see `default_over`.
       metric: name of any metric; more is worse. A run without a score counts as the worst.
       points: number of points, a power of 2; with k axes there are (k + 2) times as many runs. Default: as many as
-        take up to about 20 s of one core.
+        take up to about 20 s of one core, but at least 16, with which the Panda takes 50 s.
       seed: of the points.
       threads, progress: as in `run`. The result does not depend on threads.
 
