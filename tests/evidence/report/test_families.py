@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks import families as script
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.report import families
 
@@ -51,3 +52,33 @@ def test_runs_that_share_gains_count_once():
 def test_what_nobody_can_see_is_no_lead_and_one_family_has_none():
     assert lead(floor=1e-3, classical=1e-5, adrc=1e-9).times == 1.0
     assert lead(classical=1.0, adaptive=2.0) is None
+
+
+def test_a_sentence_stands_is_open_or_is_contradicted_by_its_interval():
+    axis, _, highest, score, kind, _ = next(one for one in script.SENTENCES if one[-1] == "is level at best")
+    cell = {"plant": "duffing", "axis": axis, "level": highest, "score": score, "kind": kind}
+    ends = [(0.9, 1.1), (0.9, 1.2), (1.01, 1.05), (1.2, 1.3)]
+    cells = [cell | {"low": low, "high": high} for low, high in ends]
+    cells += [cells[0] | {"level": 2 * highest}, cells[0] | {"kind": "another"}]
+    assert [*script.judged(cells)][-1] == "in all: 2 of 4 stand, 1 contradicted"
+    axis, _, level, score, kind, does = script.SENTENCES[0]
+    assert does == "leads"
+    cells = [cells[0] | {"axis": axis, "level": level, "score": score, "kind": kind, "low": low} for low in (0.9, 1.01)]
+    assert [*script.judged(cells)][-1] == "in all: 1 of 2 stand, 0 contradicted"
+
+
+def test_levels_by_lot_are_within_the_sentences_and_of_their_seed():
+    levels = script.by_lot(7)
+    assert levels == script.by_lot(7) != script.by_lot(8)
+    for axis, lowest, highest, *_ in script.SENTENCES:
+        assert sum(lowest <= level <= highest for level in levels[axis]) >= script.DRAWN
+
+
+def test_a_lead_is_told_where_the_gains_admit_the_load_and_where_not():
+    """On the hanging chain implicit_first_order has k of 0.65 to 0.8 N m, super_twisting k2 of 1 to 8 N m / s."""
+    runs = {law: np.ones(RUNS) for law in script.SURE} | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 9.0))
+    cell = {"plant": "pendulum_network", "axis": script.FORCE, "score": "error", "kind": "switching", "runs": runs}
+    weaker = runs | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 2.0))
+    told = [*script.borders([cell | {"level": 0.6}, cell | {"level": 1.0, "runs": weaker}])]
+    assert [line.split(": ")[1] for line in told[:2]] == ["9 (9 to 9), 12 runs", "2 (2 to 2), 12 runs"]
+    assert "24 runs" in told[3]  # the load's rate, 14 N m / s at least, is beyond every k2
