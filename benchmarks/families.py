@@ -234,13 +234,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("plants", nargs="*")
     parser.add_argument("--lot", type=int, metavar="SEED", help="levels drawn by lot, to check the page's sentences")
+    parser.add_argument("--without", metavar="LAW", help="leave this law out")
     parser.add_argument("--figure", type=Path, help="draw the cells of --out, without plants those of an earlier call")
     parser.add_argument("--out", type=Path, default=Path("families.json"))
     asked, known = parser.parse_args(), []
     if not asked.plants:
         known = json.loads(asked.out.read_text())
     for plant in asked.plants:
-        families = {family: laws_of(plant, names) for family, names in FAMILIES.items()}
+        compared = {family: [name for name in names if name != asked.without] for family, names in FAMILIES.items()}
+        families = {family: laws_of(plant, names) for family, names in compared.items()}
         print(plant, families, file=sys.stderr)
         for axis, levels in (LEVELS if asked.lot is None else by_lot(asked.lot)).items():
             for level in levels:
