@@ -11,7 +11,7 @@ starts=smc.starts(x0=0.3))` tunes laws on it and says which to take.
 
 The names by task, those of a first script first; `help(smc.run)` tells what a name does:
 
-    Run and look: Scenario, run, Trace, load, score, figure, plot, film, show
+    Run and look: Scenario, run, Trace, load, score, figure, plot, film, show, view
     Laws: law, laws, law_function, Measurement, law_from
     Plants: plant, plants, plant_from, Channel
     Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder, Backlash, DCMotor, Lag

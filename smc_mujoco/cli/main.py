@@ -24,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
 )
 GROUPS: dict[str, list[Callable[..., None]]] = {  # heading in the help -> commands; the annexes add theirs
-    "Run and look": [catalogue.list_, runs.run, runs.show],
+    "Run and look": [catalogue.list_, runs.run, runs.show, runs.view],
     "Compare": [studies.compare, studies.which],
     "Tune and analyse": [
         analysis.tune,

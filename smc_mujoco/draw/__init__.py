@@ -1,1 +1,1 @@
-"""Pictures of traces: figures, films, the viewer, one style."""
+"""Pictures of traces: figures, films, live views, one style."""

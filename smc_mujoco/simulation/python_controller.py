@@ -3,7 +3,7 @@
     readings -> noise, encoder -> velocity estimator -> law -> saturation
 
 It calls laws, estimators and signals as the Python functions they are, and has none of the callback's code. The
-reference loop, agents and the viewer control by it.
+reference loop and agents control by it.
 """
 
 import math

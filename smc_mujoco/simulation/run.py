@@ -9,7 +9,6 @@ grouping or the other runs.
 import contextlib
 import copy
 import ctypes
-import itertools
 import os
 import sys
 import warnings
@@ -170,20 +169,15 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
     if prepared.why_not:
         return None
     scenario = trace.scenario.resolved
-    total, jump = scenario.samples * scenario.steps, scenario.jump_step
+    total = scenario.samples * scenario.steps
     wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
     qpos_at: dict[int, np.ndarray] = {}
-    ends: list[int] = sorted({*wanted, *([jump] if 0 < jump < total else [])})
-    step = 0
     with callback.installed():
         batch = ScenarioBatch([prepared], threads=1)
         qpos = batch.batch.bind("qpos")
         last = qpos[0].copy()
-        for end in ends:
-            batch.advance(end - step, lambda steps: None)
-            step = end
-            if step == jump:
-                batch.set_parameters(step, [0])
+        for end in sorted(set(wanted)):
+            batch.advance_to(end)
             if batch.records["failure"][0] == state.FINE:
                 last = qpos[0].copy()
             qpos_at[end] = last
@@ -221,6 +215,7 @@ class ScenarioBatch:
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
         self.replaced = ""  # the name of a callback of MuJoCo's that other code set during the runs
+        self.step = 0  # physics steps done
         self.calls = 0  # callbacks that each simulation should have had by now
         self.set_parameters(0, range(count))
 
@@ -253,13 +248,15 @@ class ScenarioBatch:
 
     def simulate(self, report: Report) -> None:
         """Simulate all scenarios to the end. Their samples are then in `logs`."""
-        total = self.scenarios[0].samples * self.scenarios[0].steps
-        jumps = sorted({s.jump_step for s in self.scenarios if 0 < s.jump_step <= total})
-        for step, next_step in itertools.pairwise([0, *jumps, total]):
-            if step:
-                self.set_parameters(step, [i for i, s in enumerate(self.scenarios) if s.jump_step == step])
-            self.advance(next_step - step, report)
+        self.advance_to(self.scenarios[0].samples * self.scenarios[0].steps, report)
         self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
+
+    def advance_to(self, end: int, report: Report = lambda steps: None) -> None:
+        """Step all scenarios to a physics step, each with the parameters that hold from its jump on."""
+        for stop in sorted({end, *(s.jump_step for s in self.scenarios if self.step < s.jump_step <= end)}):
+            self.advance(stop - self.step, report)
+            self.step = stop
+            self.set_parameters(stop, [i for i, s in enumerate(self.scenarios) if s.jump_step == stop > 0])
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
         """Set the true parameters that hold from a physics step on, in the simulations of these indices."""

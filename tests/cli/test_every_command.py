@@ -16,7 +16,6 @@ from typer.models import OptionInfo
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
-from smc_mujoco.draw import display
 
 CALLS = {  # command line -> the functions that it calls, of which the last does the work; not for audits
     "list pid": ["cli.law_pages.print_pages"],
@@ -26,8 +25,8 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "list law.c --gains a=1 --memory 3 --symbol f --flag=-Ia --flag=-Ib --timeout 4": ["exchange.c.load.check"],
     "run duffing": ["cli.scene.perform"],
     "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat": ["cli.scene.perform"],
-    "run duffing --view": ["draw.viewer.watch"],
-    "run control_signals --view --seed 3 --condition nominal --label super_twisting": ["draw.viewer.watch"],
+    "view duffing": ["draw.studio.view"],
+    "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --unchecked --out there --figure f "
@@ -99,15 +98,15 @@ PRINTED = [  # command lines that are run to their ends
 ]
 
 
-FLAGS = {"--no-film", "--no-repeat", "--view", "--no-tune", "--worst", "--quick", "--defaults", "--unchecked"}
+FLAGS = {"--no-film", "--no-repeat", "--no-browser", "--no-tune", "--worst", "--quick", "--defaults", "--unchecked"}
 FLAGS |= {"--no-binary"}
-SWITCHES = {"--view", "--rig", "--needs", "--plant"}  # which function does the work; --needs and --plant of `list`
+SWITCHES = {"--rig", "--needs", "--plant"}  # which function does the work; --needs and --plant of `list`
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 ALIASES = {  # option -> arguments that it may change, besides the one of its name
     "--law": "laws scenario scenarios", "--condition": "conditions scenario", "--x0": "starts scenarios",
     "--seed": "scene scenario", "--seeds": "scenarios", "--duration": "scenario scenarios", "--gains": "law scenario",
     "--disturbance": "within over", "--bound": "within over", "--flag": "flags", "--label": "scenario",
-    "--no-film": "filming",
+    "--no-film": "filming", "--no-browser": "open_browser",
     "--no-repeat": "repeated", "--out": "folder", "--actuator": "changes", "--type": "numbers",
     "--period": "control_period",
 }  # fmt: skip
@@ -116,7 +115,7 @@ UNTOLD = {
     "case(changes)",
     "worst_case(scenario)",
     "sensitivity(scenario)",
-    "watch(scenario)",
+    "view(scenario)",
 }  # not told in whole
 UNTOLD |= {"study(noise_key)"}  # 0 is the function's own default
 
@@ -161,7 +160,6 @@ def reached(words: list[str], paths: list[str]) -> dict[str, str]:
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(display, "missing", lambda: None)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     monkeypatch.setattr("warnings.showwarning", None)
     return tmp_path

@@ -1,7 +1,5 @@
-"""smc-mujoco run, show: the runs of a scene, on record or in a window, and a saved trace."""
+"""smc-mujoco run, show, view: the runs of a scene, a saved trace, and any machine in a browser tab."""
 
-import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +12,6 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 
 
 def run(
-    ctx: typer.Context,
     name: options.SceneName,
     out: Annotated[
         Path, typer.Option(metavar="FOLDER", help="For results; each scene has a folder of its name in it.")
@@ -30,13 +27,6 @@ def run(
         bool, typer.Option(help="Whether to repeat runs at half the physics step, to mark what depends on it.")
     ] = True,
     timing: Annotated[bool, typer.Option("--timing", help="Print how long each part took.")] = False,
-    view: Annotated[
-        bool, typer.Option("--view", help="Watch one run in MuJoCo's viewer instead, and change its law's gains.")
-    ] = False,
-    condition: Annotated[
-        str | None, typer.Option(help="Of the run in the viewer; default the condition of the film.")
-    ] = None,
-    label: Annotated[str | None, typer.Option(help="Of the run in the viewer; default the condition's first.")] = None,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
@@ -45,25 +35,8 @@ def run(
 
     Exported traces have every number to the last bit, and its unit.
 
-    With --view a window shows one run in real time, and nothing is written:
-
-    - Pause and continue: the space bar.
-    - Change a gain: its slider gain:NAME in the panel "Control" at the right, from a tenth of the scene's value to ten
-      times that value. At the end the law is printed, as code that makes it.
-    - Push a body: double-click it, hold Ctrl, and drag with the right mouse button.
-    - Start again: Backspace. The run also starts again by itself when its duration is over. Changed gains are kept.
-
-    All other sliders and settings of the viewer change only the picture.
-
     Example: smc-mujoco run duffing --no-film --out results --export csv,parquet
-
-    Example: smc-mujoco run inverted_pendulum --view --label super_twisting
     """
-    options.only_for(ctx, ("condition", "label"), view, "a run in the viewer, --view")
-    options.only_for(ctx, ("out", "film", "threads", "export", "repeat", "timing"), not view, "runs without --view")
-    if view:
-        _watch(name, seed, condition, label)
-        return
     clock = Clock()
     with clock("loading"), delay_ctrl_c():
         from smc_mujoco.cli.scene import perform
@@ -121,25 +94,41 @@ def show(
     terminal.wrote(*written)
 
 
-def _watch(name: str, seed: int | None, condition: str | None, label: str | None) -> None:
-    """Show one run of a scene in MuJoCo's viewer."""
-    from smc_mujoco.common.errors import ScenarioError, find
-    from smc_mujoco.draw import display
+def view(
+    machine: Annotated[
+        str,
+        typer.Argument(
+            metavar="MACHINE",
+            autocompletion=options.PLANTS,
+            help="A plant from `smc-mujoco list`; yours, FILE.xml:joint+joint, or FILE.xml:joint of a free body; or a "
+            "scene file, FILE.py, of which the first two runs of the film's condition are shown.",
+        ),
+    ],
+    law: options.Laws = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: the first free one from 8080 on.")] = 0,
+    browser: Annotated[bool, typer.Option(help="Whether to open the browser's tab.")] = True,
+) -> None:
+    """Watch a machine under one law or two in a browser tab, in MuJoCo's Studio; change, push and save what you see.
 
-    no_window = display.missing()
-    if sys.platform == "linux" and not no_window:
-        os.environ["MUJOCO_GL"] = "glfw"  # one library for all windows
+    The panel "Laws" has the laws, their gains, mass, delay, noise and friction, each of which starts the runs again; u,
+    s and e; the model's keyframes; and "save as scene", which writes view.py: `smc-mujoco run view.py` repeats the runs
+    to the bit. The second law's machine is the transparent one.
+
+    Push a body: double-click it, hold Ctrl, drag with the right mouse button, and let go.
+
+    It needs MuJoCo 4, and ends with Ctrl-C.
+
+    Example: smc-mujoco view duffing --law super_twisting,pid
+
+    Example: smc-mujoco view arm.xml:shoulder+elbow --law adrc
+    """
     with delay_ctrl_c():
-        from smc_mujoco.draw import viewer
+        from smc_mujoco.draw import studio
+
+    shown = machine
+    if machine.endswith(".py"):
         from smc_mujoco.studies import scene as scenes
 
-    scene = scenes.read(scenes.find(name))
-    if seed is not None:
-        scene = scene.seeded(seed)
-    runs = scene.conditions[scene.film]
-    if condition is not None:
-        runs = find(f"condition of {name}", condition, scene.conditions)
-    scenario = next(iter(runs.values())) if label is None else find(f"label in {name}", label, runs)
-    if no_window:
-        raise ScenarioError(no_window)
-    viewer.watch(scenario)
+        scene = scenes.read(scenes.find(machine))
+        shown = list(scene.conditions[scene.film].values())[:2]
+    studio.view(shown, options.laws(law), port, browser)

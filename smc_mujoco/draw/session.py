@@ -1,0 +1,263 @@
+"""Runs that a person watches and changes: at every moment they are those of `smc.run`, so that they can be saved.
+
+A changed gain, condition or law starts the runs again. A push joins their disturbances, and they are repeated up to the
+present. So the session is its scenarios, and a saved one repeats it.
+"""
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from pprint import pformat
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control import joint_law
+from smc_mujoco.control.gain_sets import law as law_with_gains
+from smc_mujoco.control.law import FREE_BODY, Law, laws
+from smc_mujoco.mechanisms.hardware.friction import Coulomb
+from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
+from smc_mujoco.simulation import callback, state
+from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.prepare import prepare
+from smc_mujoco.simulation.run import ScenarioBatch
+from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.serialise import describe, restore
+from smc_mujoco.simulation.signals import Push
+
+PUSH_WIDTH = 0.1  # s
+SAVED = '''"""What was seen of {plant} in `smc-mujoco view`, to the bit."""
+
+from math import inf, nan  # noqa: F401
+
+import smc_mujoco as smc
+from smc_mujoco.simulation.serialise import restore
+
+RUNS = {runs}
+scene = smc.Scene(
+    title="A view of {plant}", conditions={{"view": {{label: restore(run) for label, run in RUNS.items()}}}}
+)
+
+if __name__ == "__main__":
+    smc.play(__file__)
+'''
+
+
+class Slider(NamedTuple):
+    """A number of a scenario: its present value, its range, and how a scenario gets another."""
+
+    value: float
+    low: float
+    high: float
+    changed: Callable[[Scenario, float], Scenario]
+
+
+class Session:
+    """Runs of one plant under its laws, of which `sample` samples are over; a reset goes back to `first`."""
+
+    def __init__(self, scenarios: Sequence[Scenario]):
+        self.first = tuple(scenarios)
+        self.due, self.message, self.paused = 0.0, "", False
+        self.begin(self.first)
+
+    def begin(self, scenarios: Sequence[Scenario], sample: int = 0) -> None:
+        """Start these scenarios, and repeat them up to a sample of the control."""
+        prepared = [prepare(scenario) for scenario in scenarios]
+        if reason := next((one.why_not for one in prepared if one.why_not), None):
+            raise ScenarioError(f"no view: {reason}")
+        with callback.installed():
+            self.batches = [ScenarioBatch([one], threads=1) for one in prepared]
+        self.scenarios = tuple(scenarios)
+        self.sliders = [sliders(scenario) for scenario in self.scenarios]
+        self.advance_to(sample)
+
+    @property
+    def samples(self) -> int:
+        """Samples of the whole runs."""
+        return self.scenarios[0].samples
+
+    @property
+    def time(self) -> float:
+        """Time of the runs, s."""
+        return self.sample * self.scenarios[0].control_period
+
+    def advance(self, seconds: float) -> None:
+        """Simulate the time that is due, in whole control periods; start again after the end."""
+        if self.sample == self.samples:
+            self.begin(self.scenarios)
+        self.due += seconds
+        count = int(self.due / self.scenarios[0].control_period)
+        self.due -= count * self.scenarios[0].control_period
+        self.advance_to(min(self.sample + count, self.samples))
+
+    def advance_to(self, sample: int) -> None:
+        """Step all runs to a sample. A run that fails stays where it is, and says why."""
+        self.sample = sample
+        with callback.installed():
+            for batch in self.batches:
+                batch.advance_to(sample * batch.scenarios[0].steps)
+        for batch in self.batches:
+            if batch.records["failure"][0] != state.FINE:
+                self.message = f"{batch.scenarios[0].law.name} failed: {batch.trace(0).failure}"
+
+    def change(self, changed: Callable[[Scenario], Scenario], run: int | None = None, sample: int = 0) -> None:
+        """Start again with changed scenarios, all or one; a change that they refuse leaves them, and says why."""
+        try:
+            self.begin([changed(s) if run in {None, i} else s for i, s in enumerate(self.scenarios)], sample)
+            self.message = ""
+        except ScenarioError as error:
+            self.message = str(error)
+
+    def reset(self) -> None:
+        """Start again as the session began."""
+        self.begin(self.first)
+        self.message = ""
+
+    def push(self, body: str, force: np.ndarray) -> None:
+        """Push a body from now on: a half sine of 0.1 s with this peak in the axes of the world, N."""
+        x, y, z = force.tolist()
+        push = Push(body=body, x=x, y=y, z=z, time=self.time, width=PUSH_WIDTH)
+        self.change(lambda s: dataclasses.replace(s, disturbance=(*s.disturbance, push)), sample=self.sample)
+
+    def take_law(self, law: Law | str, run: int) -> None:
+        """Give one run another law, by its name with its gains for the plant."""
+        self.change(lambda s: dataclasses.replace(s, law=law_for(s.plant, law), surface=None, model=None), run)
+
+    def state(self, run: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return positions, velocities and activations of a run."""
+        bind = self.batches[run].batch.bind
+        act = bind("act")[0] if self.batches[run].model.na else np.zeros(0)
+        return bind("qpos")[0], bind("qvel")[0], act
+
+    def log(self, run: int) -> np.ndarray:
+        """Return the samples of a run so far, (samples, channels)."""
+        return self.batches[run].logs[0][: self.sample]
+
+    def screen(self) -> mujoco.MjModel:
+        """Return the mechanism with the true parameters at the start, for the screen."""
+        scenario = self.scenarios[0].resolved
+        seen = compiled_for_runs(models.spec(scenario), 0)
+        models.put_values(seen, seen, scenario, 0)
+        mujoco.mj_setConst(seen, mujoco.MjData(seen))
+        return seen
+
+    def pause(self) -> None:
+        """Pause, or go on."""
+        self.paused = not self.paused
+
+    def add(self) -> None:
+        """Show the run twice, so that the second can take another law."""
+        self.begin([self.scenarios[0]] * 2)
+
+    def move(self, run: int, slider: Slider, value: float) -> None:
+        """Start again with the number of a slider."""
+        self.change(lambda s: slider.changed(s, value), run)
+
+    def keyframe(self, key: int) -> None:
+        """Start again from a keyframe of the model."""
+        self.change(lambda s: at_keyframe(s, self.batches[0].base, key))
+
+    def save(self, path: Path) -> Path:
+        """Write a scene file whose runs are these to the bit; refuse what it could not repeat."""
+        runs = {f"{s.law.name} {i + 1}": describe(s) for i, s in enumerate(self.scenarios)}
+        runs = json.loads(json.dumps(runs))
+        if [restore(run) for run in runs.values()] != list(self.scenarios):
+            raise ScenarioError("the session cannot be saved: a scene file cannot name its law or plant")
+        plant = self.scenarios[0].plant.name
+        path.write_text(SAVED.format(plant=plant, runs=pformat(runs, width=110, sort_dicts=False)), encoding="utf-8")
+        return path
+
+
+def sliders(s: Scenario) -> dict[str, Slider]:
+    """Return name -> slider of a run's gains and conditions."""
+    gains = {} if len(s.law.parts) > 1 else gain_sliders(s.law)
+    return gains | {name: one for name, one in condition_sliders(s).items() if takes(s, one)}
+
+
+def laws_of(plant: Plant) -> list[str]:
+    """List the laws for a plant: of many joints for a free body, else of one channel."""
+    if not plant.pose:
+        return [name for name in laws(plant) if name != "none"]
+    return [name for name, law in joint_law.catalogue().items() if FREE_BODY in law.plants]
+
+
+def law_for(plant: Plant, law: Law | str) -> Law | str:
+    """Return a law; for a name, with the package's gains for the plant where there are any, else its defaults."""
+    try:
+        return law_with_gains(plant, law) if isinstance(law, str) else law
+    except ScenarioError:
+        return law
+
+
+def at_keyframe(scenario: Scenario, model: mujoco.MjModel, key: int) -> Scenario:
+    """Return a scenario that starts in a keyframe; refuse one that the channels' x0 and v0 cannot give."""
+    qpos, qvel, joints = model.key_qpos[key], model.key_qvel[key], models.moving_joints(model)[0]
+    if scenario.plant.pose:
+        first, dof = model.jnt_qposadr[joints[0]], model.jnt_dofadr[joints[0]]
+        turn = np.zeros(3)
+        mujoco.mju_quat2Vel(turn, qpos[first + 3 : first + 7], 1.0)
+        x0, v0 = [*qpos[first : first + 3], *turn], qvel[dof : dof + 6]
+    else:
+        x0, v0 = qpos[model.jnt_qposadr[joints]], qvel[model.jnt_dofadr[joints]]
+    started = dataclasses.replace(scenario, x0=tuple(map(float, x0)), v0=tuple(map(float, v0)))
+    if not all(map(np.allclose, models.initial_state(model, started), (qpos, qvel))):
+        raise ScenarioError(f"no start from keyframe {key}: it moves joints without a channel")
+    return started
+
+
+def gain_sliders(law: Law) -> dict[str, Slider]:
+    """Return a slider for each finite gain that all channels share: a tenth to ten times it, 0 to 1 for 0."""
+
+    def changed(name: str) -> Callable[[Scenario, float], Scenario]:
+        return lambda s, value: dataclasses.replace(
+            s, law=dataclasses.replace(s.law, gains={**s.law.gains, name: value})
+        )
+
+    return {
+        name: Slider(gain, *(sorted((gain / 10.0, gain * 10.0)) if gain else (0.0, 1.0)), changed(name))
+        for name, gain in law.gains.items()
+        if not isinstance(gain, tuple) and math.isfinite(gain)
+    }
+
+
+def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
+    """Return the sliders of what acts on a run, but of friction where the scenario has a kind of its own."""
+    step = s.resolved.physics_step
+    bound = float(np.min(s.resolved.u_max))
+    sliders: dict[str, Slider] = {
+        "mass, factor": Slider(
+            s.mismatch.get("mass", 1.0),
+            0.5,
+            2.0,
+            lambda s, v: dataclasses.replace(s, mismatch={**s.mismatch, "mass": v}),
+        ),
+        "delay, s": Slider(
+            s.input_delay, 0.0, 0.05, lambda s, v: dataclasses.replace(s, input_delay=round(v / step) * step)
+        ),
+        "noise, rad or m": Slider(
+            s.noise.position,
+            0.0,
+            0.02,
+            lambda s, v: dataclasses.replace(s, noise=dataclasses.replace(s.noise, position=v)),
+        ),
+    }
+    if all(type(part) is Coulomb for part in s.friction) and len(s.friction) <= 1:
+        level = next((part.level for part in s.friction), 0.0)
+        most = 0.5 * bound if math.isfinite(bound) else 1.0
+        sliders["friction, N or N m"] = Slider(
+            level, 0.0, most, lambda s, v: dataclasses.replace(s, friction=Coulomb(v) if v else None)
+        )
+    return sliders
+
+
+def takes(scenario: Scenario, slider: Slider) -> bool:
+    """Return whether a scenario takes what a slider changes."""
+    try:
+        slider.changed(scenario, slider.high)
+    except ScenarioError:
+        return False
+    return True

@@ -1,0 +1,108 @@
+"""`smc.view`: any machine in MuJoCo's Studio, in a browser tab, stepped by the compiled loop of `smc.run`.
+
+Studio shows copies of the runs' positions, so nothing in its panels changes a run but the panel "Laws", the push of the
+mouse and Reset. Its page runs in a thread of its own: it asks, and the loop of `view` does it between two frames.
+"""
+
+import contextlib
+import dataclasses
+import importlib.util
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control.law import Law
+from smc_mujoco.draw.session import Session, law_for, laws_of
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.scenario import Scenario
+
+FRAME_TIME = 1.0 / 60.0  # s
+MAX_FRAME_TIME = 0.1  # s, simulated in a frame at most, so that slow runs still answer
+
+
+def view(
+    scenario: Scenario | Sequence[Scenario] | Plant | str,
+    laws: Sequence[Law | str] = (),
+    port: int = 0,
+    open_browser: bool = True,
+    watched: Callable[[Session], bool] = lambda session: True,
+) -> tuple[Scenario, ...]:
+    """Show a machine under one law or two in a browser tab until Ctrl-C; return its scenarios as they are then.
+
+    The second law's machine is the transparent one. The panel "Laws" has the laws, their gains, what acts on the runs,
+    u, s and e, and "save as scene". Double-click a body, hold Ctrl and drag with the right mouse button: it is pushed
+    when you let go. The tab needs MuJoCo 4.
+
+    Args:
+      scenario: a Scenario or two, a plant, or "arm.xml:shoulder+elbow".
+      laws: one or two; default the scenario's, or the first that suits the plant.
+      port: of the page on this machine; 0 takes the first free one from 8080 on.
+      open_browser: whether to open the tab.
+      watched: called after each frame; the view ends when it returns False.
+
+    Raises:
+      ScenarioError: MuJoCo is older than 4, or a law does not suit the machine.
+    """
+    session = Session(runs_of(scenario, laws))
+    if importlib.util.find_spec("mujoco.studio") is None:
+        raise ScenarioError(f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'")
+    from mujoco.studio import app, launch_web, viewer_protocol
+    from mujoco.studio.web import web_server
+
+    from smc_mujoco.draw.studio_panel import Panel
+
+    bind = web_server.bind_public_socket
+    web_server.bind_public_socket = lambda host, port: bind("127.0.0.1", port)  # Studio would serve the whole network
+    config = viewer_protocol.ViewerConfig(title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser)
+    panel = Panel(session)
+    with contextlib.suppress(KeyboardInterrupt), launch_web.launch(config, plugins=[app.App(), panel]) as page:
+        show(session, page, panel, watched)
+    return session.scenarios
+
+
+def runs_of(scenario: Scenario | Sequence[Scenario] | Plant | str, laws: Sequence[Law | str]) -> list[Scenario]:
+    """Return the scenarios to show."""
+    if len(laws) > 2:
+        raise ScenarioError(f"laws has {len(laws)} laws: give one or two, which are shown in one picture")
+    shown = [scenario] if isinstance(scenario, Scenario) else scenario
+    if isinstance(shown, list | tuple):
+        first = shown[0]
+        return [dataclasses.replace(first, law=law_for(first.plant, law)) for law in laws] or list(shown)
+    plant = as_plant(shown)
+    chosen = list(laws) or laws_of(plant)[:1]
+    return [Scenario(plant=plant, law=law_for(plant, law)) for law in chosen]
+
+
+def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], bool]) -> None:
+    """Show frame after frame: what was asked for, the push, a reset, the runs' next part."""
+    model = session.screen()
+    data = mujoco.MjData(model)
+    page.set_model(model, data=data)
+    before, pull = time.perf_counter(), np.zeros((model.nbody, 3))
+    while page.is_running() and watched(session):
+        now = time.perf_counter()
+        while not panel.asked.empty():
+            panel.asked.get()()
+        if not session.paused:
+            session.advance(min(now - before, MAX_FRAME_TIME))
+        before = now
+        data.time = session.time
+        data.qpos[:], data.qvel[:], data.act[:] = session.state(0)
+        if len(session.scenarios) > 1:
+            panel.ghost_at = session.state(1)[0].copy()
+        shown = data.time
+        data.xfrc_applied[:] = 0.0
+        page.sync(model, data)
+        if data.time == 0.0 < shown:
+            session.reset()
+        pulled = data.xfrc_applied[:, :3].copy()
+        if np.any(pull) and not np.any(pulled):  # the mouse let go
+            body = int(np.argmax(np.abs(pull).sum(axis=1)))
+            session.push(model.body(body).name, pull[body])
+        pull = pulled
+        time.sleep(max(0.0, now + FRAME_TIME - time.perf_counter()))

@@ -1,0 +1,101 @@
+"""The panel "Laws" of `smc.view`, and the second run's machine. It runs in the thread of Studio's page."""
+
+import functools
+import queue
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from mujoco.studio import messages, plugin
+from mujoco.studio.dear_imgui import dear_imgui as imgui
+from mujoco.studio.implot import implot
+
+from smc_mujoco.draw.session import Session, laws_of
+
+GHOST = 0.35  # opacity of the second run's machine
+GEOMS = 2000  # of the second run's machine, at most
+SAMPLES = 500  # of a curve
+SAVED_AS = Path("view.py")
+
+
+class Panel(plugin.ViewerPlugin):
+    """Shows a session, and puts what the user asks for into `asked`."""
+
+    def __init__(self, session: Session):
+        self.session = session
+        self.asked: queue.Queue[Callable[[], object]] = queue.Queue()
+        self.laws = laws_of(session.first[0].plant)
+        self.ghost: mujoco.MjvScene | None = None
+        self.ghost_at: np.ndarray | None = None  # positions of the second run
+
+    @messages.handler
+    def on_gui(self, event: messages.BuildGuiEvent) -> None:
+        """Build the panel of this frame."""
+        session = self.session
+        imgui.SetNextWindowSize(imgui.Vec2(420.0, 620.0), imgui.Cond.FirstUseEver)
+        if imgui.Begin("Laws")[0]:
+            imgui.Text(f"{session.time:.2f} s {session.message}")
+            self.button("pause" if not session.paused else "go on", session.pause)
+            imgui.SameLine()
+            self.button("reset", session.reset)
+            imgui.SameLine()
+            self.button(f"save as scene {SAVED_AS}", functools.partial(session.save, SAVED_AS))
+            for key in range(self.viewer.model.nkey):
+                self.button(
+                    f"keyframe {self.viewer.model.key(key).name or key}", functools.partial(session.keyframe, key)
+                )
+            for run in range(len(session.scenarios)):
+                self.run(run)
+            if len(session.scenarios) == 1:
+                self.button("a second law", session.add)
+            self.curves()
+        imgui.End()
+        if self.ghost_at is not None:
+            self.draw_ghost()
+
+    def button(self, words: str, ask: Callable[[], object]) -> None:
+        """Show a button that asks for something."""
+        if imgui.Button(words):
+            self.asked.put(ask)
+
+    def run(self, run: int) -> None:
+        """Show the law of a run, and its sliders."""
+        law = self.session.scenarios[run].law.name
+        names = self.laws if law in self.laws else [law, *self.laws]
+        changed, chosen = imgui.Combo(f"law {run + 1}", names.index(law), names)
+        if changed:
+            self.asked.put(functools.partial(self.session.take_law, names[chosen], run))
+        for name, slider in self.session.sliders[run].items():
+            changed, value = imgui.SliderFloat(f"{name}##{run}", slider.value, slider.low, slider.high, "%.4g")
+            if changed:
+                self.asked.put(functools.partial(self.session.move, run, slider, value))
+
+    def curves(self) -> None:
+        """Show u, s and e of each run's first channel up to now."""
+        for name in ("u", "s", "e"):
+            if implot.BeginPlot(name, imgui.Vec2(-1.0, 130.0)):
+                for run, scenario in enumerate(self.session.scenarios):
+                    log = self.session.log(run)[:, 0]
+                    log = log[:: max(1, len(log) // SAMPLES)]
+                    values = log["x"] - log["r"] if name == "e" else log[name]
+                    implot.PlotLine(
+                        f"{scenario.law.name}##{run}",
+                        np.linspace(0.0, self.session.time, len(log)).tolist(),
+                        values.tolist(),
+                    )
+                implot.EndPlot()
+
+    def draw_ghost(self) -> None:
+        """Draw the second run's machine, transparent, into the first's picture."""
+        model = self.viewer.model
+        self.ghost = self.ghost or mujoco.MjvScene(model, GEOMS)
+        data = mujoco.MjData(model)
+        data.qpos[:] = self.ghost_at
+        mujoco.mj_forward(model, data)
+        dynamic = mujoco.mjtCatBit.mjCAT_DYNAMIC.value
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), dynamic, self.ghost)
+        geoms = [self.ghost.geoms[i] for i in range(self.ghost.ngeom)]
+        for geom in geoms:
+            geom.rgba[3] = GHOST
+        self.viewer.extra_geoms[:] = geoms

@@ -1,0 +1,127 @@
+"""What `smc.view` promises without its window: the runs on screen are those of smc.run, and a saved session repeats."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smc_mujoco as smc
+from smc_mujoco.draw import studio
+from smc_mujoco.draw.session import Session
+from smc_mujoco.studies import scene
+
+DUFFING = smc.Scenario(plant="duffing", law=smc.law("observer_free", lam=6.0, k1=3.0), duration=0.4)
+HARD = smc.Scenario(
+    plant="inverted_pendulum",
+    law=smc.law("super_twisting"),
+    duration=0.3,
+    noise=smc.Noise(0.001, 0.01),
+    input_delay=0.005,
+    friction=smc.Coulomb(0.05),
+    jump=smc.Jump(time=0.15, factors={"m": 1.5}),
+    seed=3,
+)
+ROOT = Path(__file__).parents[2]
+NETWORK = smc.Scenario(plant=smc.plant("pendulum_network", n=3), law=smc.law("classical"), duration=0.2)
+ARM = """<mujoco><worldbody><body name="arm"><joint name="shoulder" damping="0.1"/><geom size="0.05" pos="0 0 -0.5"/>
+  </body></worldbody><actuator><motor joint="shoulder" ctrllimited="true" ctrlrange="-9 9"/></actuator>
+  <keyframe><key name="up" qpos="3" qvel="0.5"/></keyframe></mujoco>"""
+
+
+def watch(session):
+    """Watch to the end in frames of uneven length."""
+    while session.sample < session.samples:
+        session.advance(0.0171)
+
+
+def same(session, scenarios):
+    """The session's samples are those of smc.run, to the bit."""
+    for run, scenario in enumerate(scenarios):
+        trace, log = smc.run(scenario), session.log(run)
+        assert len(log) == scenario.samples
+        for name in ("x", "v", "u", "s", "d"):
+            assert np.array_equal(log[name], getattr(trace, name)[: len(log)]), name
+
+
+@pytest.fixture
+def arm(tmp_path):
+    """A user's own model."""
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM)
+    return path
+
+
+@pytest.mark.parametrize("scenario", [DUFFING, HARD, NETWORK], ids=lambda s: s.plant.name)
+def test_a_session_is_the_run_of_its_scenario(scenario):
+    session = Session([scenario, dataclasses.replace(scenario, seed=5)])
+    watch(session)
+    same(session, session.scenarios)
+
+
+def test_a_saved_session_repeats_to_the_bit(tmp_path):
+    session = Session([HARD])
+    session.move(0, session.sliders[0]["k1"], 5.0)
+    session.move(0, session.sliders[0]["mass, factor"], 1.2)
+    session.advance(0.1)
+    session.push("pendulum", np.array([2.0, 0.0, 0.0]))
+    assert not session.message
+    assert session.time == pytest.approx(0.1)
+    watch(session)
+    path = session.save(tmp_path / "view.py")
+    (saved,) = scene.read(path).conditions["view"].values()
+    assert dict(saved.law.gains)["k1"] == 5.0
+    same(session, [saved])
+
+
+def test_a_push_acts_from_now_on():
+    session = Session([DUFFING])
+    session.advance(0.1)
+    before = session.log(0)["x"].copy()
+    session.push("cart", np.array([2.0, 0.0, 0.0]))
+    assert np.array_equal(session.log(0)["x"], before)
+    watch(session)
+    assert not np.array_equal(session.log(0)["x"][:, 0], smc.run(DUFFING).x[:-1, 0])
+
+
+def test_what_a_run_refuses_leaves_it_and_says_why():
+    session = Session([DUFFING])
+    session.take_law("geometric", 0)
+    assert session.scenarios == (DUFFING,)
+    assert "geometric" in session.message
+
+
+def test_a_law_that_a_file_cannot_name_is_not_saved(tmp_path):
+    @smc.law_function(gains={"k": 3.0})
+    def mine(y, gains, memory):
+        return -gains.k * y.e, y.e
+
+    with pytest.raises(smc.ScenarioError, match="cannot be saved"):
+        Session([dataclasses.replace(DUFFING, law=mine())]).save(tmp_path / "view.py")
+
+
+def test_an_own_arm_starts_from_its_keyframe_and_is_saved(arm, tmp_path):
+    (scenario,) = studio.runs_of(smc.plant_from(arm, ["shoulder"], keyframe="up"), ["pid"])
+    session = Session([dataclasses.replace(scenario, duration=0.2, x0=1.0)])
+    session.keyframe(0)
+    assert (session.scenarios[0].x0, session.scenarios[0].v0) == ((3.0,), (0.5,))
+    watch(session)
+    (saved,) = scene.read(session.save(tmp_path / "view.py")).conditions["view"].values()
+    same(session, [saved])
+
+
+def test_a_quadrotor_starts_from_its_keyframe():
+    plant = smc.plant_from(ROOT / "examples/quadrotor.xml", channels=["body"], keyframe="hover")
+    session = Session(studio.runs_of(plant, []))
+    session.keyframe(0)
+    assert not session.message
+    session.advance(0.1)
+    assert session.state(0)[0].shape == (7,)
+
+
+def test_a_view_says_what_it_needs(monkeypatch):
+    with pytest.raises(smc.ScenarioError, match="one or two"):
+        smc.view("duffing", laws=["pid", "adrc", "twisting"])
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(smc.ScenarioError, match="pip install 'mujoco>=4'"):
+        smc.view("duffing", laws=["pid"])
