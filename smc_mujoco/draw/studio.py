@@ -46,7 +46,7 @@ def view(
       watched: called after each frame; the view ends when it returns False.
 
     Raises:
-      ScenarioError: MuJoCo is older than 4, or a law does not suit the machine.
+      ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit the machine.
     """
     session = Session(runs_of(scenario, laws))
     if importlib.util.find_spec("mujoco.studio") is None:
@@ -57,6 +57,8 @@ def view(
     from smc_mujoco.draw.studio_panel import Panel
 
     bind = web_server.bind_public_socket
+    if bind.__module__ == __name__:
+        raise ScenarioError("no view: this process had one already, and Studio crashes in a second: restart Python")
     web_server.bind_public_socket = lambda host, port: bind("127.0.0.1", port)  # Studio would serve the whole network
     config = viewer_protocol.ViewerConfig(title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser)
     panel = Panel(session)
