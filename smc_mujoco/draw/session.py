@@ -66,6 +66,8 @@ class Session:
 
     def begin(self, scenarios: Sequence[Scenario], sample: int = 0) -> None:
         """Start these scenarios, and repeat them up to a sample of the control."""
+        if len({(s.control_period, s.samples) for s in scenarios}) > 1:
+            raise ScenarioError("no view: the runs differ in control_period or duration: give both the same")
         prepared = [prepare(scenario) for scenario in scenarios]
         if reason := next((one.why_not for one in prepared if one.why_not), None):
             raise ScenarioError(f"no view: {reason}")
@@ -168,6 +170,7 @@ class Session:
         if [restore(run) for run in runs.values()] != list(self.scenarios):
             raise ScenarioError("the session cannot be saved: a scene file cannot name its law or plant")
         plant = self.scenarios[0].plant.name
+        self.message = f"saved as {path}"
         path.write_text(SAVED.format(plant=plant, runs=pformat(runs, width=110, sort_dicts=False)), encoding="utf-8")
         return path
 
@@ -213,12 +216,10 @@ def gain_sliders(law: Law) -> dict[str, Slider]:
     """Return a slider for each finite gain that all channels share: a tenth to ten times it, 0 to 1 for 0."""
 
     def changed(name: str) -> Callable[[Scenario, float], Scenario]:
-        return lambda s, value: dataclasses.replace(
-            s, law=dataclasses.replace(s.law, gains={**s.law.gains, name: value})
-        )
+        return lambda s, gain: dataclasses.replace(s, law=dataclasses.replace(s.law, gains={**s.law.gains, name: gain}))
 
     return {
-        name: Slider(gain, *(sorted((gain / 10.0, gain * 10.0)) if gain else (0.0, 1.0)), changed(name))
+        name: Slider(gain, min(gain / 10.0, gain * 10.0), max(gain / 10.0, gain * 10.0) if gain else 1.0, changed(name))
         for name, gain in law.gains.items()
         if not isinstance(gain, tuple) and math.isfinite(gain)
     }
@@ -245,8 +246,9 @@ def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
             lambda s, v: dataclasses.replace(s, noise=dataclasses.replace(s.noise, position=v)),
         ),
     }
-    if all(type(part) is Coulomb for part in s.friction) and len(s.friction) <= 1:
-        level = next((part.level for part in s.friction), 0.0)
+    coulomb = [part.level for part in s.friction if isinstance(part, Coulomb)]
+    if len(coulomb) == len(s.friction) <= 1:
+        level = sum(coulomb)
         most = 0.5 * bound if math.isfinite(bound) else 1.0
         sliders["friction, N or N m"] = Slider(
             level, 0.0, most, lambda s, v: dataclasses.replace(s, friction=Coulomb(v) if v else None)

@@ -4,6 +4,8 @@ Studio shows copies of the runs' positions, so nothing in its panels changes a r
 mouse and Reset. Its page runs in a thread of its own: it asks, and the loop of `view` does it between two frames.
 """
 
+# pyright: reportMissingImports=false
+# (MuJoCo 3, which the lock has, lacks Studio)
 import contextlib
 import dataclasses
 import importlib.util
@@ -89,7 +91,10 @@ def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], b
     while page.is_running() and watched(session):
         now = time.perf_counter()
         while not panel.asked.empty():
-            panel.asked.get()()
+            try:
+                panel.asked.get()()
+            except (ScenarioError, OSError) as error:
+                session.message = str(error)
         if not session.paused:
             session.advance(min(now - before, MAX_FRAME_TIME))
         before = now

@@ -1,5 +1,7 @@
 """The panel "Laws" of `smc.view`, and the second run's machine. It runs in the thread of Studio's page."""
 
+# pyright: reportMissingImports=false
+# (MuJoCo 3, which the lock has, lacks Studio)
 import functools
 import queue
 from collections.abc import Callable
@@ -89,13 +91,13 @@ class Panel(plugin.ViewerPlugin):
     def draw_ghost(self) -> None:
         """Draw the second run's machine, transparent, into the first's picture."""
         model = self.viewer.model
-        self.ghost = self.ghost or mujoco.MjvScene(model, GEOMS)
+        ghost = self.ghost = self.ghost or mujoco.MjvScene(model, GEOMS)
         data = mujoco.MjData(model)
         data.qpos[:] = self.ghost_at
         mujoco.mj_forward(model, data)
         dynamic = mujoco.mjtCatBit.mjCAT_DYNAMIC.value
-        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), dynamic, self.ghost)
-        geoms = [self.ghost.geoms[i] for i in range(self.ghost.ngeom)]
+        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), dynamic, ghost)
+        geoms = [ghost.geoms[i] for i in range(ghost.ngeom)]
         for geom in geoms:
             geom.rgba[3] = GHOST
         self.viewer.extra_geoms[:] = geoms

@@ -119,6 +119,11 @@ def test_a_quadrotor_starts_from_its_keyframe():
     assert session.state(0)[0].shape == (7,)
 
 
+def test_runs_of_other_lengths_are_refused():
+    with pytest.raises(smc.ScenarioError, match="differ in control_period or duration"):
+        Session([DUFFING, dataclasses.replace(DUFFING, duration=0.3)])
+
+
 def test_a_view_says_what_it_needs(monkeypatch):
     with pytest.raises(smc.ScenarioError, match="one or two"):
         smc.view("duffing", laws=["pid", "adrc", "twisting"])

@@ -26,6 +26,7 @@ def test_a_browser_shows_the_machine(port, words):
     command = [sys.executable, "-m", "smc_mujoco", "view", *words.split(), "--port", str(port), "--no-browser"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as view:
         try:
+            assert view.stdout
             while "Model changed" not in (line := view.stdout.readline()):
                 assert line, "the view ended before it showed a model"
             with sync.sync_playwright() as play:
