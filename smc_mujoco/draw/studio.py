@@ -103,10 +103,10 @@ def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], b
         if len(session.scenarios) > 1:
             panel.ghost_at = session.state(1)[0].copy()
         shown = data.time
-        data.xfrc_applied[:] = 0.0
         page.sync(model, data)
         if data.time == 0.0 < shown:
             session.reset()
+            pull[:] = data.xfrc_applied[:] = 0.0
         pulled = data.xfrc_applied[:, :3].copy()
         if np.any(pull) and not np.any(pulled):  # the mouse let go
             body = int(np.argmax(np.abs(pull).sum(axis=1)))

@@ -1,6 +1,8 @@
 """What `smc.view` promises without its window: the runs on screen are those of smc.run, and a saved session repeats."""
 
 import dataclasses
+import queue
+import types
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +119,34 @@ def test_a_quadrotor_starts_from_its_keyframe():
     assert not session.message
     session.advance(0.1)
     assert session.state(0)[0].shape == (7,)
+
+
+class Page:
+    """A stand-in for Studio's, which tells the mouse's pull, N, in some frames only."""
+
+    def __init__(self, pulls):
+        self.pulls, self.frame = pulls, 0
+
+    def set_model(self, model, data):
+        self.body = model.body("cart").id
+
+    def is_running(self):
+        return self.frame < 9
+
+    def sync(self, model, data):
+        self.frame += 1
+        if (pull := self.pulls.get(self.frame)) is not None:
+            data.xfrc_applied[self.body, 0] = pull
+
+
+def test_a_body_is_pushed_once_when_the_mouse_lets_go():
+    session, panel = Session([DUFFING]), types.SimpleNamespace(asked=queue.Queue())
+    panel.asked.put(lambda: session.save(Path("no/folder/view.py")))
+    studio.show(session, Page({2: 1.0, 4: 3.0, 7: 0.0}), panel, lambda session: True)
+    (push,) = session.scenarios[0].disturbance
+    assert (push.body, push.x, push.y) == ("cart", 3.0, 0.0)
+    assert 0.0 < push.time < session.time
+    assert session.sample > 0
 
 
 def test_runs_of_other_lengths_are_refused():
