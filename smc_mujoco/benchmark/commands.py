@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from smc_mujoco.cli.terminal import Terminal
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
@@ -97,7 +97,10 @@ def site(
     terminal = Terminal()
     if not results.is_dir():
         raise ScenarioError(f"no folder {str(results)!r}: enter a law first, with smc-mujoco enter FOLDER")
-    terminal.wrote(pages.build(results, results / "site" if out is None else out))
+    page, left_out = pages.build(results, results / "site" if out is None else out)
+    for why in left_out:
+        terminal.note(f"left out: {printable(why)}", wrap=True)
+    terminal.wrote(page)
 
 
 GROUPS = {"Benchmark": [enter, site]}  # heading in the help -> commands

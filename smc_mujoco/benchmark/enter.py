@@ -8,6 +8,7 @@ A law that is not checked (see `Law.checked`) runs twice, in two processes and o
 its answers differ, it keeps something between runs.
 """
 
+import contextlib
 import hashlib
 import os
 import platform
@@ -19,8 +20,8 @@ from smc_mujoco.benchmark import entrant, runs, suite
 from smc_mujoco.benchmark import entry as entries
 from smc_mujoco.benchmark.problem import problem, rules
 from smc_mujoco.common.constraints import FilePath, constrained
-from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.files import reading, replacing, scratch, slug, write_json
+from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.files import read_json, reading, replacing, scratch, slug, write_json
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.version import versions
 
@@ -59,6 +60,8 @@ def enter(
     """
     entry, problems = entries.read(folder), suite.suite(name)
     target = Path(out) / name / slug(entry.name)
+    if (other := _entered(target)) not in ("", entry.name):
+        raise ScenarioError(f"{target} is the result of {shown(other)}: give the entry another name")
     table, result = (target / (HIDDEN[file] if number else file) for file in (TABLE, RESULT))
     with scratch() as temporary:
         made = temporary / TABLE
@@ -83,16 +86,26 @@ def enter(
         "marks": marks,
         "sample": first["sample"],
         "run": report["seconds"],
-        "hashes": {
-            "table": hashlib.sha256(content).hexdigest(),
-            "rules": hashlib.sha256(problem(problems[0]).rules.encode()).hexdigest(),
-            "suite": hashlib.sha256("\n".join(problems).encode()).hexdigest(),
-        },
+        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(problems),
         "versions": versions(),
         "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
     }
     write_json(result, about)
     return target
+
+
+def _entered(target: Path) -> str:
+    """Return the name of the entry whose result is in a folder; "" if there is none that can be read."""
+    for file in (RESULT, HIDDEN[RESULT]):
+        with contextlib.suppress(OSError, ValueError, KeyError, TypeError, ScenarioError):
+            return str(read_json(target / file)["entry"]["name"])
+    return ""
+
+
+def made_under(problems: Sequence[str]) -> dict[str, str]:
+    """Return the hashes of the rules and of the list of a suite's problems."""
+    texts = {"rules": problem(problems[0]).rules, "suite": "\n".join(problems)}
+    return {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
 
 
 def _order(

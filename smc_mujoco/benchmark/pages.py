@@ -3,6 +3,7 @@
 The pages are HTML and SVG in a few files, without scripts, and need neither network nor server.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from smc_mujoco.benchmark.results import HIDDEN, MEASURE, RESULT, TITLES, WORDS, Board, Results
-from smc_mujoco.benchmark.results import results as load
+from smc_mujoco.benchmark.results import MEASURE, TITLES, WORDS, Board, Results, sound
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing, slug
 from smc_mujoco.common.text import number
@@ -30,31 +30,33 @@ ASKS = {
 SHOWN = 5  # best and worst problems on an entry's page
 
 
-def build(results: Path, out: Path) -> Path:
-    """Write the pages of all results in a folder, and return the first page.
+def build(results: Path, out: Path) -> tuple[Path, list[str]]:
+    """Write the pages of all results in a folder. Return the first page, and why results are left out.
 
     Raises:
       ScenarioError: no results there, or a folder that cannot be written.
     """
-    folders = sorted({file.parent.parent for file in results.rglob(RESULT)})
-    if not folders:
-        raise ScenarioError(f"no results in {str(results)!r}: enter a law first, with smc-mujoco enter FOLDER")
-    suites = [load(folder) for folder in folders]
-    made = _environment()
+    suites, refused = sound(results, hidden=False)
+    if not suites:
+        why = str(refused[0]) if refused else "enter a law first, with smc-mujoco enter FOLDER"
+        raise ScenarioError(f"no results in {str(results)!r}: {why}")
+    kept, refused_hidden = sound(results, hidden=True)
+    hidden, made = {found.suite: found for found in kept}, _environment()
+    left_out = [str(error).replace(f"{results}{os.sep}", "") for error in refused + refused_hidden]
     for found in suites:
-        hidden = load(results / found.suite, hidden=True) if any(results.rglob(HIDDEN[RESULT])) else None
-        _write(out / f"{found.suite}.html", made, "suite.jinja", found=found, hidden=hidden, up="", title=found.suite)
+        values = {"hidden": hidden.get(found.suite), "up": "", "title": found.suite}
+        _write(out / f"{found.suite}.html", made, "suite.jinja", found=found, **values)
         for name in found.entries:
             page = out / found.suite / f"{slug(name)}.html"
             _write(page, made, "entry.jinja", found=found, name=name, up="../", title=name)
-    _write(out / "index.html", made, "index.jinja", suites=suites, up="", title="Results")
-    return out / "index.html"
+    _write(out / "index.html", made, "index.jinja", suites=suites, left_out=left_out, up="", title="Results")
+    return out / "index.html", left_out
 
 
 def _write(path: Path, made: "Environment", template: str, **values: Any) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as file:
-        file.write_text(made.get_template(template).render(values), encoding="utf-8")
+        file.write_text(made.get_template(template).render(values), encoding="utf-8", errors="replace")
 
 
 def _environment() -> "Environment":

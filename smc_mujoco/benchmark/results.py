@@ -17,15 +17,16 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import NoneType
 from typing import Any
 
 import numpy as np
 
-from smc_mujoco.benchmark import runs, suite
+from smc_mujoco.benchmark import enter, runs, suite
 from smc_mujoco.benchmark.enter import HIDDEN, RESULT, TABLE
 from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.files import read_json, reading
+from smc_mujoco.common.files import read_json, reading, slug
 
 MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}  # of each board
 TITLES = {"forces": "Accuracy under forces", "sensors": "Accuracy under sensors", "speed": "Speed", "calm": "Calm"}
@@ -34,7 +35,22 @@ DRAWS, LEVEL = 4000, 90.0  # resamples of the problems; %, of the intervals
 CHANGE = 0.01  # a median that changes by less counts as the same; chosen
 MOMENTS = 81  # of a curve of targets
 MAX_UNPACKED = 4 * 10**9  # bytes of an archive; chosen
-NEEDED = "suite", "instances", "entry", "checked", "marks", "hashes"
+CURE = "enter the law again"
+ABOUT: dict[str, Any] = {  # what a result says, and of which type
+    "suite": str, "instances": int, "entry": dict, "checked": bool, "marks": list, "sample": list | NoneType,
+    "hashes": dict, "versions": dict, "machine": str,
+}  # fmt: skip
+OF_ENTRY: dict[str, Any] = dict.fromkeys(("name", "source", "licence", "division", "digest"), str) | {"authors": list}
+HASHES: dict[str, Any] = dict.fromkeys(("table", "rules", "suite"), str)
+
+
+def _check(values: Any, fields: Mapping[str, Any]) -> None:
+    """Raise ScenarioError if values are no mapping with a value of the right type for each field."""
+    if not isinstance(values, dict):
+        raise ScenarioError(f"it has {shown(values)} where names and values are")
+    for name, kind in fields.items():
+        if not isinstance(values.get(name), kind):
+            raise ScenarioError(f"its {name} is {shown(values.get(name))}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -74,14 +90,23 @@ class Result:
     def __init__(self, folder: Path, hidden: bool):
         self.folder, self.hidden = folder, hidden
         self.table = folder / (HIDDEN[TABLE] if hidden else TABLE)
-        with reading(folder / (HIDDEN[RESULT] if hidden else RESULT), "result", "enter the law again") as file:
+        with reading(folder / (HIDDEN[RESULT] if hidden else RESULT), "result", CURE) as file:
             self.about: dict[str, Any] = read_json(file)
-            if not isinstance(self.about, dict) or not {*NEEDED} <= {*self.about}:
-                raise ScenarioError(f"it has no {', '.join(NEEDED)}")
-        with reading(self.table, "table of runs", "enter the law again") as file:
+            _check(self.about, ABOUT)
+            _check(self.about["entry"], OF_ENTRY)
+            _check(self.about["hashes"], HASHES)
+            if (sample := self.about["sample"]) is not None and [*map(type, sample)] != [float] * 3:
+                raise ScenarioError(f"its sample is {shown(sample)}")
+            self.problems = suite.suite(self.about["suite"])
+            for what, digest in enter.made_under(self.problems).items():
+                if digest != self.about["hashes"][what]:
+                    raise ScenarioError(f"it is of another {what} than {self.about['suite']} here")
+        with reading(self.table, "table of runs", CURE) as file:
             digest = hashlib.sha256(file.read_bytes()).hexdigest()
         if digest != self.about["hashes"]["table"]:
-            raise ScenarioError(f"{self.table} is not the table that its result was written for: enter the law again")
+            raise ScenarioError(f"{self.table} is not the table that its result was written for: {CURE}")
+        with reading(self.table, "table of runs", CURE):
+            self.runs.check(self.problems, self.about["instances"])
 
     @property
     def name(self) -> str:
@@ -113,6 +138,9 @@ class Results:
     def __init__(self, name: str, entries: Mapping[str, Result], hidden: bool):
         self.suite, self.entries, self.hidden = name, dict(entries), hidden
         self.problems = suite.suite(name)
+        informed = {cell: suite.boards(cell) for cell in self.problems}
+        self._informing = {question: tuple(c for c in informed if question in informed[c]) for question in MEASURE}
+        self._boards, self._curves = dict[str, Board](), dict[tuple[str, str], np.ndarray]()  # that were asked for
 
     def __repr__(self) -> str:
         return f"results of {len(self.entries)} entries on {self.suite}" + ", hidden instances" * self.hidden
@@ -120,22 +148,6 @@ class Results:
     def on(self, question: str) -> tuple[str, ...]:
         """Return the problems that inform a board."""
         return self._informing[question]
-
-    @functools.cached_property
-    def _informing(self) -> dict[str, tuple[str, ...]]:
-        """Question -> the problems that inform its board."""
-        informed = {name: suite.boards(name) for name in self.problems}
-        return {question: tuple(name for name in informed if question in informed[name]) for question in MEASURE}
-
-    @functools.cached_property
-    def _boards(self) -> dict[str, Board]:
-        """Question -> Board, of those that were asked for."""
-        return {}
-
-    @functools.cached_property
-    def _curves(self) -> dict[tuple[str, str], np.ndarray]:
-        """(entry, question) -> shares of the targets, of those that were asked for."""
-        return {}
 
     def ranks(self, question: str, names: Sequence[str]) -> np.ndarray:
         """Return the ranks of entries on each problem of a board, (entries, problems); equal medians share a rank."""
@@ -273,15 +285,38 @@ def results(source: str | os.PathLike[str] = "smc-30@1", hidden: bool = False) -
       ScenarioError: no results there, results on several suites, or a table that was changed since it was written.
     """
     path = Path("results") / source if source in suite.suites() else Path(source)
-    folder = _unpacked(path) if path.suffix == ".zip" else path
-    wanted = HIDDEN[RESULT] if hidden else RESULT
-    found = [Result(file.parent, hidden) for file in sorted(folder.rglob(wanted))] if os.path.isdir(folder) else []
+    found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path, hidden)
+    if refused:
+        raise refused[0]
     if not found:
         raise ScenarioError(f"no results at {shown(str(path))}: enter a law first, with smc-mujoco enter FOLDER")
-    names = {one.about["suite"] for one in found}
-    if len(names) > 1:
-        raise ScenarioError(f"{shown(str(path))} has results on {' and '.join(sorted(names))}: give a folder of one")
-    return Results(names.pop(), {one.name: one for one in found}, hidden)
+    if len(found) > 1:
+        names = " and ".join(one.suite for one in found)
+        raise ScenarioError(f"{shown(str(path))} has results on {names}: give a folder of one")
+    return found[0]
+
+
+def sound(folder: Path, hidden: bool) -> tuple[list[Results], list[ScenarioError]]:
+    """Return the results in a folder, by suite, and why others are left out.
+
+    Names that share a folder's name are one: the result stands that is in the folder of its name.
+    """
+    wanted, of_suite, refused = HIDDEN[RESULT] if hidden else RESULT, dict[str, dict[str, Result]](), []
+    for place in sorted(Path(place) for place, _, files in os.walk(folder) if wanted in files):  # skips what vanishes
+        try:
+            one = Result(place, hidden)
+        except ScenarioError as error:
+            refused.append(error)
+            continue
+        its = of_suite.setdefault(one.about["suite"], {})
+        first = its.setdefault(slug(one.name), one)
+        if first is one:
+            continue
+        if one.folder.name == slug(one.name):
+            its[slug(one.name)], one = one, first
+        refused.append(ScenarioError(f"{one.folder} is another result of {shown(one.name)}: remove it"))
+    made = [Results(name, {one.name: one for one in its.values()}, hidden) for name, its in sorted(of_suite.items())]
+    return made, refused
 
 
 _UNPACKED: list[TemporaryDirectory[str]] = []  # archives, which are read until the process ends

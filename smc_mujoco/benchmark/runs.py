@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.benchmark.problem import MEASURES, Problem, problem
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.simulation.run import stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies import table as tables
@@ -62,6 +63,15 @@ class Runs:
 
     def __len__(self) -> int:
         return self.file.metadata.num_rows
+
+    def check(self, problems: Sequence[str], instances: int) -> None:
+        """Raise ScenarioError unless the table has every problem's instances and all columns."""
+        if missing := [name for name in ("instance", *COLUMNS) if name not in self.file.schema_arrow.names]:
+            raise ScenarioError(f"it has no column {missing[0]!r}")
+        for name in problems:
+            count = self.file.metadata.row_group(self.groups[name]).num_rows if name in self.groups else 0
+            if count != instances:
+                raise ScenarioError(f"it has {count} runs of {name}, not {instances}")
 
     def columns(self, name: str) -> Mapping[str, np.ndarray]:
         """Return the columns of a problem's runs, (instances,) each, in the order of the instances."""

@@ -29,7 +29,9 @@ def test_the_page_s_law_goes_from_its_files_to_a_row_and_is_compared(tmp_path, m
         exec(block.replace("older.zip", "results/smc-30@1"))
     assert printed.getvalue().count("soft relay") == 5  # its row, and four boards
     assert printed.getvalue().count("the same") == 4
-    assert "soft relay" in (pages.build(tmp_path / "results", tmp_path / "pages").parent / "smc-30@1.html").read_text()
+    assert (
+        "soft relay" in (pages.build(tmp_path / "results", tmp_path / "pages")[0].parent / "smc-30@1.html").read_text()
+    )
 
 
 @pytest.mark.parametrize("folder", EXAMPLES, ids=lambda path: path.name)

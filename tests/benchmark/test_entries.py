@@ -107,6 +107,8 @@ def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path
     found = smc.results(target.parent)
     about = found.entries["own law"].about
     assert (about["checked"], about["marks"], len(found.entries["own law"].runs)) == (True, [], 4)
+    with pytest.raises(ScenarioError, match="is the result of 'own law': give the entry another name"):
+        entering.enter(written(tmp_path / "same_folder", name="Own law"), out=out, instances=2)
     table = target / "runs.parquet"
     other = tmp_path / "other"
     shutil.copytree(target.parent, other)
@@ -188,8 +190,7 @@ def test_a_law_that_knows_the_visible_instances_is_marked():
 
 def made(medians, checked=None, hidden=False):
     """Return results of entries with given medians on the problems of smc-30@1, (entry -> factor of each problem)."""
-    found = object.__new__(results.Results)
-    found.suite, found.hidden, found.problems, found.entries = "smc-30@1", hidden, suite.suite("smc-30@1"), {}
+    found = results.Results("smc-30@1", {}, hidden)
     for name, values in medians.items():
         one = object.__new__(results.Result)
         rows = {cell: dict.fromkeys(runs.VALUES, value) for cell, value in zip(found.problems, values, strict=True)}

@@ -1,13 +1,16 @@
 """The pages of results: complete, small, without scripts or network, and with links that lead somewhere."""
 
 import hashlib
+import html
+import json
 import re
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 
-from smc_mujoco.benchmark import pages, runs, suite
+import smc_mujoco as smc
+from smc_mujoco.benchmark import enter, pages, runs, suite
 from smc_mujoco.benchmark.enter import RESULT, TABLE
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import write_json
@@ -41,7 +44,12 @@ def entered(folder, name, factor, marks=()):
         "digest": "0",
     }
     about = {"suite": "smc-30@1", "instances": 3, "entry": entry, "checked": not marks, "marks": list(marks)}
-    about |= {"sample": [1e-8, 2e-8, 1.5], "hashes": {"table": table, "rules": "1"}, "machine": "m", "versions": {}}
+    about |= {
+        "sample": [1e-8, 2e-8, 1.5],
+        "hashes": {"table": table} | enter.made_under(PROBLEMS),
+        "machine": "m",
+        "versions": {},
+    }
     write_json(target / RESULT, about)
 
 
@@ -71,7 +79,7 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
     for name, factor, marks in (("slow", 2.0, ()), ("fast", 1.0, ()), ("odd", 3.0, ("unchecked: it is in Python",))):
         entered(folder / "results", name, factor, marks)
-    return pages.build(folder / "results", folder / "site").parent
+    return pages.build(folder / "results", folder / "site")[0].parent
 
 
 def test_pages_are_complete_and_their_links_lead_to_pages(site):
@@ -106,6 +114,58 @@ def test_a_board_lists_the_better_law_first_and_its_page_says_where_it_is_best(s
     assert "A &lt;b&gt;" in page
     assert "Where it is best" in page
     assert "Where it is worst" in page
+
+
+def with_row(folder, table):
+    """Change a table, and its hash in the result that stands beside it."""
+    about = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+    table(folder / TABLE)
+    about["hashes"]["table"] = hashlib.sha256((folder / TABLE).read_bytes()).hexdigest()
+    write_json(folder / RESULT, about)
+
+
+def said(**change):
+    """Return a change of what a result says."""
+
+    def forge(folder):
+        about = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        write_json(folder / RESULT, {name: value for name, value in (about | change).items() if value != "nothing"})
+
+    return forge
+
+
+FORGED = {
+    "a table of others": (lambda folder: (folder / TABLE).write_bytes(b"PAR1"), "not the table"),
+    "no table": (lambda folder: with_row(folder, lambda table: table.write_bytes(b"PAR1")), "not a table of runs"),
+    "one problem": (
+        lambda folder: with_row(folder, lambda table: runs.write(table, [[{"problem": PROBLEMS[0], "instance": 0}]])),
+        rf"1 runs of {PROBLEMS[0]}, not 3",
+    ),
+    "no JSON": (lambda folder: (folder / RESULT).write_text("{"), "not a result"),
+    "no marks": (said(marks="nothing"), "its marks is None"),
+    "words for a time": (said(sample=["fast", 1.0, 1.0]), "its sample is"),
+    "no entry": (said(entry=[]), "its entry is"),
+    "an unknown suite": (said(suite="smc-99@1"), "unknown suite"),
+    "other rules": (said(hashes=dict.fromkeys(("table", "rules", "suite"), "0")), "of another rules"),
+    "another's name": (said(entry={"name": "slow", "authors": []} | dict.fromkeys(
+        ("source", "licence", "division", "digest"), "")), "another result of 'slow'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("forge", "words"), FORGED.values(), ids=FORGED)
+def test_a_forged_result_is_left_out_and_the_others_stand(tmp_path, forge, words):
+    for name, factor in (("slow", 2.0), ("aforged", 0.5)):
+        entered(tmp_path / "results", name, factor)
+    forge(tmp_path / "results" / "smc-30@1" / "aforged")
+    page, refused = pages.build(tmp_path / "results", tmp_path / "site")
+    (why,) = refused
+    assert re.search(words, why)
+    assert str(tmp_path) not in why
+    assert why in html.unescape(page.read_text(encoding="utf-8"))
+    assert "aforged" not in (tmp_path / "site" / "smc-30@1.html").read_text(encoding="utf-8")
+    assert not (tmp_path / "site" / "smc-30@1" / "aforged.html").exists()
+    with pytest.raises(ScenarioError, match=words):
+        smc.results(tmp_path / "results")
 
 
 def test_a_folder_without_results_is_told(tmp_path):

@@ -53,6 +53,7 @@ class Running(NamedTuple):
     slave: Slave
     start: float  # s: time of the first sample
     last: list[float]  # u and s of the last step
+    steps: list[int]  # number of its steps, and the sample from which the next ones are due
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,16 +78,22 @@ class FmuLaw(Uncompiled):
         return self.name
 
     def __call__(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
-        """Return u and s. The memory holds the number of the instance, 0 before the first sample."""
+        """Return u and s. The memory holds the number of the instance, 0 before the first sample.
+
+        The FMU's own time counts its steps: it has none for a sample that is missed, and a late one is none to it.
+        """
         if memory[0] == 0.0:
             memory[0] = self._begin(y, gains, memory)
         running = _running[int(memory[0])]
         every, length = steps(self.period, y.dt)
-        k = round((y.t - running.start) / y.dt)
-        if k % every == 0:
+        done, due = running.steps
+        k = math.floor((y.t - running.start) / y.dt + PERIOD_TOLERANCE)
+        if k >= due:
             values = [getattr(y, ours) for ours, _ in self.inputs]
-            for i in range(round(every * y.dt / length)):
-                running.last[: len(self.outputs)] = running.slave.step(values, y.t + i * length, length)
+            for _ in range(round(every * y.dt / length)):
+                running.last[: len(self.outputs)] = running.slave.step(values, running.start + done * length, length)
+                done += 1
+            running.steps[:] = done, every * (k // every + 1)
         return running.last[0], running.last[1]
 
     def fixed(self, gains: Iterable[float]) -> dict[str, float]:
@@ -106,7 +113,7 @@ class FmuLaw(Uncompiled):
                     "give a plant of one channel"
                 )
         made = Slave(str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t)
-        _running[place] = Running(self, made, y.t, [0.0, 0.0])
+        _running[place] = Running(self, made, y.t, [0.0, 0.0], [0, 0])
         owner: Any = memory if memory.base is None else memory.base
         weakref.finalize(owner, _end, place)
         return place

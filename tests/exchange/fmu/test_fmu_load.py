@@ -73,6 +73,21 @@ def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more)
         np.testing.assert_array_equal(getattr(second, field), getattr(first, field))
 
 
+def test_samples_that_are_late_or_missed_are_steps_that_follow_each_other(folder, foreign):
+    """The law's state waits for a missed sample, and an FMU of a longer period for the first sample that is due."""
+    clock = {"clock": smc.Clock(jitter=5e-4, missed=0.3), "physics_step": 1e-4, "seed": 4}
+    ours = scenario("super_twisting", **clock)
+    theirs = smc.exchange.law_from_fmu(smc.exchange.law_to_fmu(ours, folder / "late.fmu"), isolate=False)()
+    first, second = smc.run([ours, scenario(theirs, **clock)])
+    assert second.failure is None
+    np.testing.assert_array_equal(second.u, first.u)
+    slower = smc.run(scenario(smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)(), u_max=100.0, **clock))
+    changed = np.flatnonzero(np.diff(slower.u[:, 0])) + 1
+    assert slower.failure is None
+    assert set(changed // 10) == set(range(1, 11))  # once in each 10 ms
+    assert 0 < sum(changed % 10 > 0) < 6
+
+
 def test_gains_are_the_fmu_s_parameters(folder):
     path = smc.exchange.law_to_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
     template = smc.exchange.law_from_fmu(path, isolate=False)
