@@ -215,7 +215,6 @@ class ScenarioBatch:
         self.fields: dict[str, np.ndarray] = {}  # model fields that differ between the simulations
         self.errors: dict[int, str] = {}  # simulation -> MuJoCo's error
         self.replaced = ""  # the name of a callback of MuJoCo's that other code set during the runs
-        self.step = 0  # physics steps done
         self.calls = 0  # callbacks that each simulation should have had by now
         self.set_parameters(0, range(count))
 
@@ -237,6 +236,7 @@ class ScenarioBatch:
     def reset(self) -> None:
         """Put MuJoCo's states at the model's defaults, and tell the callback which record is whose."""
         count = len(self.scenarios)
+        self.step = 0  # physics steps done
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
         self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
