@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError, items_of, shown, whole
+from smc_mujoco.common.errors import ScenarioError, items_of, number, shown, whole
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
@@ -222,7 +222,7 @@ def load(path: str | os.PathLike[str]) -> Basin:
 
 
 def _axis(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    axis = np.array(values, float)
-    if axis.ndim != 1 or not axis.size or not np.isfinite(axis).all():
+    axis = [number(f"a value of {name}", value) for value in items_of(name, values)]
+    if not axis:
         raise ScenarioError(f"{name} is {shown(values)}: give one or more finite numbers")
-    return axis
+    return np.array(axis)

@@ -26,7 +26,7 @@ from smc_mujoco.benchmark import enter, runs, suite
 from smc_mujoco.benchmark.enter import HIDDEN, RESULT, TABLE
 from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.files import read_json, reading, slug
+from smc_mujoco.common.files import as_path, read_json, reading, slug
 
 MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}  # of each board
 TITLES = {"forces": "Accuracy under forces", "sensors": "Accuracy under sensors", "speed": "Speed", "calm": "Calm"}
@@ -284,7 +284,7 @@ def results(source: str | os.PathLike[str] = "smc-30@1", hidden: bool = False) -
     Raises:
       ScenarioError: no results there, results on several suites, or a table that was changed since it was written.
     """
-    path = Path("results") / source if source in suite.suites() else Path(source)
+    path = Path("results") / source if source in suite.suites() else as_path(source)
     found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path, hidden)
     if refused:
         raise refused[0]

@@ -303,7 +303,10 @@ def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(refused
 
 
 def test_positions_that_are_none_are_refused(refused):
-    for x in [[], [math.nan], [[1.0]]]:
+    deep: list = [[0.0]]
+    for _ in range(70):  # more than numpy takes
+        deep = [deep]
+    for x in [[], [math.nan], [[1.0]], deep]:
         refused(lambda x=x: maps.basin_of(base("duffing", WEAK), x, [0.0]))
 
 
