@@ -17,6 +17,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control import joint_law
+from smc_mujoco.control.component import Template
 from smc_mujoco.control.gain_sets import law as law_with_gains
 from smc_mujoco.control.law import FREE_BODY, Law, laws
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -188,7 +189,7 @@ def laws_of(plant: Plant) -> list[str]:
     return [name for name, law in joint_law.catalogue().items() if FREE_BODY in law.plants]
 
 
-def law_for(plant: Plant, law: Law | str) -> Law | str:
+def law_for(plant: Plant, law: Law | Template | str) -> Law | Template | str:
     """Return a law; for a name, with the package's gains for the plant where there are any, else its defaults."""
     try:
         return law_with_gains(plant, law) if isinstance(law, str) else law

@@ -16,11 +16,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.law import Law
 from smc_mujoco.draw.session import Session, law_for, laws_of
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.simulation.grid import listed_laws
 from smc_mujoco.simulation.scenario import Scenario
 
 FRAME_TIME = 1.0 / 60.0  # s
@@ -71,15 +72,18 @@ def view(
 
 def runs_of(scenario: Scenario | Sequence[Scenario] | Plant | str, laws: Sequence[Law | str]) -> list[Scenario]:
     """Return the scenarios to show."""
-    if len(laws) > 2:
-        raise ScenarioError(f"laws has {len(laws)} laws: give one or two, which are shown in one picture")
-    shown = [scenario] if isinstance(scenario, Scenario) else scenario
-    if isinstance(shown, list | tuple):
-        first = shown[0]
-        return [dataclasses.replace(first, law=law_for(first.plant, law)) for law in laws] or list(shown)
-    plant = as_plant(shown)
-    chosen = list(laws) or laws_of(plant)[:1]
-    return [Scenario(plant=plant, law=law_for(plant, law)) for law in chosen]
+    wanted = listed_laws(laws) if laws else []
+    runs = [scenario] if isinstance(scenario, Scenario) else scenario
+    if isinstance(runs, list | tuple):
+        if not runs or not all(isinstance(one, Scenario) for one in runs):
+            raise ScenarioError(f"scenario is {shown(scenario)}: give a Scenario or two, or a plant")
+        runs = [dataclasses.replace(runs[0], law=law_for(runs[0].plant, law)) for law in wanted] or list(runs)
+    else:
+        plant = as_plant(runs)
+        runs = [Scenario(plant=plant, law=law_for(plant, law)) for law in wanted or laws_of(plant)[:1]]
+    if len(runs) > 2:
+        raise ScenarioError(f"{len(runs)} runs to show: give one or two, which are shown in one picture")
+    return runs
 
 
 def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], bool]) -> None:
@@ -102,9 +106,9 @@ def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], b
         data.qpos[:], data.qvel[:], data.act[:] = session.state(0)
         if len(session.scenarios) > 1:
             panel.ghost_at = session.state(1)[0].copy()
-        shown = data.time
+        before_sync = data.time
         page.sync(model, data)
-        if data.time == 0.0 < shown:
+        if data.time == 0.0 < before_sync:
             session.reset()
             pull[:] = data.xfrc_applied[:] = 0.0
         pulled = data.xfrc_applied[:, :3].copy()
