@@ -195,6 +195,8 @@ def suits(law: Law | Template, plant: Plant) -> bool:
     """
     if isinstance(law, Template) and any(gain.plant for gain in law.gains.values()):
         return not (plant.unmodelled or plant.underactuated)
+    if plant.pose and not law.joint:
+        return law.name == "none"
     if not law.plants or plant.name in law.plants or (plant.pose and FREE_BODY in law.plants):
         return True
     plants = [plants_known()[name] for name in law.plants if name in plants_known()]
@@ -210,7 +212,7 @@ KINDS = {  # of laws and of their parts -> the catalogue
 
 
 def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
-    """List the names of laws; with a plant, only those of laws of one channel for this plant.
+    """List the names of laws; with a plant, only those for it: of one channel, or for a free body of many joints.
 
     A law that names no plants is for every plant whose channels all have an actuator. `none` is for every plant. A law
     for joints without an actuator is also for your own models with such joints.
@@ -228,8 +230,6 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     if kind != "law":
         raise ScenarioError(f"laws of kind {kind!r} are not for single plants: leave plant out")
     plant = as_plant(plant)
-    return [
-        name
-        for name, template in catalogue().items()
-        if suits(template, plant) and (template.plants or name == "none" or not plant.underactuated)
-    ]
+    known = known_laws() if plant.pose else catalogue()
+    whole = not plant.underactuated and plant.pose != "heading"
+    return [name for name, law in known.items() if suits(law, plant) and (law.plants or name == "none" or whole)]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from smc_mujoco.common.errors import find
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import Measurement, catalogue, laws
+from smc_mujoco.control.law import Measurement, catalogue, known_laws, laws
 from smc_mujoco.mechanisms.plant import Plant
 
 VELOCITY = {"v", "de", "dq"}  # fields of the measurement that a velocity sensor or an estimator gives
@@ -69,7 +69,7 @@ def families() -> dict[str, list[str]]:
 def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> list[Template]:
     """Return the laws of the library, or those for a plant, that have all these PROPERTIES."""
     properties = [find("property of a law", need, PROPERTIES) for need in needs]
-    templates = [catalogue()[name] for name in laws(plant)]
+    templates = [known_laws()[name] for name in laws(plant)]
     return [law for law in templates if all(needed.holds(law) for needed in properties)]
 
 

@@ -65,6 +65,7 @@ class Gain:
     # "a1", "a2" or "b" of x'' = a1 x + a2 x' + b u near the plant's origin, which a scenario puts in place of inf
     plant: str = ""
     shared: bool = False  # whether it is one number for all joints in a law of many joints, instead of a vector
+    turns: bool = False  # whether it is of the attitude, in a law of free bodies, and not of the position
 
     @property
     def constraint(self) -> Each:

@@ -16,10 +16,9 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.gain_sets import law as law_with_gains
-from smc_mujoco.control.law import FREE_BODY, Law, laws
+from smc_mujoco.control.law import Law, laws
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.mechanisms.plant import Plant, compiled_for_runs
 from smc_mujoco.simulation import callback, state
@@ -183,10 +182,8 @@ def sliders(s: Scenario) -> dict[str, Slider]:
 
 
 def laws_of(plant: Plant) -> list[str]:
-    """List the laws for a plant: of many joints for a free body, else of one channel."""
-    if not plant.pose:
-        return [name for name in laws(plant) if name != "none"]
-    return [name for name, law in joint_law.catalogue().items() if FREE_BODY in law.plants]
+    """List the laws for a plant, without `none`."""
+    return [name for name in laws(plant) if name != "none"]
 
 
 def law_for(plant: Plant, law: Law | Template | str) -> Law | Template | str:

@@ -11,7 +11,7 @@ import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -114,7 +114,9 @@ class Plant:
     # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its
     # number to such a parameter, in this unit, instead of multiplying it
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    pose: bool = False  # whether its channels are the pose of a free body: x, y, z, and its rotation vector
+    # Of a free body, whose channels are its pose: x, y, z, and its rotation vector. "all": its actuators exert any
+    # force and torque; "heading": they do not, as rotors that push one way, so its tilt follows from the force. Else ""
+    pose: Literal["", "all", "heading"] = ""
     direct: bool = False  # whether disturbances act on its joints, not on the bodies that they carry
     smooth: bool = True  # whether its model has no limits, contacts, dry friction and equality constraints
     # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user may meet.
@@ -196,7 +198,7 @@ class Plant:
     @property
     def unscaled(self) -> str:
         """Why tuning cannot derive its scales from the plant, or ""."""
-        if self.underactuated or self.mixed:
+        if self.underactuated or (self.mixed and not self.pose):
             return "it has free joints, or channels of two units: choose a plant that has neither"
         return f"it has no nominal model, which tuning takes its scales from: {self.unmodelled}" * bool(self.unmodelled)
 

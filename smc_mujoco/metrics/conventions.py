@@ -7,6 +7,9 @@ percentage or a share of the motion: a law that drops the pole has settled nothi
 command, counts only driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
 returns every group by itself.
 
+Of a free body a metric with x's or u's unit is of the position, and its u are the forces of its actuators, N. Of the
+attitude only the heading counts where tilt follows from the force, as with rotors that push one way.
+
 Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
 sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
 
@@ -89,10 +92,14 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     """Return the trace of a group's channels; the same trace if these are all. Its scenario has all channels."""
     if len(group.channels) == trace.x.shape[1]:
         return trace
-    columns, whole = list(group.channels), trace.arrays()
-    if trace.scenario.plant.pose:  # metrics take x - r for the error
+    columns, whole, pose = list(group.channels), trace.arrays(), trace.scenario.plant.pose
+    if pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
+    turns = pose and group.unit == "rad"
+    columns = columns[-1:] if turns and pose == "heading" else columns
     arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
+    if pose and not turns:
+        arrays["u"] = trace.applied
     return dataclasses.replace(trace, **arrays)
 
 
@@ -119,7 +126,7 @@ class Metric:
         driven = [group for group in groups(plant) if group.driven]
         if not any(map(self.applies_to, driven)):
             return f"{self.name} compares channels and {plant.name} has one of a kind: give a network, n >= 2"
-        if ("{" in self.unit or self.unit == UNIT_OF_S) and len(driven) > 1:
+        if ("{" in self.unit or self.unit == UNIT_OF_S) and len(driven) > 1 and not plant.pose:
             units = " and ".join(group.unit for group in driven)
             return f"{self.name} has no one value where channels are in {units}, as in {plant.name}: use smc.scores"
         return ""
@@ -136,6 +143,7 @@ class Metric:
     def worst(self, traces: Mapping[Group, Trace]) -> float:
         """Return the value of the worst group, from the result of `by_group`."""
         counted = [trace for group, trace in traces.items() if self.applies_to(group) and (group.driven or self.shared)]
+        counted = counted[:1] if "{" in self.unit or self.unit == UNIT_OF_S else counted  # of a pose the position
         values = [value for value in (float(self.formula(trace)) for trace in counted) if not math.isnan(value)]
         return max(values, default=math.nan)  # a group without the value, such as a limit cycle, hides no other
 

@@ -5,6 +5,7 @@ already. It raises ScenarioError, one sentence with the field, the value and the
 """
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -131,7 +132,7 @@ def physics_step(name: str, value: float | None, s: Any) -> float | None:
         return None
     h, period = number(name, value, above=0.0, low=MIN_TIME), s.control_period
     count = period / h
-    if count < 1.0 - 1e-9 or abs(count - round(count)) > 1e-6 * count:
+    if not 1.0 - 1e-9 <= count < math.inf or abs(count - round(count)) > 1e-6 * count:
         raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
     return period / round(count)
 

@@ -11,11 +11,13 @@ nothing in it is run:
 
 The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N is u_max / 60. The
 viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn gear, the lag that of a
-hydraulic valve, and the counts, per revolution or metre, are those of an inexpensive encoder. The pulse of "contact" is
-as strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the suite's
-control period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration, so gains
-for a force do not suit it: tune under it. Its rates are those of the firmware of rig stepper_furuta; it is 30 times as
-strong as other drives, near that machine's ratio of torque to inertia, as one of their strength loses steps here.
+hydraulic valve, and the counts, per revolution or metre, are those of an inexpensive encoder. On a free body, whose
+size may be any, a disturbance is the same share of the largest force as it is of u_max in the study. The pulse of
+"contact" is as strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of
+the suite's control period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration,
+so gains for a force do not suit it: tune under it. Its rates are those of the firmware of rig stepper_furuta; it is 30
+times as strong as other drives, near that machine's ratio of torque to inertia, as one of their strength loses steps
+here.
 """
 
 import ast
@@ -47,7 +49,7 @@ from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.scenario import Scenario, default_u_max
+from smc_mujoco.simulation.scenario import U_MAX, Scenario, default_u_max
 from smc_mujoco.simulation.signals import Clock, Constant, Jump, Noise, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
@@ -57,6 +59,7 @@ MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
 ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
+NOT_OF_FREE_BODIES = ("friction", "actuator", "sensor", "feedforward", "clock", "velocity")  # see `check_free_body`
 ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
@@ -83,7 +86,13 @@ class Condition:
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
         """Return the Scenario fields for a plant and a duration, s. Single events happen at half of the duration."""
         length = number("duration", duration, above=0.0)
-        return dict(self.fields(plant, length) if callable(self.fields) else self.fields)
+        fields = dict(self.fields(plant, length) if callable(self.fields) else self.fields)
+        if plant.pose and (refused := [name for name in NOT_OF_FREE_BODIES if fields.get(name)]):
+            raise ScenarioError(
+                f"condition {self.name!r} sets {refused[0]}, and {plant.name} is a free body, which takes none: choose "
+                "another condition"
+            )
+        return fields
 
     def __add__(self, other: "Condition | str") -> "Condition":
         """Return both at once. Disturbances, frictions and actuators add up; other fields must not differ."""
@@ -296,7 +305,7 @@ def _jump(size: str) -> Recipe:
             with_jump = [name for name, other in plants().items() if size in other.jumps]
             cure = f"choose another condition, or one of {', '.join(with_jump)}"
             raise ScenarioError(f"condition 'jump_{size}' has no numbers for plant {plant.name!r}: {cure}")
-        return {"disturbance": SINE, "jump": Jump(time=duration / 2, factors=plant.jumps[size])}
+        return {"disturbance": _sized(SINE, plant), "jump": Jump(time=duration / 2, factors=plant.jumps[size])}
 
     return fields
 
@@ -315,14 +324,27 @@ def _stepper(plant: Plant, duration: float) -> Fields:
     return {"actuator": motor, "u_max": motor.ramp}
 
 
+def _sized(signal: Signal, plant: Plant) -> Signal:
+    """Return a disturbance of the study's plants; for a free body that share of its largest force."""
+    if not plant.pose:
+        return signal
+    name = "sigma" if isinstance(signal, OrnsteinUhlenbeck) else "amplitude"
+    return dataclasses.replace(signal, **{name: getattr(signal, name) * default_u_max(plant) / U_MAX})
+
+
+def _disturbed(make: Callable[[float], Signal]) -> Recipe:
+    """Return the disturbance that a function makes for half of the duration."""
+    return lambda plant, duration: {"disturbance": _sized(make(duration / 2), plant)}
+
+
 IDEAL: dict[str, Recipe] = {
     "nominal": {},
     "noise": {"noise": SENSOR_NOISE},
-    "sine": {"disturbance": SINE},
-    "constant": {"disturbance": Constant(0.2)},
-    "step": lambda plant, duration: {"disturbance": Step(0.2, time=duration / 2)},
-    "pulse": lambda plant, duration: {"disturbance": Pulse(2.0, time=duration / 2, width=0.1)},
-    "process_noise": {"disturbance": OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
+    "sine": _disturbed(lambda half: SINE),
+    "constant": _disturbed(lambda half: Constant(0.2)),
+    "step": _disturbed(lambda half: Step(0.2, time=half)),
+    "pulse": _disturbed(lambda half: Pulse(2.0, time=half, width=0.1)),
+    "process_noise": _disturbed(lambda half: OrnsteinUhlenbeck(sigma=0.2, tau=0.1)),
     **{f"delay_{ms}ms": {"input_delay": ms * 1e-3} for ms in (1, 5, 10, 20, 50)},
     "light": {"mismatch": {"mass": 0.7}},
     "heavy": {"mismatch": {"mass": 1.3}},

@@ -555,12 +555,12 @@ def _apply_pushes(address, sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _add_force(data, channel, force, cartesian):
-    """Add a force to a channel: a horizontal one on its body, or one on its joint, if that has an actuator."""
+    """Add a force to a channel: a horizontal one on its body, or one on its joint, if an actuator acts there."""
     if cartesian:
         data.xfrc_applied[channel.horizontal] += force
     elif channel.ctrl >= 0 and channel.qfrc >= 0:
         data.qfrc_applied[channel.qfrc] += force
-    elif channel.ctrl >= 0:
+    elif channel.ctrl >= 0 or channel.gathered >= 0:
         data.xfrc_applied[channel.xfrc] += channel.sign * force
 
 

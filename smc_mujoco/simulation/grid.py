@@ -7,6 +7,9 @@ start. Seed 0 is x0 itself. Seed s starts channel i from
 
     x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
 
+A free body may rest anywhere, so that x0 is no scale. It starts at x_i = x0_i + (spread + by) z_i, in m and rad, also
+from seed 0.
+
 A run with contacts must start clear of its obstacles. There -|z_i| replaces z_i, which moves the start inwards, and
 pendulums that may touch each other ("bobs") start in order from left to right.
 """
@@ -62,8 +65,13 @@ class Starts:
     by: float = 0.0
 
     def largest(self, scenario: Scenario) -> float:
-        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0, rad or m."""
-        middle = scenario.resolved.x0 if self.x0 is None else self.x0
+        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0, rad or m.
+
+        Of a free body it is the largest distance from rest along an axis, m, from which a run may start.
+        """
+        middle, plant = scenario.resolved.x0 if self.x0 is None else self.x0, scenario.plant
+        if plant.pose:
+            return max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False)) + self.spread + self.by
         return max(abs(x) for x in middle) or self.by
 
     def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
@@ -75,11 +83,14 @@ class Starts:
         """Return a scenario with a seed, from the start that belongs to the seed."""
         if self.x0 is not None:
             scenario = dataclasses.replace(scenario, x0=self.x0)
-        if seed == 0:
+        if seed == 0 and not scenario.plant.pose:
             return dataclasses.replace(scenario, seed=0)
         kind = scenario.contact.kind
         z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
         z = z if kind == "none" else [-abs(factor) for factor in z]
+        if scenario.plant.pose:
+            moved = [x + (self.spread + self.by) * factor for x, factor in zip(scenario.resolved.x0, z, strict=True)]
+            return dataclasses.replace(scenario, seed=seed, x0=moved)
         x0 = [
             x * (1.0 + self.spread * factor) + (self.by if x >= 0.0 else -self.by) * factor
             for x, factor in zip(scenario.resolved.x0, z, strict=True)
@@ -93,7 +104,8 @@ def starts(x0: float | Sequence[float] | None = None, spread: Natural = SPREAD, 
 
     Args:
       x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's x0.
-      spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more.
+      spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more; of a free body in m and
+        rad.
       by: a distance that is added to it, rad or m, 0 or more; for a plant that rests at 0.
 
     Raises:

@@ -154,7 +154,10 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
 
 
 def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
-    """Return the channels of a free body, (6,) CHANNEL. The first ones have the ctrl of the actuators."""
+    """Return the channels of a free body, (6,) CHANNEL. The first ones have the ctrl of the actuators.
+
+    A disturbance is a force on its centre of mass, the same along each axis of the world; a horizontal one is along x.
+    """
     joint, drives = free_joint(model), drive_ids(model)
     table = np.full(len(PLACES), -1, [(name, "i8") for name in CHANNEL.names or ()])
     at, turns = np.arange(len(PLACES)), np.arange(len(PLACES)) - 3
@@ -162,9 +165,10 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
         first, second = (int(model.sensor_adr[model.sensor(POSE + kind).id]) for kind in kinds)
         table[name] = np.where(turns < 0, first + at, second + (turns if name == "v_sensor" else 0))
     table["qpos"] = model.jnt_qposadr[joint] + np.minimum(at, 3)
-    table["qvel"] = table["qfrc"] = table["gathered"] = model.jnt_dofadr[joint] + at
-    table["xfrc"] = table["horizontal"] = 6 * model.jnt_bodyid[joint] + at
-    table["turn"], table["sign"] = np.where(turns < 0, -1, turns), 1
+    table["qvel"] = table["gathered"] = model.jnt_dofadr[joint] + at
+    table["xfrc"] = 6 * model.jnt_bodyid[joint] + at
+    table["horizontal"] = np.where(at == 0, table["xfrc"], 0)  # 0 is of the world, which no force moves
+    table["turn"], table["sign"] = np.where(turns < 0, -1, turns), np.where(turns < 0, 1, 0)
     table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
     return table.astype(CHANNEL)
 

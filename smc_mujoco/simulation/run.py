@@ -272,11 +272,16 @@ class ScenarioBatch:
         if changed:
             self.batch.set_const(np.unique(changed).astype(np.int32))
 
+    @property
+    def started(self) -> dict[str, np.ndarray]:
+        """The arrays of all simulations whose start is not MuJoCo's: states, and the past of delayed sensors."""
+        lagged = ["act"] * bool(self.scenarios[0].plant.pose and self.model.na)
+        names = ("qpos", "qvel", *lagged, *["history"] * bool(self.model.nhistory))
+        return {name: self.batch.bind(name) for name in names}
+
     def put_initial_states(self) -> None:
         """Put all simulations at t = 0, with the past readings of delayed sensors."""
-        delayed = bool(self.model.nhistory)
-        lagged = ["act"] * bool(self.scenarios[0].plant.pose and self.model.na)
-        arrays = {name: self.batch.bind(name) for name in ("qpos", "qvel", *lagged, *["history"] * delayed)}
+        delayed, arrays = bool(self.model.nhistory), self.started
         model, data = copy.copy(self.model) if delayed else self.model, self.scratch
         for i, scenario in enumerate(self.scenarios):
             if delayed:  # the periods of the readings differ between scenarios

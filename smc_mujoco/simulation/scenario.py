@@ -561,7 +561,8 @@ def check_signals(s: Resolved) -> None:
         raise ScenarioError("only a reference may have a signal for each channel: give one signal for all")
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
-    if s.plant.direct and (forces := [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]):
+    forces = [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]
+    if forces and s.plant.direct and not s.plant.pose:
         raise ScenarioError(
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
             "joints: give another signal"
@@ -644,7 +645,7 @@ def check_free_body(s: Resolved) -> None:
     """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three numbers."""
     if not s.plant.pose:
         return
-    if not s.law.joint:
+    if not s.law.joint and s.law.name != "none":
         raise ScenarioError(
             f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose channels turn together: "
             "give a law of many joints, such as 'geometric'"
@@ -656,7 +657,7 @@ def check_free_body(s: Resolved) -> None:
         (s.feedforward, "feedforward"),
         (not s.clock.regular, "clock with late or missed samples"),
         (s.velocity.name != "measured", f"velocity {s.velocity.name!r}"),
-        (any(not isinstance(d, Push) for d in s.disturbance), "disturbance but a Push"),
+        (any(d.sees for d in s.disturbance), "disturbance that sees the loop"),
     ):
         if given:
             raise ScenarioError(f"{s.plant.name} is a free body, which takes no {what}: leave that out")

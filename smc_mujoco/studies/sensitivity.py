@@ -244,16 +244,17 @@ def default_over(scenario: Scenario) -> Uncertainty:
 
     Mass x .7 to 1.3, dry friction up to a twentieth of the force of the weakest drive, delay up to 20 control periods,
     noise up to 1 mrad or mm at each sample, encoders of 2^11 to 2^15 counts, u_max x .5 to 1, control period x 1 to 4.
+    A free body has no friction and no encoder.
     """
-    plant, u = scenario.plant, strength(scenario)
+    plant, u, flies = scenario.plant, strength(scenario), bool(scenario.plant.pose)
     return Uncertainty(
         mass=MASS if plant.mass and not plant.uncertain else (1.0, 1.0),
         parameters=plant.uncertain,
-        friction=(0.0, FRICTION_SHARE * u) if math.isfinite(u) else (0.0, 0.0),
+        friction=(0.0, FRICTION_SHARE * u) if math.isfinite(u) and not flies else (0.0, 0.0),
         delay=(0.0, min(DELAY_PERIODS, scenario.samples // 10) * scenario.control_period),
         position_noise=NOISE * (not any(scenario.noise.errors)),
         hold=scenario.control_period,
-        encoder=COUNTS,
+        encoder=None if flies else COUNTS,
         bound=BOUND if math.isfinite(u) else (1.0, 1.0),
         period=(1.0, 1.0) if hasattr(scenario.law.function, "control_period") else PERIOD,
     )

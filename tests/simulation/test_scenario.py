@@ -79,6 +79,7 @@ def test_absurd_clocks_are_refused_and_not_run(refused):
         {"control_period": TINY},
         {"control_period": 1e306, "duration": HUGE},
         {"physics_step": TINY},
+        {"control_period": 1e305, "physics_step": 1e-9, "duration": 1e306},
         {"duration": HUGE, "input_delay": HUGE},
         {"duration": 1e6, "control_period": 1e-6},
         {"duration": 1.0, "physics_step": 1e-9},

@@ -106,6 +106,8 @@ class Evaluator:
     def _terms(self, index: int, ended: Ended) -> tuple[float, float]:
         """Return tracking and variation of the run of a case, given by its index."""
         case = self.cases[index]
+        if ended.failed_at is None and case.plant.pose:
+            return self.goal.terms_of_pose(case, ended.log["x"], ended.log["r"], ended.log["u"])
         if ended.failed_at is None:
             itae, start, tv = sums(ended.log, case.control_period)
             if math.isfinite(itae):
@@ -210,9 +212,7 @@ class _Again(ScenarioBatch):
         super().__init__(prepared, threads, constraints)
         self.first_records = self.records.copy()
         self.first_numbers = [packed.numbers.copy() for packed in self.packed]
-        self.start = {
-            name: self.batch.bind(name).copy() for name in ("qpos", "qvel", *["history"] * bool(self.model.nhistory))
-        }
+        self.start = {name: array.copy() for name, array in self.started.items()}
         law, n = prepared[0].scenario.law, prepared[0].scenario.plant.n
         self.gains = [_Gains(law, names, *pair, n) for pair in zip(self.records, self.packed, strict=True)]
 

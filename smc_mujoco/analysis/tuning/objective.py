@@ -7,6 +7,10 @@ that jumps from bound to bound at every sample has TV / (u_max duration) = 2 / h
 is w = h times 1 s^2 = 1e-3 s^3, chosen so that such chattering costs 2 s^2, as much as a run that stays at x0 for its
 first 2 s. Without it ("tracking", w = 0), chattering costs nothing.
 
+Of a free body ITAE / sum |x0| is added up over position and attitude, with |x0| the distance from the reference at the
+start, and 1 m or 1 rad where that is 0; TV / u_max is that of its worst force or torque, each over its own bound.
+Where tilt follows from the force, only the heading counts.
+
 The conditions are those in which laws are ranked: nominal, noise, delay, a sine and a constant disturbance, and 30 %
 less and 30 % more mass. Their runs have seeds, noise and initial states that no grid uses, so no law is judged on runs
 that it was tuned on. `evaluator.objectives` computes J on instances that no search has seen either.
@@ -25,6 +29,7 @@ from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.rotation import attitude_errors
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
 from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_starts
@@ -136,12 +141,23 @@ class Objective:
         """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its cost, and 0."""
         if trace.diverged_at is not None:
             return self.terms_of_failure(trace.diverged_at)
+        if trace.scenario.plant.pose:
+            return self.terms_of_pose(trace.scenario, trace.x, trace.r, trace.u)
         return self.terms_of_sums(trace.scenario, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace))
 
     def terms_of_sums(self, case: Scenario, itae: float, start: float, tv: float) -> tuple[float, float]:
         """Return the terms of a run with this ITAE, sum |x0| and TV."""
         bound = float(np.max(case.resolved.u_max)) if self.u_max is None else self.u_max
         return min(itae / start, FAILURE_COST), tv / (bound * self.duration)
+
+    def terms_of_pose(self, case: Scenario, x: np.ndarray, r: np.ndarray, u: np.ndarray) -> tuple[float, float]:
+        """Return the terms of a run of a free body, from its log, (K + 1, 6) each."""
+        e, t = x - r, case.control_period * np.arange(len(x))
+        e[:, 3:] = attitude_errors(x[:, 3:], r[:, 3:])
+        parts = np.abs(e[:, :3]).sum(axis=1), np.abs(e[:, 3:] if case.plant.pose == "all" else e[:, 5:]).sum(axis=1)
+        tracking = sum(float(np.trapezoid(t * part, t)) / (float(part[0]) or 1.0) for part in parts)
+        variation = np.abs(np.diff(u, axis=0)).sum(axis=0) / (np.array(case.limits) * self.duration)
+        return min(tracking, FAILURE_COST), float(variation.max())
 
     def terms_of_failure(self, time: float) -> tuple[float, float]:
         """Return the terms of a run that fails at a time, s."""

@@ -13,6 +13,10 @@ every law alike, so a law with 2 a in place of lambda, or 1 / tau in place of k,
 a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as
 a force, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
+A free body has these scales twice, as its forces and torques differ: of its position, with X the largest distance from
+rest at the start, and of its attitude, with X = 1 rad, since it tilts to move wherever it starts. A gain that is
+declared with `turns=True` is of the attitude.
+
 A law declares the unit of each gain, and which gains the search leaves as they are: initial values, exponents, table
 sizes, a plant's parameters, filters and number formats of a processor. A gain of unknown unit is searched over as many
 decades about its default:
@@ -32,12 +36,14 @@ import numpy as np
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import Gain, Unit
+from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.simulation.grid import START_CURE
+from smc_mujoco.simulation.grid import SPREAD, START_CURE
 
 HALF_WIDTH = 1.5  # decades on either side of a scale: chosen, a factor of 1000 in all
 BOUND_MARGIN = 0.02  # of the range in log space: a gain so close to a bound counts as at the bound
 WIDENING = 1.0  # decades by which the search may leave the box
+OF_TURNS = " of turns"  # at the end of the names of an attitude's scales
 ROUNDING_TOLERANCE = 1e-3  # of a gain: twice the largest error of four digits
 
 Box = Mapping[str, tuple[float, float]]  # gain -> lowest, highest
@@ -66,14 +72,28 @@ def without_unit(law: Component) -> dict[str, float]:
 
 def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
     """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is not searched."""
-    gain_unit = unit(law, name)
-    return 1.0 if gain_unit is None or _gain(law, name).held else gain_unit.of(scales)
+    gain_unit, gain = unit(law, name), _gain(law, name)
+    return 1.0 if gain_unit is None or gain.held else gain_unit.of(_scales_of(gain, scales))
+
+
+def _scales_of(gain: Gain, scales: Mapping[str, float]) -> Mapping[str, float]:
+    """Return F, X and T of the channels that a gain is of."""
+    return {name: scales[name + OF_TURNS] for name in ("F", "X", "T")} if gain.turns else scales
 
 
 def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
-    """Return the plant's X, F, M and T in SI units; `reach` is X, rad or m, by default max |x0| of the plant."""
+    """Return the plant's X, F, M and T in SI units; `reach` is X, rad or m, by default max |x0| of the plant.
+
+    Those of a free body's attitude have names that end in OF_TURNS.
+    """
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
+    if plant.pose and isinstance(plant.nominal, NominalModel):
+        M, limits = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M, plant.limits
+        force, torque = (min([u_max, *limits[i : i + 3]]) for i in (0, 3))
+        of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, with_model, 1.0)
+        own = _scales(1.0 / M[0, 0], force, with_model, SPREAD if reach is None else reach)
+        return own | {name + OF_TURNS: value for name, value in of_turns.items()}
     zeros = np.zeros(plant.n)
     g = min(abs(plant.nominal(zeros, zeros, i, plant.values({}))[1]) for i in range(plant.n))
     X = max(abs(x) for x in plant.x0) if reach is None else reach
@@ -81,6 +101,11 @@ def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = N
         raise ScenarioError(f"{plant.name} starts at 0, where a law has nothing to do: {START_CURE}")
     if not (math.isfinite(g) and g > 0.0):
         raise ScenarioError(f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant")
+    return _scales(g, u_max, with_model, X)
+
+
+def _scales(g: float, u_max: float, with_model: bool, X: float) -> dict[str, float]:
+    """Return the scales of channels with this g, bound on u and X."""
     return {"X": X, "F": u_max * g if with_model else u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
 
 
@@ -96,7 +121,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
                 unit(law, name)  # raises: there is neither a unit nor a size
             bounds[name] = (defaults[name] * 10**-HALF_WIDTH, defaults[name] * 10**HALF_WIDTH)
         elif (gain_unit := unit(law, name)) is not None and not _gain(law, name).held:
-            scale = gain_unit.of(plant_scales)
+            scale = gain_unit.of(_scales_of(_gain(law, name), plant_scales))
             bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**HALF_WIDTH)
     if not bounds:
         raise ScenarioError(f"law {law.name!r} has no gain to tune: choose another")

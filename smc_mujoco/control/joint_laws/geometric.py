@@ -31,8 +31,8 @@ from smc_mujoco.control.units import RATE, Gain, Unit
     gains={
         "kx": Gain(7.0, Unit(time=-2), positive=True, shared=True),
         "kv": Gain(4.0, RATE, positive=True, shared=True),
-        "kR": Gain(421.7, Unit(time=-2), positive=True, shared=True),
-        "kW": Gain(69.27, RATE, positive=True, shared=True),
+        "kR": Gain(421.7, Unit(time=-2), positive=True, shared=True, turns=True),
+        "kW": Gain(69.27, RATE, positive=True, shared=True, turns=True),
     },
     accuracy={"s": 0, "e": 0},
     label="Geometric",

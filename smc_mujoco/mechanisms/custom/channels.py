@@ -6,7 +6,7 @@ A motor of gear 1 replaces the actuator that drives a channel's joint.
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -193,6 +193,12 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
     sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
     reached = [float(np.sum(largest[column > 0.0] * column[column > 0.0])) for column in sizes.T]
     return (reached[0],) * 3 + tuple(reached[1:])
+
+
+def held_pose(model: mujoco.MjModel, joint: str) -> Literal["all", "heading"]:
+    """Return what of its pose a free body can hold, as in `Plant.pose`."""
+    forces = exerted(model, model.joint(joint).id, thrusters(model, joint))
+    return "all" if np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max()) == len(PLACES) else "heading"
 
 
 def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> tuple[float, ...]:

@@ -1,5 +1,6 @@
-"""A free body of a user's model: its pose, its mixer, and its motion, against an integration without MuJoCo."""
+"""A free body of a user's model: pose, mixer, motion against an integration without MuJoCo, scores, comparisons."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -8,11 +9,15 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search_space
+from smc_mujoco.analysis.tuning.evaluator import Evaluator
+from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import shipped
 from smc_mujoco.control.attitude import of_thrust
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.mechanisms import rotation
+from smc_mujoco.simulation.conditions import applicable, find_condition
 from smc_mujoco.simulation.python_controller import Controller
 
 TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encoding="utf-8")
@@ -219,7 +224,7 @@ def test_a_floating_base_goes_to_a_pose_under_a_law_of_arms():
 
 def refusals():
     yield "law of one channel", {"law": "pid"}, "of many joints"
-    yield "disturbance", {"law": "geometric", "disturbance": smc.Sine(0.1, 1.0)}, "Push"
+    yield "disturbance", {"law": "geometric", "disturbance": smc.signals.Relay(0.1, s=1.0)}, "sees the loop"
     yield "friction", {"law": "geometric", "friction": smc.Coulomb(0.1)}, "friction"
     yield "estimator", {"law": "geometric", "velocity": "levant"}, "levant"
     yield "clock", {"law": "geometric", "clock": smc.Clock(missed=0.1)}, "clock"
@@ -246,3 +251,106 @@ def test_a_film_has_no_arrow_for_actuators_that_act_along_several_channels(drone
     trace = smc.run(smc.Scenario(plant=drone, law="geometric", model="nominal", duration=0.1))
     assert np.abs(trace.applied).max() > 0.07  # of a rotor that carries its part of the weight
     assert [scale.control for scale in arrows.scales([trace]).values()] == [0.0, 0.0]
+
+
+def test_disturbances_are_forces_on_the_centre_of_mass_and_turn_nothing():
+    text = TEXT.replace('act="0.0782 0.0782 0.0782 0.0782"', "")
+    body = smc.plant_from(text, channels=["body"], name="body", keyframe="hover")
+    fall = {"plant": body, "law": "none", "duration": 0.5, "integrator": "RK4", "x0": (0.0, 0.0, 3.0, 0.4, -0.3, 0.2)}
+    trace = smc.run(smc.Scenario(**fall, disturbance=smc.Constant(0.02)))
+    t, a = trace.t[:, None], 0.02 / MASS
+    np.testing.assert_allclose(trace.e[:, :3] - [0.0, 0.0, 2.0], 0.5 * t**2 * [a, a, a - G], atol=1e-12)
+    assert np.ptp(trace.x[:, 3:], axis=0).max() < 1e-12
+    assert np.all(trace.d == [0.02] * 3 + [0.0] * 3)
+    sideways = smc.run(smc.Scenario(**fall, disturbance=smc.signals.Gust(0.02, time=0.1, width=0.3)))
+    assert np.abs(sideways.d[:, 0]).max() > 0.0199
+    assert np.all(sideways.d[:, 1:] == 0.0)
+    wind = smc.run(smc.Scenario(**fall, disturbance=smc.signals.OrnsteinUhlenbeck(0.02, tau=0.1), seed=3)).d
+    assert np.abs(np.corrcoef(wind[:, :3].T)[np.triu_indices(3, 1)]).max() < 0.9  # each axis has its own
+    assert np.ptp(wind[:, 0]) > 0.01
+
+
+def test_the_suites_conditions_have_the_size_of_the_body_or_are_refused(drone):
+    force = 0.48 / 6.0  # N, of the four rotors, over the study's bound
+    assert find_condition("constant").on(drone, 2.0)["disturbance"] == smc.Constant(0.2 * force)
+    assert find_condition("process_noise").on(drone, 2.0)["disturbance"].sigma == pytest.approx(0.2 * force)
+    with pytest.raises(ScenarioError, match="'lag_20ms' sets actuator, and drone is a free body"):
+        find_condition("lag_20ms").on(drone, 2.0)
+    assert {"nominal", "noise", "sine", "heavy"} == set(
+        applicable(["nominal", "noise", "sine", "heavy", "encoder"], [drone], 1.0)
+    )
+
+
+def test_every_seed_starts_within_a_fifth_of_a_metre_and_of_a_radian(drone):
+    starts = np.array([one.resolved.x0 for one in smc.grid(drone, "geometric", seeds=40, gains="default")])
+    off = np.abs(starts - drone.rest)
+    assert np.all((off.max(axis=0) > 0.15) & (off.max(axis=0) <= 0.2))
+    wider = smc.grid(drone, "geometric", seeds=40, gains="default", starts=smc.starts(spread=0.0, by=0.5))
+    assert np.abs([one.resolved.x0 for one in wider] - np.array(drone.rest)).max() > 0.45
+
+
+def test_laws_for_a_free_body_are_those_that_it_can_run(drone):
+    laws = smc.laws(drone)
+    assert {"none", "geometric", "quaternion_sliding"} <= set(laws)
+    assert not {"pid", "computed_torque", "super_twisting_computed_torque"} & set(laws)
+    for law in laws:
+        smc.Scenario(plant=drone, law=law)
+    floating = smc.plant_from(THRUSTERS.format(SIX), channels=["floats"])
+    assert {"geometric", "super_twisting_computed_torque"} <= set(smc.laws(floating))
+
+
+def test_scores_are_of_the_position_the_heading_and_the_actuators(drone):
+    """Rotors that push one way tilt the body wherever a force acts, so that its tilt is no error."""
+    trace = smc.run(smc.Scenario(plant=drone, law="geometric", x0=(0.1, -0.2, 1.1, 0.0, 0.0, 0.3), duration=6.0))
+    found, e, t = smc.score(trace), trace.e, trace.t
+    assert found["itae"] == pytest.approx(np.trapezoid(t * np.abs(e[:, :3]).sum(axis=1), t))
+    assert found["tv"] == pytest.approx(np.abs(np.diff(trace.applied, axis=0)).sum(axis=0).max())
+    last = [
+        t[np.flatnonzero(np.abs(part).max(axis=1) > 0.02 * size)[-1] + 1]
+        for part, size in ((e[:, :3], 0.2), (e[:, 5:], 0.3))
+    ]
+    assert found["settling_time"] == pytest.approx(max(last))
+    pushed = smc.run(smc.Scenario(plant=drone, law="geometric", disturbance=smc.Constant(0.02), duration=8.0))
+    assert np.abs(pushed.e[-1, 3:5]).min() > 0.05  # rad: it leans into the force
+    assert smc.scores(pushed)["driven rad"]["ultimate_bound"] < 0.01
+
+
+def test_position_and_attitude_have_scales_of_their_own(drone):
+    scales = search_space.scales(drone, 0.48, True, 0.5)
+    assert (scales["X"], scales["F"]) == (0.5, pytest.approx(0.48 / MASS))
+    assert scales["T"] == pytest.approx(math.sqrt(0.5 * MASS / 0.48))
+    torque, inertia = drone.limits[5], 29.8e-6
+    assert scales["T of turns"] == pytest.approx(math.sqrt(inertia / torque))
+    box = search_space.box(smc.law("geometric"), scales)
+    assert math.sqrt(math.prod(box["kx"])) == pytest.approx(scales["T"] ** -2)
+    assert math.sqrt(math.prod(box["kR"])) == pytest.approx(scales["T of turns"] ** -2)
+    assert all(
+        low < value < high for value, (low, high) in zip(smc.law("geometric").gains.values(), box.values(), strict=True)
+    )
+
+
+def test_the_objective_of_a_free_body_is_that_of_its_traces(drone):
+    goal = Objective(conditions=("noise", "constant"), duration=0.4, u_max=0.48)
+    cases = goal.scenarios(drone, smc.law("geometric"))
+    (made,) = Evaluator(goal, cases, ("kx", "kR"))([(5.0, 300.0)])
+    traces = smc.run([dataclasses.replace(one, law=smc.law("geometric", kx=5.0, kR=300.0)) for one in cases])
+    tracking = variation = 0.0
+    for trace in traces:
+        for part in (trace.e[:, :3], trace.e[:, 5:]):
+            tracking += np.trapezoid(trace.t * np.abs(part).sum(axis=1), trace.t) / np.abs(part[0]).sum()
+        variation += np.max(np.abs(np.diff(trace.u, axis=0)).sum(axis=0) / drone.limits) / 0.4
+    assert (made.tracking, made.variation) == (pytest.approx(tracking), pytest.approx(variation))
+    assert made.objective == goal.evaluation(cases[0], traces).objective
+
+
+def test_laws_of_a_free_body_are_compared_and_advised_as_any(drone, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    laws = ["geometric", "quaternion_sliding"]
+    found = smc.compare(
+        laws, drone, ["nominal", "constant"], seeds=7, tune=False, defaults=True, duration=3.0, progress=False
+    )
+    assert {"itae", "tv_rate"} <= {board.metric for board in found.leaderboard}
+    (itae,) = [b for b in found.leaderboard if b.metric == "itae" and b.group["condition"] == "nominal"]
+    assert itae.winner == "geometric"
+    tuned = smc.compare("geometric", drone, "nominal", seeds=1, searches=1, budget=1, duration=0.3, progress=False)
+    assert tuned.gains["drone"]["geometric"].source.kind == "tuned here"
