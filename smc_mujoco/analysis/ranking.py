@@ -211,10 +211,14 @@ class Comparison:
         return better
 
     @functools.cached_property
+    def worse(self) -> np.ndarray:
+        """Whether another law is better, (laws, blocks)."""
+        return np.asarray(np.any(self.better, axis=1).T)
+
+    @functools.cached_property
     def beaten(self) -> np.ndarray:
         """Whether another law is better, or a run of the law failed or has no value, (laws, blocks)."""
-        lacking = self.without_value > 0
-        return np.any(self.better, axis=1).T | lacking
+        return self.worse | (self.without_value > 0)
 
     @functools.cached_property
     def level(self) -> np.ndarray:

@@ -74,6 +74,7 @@ class Block:
     lacking: Mapping[str, int]  # law -> number of runs that failed or have no value
     best: tuple[str, ...]  # laws that no other is better than, with a value in every run and enough samples to tell
     undecided: tuple[str, ...]  # laws that no other is better than, but only because there are too few samples
+    worse: tuple[str, ...]  # laws that another is better than
     ahead: str | None  # the law that is better than every other, laws with default gains included
     lead: Lead | None  # None for one law, for "settles", or if the law in front has runs without a value
     seeds: int  # in which every law ran
@@ -151,8 +152,12 @@ class Board(Tables):
         return [block.condition for block in self.blocks if block.winner == law]
 
     def losses(self, law: str) -> list[str]:
-        """Return the conditions in which another law is better, or in which runs of this law fail."""
-        return [block.condition for block in self.blocks if law not in (*block.best, *block.undecided)]
+        """Return the conditions in which another law is better."""
+        return [block.condition for block in self.blocks if law in block.worse]
+
+    def fails(self, law: str) -> list[str]:
+        """Return the conditions in which no other law is better, but runs of this law fail or have no value."""
+        return [block.condition for block in self.blocks if block.lacking[law] and law not in block.worse]
 
     @property
     def label(self) -> str:
@@ -186,8 +191,9 @@ class Board(Tables):
         results = []
         for law in (entry.law for entry in self.entries if self.wins(entry.law)):
             losses = f", loses under {_listed(self.losses(law))}" * bool(self.losses(law))
+            fails = f", has runs that {self._fail} under {_listed(self.fails(law))}" * bool(self.fails(law))
             won = f"{law} wins under {_listed(self.wins(law))}{self._small(law)}"
-            results.append(f"{won}{losses}{self._search(law)}")
+            results.append(f"{won}{losses}{fails}{self._search(law)}")
         if results:
             return f"no winner {blocks}: {'; '.join(results)}{these}"
         if self.why:
@@ -195,10 +201,29 @@ class Board(Tables):
         if len(self.best) == len(self.entries):
             which = "all laws" if len(self.best) > 2 else "both laws"
             return f"no winner: {f'{which} are {LEVEL_WORDS}' if self.level else self.cannot_tell}"
-        unclear = [entry.law for entry in self.entries if entry.law not in self.best and not self.losses(entry.law)]
-        doubt = f"; too few samples to tell whether {joined(unclear)} {'is' if len(unclear) == 1 else 'are'} beaten"
         apart = f"; {LEVEL_WORDS if self.level else self.cannot_tell}" if len(self.best) > 1 else ""
-        return f"no winner, undefeated: {joined(self.best)}{apart}{doubt * bool(unclear)}"
+        defeated = any(self.losses(entry.law) for entry in self.entries)
+        told = f"undefeated: {joined(self.best)}{apart}" if defeated else "none beaten"
+        return "; ".join([f"no winner, {told}", *self._doubts])
+
+    @property
+    def _doubts(self) -> list[str]:
+        """Why laws that are not the best may not be beaten, in words."""
+        open_ones = [entry.law for entry in self.entries if entry.law not in self.best and not self.losses(entry.law)]
+        failing = [law for law in open_ones if self.fails(law)]
+        few = [law for law in open_ones if law not in failing]
+        doubts = []
+        if few:
+            doubts.append(f"too few samples to tell whether {joined(few)} {'is' if len(few) == 1 else 'are'} beaten")
+        if failing:
+            have, are = ("has", "it is") if len(failing) == 1 else ("have", "they are")
+            doubts.append(f"{joined(failing)} {have} runs that {self._fail}, too few to tell whether {are} beaten")
+        return doubts
+
+    @property
+    def _fail(self) -> str:
+        """What runs without a value do, in words."""
+        return "never end" if self.unit == "s" else "fail"
 
     @property
     def level(self) -> bool:
@@ -253,7 +278,7 @@ class Board(Tables):
         if outside := dict.fromkeys(block.outside for block in self.blocks if block.outside):
             return f"{joined(outside)} {'is' if len(outside) == 1 else 'are'} ahead of checked laws, but unchecked"
         if all(not block.best for block in self.blocks) and all(all(block.lacking.values()) for block in self.blocks):
-            return f"every law has runs that {'never end' if self.unit == 's' else 'fail'}"
+            return f"every law has runs that {self._fail}"
         undecided = ", or has too few samples to tell" * any(block.undecided for block in self.blocks)
         return self.too_few or ("" if self.best else f"each loses to another, or fails{undecided}")
 

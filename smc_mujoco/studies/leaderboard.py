@@ -234,6 +234,7 @@ def _block(
         lacking=dict(zip(comparison.laws, comparison.without_value[:, at].tolist(), strict=True)),
         best=comparison.best[at],
         undecided=tuple(np.array(comparison.laws)[comparison.undecided[:, at]].tolist()),
+        worse=tuple(np.array(comparison.laws)[comparison.worse[:, at]].tolist()),
         ahead=comparison.winners[at],
         lead=_lead(comparison, at),
         level=_level(comparison, at),

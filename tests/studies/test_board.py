@@ -303,7 +303,8 @@ def test_a_winner_is_told_by_how_much_for_which_gains_and_in_which_conditions(pa
     both = pair.result
     assert both.startswith("third wins in both conditions: at least ")
     assert both.endswith(", ahead in 20 of 20 runs, for these gains")
-    here = dataclasses.replace(pair, blocks=(first, dataclasses.replace(second, ahead="second", best=("second",))))
+    turned = dataclasses.replace(second, ahead="second", best=("second",), worse=("third",))
+    here = dataclasses.replace(pair, blocks=(first, turned))
     assert here.result.startswith("no winner in both conditions: third wins under nominal, loses under noise")
     assert dataclasses.replace(pair, blocks=(dataclasses.replace(first, lead=None),)).result == (
         "third wins, for these gains"
