@@ -53,7 +53,8 @@ if TYPE_CHECKING:
 
 METRIC = "rms_error"
 DEFAULT_STEPS = 3_600_000  # physics steps by default, for a plant of one channel: up to 20 s of a core
-MIN_POINTS, MAX_POINTS = 16, 4096  # of the default, powers of 2
+MIN_POINTS, MAX_POINTS = 8, 4096  # of the default, powers of 2
+ROUGH_POINTS = 32  # with fewer, intervals of total indices cover less than 85 %, see docs/worst_case.md
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
 DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)  # of the default class: control periods, rad or m; chosen
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
@@ -143,7 +144,9 @@ class Sensitivity(Tables, Explained):
         )
         fails = ["A run fails, too, if it ends beyond 5 % of its scale."] if self.failed.any() else []
         missing = [f"{self.unscored} runs have no score and count as the worst."] if self.unscored else []
-        notes = [*self.sentences, *missing, key, *fails]
+        points = len(self.values) // 2
+        few = [f"{points} points, which is few: intervals are rough, so give more."] if points < ROUGH_POINTS else []
+        notes = [*self.sentences, *few, *missing, key, *fails]
         return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
 
     def about(self) -> dict[str, Any]:
@@ -183,7 +186,7 @@ def sensitivity(
         random within it. Default: mass, friction, delay, noise, encoder, period and bound, see `default_over`.
       metric: name of any metric; more is worse. A run without a score counts as the worst.
       points: number of points, a power of 2; with k axes there are (k + 2) times as many runs. Default: as many as
-        take up to about 20 s of one core, but at least 16, with which the Panda takes 50 s.
+        take up to about 20 s of one core, but at least 8, with which the Panda takes 25 s. Fewer than 32 are told.
       seed: of the points.
       threads, progress: as in `run`. The result does not depend on threads.
 

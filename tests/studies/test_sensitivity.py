@@ -173,6 +173,16 @@ def test_the_default_class_has_the_axes_of_machines():
     assert set(found.names) == {"mass", "friction", "delay", "noise", "encoder", "bound", "period", "chance"}
     assert default_points(scenario(duration=8.0), 8) == 32
     assert default_points(scenario(duration=5.0), 8) == 64
+    assert default_points(scenario(plant="panda", law="computed_torque", duration=10.0), 8) == 8
+
+
+def test_few_points_are_told():
+    """A total index needs 32 points or more for an interval that covers about what it says."""
+    few, enough = (
+        smc.sensitivity(scenario(duration=0.1), smc.Uncertainty(mass=(0.5, 2.0)), points=n) for n in (16, 32)
+    )
+    assert "16 points, which is few" in str(few.tables[0])
+    assert "which is few" not in str(enough.tables[0])
 
 
 def test_scores_that_only_mixed_points_tell_apart_explain_nothing_and_no_index_is_above_1():
