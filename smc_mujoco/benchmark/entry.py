@@ -30,11 +30,11 @@ from typing import Any
 import numpy as np
 
 from smc_mujoco.benchmark import controls
-from smc_mujoco.benchmark.problem import rules, versions
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
 from smc_mujoco.control.from_text import law as law_of
 from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.mechanisms.plant import plants
 
 ABOUT, FILES = "entry.toml", ("law.py", "law.c", "law.fmu")
 TEXTS = "name", "source", "licence"
@@ -198,8 +198,7 @@ def _text(name: str, value: object) -> str:
 
 def _gains(sets: object, division: str) -> Mapping[str, Mapping[str, float]]:
     """Return plant -> gain -> value, as a division allows them."""
-    plants = {plant for version in versions() for plant in rules(int(version))["plants"]}
-    known = {EVERYWHERE} if division == "one set" else plants
+    known = {EVERYWHERE} if division == "one set" else {*plants()}
     if not isinstance(sets, dict):
         raise ScenarioError(f"gains is {shown(sets)}: write a table, as [gains.{sorted(known)[0]}]")
     for name, values in sets.items():

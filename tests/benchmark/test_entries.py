@@ -41,6 +41,14 @@ def test_an_entry_has_its_gains_on_each_plant(tmp_path):
     assert (free.law("duffing").gains["k"], free.law("van_der_pol").gains["k"]) == (2.5, 4.0)
     assert free.law("duffing").name == "own law"
     assert one.digest != free.digest
+    for plant in ("furuta", "acrobot"):
+        its = entry.read(written(tmp_path / plant, gains=f"[gains.{plant}]\nk = 2.5", division="free"))
+        assert its.law(plant).gains["k"] == 2.5
+
+
+def test_realaigyms_boards_are_no_list_of_problems():
+    with pytest.raises(ScenarioError, match=r"no targets: enter a folder there with python -m .* --entry FOLDER"):
+        suite.suite("realaigym")
 
 
 @pytest.mark.parametrize(

@@ -607,6 +607,17 @@ def test_the_command_shows_this_packages_rows_among_the_published(capsys, tmp_pa
     assert (tmp_path / "a.svg").exists()
 
 
+@pytest.mark.parametrize("robot", boards.ROBOTS)
+def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(robot, capsys):
+    with pytest.raises(SystemExit) as ended:
+        command([robot, "--no-robustness", "--entry", str(ROOT / "examples" / "entries" / "soft_relay")])
+    assert ended.value.code in (0, None)
+    out = capsys.readouterr().out
+    assert out.count("soft relay") == 2
+    assert "trajectory + " not in out
+    assert out.index("History SAC") < out.index("soft relay")
+
+
 UNWRITABLE = ["acrobot", "--no-robustness", "--figure", f"{__file__}/a"]  # in no folder
 
 

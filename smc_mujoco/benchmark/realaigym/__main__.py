@@ -15,6 +15,12 @@ def board(
     robustness: Annotated[
         bool, typer.Option(help="Whether to run the robustness test too: 722 machines a row, some 20 s in all.")
     ] = True,
+    entry: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FOLDER", help="A law and entry.toml, see smc-mujoco enter: its rows, not this package's."
+        ),
+    ] = None,
     figure: Annotated[Path | None, options.picture("the run")] = None,
     film: Annotated[Path | None, typer.Option(help="Also film the run, to a .mp4 file.")] = None,
 ) -> None:
@@ -23,12 +29,13 @@ def board(
     The task: swing the double pendulum up from rest and balance it, with one motor of 6 N m at the shoulder (pendubot)
     or at the elbow (acrobot), in 10 s. Less is better in every criterion, more in the score. This package's rows are an
     optimised trajectory under a Riccati law, and control experiments on the same trajectory. On the board of 2025 the
-    machine is carried off 15 times in a minute, and the time upright counts. For your own law use smc.boards, see
-    docs/boards.md.
+    machine is carried off 15 times in a minute, and the time upright counts. For your own law give --entry, or use
+    smc.boards, see docs/boards.md.
 
     Example: python -m smc_mujoco.benchmark.realaigym acrobot --figure acrobot --film acrobot.mp4
     """
     with delay_ctrl_c():
+        from smc_mujoco.benchmark import entry as entries
         from smc_mujoco.benchmark import realaigym as boards
         from smc_mujoco.benchmark.realaigym import tables
         from smc_mujoco.cli.scene import filmed
@@ -37,7 +44,11 @@ def board(
         from smc_mujoco.simulation.run import run
 
     terminal = Terminal()
-    rows = boards.experiments(robot)
+    rows, mine, first = boards.experiments(robot), boards.global_experiments(robot), boards.NAME
+    if entry:
+        one = entries.read(entry)
+        rows, first = {one.name: boards.on_board(robot, one.law(robot))}, one.name
+        mine = rows
     writable(figure, film and with_ending(film, ".mp4"))
     traces = dict(zip(rows, run(list(rows.values())), strict=True))
     terminal.print(tables.board(robot, boards.board(traces), rows))
@@ -48,23 +59,23 @@ def board(
                 for i, (name, scenario) in enumerate(rows.items())
             }
         terminal.print(tables.board(robot, boards.robustness_board(robot, results), rows))
-    mine = boards.global_experiments(robot)
     terminal.print(
         tables.board(
             robot, boards.global_board(robot, [boards.global_row(name, run) for name, run in mine.items()]), mine
         )
     )
-    terminal.note(f"{boards.KEY}. On the board of 2025 they are means over four seeds of the resets.", "dim", wrap=True)
+    about = "" if entry else f"{boards.KEY}. "
+    terminal.note(f"{about}On the board of 2025 they are means over four seeds of the resets.", "dim", wrap=True)
     terminal.note(f"published rows: {boards.SOURCE}; {terminal.seconds:.0f} s", "dim", wrap=True)
     title = f"{robot.capitalize()}: swing-up and balance"
     if figure:
         from smc_mujoco.draw.figure import figure as draw
         from smc_mujoco.draw.page import files
 
-        draw([traces[boards.NAME]], figure, title=title)
+        draw([traces[first]], figure, title=title)
         terminal.wrote(*files(figure))
     if film:
-        terminal.wrote(*filmed([traces[boards.NAME]], film, None, title, terminal))
+        terminal.wrote(*filmed([traces[first]], film, None, title, terminal))
 
 
 app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="markdown")
