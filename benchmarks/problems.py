@@ -2,7 +2,9 @@
 
     python benchmarks/problems.py measure laws visible.json
     python benchmarks/problems.py measure controls controls.json --number random --instances 24
-    python benchmarks/problems.py freeze visible.json controls.json   # writes the targets into the rules
+    python benchmarks/problems.py measure controls seen.json --instances 15
+    python benchmarks/problems.py freeze visible.json controls.json seen.json  # writes the targets into the rules
+    python benchmarks/problems.py hold                     # do both controls hold on every problem of every suite?
     python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of the rules? all of it
     python benchmarks/problems.py measure laws hidden.json --number random
     python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
@@ -36,6 +38,7 @@ INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
 CONTROLLED = 24  # of each problem, for the controls
 ATTACKED = 2  # instances against an adversary
+SEEN = 1.01  # of a target over the oracle's worst on visible instances: levels are written with three digits
 LATER = {"pendulum_network/mpc", "inverted_pendulum_network/mpc"}  # got shipped gains after the freeze of version 1
 MARGIN = 1.25  # of a target over the oracle's worst; 2 where no catalogue sets the levels
 NEAR = 0.1  # of the start: no target is easier, and a problem in which u = 0 ends there is left out
@@ -98,14 +101,20 @@ def levels(laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Ma
     return chosen.tolist()
 
 
-def targets(name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
-    """Return the targets of a problem and the oracle's bandwidth; None where a control forbids it."""
+def targets(
+    name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.ndarray], seen: Mapping[str, np.ndarray]
+) -> dict[str, Any] | None:
+    """Return the targets of a problem and the oracle's bandwidth; None where a control forbids it.
+
+    `runs` are those of the controls on drawn instances, which get a margin, `seen` on the visible ones.
+    """
     rules, best, margin = problems.rules(int(name.partition("@")[2])), None, MARGIN if laws else 2.0
     for label, oracle in runs.items():
         if not label.startswith("oracle"):
             continue
         setting = [float(word) for word in label.split()[1:]]
-        worst = {m: margin * float(oracle[:, MEASURES.index(m)].max()) for m in problems.MEASURES}
+        columns = {m: MEASURES.index(m) for m in problems.MEASURES}
+        worst = {m: max(margin * oracle[:, i].max(), SEEN * seen[label][:, i].max()) for m, i in columns.items()}
         worst["accuracy"] = max(worst["accuracy"], 0.0 if laws else rules["hardest"])
         if not all(map(math.isfinite, worst.values())):
             continue
@@ -128,14 +137,15 @@ def repeat(folder: Path, names: Sequence[str]) -> bool:
     rules = problems.rules(1)
     measure("laws", folder / "laws.json", "", INSTANCES, names)
     measure("controls", folder / "controls.json", rules["frozen"]["number"], CONTROLLED, names)
-    visible, of_controls = read(folder / "laws.json"), read(folder / "controls.json")
+    measure("controls", folder / "seen.json", "", rules["visible"], names)
+    visible, of_controls, seen = (read(folder / f"{kind}.json") for kind in ("laws", "controls", "seen"))
     differ = 0
     for name in names:
         cell = name.partition("@")[0]
         laws = {
             law: runs for law, runs in visible.get(name, {}).items() if f"{cell.partition('/')[0]}/{law}" not in LATER
         }
-        found, stored = targets(name, laws, of_controls[name]), rules["targets"].get(cell)
+        found, stored = targets(name, laws, of_controls[name], seen[name]), rules["targets"].get(cell)
         if found is not None:
             found |= {m: [float(f"{level:.3g}") for level in found[m]] for m in problems.MEASURES}
         differ += found != stored
@@ -143,12 +153,53 @@ def repeat(folder: Path, names: Sequence[str]) -> bool:
     return not differ
 
 
-def freeze(visible: Runs, of_controls: Runs, number: str) -> None:
+def margins(one: problems.Problem, instances: str | Sequence[int], number: str) -> tuple[float, float, int]:
+    """Return by what factors both controls hold on instances of a problem, above 1 if they do, and their failures.
+
+    The oracle's is the least, over runs and measures, of the hardest level over the measure; that of u = 0 is its
+    least accuracy over the easiest level. A failure is a target that the oracle misses or u = 0 reaches.
+    """
+    oracle, zero, failures = math.inf, math.inf, 0
+    for control, law in one.controls.items():
+        for _, trace in stream(one.scenarios(law, instances, number)):
+            values = one.measures(trace)
+            reached = [math.isfinite(t) for key, t in values.items() if key.rpartition("_")[2].isdigit()]
+            failures += sum(reached) if control == "zero" else reached.count(False)
+            if control == "zero":
+                zero = min(zero, values["accuracy"] / one.targets["accuracy"][-1])
+            else:
+                oracle = min(oracle, *(levels[0] / values[m] for m, levels in one.targets.items()))
+    return oracle, zero, failures
+
+
+def hold(number: str, instances: int | None) -> bool:
+    """Print the margins of both controls on every problem of every suite, and return whether both hold on all."""
+    names = sorted({name for each in suite.suites() for name in suite.suite(each)})
+    table: dict[str, dict[str, str]] = {}
+    every, failing = [], []
+    for name in names:
+        one = problems.problem(name)
+        count = range(min(instances, ATTACKED) if "/worst" in name else instances) if instances else "visible"
+        oracle, zero, failures = margins(one, count, number)
+        every.append((oracle, zero, name))
+        failing += [f"{name}: {failures} targets"] if failures else []
+        table.setdefault(one.plant, {})[one.condition] = f"{oracle:.2f}, {zero:.3g}"
+        print(name, f"{oracle:.3f}", f"{zero:.3g}", failures, sep="\t", file=sys.stderr, flush=True)
+    conditions = list(dict.fromkeys(name.replace("@", "/").split("/")[1] for name in names))
+    print("", *conditions, sep=" | ")
+    for plant, cells_of in table.items():
+        print(plant, *(cells_of.get(condition, "–") for condition in conditions), sep=" | ")
+    print(f"{len(names)} problems, {len(failing)} where a control does not hold: {'; '.join(failing) or 'none'}")
+    print("least of the oracle:", *min(every)[::2], "; least of u = 0:", *min(every, key=lambda row: row[1])[1:])
+    return not failing
+
+
+def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str) -> None:
     """Write targets and what is left out below the mark in the rules."""
     path = problems.RULES / "1.toml"
     lines, left_out = ["[targets]"], []
     for name in cells():
-        if (found := targets(name, visible.get(name, {}), of_controls[name])) is None:
+        if (found := targets(name, visible.get(name, {}), of_controls[name], seen[name])) is None:
             left_out.append(name.partition("@")[0])
             continue
         texts = [f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]" for m in problems.MEASURES]
@@ -213,10 +264,13 @@ def parser() -> argparse.ArgumentParser:
     measured.add_argument("out", type=Path)
     measured.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
     measured.add_argument("--instances", type=int, default=INSTANCES)
-    for name, files in (("freeze", ("visible", "controls")), ("agree", ("visible", "hidden"))):
+    for name, files in (("freeze", ("visible", "controls", "seen")), ("agree", ("visible", "hidden"))):
         command = commands.add_parser(name)
         for file in files:
             command.add_argument(file, type=Path)
+    held = commands.add_parser("hold")
+    held.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
+    held.add_argument("--instances", type=int, help="of each problem; default: all visible ones")
     repeated = commands.add_parser("repeat")
     repeated.add_argument("folder", type=Path)
     repeated.add_argument("problems", nargs="*")
@@ -226,14 +280,19 @@ def parser() -> argparse.ArgumentParser:
 
 if __name__ == "__main__":
     given = parser().parse_args()
+    if (number := getattr(given, "number", "")) == "random":
+        number = secrets.token_hex(32)
+        print(f"number {number}", file=sys.stderr)
     if given.command == "measure":
-        number = secrets.token_hex(32) if given.number == "random" else given.number
         measure(given.kind, given.out, number, given.instances, cells())
+    elif given.command == "hold":
+        sys.exit(not hold(number, given.instances))
     elif given.command == "repeat":
         given.folder.mkdir(parents=True, exist_ok=True)
         sys.exit(not repeat(given.folder, given.problems or cells()))
     elif given.command == "freeze":
-        freeze(read(given.visible), read(given.controls), json.loads(given.controls.read_text())["number"])
+        controlled, seen = read(given.controls), read(given.seen)
+        freeze(read(given.visible), controlled, seen, json.loads(given.controls.read_text())["number"])
     elif given.command == "enter":
         enter_all(given.results)
     else:

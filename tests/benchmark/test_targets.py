@@ -19,11 +19,11 @@ def runs(accuracy: list[float], settling: float = 1.0, calm: float = 1.0) -> np.
     return np.array([[0.0, one, 1.0, settling, calm] for one in accuracy])
 
 
-def frozen(unit: float, oracle: list[float], zero: list[float]) -> dict | None:
-    """The targets for laws whose medians are 1, 2, ... 21 times a unit, and for measures of the controls."""
+def frozen(unit: float, oracle: list[float], zero: list[float], seen: float = 1e-9) -> dict | None:
+    """The targets for laws whose medians are 1, 2, ... 21 times a unit, and for accuracies of the controls."""
     laws = {f"{i}": runs([1e-9, unit * i, 1e9], settling=0.1 * i, calm=float(i)) for i in range(1, 22)}
     of_controls = {"zero": runs(zero, math.inf, 0.0), "oracle 16 0.5": runs(oracle, 0.01, 0.01)}
-    return script.targets(CELL, laws, of_controls)
+    return script.targets(CELL, laws, of_controls, {"oracle 16 0.5": runs([seen], 0.01, 0.01)})
 
 
 @pytest.mark.quick
@@ -45,6 +45,15 @@ def test_levels_are_the_quantiles_of_the_medians():
 def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing(oracle, zero, levels):
     found = frozen(0.01, oracle, zero)
     assert (found and found["accuracy"]) == (levels and pytest.approx(levels))
+
+
+@pytest.mark.quick
+@pytest.mark.parametrize(("seen", "hardest"), [(0.049, 0.05), (0.052, 0.05252)])
+def test_a_level_is_no_harder_than_the_oracles_worst_on_visible_instances(seen, hardest):
+    """There it has no margin: of drawn ones the worst, 0.04, has one of 1.25."""
+    found = frozen(0.01, [0.04], [0.9], seen)
+    assert found
+    assert found["accuracy"][0] == pytest.approx(hardest)
 
 
 @pytest.mark.quick
