@@ -126,22 +126,29 @@ def law_colour(law: Component | str) -> str:
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
-    The library's laws have their colours. Only where two would be mistaken for each other, the later one gets the
-    colour farthest from all in the picture: any 12 laws are then 13.7 apart, 24 are 9.6. Laws that are not of the
-    library, whose colours say nothing, come after them, wherever they stand. A law that runs several times has shades
-    of its colour, from light to dark.
+    The library's laws have their colours, in pictures of two and of many. Only one that would be mistaken for a law
+    that is before it in the palette, wherever they stand, gets the colour farthest from all: any 12 laws are then 13.7
+    apart, 24 are 9.6. Laws that are not of the library, whose colours say nothing, come after them. A law that runs
+    several times has shades of its colour, from light to dark.
     """
     names = [_template(law)[1] for law in laws]
     colours: dict[int, str] = {}
-    for i in sorted(range(len(laws)), key=lambda i: (names[i] not in known_laws().own, i)):
+    own, places = known_laws().own, {name: place for place, name in enumerate(_palette(), 1)}  # stated colours have 0
+    library, others = ([i for i, name in enumerate(names) if (name in own) == ours] for ours in (True, False))
+    library.sort(key=lambda i: (places.get(names[i], 0), names[i]))
+    changed = []
+    for i in library + others:
         again = [k for k, name in enumerate(names) if name == names[i]]
         wanted, shades = law_colour(laws[i]), len(again) > 1
         if shades:
             wanted = ramp(wanted, len(again))[again.index(i)]
         if not shades and any(distance(wanted, other) < MIN_DISTANCE for other in colours.values()):
-            used = [*colours.values(), PAPER, INK, DISTURBANCE, REACTION, FAILED]
-            wanted = _farthest([colour for colour in _grid(len(colours)) if colour not in used], used)
-        colours[i] = wanted
+            changed.append(i)
+        else:
+            colours[i] = wanted
+    for i in sorted(changed):
+        used = [*colours.values(), PAPER, INK, DISTURBANCE, REACTION, FAILED]
+        colours[i] = _farthest([colour for colour in _grid(len(colours)) if colour not in used], used)
     return [colours[i] for i in range(len(laws))]
 
 
