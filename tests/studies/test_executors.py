@@ -233,10 +233,14 @@ def of_this_script(y, gains, memory):  # which is __main__, and another one in a
     return -gains.k * math.tanh(s), s
 
 scenarios = grid(["duffing"], ["classical", of_this_script], ["nominal", "noise"], 30, "study", 0.2)
+scenarios += smc.problem("duffing/noise@1").scenarios("pid", range(3))  # as an entry of the benchmark runs them
 add = Store.add
 
 def add_and_wait(store, rows):  # at the third part for the file "go", so that there is work left until then
     add(store, rows)
+    if store.parts.parent.name == "remote":
+        with (out / "hashes").open("a") as file:
+            file.writelines(row["hash"] + "\\n" for row in rows)
     while len(list(store.parts.glob("*.parquet"))) == 3 and not (out / "go").exists():
         time.sleep(0.02)
 
@@ -342,6 +346,19 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp
     said, _ = half_done.communicate(timeout=300)
     assert (said, half_done.returncode) == ("True\n", 0), (tmp_path / "client.log").read_text()
     assert (worker.poll(), other.poll()) == (-signal.SIGKILL, None)
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_in_mid_run_goes_on_over_the_workers_with_the_same_bytes(dask, half_done, tmp_path):
+    half_done.kill()
+    half_done.wait()
+    done = (tmp_path / "hashes").read_text().split()
+    (tmp_path / "go").touch()
+    again = start("-c", CLIENT, str(tmp_path), dask[0], "5", log=tmp_path / "again.log")
+    said, _ = again.communicate(timeout=300)
+    assert (said, again.returncode) == ("True\n", 0), (tmp_path / "again.log").read_text()
+    every = (tmp_path / "hashes").read_text().split()
+    assert 0 < len(done) < len(every) == len(set(every))  # what was done is not run again
 
 
 @pytest.mark.slow
