@@ -29,7 +29,7 @@ OTHERWISE = {  # flag -> the classes that lack it; for "slots", those that have 
 POSITIONAL = {  # made by position, as signals and parts of machines are
     *("Clock", "Wave", "StepChange", "Trials", "Member", "Added", "LinearLaw", "File", "Network", "Policy", "Gain"),
     *("Frames", "Audit", "Robustness", "Identified", "Columns", "Piece", "Point", "Slopes", "rig.Part", "Quantity"),
-    *("Reached", "FmuLaw", "Source", "BorrowedData", "NominalModel", "UserFields", "UserModel", "Tip", "Condition"),
+    *("FmuLaw", "Source", "BorrowedData", "NominalModel", "UserFields", "UserModel", "Tip", "Condition"),
     *("Jump", "Noise", "Functions", "Packed", "Prepared", "Mechanism", "runs.Runs"),
 }
 

@@ -106,6 +106,7 @@ def repeated(name):
     """A twin whose replays are texts."""
     twin = SimpleNamespace(name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated)
     twin.columns, twin.members = SimpleNamespace(time="t"), lambda: {"set 1": twin}
+    twin.prediction = PREDICTION if name == "stepper_furuta" else None
     twin.fit, twin.idle = (lambda _: {"x": 99.04, "u": 1.25}), (lambda _: {"x": -0.04, "u": 0.0})
     twin.fits = lambda _: [{"x": Fall(8.44), "u": -20.0}]
     twin.predictions = lambda _: [(f"{name} predicted", "measured", "times")]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,21 +11,25 @@ from smc_mujoco.cli.terminal import Terminal
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
+if TYPE_CHECKING:
+    from smc_mujoco.evidence.rigs.rig import Rig
+
 
 def rig(
     ctx: typer.Context,
     name: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            metavar="RIG", help="A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint."
+            metavar="[RIG]",
+            help="A rig, such as qube_servo; with --fit also a plant, or FILE.xml:joint+joint. None: all machines.",
         ),
-    ],
+    ] = None,
     files: Annotated[
         list[Path] | None,
         typer.Argument(
             metavar="FILE...",
-            help="Records: CSV or npz files of columns; with --fit also traces. None: predictions of a rig that has "
-            "figures instead of records.",
+            help="Records: CSV or npz files of columns; with --fit also traces. None: what the twin said of the public "
+            "records, and what the machine did.",
         ),
     ] = None,
     columns: options.Columns = None,
@@ -68,8 +72,11 @@ def rig(
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The
     first line of a CSV file has the names of the columns.
 
-    Without a file, the figures of a bursty machine are predicted, whose records cannot be repeated: those that were
-    fitted on, those of other laws, and which parts of the twin they need.
+    Without a file: what the twin said of each public record, and what the machine did. Of a bursty machine, whose
+    records cannot be repeated, the figures are predicted anew: those that were fitted on, those of other laws, and
+    which parts of the twin they need.
+
+    Example: smc-mujoco rig
 
     Example: smc-mujoco rig stepper_furuta
 
@@ -80,8 +87,10 @@ def rig(
     options.only_for(ctx, ("sets", "start", "duration", "film"), not fit, "a record beside its twin: leave out --fit")
     options.only_for(ctx, ("quantities", "given", "starts", "seed", "json"), fit, "--fit")
     options.only_for(ctx, ("seeds",), not files, "predictions: leave the file out")
-    if not files and not fit:
-        _predict(name, seeds)
+    if name is None or (not files and not fit):
+        if fit:
+            raise ScenarioError("--fit without a rig: give one, or a plant")
+        _tell(name or "", seeds, figure)
         return
     files, named = files or [], options.columns(columns)
     if fit:
@@ -93,14 +102,38 @@ def rig(
     _repeat(name, files[0], named, options.names(sets), start, duration, figure, film)
 
 
-def _predict(name: str, seeds: int) -> None:
-    """Show what a rig's twin predicts of its machine."""
+def _tell(name: str, seeds: int, figure: Path | None) -> None:
+    """Show what twins said of public records, of one machine or of all; of a bursty one, what is predicted."""
     with delay_ctrl_c():
+        from smc_mujoco.common.files import writable
         from smc_mujoco.evidence.commands import tables
-        from smc_mujoco.evidence.rigs.predictions import predicted
+        from smc_mujoco.evidence.rigs import twin_figures
+        from smc_mujoco.evidence.rigs.figure import twins_figure
         from smc_mujoco.evidence.rigs.rig import rig as find_rig
 
-    terminal, twin = Terminal(), find_rig(name)
+    writable(figure)
+    terminal, rows = Terminal(), twin_figures.rows(name)
+    twin = find_rig(name) if name else None
+    if twin is not None and not rows:
+        raise ScenarioError(f"no public record of {name} is known here: give one, a CSV or npz file")
+    if figure:
+        terminal.wrote(*twins_figure(rows, figure))
+    if twin is None:
+        for table in tables.machines(rows, twin_figures.orders()):
+            terminal.print(table)
+        terminal.note(twin_figures.ABOUT, wrap=True)
+    elif twin.prediction is None:
+        terminal.print(tables.figures_of_twin(twin.label, rows))
+        terminal.note(twin_figures.ABOUT, wrap=True)
+    else:
+        _predict(twin, seeds, terminal)
+
+
+def _predict(twin: "Rig", seeds: int, terminal: Terminal) -> None:
+    """Show what a rig's twin predicts of its machine."""
+    from smc_mujoco.evidence.commands import tables
+    from smc_mujoco.evidence.rigs.predictions import predicted
+
     told = predicted(twin, seeds)
     for table in tables.predicted(told):
         terminal.print(table)

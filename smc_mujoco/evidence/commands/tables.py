@@ -18,8 +18,10 @@ from smc_mujoco.common.text import capital, number
 from smc_mujoco.evidence.audit import verdict as verdicts
 from smc_mujoco.evidence.audit.verdict import Claim
 from smc_mujoco.evidence.certificates.certificate import Certificate
+from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.predictions import Told, percentiles
+from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 
 # Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to questions have their own.
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim"), strict=True))
@@ -103,6 +105,50 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     for name, fit in by_name.items():
         table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
     return table
+
+
+def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table]:
+    """Return a table of how far twins are from their machines, by what their records were used for, and the orders."""
+    right = functools.partial(Column, justify="right", no_wrap=True)
+    named, used = Column("machine", no_wrap=True), Column("records\nare", no_wrap=True)
+    heads = [right(head) for head in ("\nrows", "median\n%", "largest\n%", "within\nrange", "public\n%")]
+    table = titled("How far the twin is from the machine", named, used, *heads, pad_edge=False)
+    for group in twin_figures.summaries(rows):
+        apart = (_percent(share) for share in (group.median, group.largest))
+        table.add_row(group.rig, group.use, f"{len(group.rows)}", *apart, f"{group.inside}", _percent(group.published))
+    ends = right("sets in the\nmachine's order"), right("tau")
+    orders = titled("Laws in the machine's order", named, "condition", "twin", *ends, pad_edge=False)
+    for one in by_laws:
+        counts = f"{one.ordered} of {one.sets}", f"{one.tau:z.2f}"
+        orders.add_row(one.rig, one.condition, one.variant or "whole", *counts)
+    return [table, orders]
+
+
+def _percent(share: float) -> str:
+    """Return a share as percent; "" for none, and "falls" for a twin that falls."""
+    return "" if math.isnan(share) else "falls" if math.isinf(share) else f"{100.0 * share:.1f}"
+
+
+def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:
+    """Return a machine's figures beside those of its twin: below each record, and each variant of the twin, its own."""
+    right = functools.partial(Column, justify="right", no_wrap=True)
+    heads = [right("machine"), right("twin"), right("range"), right("fit, %"), right("public")]
+    table, before = titled(label, "record", *heads, pad_edge=False), ("", "")
+    for row in rows:
+        if (row.record, row.variant) != before:
+            before = row.record, row.variant
+            law = "" if row.law == "none" else f", {row.law}"
+            about = row.variant or row.use
+            table.add_row(Text.assemble(f"{row.record}{law}: ", (about, "" if row.variant else "bold")))
+        ends = "" if row.low == row.high else f"{_told(row.low)}…{_told(row.high)}"
+        fit = "" if math.isnan(row.fit) or math.isinf(row.fit) else f"{row.fit:z.1f}"
+        cells = _told(row.machine), _told(row.twin), ends, fit, _told(row.published)
+        table.add_row(f"  {row.figure}, {row.unit}".removesuffix(", "), *cells)
+    return table
+
+
+def _told(value: float) -> str:
+    return "" if math.isnan(value) else "falls" if math.isinf(value) else f"{value:.4g}"
 
 
 def predicted(told: Told) -> list[Table]:

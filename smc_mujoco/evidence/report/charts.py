@@ -18,7 +18,8 @@ from smc_mujoco.draw import region
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.films import WIDTH, picture
 from smc_mujoco.evidence.report.words import style
-from smc_mujoco.evidence.rigs.figure import residual_figure
+from smc_mujoco.evidence.rigs.figure import residual_figure, twins_figure
+from smc_mujoco.evidence.rigs.twin_figures import rows as of_machines
 from smc_mujoco.mechanisms.plant import catalogue as known_plants
 
 if TYPE_CHECKING:
@@ -190,3 +191,8 @@ def record(shown: "Repeated") -> bytes:
     fits, title = {"twin": shown.fits["the twin’s"]}, f"{shown.rig.name}: {shown.name}"
     units, twin = shown.rig.units, {"twin": shown.twin}
     return picture(lambda path: residual_figure(title, shown.t, shown.measured, twin, fits, units, path))
+
+
+def twins() -> bytes:
+    """Draw what twins said of public records over what the machines did."""
+    return picture(lambda path: twins_figure(of_machines(), path))

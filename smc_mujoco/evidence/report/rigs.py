@@ -14,7 +14,7 @@ from smc_mujoco.common.text import capital
 from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report, Work
-from smc_mujoco.evidence.rigs import ensemble, records
+from smc_mujoco.evidence.rigs import ensemble, records, twin_figures
 from smc_mujoco.evidence.rigs.rig import Fall, Rig, rig, rigs
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
@@ -127,15 +127,13 @@ def read(folder: Path) -> list[tuple[Path, Rig, Mapping[str, np.ndarray]]]:
     return files
 
 
-def fit(values: Mapping[str, float], unit: str = "%") -> str:
-    """Return a fit in words: "theta 94.1, u 86.7 %", "falls at 8.4 s", or "falls" for a median that is a fall."""
+def fit(values: Mapping[str, float]) -> str:
+    """Return a fit in words: "theta 94.1, u 86.7 %", or "falls at 8.4 s"."""
     if -math.inf in values.values():
-        fall = next((value for value in values.values() if isinstance(value, Fall)), None)
-        return "falls" if fall is None else str(fall)
-    digits = 1 if unit == "%" else 3
-    return ", ".join(f"{name} {value:z.{digits}f}" for name, value in values.items()) + f" {words.typeset(unit)}"
+        return str(next(value for value in values.values() if isinstance(value, Fall)))
+    return ", ".join(f"{name} {value:z.1f}" for name, value in values.items()) + f" {words.typeset('%')}"
 
 
-def reached() -> list[Rig]:
-    """Return the rigs whose fit of public records is kept with them."""
-    return [twin for twin in map(rig, rigs()) if twin.reached]
+def told() -> list[twin_figures.Summary]:
+    """Return how far twins are from their machines, by machine and by what its records were used for."""
+    return twin_figures.summaries(twin_figures.rows())

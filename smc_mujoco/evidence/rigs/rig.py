@@ -76,16 +76,6 @@ class Part:
     zero: Mapping[str, float]  # quantities that the record determines, see `Rig.zero`
 
 
-@dataclasses.dataclass(frozen=True)
-class Reached:
-    """How well a parameter set fits records that the package does not contain. Tests check it if they have them."""
-
-    quantities: str  # "identified", the name of a published set, or "do nothing", see `Rig.idle`
-    records: str  # which records, and what the values are, such as their medians
-    values: Mapping[str, float]  # column or joint -> value
-    unit: str = "%"  # of `Rig.fit`, or that of a residual rms
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Rig:
     """A real machine.
@@ -103,6 +93,7 @@ class Rig:
       start, score_from: s after a record's first sample, at which a replay starts, and from which its fit counts.
       dynamics: function of the quantities, by name, that returns a plant with the joints of the record, for records
         whose torques are predicted from the measured motion. None: records are replayed.
+      identified_from: names of the records that its quantities were identified from, see `twin_figures`.
       free: names of the quantities that its records determine, which `smc.identify` finds by default.
       window: s, of the pieces in which identification first repeats a record; each starts from its measured state.
       published: name of a parameter set -> its values of quantities by name, and its source under "source".
@@ -110,7 +101,6 @@ class Rig:
       laws: laws with gains for this machine, which a ranking compares by default.
       x0: middle of the initial states of a ranking, rad or m, (n,); None: the plant's own.
       prediction: figures that are predicted where records cannot be replayed, see `evidence.rigs.predictions`.
-      reached: how well it fits records that the package does not contain.
       about: licence and history of the data, and what the twin predicts well or badly.
     """
 
@@ -125,6 +115,7 @@ class Rig:
     start: float = 0.0
     score_from: float = 0.0
     dynamics: Callable[[Values], Plant] | None = None
+    identified_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     window: float = 1.0
     published: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
@@ -132,7 +123,6 @@ class Rig:
     laws: tuple[Law, ...] = ()
     x0: tuple[float, ...] | None = None
     prediction: Prediction | None = None
-    reached: tuple[Reached, ...] = ()
     about: str = ""
 
     def __post_init__(self) -> None:

@@ -533,8 +533,8 @@ def test_the_page_has_no_error_and_asks_for_nothing(seen, made):
 
 def test_every_chart_is_drawn(seen, findings):
     counts = seen.page.eval_on_selector_all(".plot > svg", "all => all.map(svg => svg.querySelectorAll('path').length)")
-    # with medians, accuracy, field and fronts
-    assert len(counts) == 4 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
+    # with medians, accuracy, field, fronts and machines
+    assert len(counts) == 5 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
     assert min(counts) > 10
 
 

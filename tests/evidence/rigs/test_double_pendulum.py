@@ -104,16 +104,3 @@ def test_the_numbers_are_those_that_the_records_give(known):
     found = smc.identify(RIG, [known[name] for name in TRAIN], starts=1, most=3)
     for name in ("r1", "r2", "I1", "I2", "cf1", "cf2"):
         assert found.values[name] == pytest.approx(RIG.values[name], rel=0.01)
-
-
-@pytest.mark.parametrize("kept", RIG.reached, ids=lambda kept: kept.quantities)
-def test_the_residuals_that_are_kept_are_those_of_the_records(kept, known):
-    unused = [known[f"C1-sysid-{name}"] for name in ("01", "05", "07")]
-    twin = RIG if kept.quantities == "identified" else None
-    twin = RIG.set(kept.quantities) if kept.quantities.startswith("model") else twin
-    for joint, value in enumerate(kept.values.values()):
-        if twin:
-            parts = [apart(twin, one)[joint] for one in unused]
-        else:
-            parts = [RIG.predictions([one])[0][1][RIG.columns.torque[joint]] for one in unused]
-        assert np.sqrt(np.mean(np.concatenate(parts) ** 2)) == pytest.approx(value, abs=6e-4)

@@ -100,6 +100,7 @@ QUBE_SERVO_3 = Rig(
         pendulum_damping=0.0, pendulum_friction=6.1e-6, gravity=9.7807,
     ),
     machine=rotary,
+    identified_from=("step of 1 V", "ten free falls"),
     free=FOUND,
     published={
         "quanser": {

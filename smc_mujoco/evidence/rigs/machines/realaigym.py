@@ -7,14 +7,13 @@ The rig's numbers are identified from two records. The published fits of the mac
 import math
 
 from smc_mujoco.evidence.rigs.records import Columns
-from smc_mujoco.evidence.rigs.rig import Quantity, Reached, Rig
+from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
 from smc_mujoco.mechanisms.plants.double_pendulum import MODEL_1_0, MODEL_1_1
 
 SOURCE = "dfki-ric-underactuated-lab/double_pendulum (BSD-3), design C.1"
 ORIGIN = "identified here from the public sys-id records 03 and 13"
-UNUSED_RECORDS = "sys-id 01, 05 and 07, not used for identification: rms of the torques' residual"
 UNITS = {
     "m1": "kg", "m2": "kg", "l1": "m", "r1": "m", "r2": "m", "I1": "kg m^2", "I2": "kg m^2", "Ir": "kg m^2",
     "gear": "", "b1": "N m s/rad", "b2": "N m s/rad", "cf1": "N m", "cf2": "N m", "grav": "m/s^2",
@@ -60,17 +59,11 @@ def fields(name, q):
 COMMON = {
     "columns": Columns(time="time", x=("pos_meas1", "pos_meas2"), torque=("tau_meas1", "tau_meas2")),
     "dynamics": lambda q: plant_of("double_pendulum", q),
+    "identified_from": ("sys-id 03", "sys-id 13"),
     "free": ("r1", "r2", "I1", "I2", "Ir", "b1", "b2", "cf1", "cf2"),
     "published": SETS,
     "ensemble": tuple(  # not model 1.1, which has no friction
         {key: value for key, value in SETS[f"model_{number}_0"].items() if key != "source"} for number in (1, 2, 3)
-    ),
-    "reached": (
-        Reached("identified", UNUSED_RECORDS, {"shoulder": 0.132, "elbow": 0.073}, "N m"),
-        Reached("model_1_0", UNUSED_RECORDS, {"shoulder": 0.147, "elbow": 0.088}, "N m"),
-        Reached("model_2_0", UNUSED_RECORDS, {"shoulder": 0.144, "elbow": 0.091}, "N m"),
-        Reached("model_3_0", UNUSED_RECORDS, {"shoulder": 0.197, "elbow": 0.094}, "N m"),
-        Reached("do nothing", UNUSED_RECORDS, {"shoulder": 0.348, "elbow": 0.313}, "N m"),
     ),
     "about": "Records: sys-id motions and board runs of design C.1. Masses are kept, because torques determine only "
     "moments.",

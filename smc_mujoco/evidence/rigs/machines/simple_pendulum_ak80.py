@@ -54,6 +54,7 @@ SIMPLE_PENDULUM = Rig(
     },
     machine=machine,
     columns=Columns(time="time", x=("position",), u="torque", offset=(math.pi,)),
+    identified_from=("ddp", "direct_collocation"),  # by their source
     free=("inertia", "mass_moment", "viscous", "coulomb"),
     window=1.0,
     ensemble=(  # ends of the values found in runs of the source

@@ -1,0 +1,218 @@
+"""What simulation said of real machines, and what these did: the rows of smc_mujoco/evidence/rigs/twin_figures.json.
+
+    python benchmarks/machines.py FOLDER [--seeds N] [--write]
+
+FOLDER has the public records as npz files, one array a column, under the names below. Their sources and licences are
+those that the rigs name; the records are not in the repository. Without a record its old rows stay. EMPS, the
+QUBE-Servo 3 and the stepper need no file: what they are compared with are numbers, a program and an excerpt.
+
+A figure of a signal is its rms about its mean. Records are replayed from their measured state: in closed loop where the
+machine's own controller is known, else under the recorded command; of the double pendulum the torques of the motion are
+predicted.
+"""
+
+import argparse
+import dataclasses
+import json
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+import smc_mujoco as smc
+from smc_mujoco.common.progress import bar
+from smc_mujoco.common.version import versions
+from smc_mujoco.evidence.rigs import twin_figures
+from smc_mujoco.evidence.rigs.machines import emps
+from smc_mujoco.evidence.rigs.predictions import Told, percentiles, predicted
+from smc_mujoco.evidence.rigs.rig import Rig, percentages
+from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
+from smc_mujoco.simulation.time_series import TimeSeries
+
+STEP = Path(__file__).parents[1] / "tests" / "evidence" / "rigs" / "qube_servo_3_step.csv"
+EMPS_RECORD = {"rms error": 0.5814, "largest error": 0.8522}  # mm, of the public record
+FALLS = 2.432  # Hz, of ten free falls while the swings are 8 to 25 degrees
+QUBES = ("00", "06", "12", "18", "24", "30", "36", "42", "11")
+SYS_IDS = ("01", "03", "05", "07", "13")
+# Rig -> (record, law on the machine, file, published set that is told beside the twin)
+FILES: Mapping[str, list[tuple[str, str, str, str]]] = {
+    "qube_servo": [(name, "state feedback", f"qube-{name}", "driver") for name in QUBES],
+    "realaigym_pendubot": [
+        *((f"sys-id {name}", "none", f"double_pendulum-C1-sysid-{name}", "model_1_0") for name in SYS_IDS),
+        ("pendubot 1", "iLQR and LQR", "double_pendulum-pendubot-ilqr_tvlqr_lqr-01", "model_1_0"),
+        ("pendubot 2", "MC-PILCO", "double_pendulum-pendubot-mcpilco-01", "model_1_0"),
+    ],
+    "realaigym_acrobot": [
+        ("acrobot 1", "iLQR and LQR", "double_pendulum-acrobot-ilqr_tvlqr_lqr-01", "model_1_0"),
+        ("acrobot 2", "MC-PILCO", "double_pendulum-acrobot-mcpilco-01", "model_1_0"),
+    ],
+    "simple_pendulum_ak80": [
+        (name, law, f"simple_pendulum-{name}", "")
+        for name, law in (
+            ("ddp", "DDP"), ("direct_collocation", "direct collocation"), ("energy_shaping", "energy shaping"),
+            ("gravity_compensation", "gravity compensation"), ("pd-system_identification", "PD"),
+        )
+    ],
+}  # fmt: skip
+# Rig -> variant of the twin -> quantities that say so
+VARIANTS = {"qube_servo": {"without the commutator": {"ripple": 0.0}}}
+
+
+def size(values: np.ndarray) -> float:
+    """Return the rms about the mean."""
+    return float(np.std(values))
+
+
+def of_record(rig: Rig, name: str, law: str, file: Path, published: str) -> Iterator[TwinFigure]:
+    """Yield the rows of a record: one for each signal."""
+    record = dict(np.load(file))
+    members = list(rig.members().values())
+    variants = {"": members} | {
+        variant: [one.with_values(values, "left out") for one in members]
+        for variant, values in VARIANTS.get(rig.name, {}).items()
+    }
+    control = rig.set(published) if published else None
+    beside = None if control is None else (control.predictions([record])[0], control.fits([record])[0])
+    for variant, sets in variants.items():
+        told = [(one.predictions([record])[0], one.fits([record])[0]) for one in sets]
+        for column, (figure, measured) in enumerate(told[0][0][1].items()):
+            values = [
+                math.inf if math.isinf(list(fits.values())[column]) else size(made[figure])
+                for (made, _, _), fits in told
+            ]
+            fit = float(list(told[0][1].values())[column])
+            public = math.nan
+            if beside is not None and not variant:
+                fell = math.isinf(list(beside[1].values())[column])
+                public = math.inf if fell else size(beside[0][0][figure])
+            yield TwinFigure(
+                rig=rig.name, record=name, law=law, figure=f"{figure} rms", unit=rig.units[figure],
+                machine=size(measured), twin=values[0], low=min(values), high=max(values), runs=len(sets), fit=fit,
+                published=public, variant=variant,
+            )  # fmt: skip
+
+
+def of_emps() -> Iterator[TwinFigure]:
+    """Yield the tracking errors of the program, also with other instants of the reference's samples."""
+    rig, program = smc.rig("emps"), emps.program()
+    values = list(program.values)
+    variants = {
+        "": None,
+        "with the reference a tick late": [values[0], *values[:-1]],
+        "with the reference a tick early": [*values[1:], values[-1]],
+    }
+    for variant, other in variants.items():
+        told = emps.tracking(rig, None if other is None else TimeSeries(program.times, other))
+        for (figure, machine), twin in zip(EMPS_RECORD.items(), told, strict=True):
+            yield TwinFigure(
+                rig="emps", record="program of 24.8 s", law="cascade", figure=figure, unit="mm", machine=machine,
+                twin=1e3 * twin, low=1e3 * twin, high=1e3 * twin, runs=1, variant=variant,
+            )  # fmt: skip
+
+
+def moved(rig: Rig, volts: float, angle: float, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, the arm's angle and the pendulum's from hanging, of a QUBE-Servo 3 that starts at rest."""
+    start = {"x0": (0.0, np.pi + angle), "v0": 0.0}
+    trace = smc.run(rig.scenario("none", feedforward=smc.Constant(volts), duration=duration, **start))
+    return trace.t, trace.x[:, 0], trace.x[:, 1] - np.pi
+
+
+def frequency(rig: Rig) -> float:
+    """Return the mean of the first periods of falls that cover the machine's swings, Hz."""
+    found = []
+    for angle in np.radians((25.0, 19.0, 13.0)):
+        t, _, a = moved(rig, 0.0, angle, 1.2)
+        i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
+        crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
+        found.append(1.0 / (crossings[2] - crossings[0]))
+    return float(np.mean(found))
+
+
+def of_qube_servo_3() -> Iterator[TwinFigure]:
+    """Yield the arm's step of 1 V and the frequency of falls."""
+    rig = smc.rig("qube_servo_3")
+    public = rig.set("quanser")
+    step = np.genfromtxt(STEP, delimiter=",", names=True)
+    step = step[step["t"] <= 0.8]
+
+    def arm(one: Rig) -> np.ndarray:
+        t, theta, _ = moved(one, -1.0, 0.0, 0.8)
+        return np.interp(step["t"], t, theta)
+
+    sets = list(rig.members().values())
+    arms = [arm(one) for one in sets]
+    fits = [percentages({"theta": values}, {"theta": step["theta"]})["theta"] for values in arms]
+    common = {"rig": rig.name, "law": "none", "runs": len(sets)}
+    rms, falls = [size(values) for values in arms], [frequency(one) for one in sets]
+    yield TwinFigure(
+        record="step of 1 V", figure="theta rms", unit="rad", machine=size(step["theta"]), twin=rms[0], low=min(rms),
+        high=max(rms), fit=fits[0], published=size(arm(public)), **common,
+    )  # fmt: skip
+    yield TwinFigure(
+        record="ten free falls", figure="frequency", unit="Hz", machine=FALLS, twin=falls[0], low=min(falls),
+        high=max(falls), published=frequency(public), **common,
+    )  # fmt: skip
+
+
+def of_stepper(told: Told) -> Iterator[TwinFigure | Order]:
+    """Yield the figures of all laws, and the order of laws in all sets, without parts of the twin too."""
+    about, rig = told.prediction, smc.rig("stepper_furuta")
+    for condition in about.conditions:
+        for law in about.order:
+            for figure in about.shown:
+                if not len(values := told.of(law, condition, figure)):
+                    continue
+                known = about.recorded[condition] if law == about.fitted_on else {}
+                middle, low, high = percentiles(values)
+                yield TwinFigure(
+                    rig=rig.name, record=f"{condition}, {law.replace('_', ' ')}", law=law.replace("_", " "),
+                    figure=figure.replace("_", " "), unit=about.units[figure], machine=known.get(figure, math.nan),
+                    twin=middle, low=low, high=high, runs=len(values),
+                )  # fmt: skip
+    for without in ("", *about.left_out):
+        for condition in about.conditions if not without else list(about.conditions)[:1]:
+            count, sets = told.ordered(condition, without)
+            yield Order(
+                rig=rig.name, condition=condition, figure=about.rank.replace("_", " "),
+                laws=tuple(law.replace("_", " ") for law in about.order), ordered=count, sets=sets,
+                tau=told.correlation(condition, without), variant=f"without {without}" * bool(without),
+            )  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seeds", type=int, default=4, help="of each law on each set of the stepper")
+    parser.add_argument("--write", action="store_true", help="replace the rows of the package")
+    given = parser.parse_args()
+    rows: list[TwinFigure | Order] = []
+    for name, records in FILES.items():
+        for record, law, file, published in records:
+            if (path := given.folder / f"{file}.npz").is_file():
+                rows += of_record(smc.rig(name), record, law, path, published)
+            else:
+                print(f"{path} is not there: its old rows stay")
+                rows += [one for one in twin_figures.rows(name) if one.record == record]
+    rows += [*of_emps(), *of_qube_servo_3()]
+    stepper = smc.rig("stepper_furuta")
+    with bar("stepper_furuta", 1, True):
+        rows += of_stepper(predicted(stepper, given.seeds))
+    data = {
+        "command": f"python benchmarks/machines.py FOLDER --seeds {given.seeds} --write",
+        "versions": versions(),
+        "figures": [twin_figures.described(row) for row in rows if isinstance(row, TwinFigure)],
+        "orders": [dataclasses.asdict(row) for row in rows if isinstance(row, Order)],
+    }
+    for row in rows:
+        if isinstance(row, TwinFigure):
+            told = f"{row.machine:9.4g} {row.twin:9.4g} ({row.low:.4g} to {row.high:.4g}) {row.published:9.4g}"
+            print(f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {told} {row.use} {row.variant}")
+        else:
+            print(f"{row.rig:21} {row.condition}: {row.ordered} of {row.sets}, tau {row.tau:.2f} {row.variant}")
+    if given.write:
+        twin_figures.FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
