@@ -106,6 +106,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
         monkeypatch.setattr(smc, name, with_little(getattr(smc, name), little))
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
+    Path("examples").symlink_to(ROOT / "examples")
     played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
     out = io.TextIOWrapper(io.BytesIO(), "utf-8")
     with beside(page, tmp_path), contextlib.redirect_stdout(out) as said, played as end:
@@ -115,7 +116,7 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
     wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|mat|svg|png|tex|c|fmu))"', block))
     wanted |= set(re.findall(r'study\(.*"(\w+)"', block)) | ({"compared"} if "smc.compare(" in block else set())
-    written = {path.name for path in tmp_path.iterdir()} - {"block.py", *titled(page)}
+    written = {path.name for path in tmp_path.iterdir()} - {"block.py", "examples", *titled(page)}
     assert wanted <= written
     assert bool(written) == bool(wanted or end)
 
