@@ -16,6 +16,7 @@ import smc_mujoco
 pytestmark = pytest.mark.quick
 
 ROOT = Path(__file__).parents[1]
+ACTION = ROOT / ".github" / "actions" / "enter" / "action.yml"
 HIDDEN = ROOT / ".github" / "workflows" / "hidden.yml"
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 PAGES = ("docs/install.md", "CONTRIBUTING.md", "docs/enter.md")
@@ -176,3 +177,35 @@ def test_no_code_that_could_read_the_number_runs_beside_it(name, monkeypatch, tm
         ENTERED.main()
     assert (ended.value.code == 9, len(ran)) == ((True, 1) if name == "soft_relay" else (False, 0))
     assert name == "soft_relay" or "before their number is published" in str(ended.value.code)
+
+
+@pytest.mark.parametrize("against", ["", "older results.zip"])
+def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(tmp_path, against):
+    """Values come by the environment alone, so that none can be a command."""
+    action = yaml.safe_load(ACTION.read_text(encoding="utf-8"))
+    *_, step = action["runs"]["steps"]
+    assert "${{" not in step["run"]
+    given = {"folder": "my law; echo no", "suite": action["inputs"]["suite"]["default"], "against": against}
+    program = tmp_path / "smc-mujoco"
+    program.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n', encoding="utf-8")
+    program.chmod(0o755)
+    read = {name: given[value.removeprefix("${{ inputs.").removesuffix(" }}")] for name, value in step["env"].items()}
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", **read}
+    out = subprocess.run(
+        ["bash", "-c", step["run"]], env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    assert out.splitlines() == [
+        "enter",
+        given["folder"],
+        "--suite",
+        "smc-30@1",
+        *["--against", against] * bool(against),
+    ]
+
+
+def test_every_action_of_others_is_pinned_to_a_commit():
+    used = [step["uses"] for _, step in STEPS if "uses" in step]
+    used += [
+        step["uses"] for step in yaml.safe_load(ACTION.read_text(encoding="utf-8"))["runs"]["steps"] if "uses" in step
+    ]
+    assert all(re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", one) or one.startswith("./") for one in used)
