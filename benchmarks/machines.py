@@ -21,10 +21,9 @@ from pathlib import Path
 import numpy as np
 
 import smc_mujoco as smc
-from smc_mujoco.common.progress import bar
 from smc_mujoco.common.version import versions
 from smc_mujoco.evidence.rigs import twin_figures
-from smc_mujoco.evidence.rigs.machines import emps
+from smc_mujoco.evidence.rigs.machines import emps, quanser
 from smc_mujoco.evidence.rigs.predictions import Told, percentiles, predicted
 from smc_mujoco.evidence.rigs.rig import Rig, percentages
 from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
@@ -111,24 +110,6 @@ def of_emps() -> Iterator[TwinFigure]:
             )  # fmt: skip
 
 
-def moved(rig: Rig, volts: float, angle: float, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, the arm's angle and the pendulum's from hanging, of a QUBE-Servo 3 that starts at rest."""
-    start = {"x0": (0.0, np.pi + angle), "v0": 0.0}
-    trace = smc.run(rig.scenario("none", feedforward=smc.Constant(volts), duration=duration, **start))
-    return trace.t, trace.x[:, 0], trace.x[:, 1] - np.pi
-
-
-def frequency(rig: Rig) -> float:
-    """Return the mean of the first periods of falls that cover the machine's swings, Hz."""
-    found = []
-    for angle in np.radians((25.0, 19.0, 13.0)):
-        t, _, a = moved(rig, 0.0, angle, 1.2)
-        i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-        crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
-        found.append(1.0 / (crossings[2] - crossings[0]))
-    return float(np.mean(found))
-
-
 def of_qube_servo_3() -> Iterator[TwinFigure]:
     """Yield the arm's step of 1 V and the frequency of falls."""
     rig = smc.rig("qube_servo_3")
@@ -137,21 +118,21 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
     step = step[step["t"] <= 0.8]
 
     def arm(one: Rig) -> np.ndarray:
-        t, theta, _ = moved(one, -1.0, 0.0, 0.8)
+        t, theta, _ = quanser.moved(one, -1.0, 0.0, 0.8)
         return np.interp(step["t"], t, theta)
 
     sets = list(rig.members().values())
     arms = [arm(one) for one in sets]
     fits = [percentages({"theta": values}, {"theta": step["theta"]})["theta"] for values in arms]
     common = {"rig": rig.name, "law": "none", "runs": len(sets)}
-    rms, falls = [size(values) for values in arms], [frequency(one) for one in sets]
+    rms, falls = [size(values) for values in arms], [quanser.fall_frequency(one) for one in sets]
     yield TwinFigure(
         record="step of 1 V", figure="theta rms", unit="rad", machine=size(step["theta"]), twin=rms[0], low=min(rms),
         high=max(rms), fit=fits[0], published=size(arm(public)), **common,
     )  # fmt: skip
     yield TwinFigure(
         record="ten free falls", figure="frequency", unit="Hz", machine=FALLS, twin=falls[0], low=min(falls),
-        high=max(falls), published=frequency(public), **common,
+        high=max(falls), published=quanser.fall_frequency(public), **common,
     )  # fmt: skip
 
 
@@ -196,8 +177,7 @@ def main() -> None:
                 rows += [one for one in twin_figures.rows(name) if one.record == record]
     rows += [*of_emps(), *of_qube_servo_3()]
     stepper = smc.rig("stepper_furuta")
-    with bar("stepper_furuta", 1, True):
-        rows += of_stepper(predicted(stepper, given.seeds))
+    rows += of_stepper(predicted(stepper, given.seeds))
     data = {
         "command": f"python benchmarks/machines.py FOLDER --seeds {given.seeds} --write",
         "versions": versions(),

@@ -166,6 +166,11 @@ class Plant:
         return self.n - self.driven
 
     @property
+    def judged(self) -> tuple[int, ...]:
+        """The channels whose errors count: all, but not the tilt of a free body that follows from the force."""
+        return (0, 1, 2, 5) if self.pose == "heading" else tuple(range(self.n))
+
+    @property
     def units(self) -> tuple[str, ...]:
         """Unit of x of each channel, (n,)."""
         return self.mixed or (self.unit,) * self.n

@@ -80,6 +80,13 @@ def put_attitude_error(x, v, r, dr, e, de):
     de[3], de[4], de[5] = v[3] - wx, v[4] - wy, v[5] - wz
 
 
+def pose_errors(x: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Return the errors of poses x from references r, (K, 6) each: of an attitude the rotation vector between both."""
+    e = x - r
+    e[:, 3:] = attitude_errors(x[:, 3:], r[:, 3:])
+    return e
+
+
 @njit(error_model="numpy")
 def attitude_errors(x, r):
     """Return the rotation vectors, (K, 3), from attitudes r to attitudes x, both as rotation vectors (K, 3)."""

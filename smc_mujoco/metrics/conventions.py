@@ -92,13 +92,12 @@ def group_trace(trace: Trace, group: Group) -> Trace:
     """Return the trace of a group's channels; the same trace if these are all. Its scenario has all channels."""
     if len(group.channels) == trace.x.shape[1]:
         return trace
-    columns, whole, pose = list(group.channels), trace.arrays(), trace.scenario.plant.pose
-    if pose:  # metrics take x - r for the error
+    plant, whole = trace.scenario.plant, trace.arrays()
+    if plant.pose:  # metrics take x - r for the error
         whole["x"] = trace.r + trace.e
-    turns = pose and group.unit == "rad"
-    columns = columns[-1:] if turns and pose == "heading" else columns
+    columns = [i for i in group.channels if i in plant.judged]
     arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
-    if pose and not turns:
+    if plant.pose and group.unit == "m":
         arrays["u"] = trace.applied
     return dataclasses.replace(trace, **arrays)
 

@@ -49,7 +49,7 @@ from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
-from smc_mujoco.simulation.scenario import U_MAX, Scenario, default_u_max
+from smc_mujoco.simulation.scenario import NOT_OF_FREE_BODIES, U_MAX, Scenario, default_u_max
 from smc_mujoco.simulation.signals import Clock, Constant, Jump, Noise, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
 
 Fields = Mapping[str, Any]
@@ -59,7 +59,6 @@ MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
 ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
-NOT_OF_FREE_BODIES = ("friction", "actuator", "sensor", "feedforward", "clock", "velocity")  # see `check_free_body`
 ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 

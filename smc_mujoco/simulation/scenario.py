@@ -44,6 +44,11 @@ from smc_mujoco.simulation.signals import Clock, Impulse, Jump, Noise, OrnsteinU
 
 MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
+# Fields that no scenario of a free body sets, with their words
+NOT_OF_FREE_BODIES = {
+    "friction": "friction", "actuator": "actuator", "sensor": "sensor", "feedforward": "feedforward",
+    "clock": "clock with late or missed samples", "velocity": "estimated velocity",
+}  # fmt: skip
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
 REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
 PLAY_STEP = 1.25e-4  # s, with a Backlash; tests/mechanisms/hardware/test_play.py compares with plastic stops
@@ -650,17 +655,12 @@ def check_free_body(s: Resolved) -> None:
             f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose channels turn together: "
             "give a law of many joints, such as 'geometric'"
         )
-    for given, what in (
-        (s.friction, "friction"),
-        (s.actuator, "actuator"),
-        (s.sensor, "sensor"),
-        (s.feedforward, "feedforward"),
-        (not s.clock.regular, "clock with late or missed samples"),
-        (s.velocity.name != "measured", f"velocity {s.velocity.name!r}"),
-        (any(d.sees for d in s.disturbance), "disturbance that sees the loop"),
-    ):
-        if given:
-            raise ScenarioError(f"{s.plant.name} is a free body, which takes no {what}: leave that out")
+    given = {name: (words, getattr(s, name)) for name, words in NOT_OF_FREE_BODIES.items()}
+    taken = {"clock": not s.clock.regular, "velocity": s.velocity.name != "measured"}
+    refused = [words for name, (words, value) in given.items() if taken.get(name, bool(value))]
+    refused += ["disturbance that sees the loop"] if any(d.sees for d in s.disturbance) else []
+    if refused:
+        raise ScenarioError(f"{s.plant.name} is a free body, which takes no {refused[0]}: leave that out")
 
 
 def check_inertia(s: Resolved) -> None:

@@ -84,10 +84,8 @@ class Trace:
     @property
     def e(self) -> np.ndarray:
         """Errors x - r, (K + 1, n); of an attitude, the rotation vector from the reference's to the body's, rad."""
-        e = self.x - self.r
-        if self.scenario.plant.pose and e.shape[1] > 3:  # a group's trace has x = r + e
-            e[:, 3:] = rotation.attitude_errors(self.x[:, 3:], self.r[:, 3:])
-        return e
+        whole = self.x.shape[1] == self.scenario.plant.n  # a group's trace has x = r + e
+        return rotation.pose_errors(self.x, self.r) if self.scenario.plant.pose and whole else self.x - self.r
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the arrays by name; `held` only if it is not None."""

@@ -115,7 +115,7 @@ def repeated(name):
     return twin
 
 
-def predicted(twin, seeds):
+def predicted(twin, seeds, report):
     """Predictions in which the first law has its recorded figures, the second twice these, and the third falls."""
     about, values = PREDICTION, {}
     for without in ("", "queue"):
@@ -225,7 +225,8 @@ GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces asid
         "filmed(['measured from 1.5 for 6.0', 'emps from 1.5 for 6.0',", "'emps: run, from 4.5 s of the record'",
         "['measured', 'twin', 'driver', 'quanser']", "driver falls at 8.4 s -20.0", "wrote run.svg wrote film.mp4"]),
     "rig stepper_furuta --seeds 2": (0, [
-        "rig('stepper_furuta') predicted(", "Fitted on: linear", "alpha rms 0.439 0.439 0.844 0.844 deg",
+        "rig('stepper_furuta')", "bar of stepper_furuta, whole 6", "predicted(",
+        "Fitted on: linear", "alpha rms 0.439 0.439 0.844 0.844 deg",
         "accel. rms", "resting 0.800 0.800", "two states hold 0.878 2132 0.128 4.50 0", "4.05…4.95",
         "four states nudges all fall all fall",
         "whole 0.439 0.878 all fall 1 of 1 1.00", "without queue 0.439 0.878 all fall",

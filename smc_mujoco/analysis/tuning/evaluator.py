@@ -106,12 +106,14 @@ class Evaluator:
     def _terms(self, index: int, ended: Ended) -> tuple[float, float]:
         """Return tracking and variation of the run of a case, given by its index."""
         case = self.cases[index]
-        if ended.failed_at is None and case.plant.pose:
-            return self.goal.terms_of_pose(case, ended.log["x"], ended.log["r"], ended.log["u"])
         if ended.failed_at is None:
-            itae, start, tv = sums(ended.log, case.control_period)
-            if math.isfinite(itae):
-                return self.goal.terms_of_sums(case, itae, start, tv)
+            if case.plant.pose:
+                terms = self.goal.terms_of_pose(case, ended.log["x"], ended.log["r"], ended.log["u"])
+            else:
+                itae, start, tv = sums(ended.log, case.control_period)
+                terms = self.goal.terms_of_sums(case, itae, start, tv) if math.isfinite(itae) else (math.nan, math.nan)
+            if math.isfinite(terms[0]):
+                return terms
             errors = np.isfinite(ended.log["x"] - ended.log["r"]).all(axis=1)
             return self.goal.terms_of_failure(int(np.argmin(errors)) * case.control_period)
         return self.goal.terms_of_failure(ended.failed_at)

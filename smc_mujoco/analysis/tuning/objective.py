@@ -29,7 +29,7 @@ from smc_mujoco.common.constraints import Natural, Positive, Whole, constrain
 from smc_mujoco.common.errors import ScenarioError, shown
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
-from smc_mujoco.mechanisms.rotation import attitude_errors
+from smc_mujoco.mechanisms.rotation import pose_errors
 from smc_mujoco.metrics import catalogue as metrics
 from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, Condition, find_condition
 from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_starts
@@ -151,10 +151,10 @@ class Objective:
         return min(itae / start, FAILURE_COST), tv / (bound * self.duration)
 
     def terms_of_pose(self, case: Scenario, x: np.ndarray, r: np.ndarray, u: np.ndarray) -> tuple[float, float]:
-        """Return the terms of a run of a free body, from its log, (K + 1, 6) each."""
-        e, t = x - r, case.control_period * np.arange(len(x))
-        e[:, 3:] = attitude_errors(x[:, 3:], r[:, 3:])
-        parts = np.abs(e[:, :3]).sum(axis=1), np.abs(e[:, 3:] if case.plant.pose == "all" else e[:, 5:]).sum(axis=1)
+        """Return the terms of a run of a free body, from its log, (K + 1, 6) each; NaN where the log has one."""
+        e, t = np.abs(pose_errors(x, r)), case.control_period * np.arange(len(x))
+        turns = [i for i in case.plant.judged if i >= 3]
+        parts = e[:, :3].sum(axis=1), e[:, turns].sum(axis=1)
         tracking = sum(float(np.trapezoid(t * part, t)) / (float(part[0]) or 1.0) for part in parts)
         variation = np.abs(np.diff(u, axis=0)).sum(axis=0) / (np.array(case.limits) * self.duration)
         return min(tracking, FAILURE_COST), float(variation.max())

@@ -77,8 +77,8 @@ def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
 
 
 def _scales_of(gain: Gain, scales: Mapping[str, float]) -> Mapping[str, float]:
-    """Return F, X and T of the channels that a gain is of."""
-    return {name: scales[name + OF_TURNS] for name in ("F", "X", "T")} if gain.turns else scales
+    """Return F, X and T of the channels that a gain is of; of a plant without a pose there is one set."""
+    return {name: scales.get(name + OF_TURNS * gain.turns, scales[name]) for name in ("F", "X", "T")}
 
 
 def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:

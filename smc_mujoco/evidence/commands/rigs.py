@@ -72,9 +72,8 @@ def rig(
     A record has a column for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The
     first line of a CSV file has the names of the columns.
 
-    Without a file: what the twin said of each public record, and what the machine did. Of a bursty machine, whose
-    records cannot be repeated, the figures are predicted anew: those that were fitted on, those of other laws, and
-    which parts of the twin they need.
+    Without a file: what the twin said of each public record, and what the machine did. A bursty machine never repeats a
+    record. Its figures are predicted anew for each law, with and without parts of the twin, in some minutes.
 
     Example: smc-mujoco rig
 
@@ -131,10 +130,13 @@ def _tell(name: str, seeds: int, figure: Path | None) -> None:
 
 def _predict(twin: "Rig", seeds: int, terminal: Terminal) -> None:
     """Show what a rig's twin predicts of its machine."""
+    from smc_mujoco.common.progress import bar
     from smc_mujoco.evidence.commands import tables
     from smc_mujoco.evidence.rigs.predictions import predicted
 
-    told = predicted(twin, seeds)
+    batches = len(twin.members()) * (1 + len(twin.prediction.left_out)) if twin.prediction else 1
+    with bar(twin.name, batches) as shown:
+        told = predicted(twin, seeds, report=lambda count: shown.advance(1.0))
     for table in tables.predicted(told):
         terminal.print(table)
     terminal.note(told.prediction.about, wrap=True)

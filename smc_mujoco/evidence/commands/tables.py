@@ -114,19 +114,16 @@ def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table
     heads = [right(head) for head in ("\nrows", "median\n%", "largest\n%", "within\nrange", "public\n%")]
     table = titled("How far the twin is from the machine", named, used, *heads, pad_edge=False)
     for group in twin_figures.summaries(rows):
-        apart = (_percent(share) for share in (group.median, group.largest))
-        table.add_row(group.rig, group.use, f"{len(group.rows)}", *apart, f"{group.inside}", _percent(group.published))
+        apart = (twin_figures.percent(share) for share in (group.median, group.largest))
+        table.add_row(
+            group.rig, group.use, f"{len(group.rows)}", *apart, f"{group.inside}", twin_figures.percent(group.published)
+        )
     ends = right("sets in the\nmachine's order"), right("tau")
     orders = titled("Laws in the machine's order", named, "condition", "twin", *ends, pad_edge=False)
     for one in by_laws:
         counts = f"{one.ordered} of {one.sets}", f"{one.tau:z.2f}"
         orders.add_row(one.rig, one.condition, one.variant or "whole", *counts)
     return [table, orders]
-
-
-def _percent(share: float) -> str:
-    """Return a share as percent; "" for none, and "falls" for a twin that falls."""
-    return "" if math.isnan(share) else "falls" if math.isinf(share) else f"{100.0 * share:.1f}"
 
 
 def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:

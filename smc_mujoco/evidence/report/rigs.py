@@ -134,6 +134,10 @@ def fit(values: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {value:z.1f}" for name, value in values.items()) + f" {words.typeset('%')}"
 
 
-def told() -> list[twin_figures.Summary]:
-    """Return how far twins are from their machines, by machine and by what its records were used for."""
-    return twin_figures.summaries(twin_figures.rows())
+def told() -> list[tuple[str, ...]]:
+    """Return how far twins are from their machines, by machine and by what its records were used for, as cells."""
+    return [
+        (one.rig, one.use, f"{len(one.rows)}", *map(twin_figures.percent, (one.median, one.largest)), f"{one.inside}",
+         twin_figures.percent(one.published))
+        for one in twin_figures.summaries(twin_figures.rows())
+    ]  # fmt: skip

@@ -64,7 +64,7 @@ def residual_figure(
 
 
 MARKS = {UNFITTED: "D", HELD_OUT: "o", FITTED: "o"}  # filled, but for records that were fitted on
-ROW, LEAST, MOST = 0.17, 0.25, 4.0  # inches a row; ends of the axis, beyond which an arrow stands
+ROW, LEAST, MOST = 0.17, 0.25, 4.0  # inches a row; ends of the axis: a triangle there stands for what is beyond
 
 
 def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
@@ -106,11 +106,16 @@ def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
 
 
 def _row(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
-    """Draw a figure's ratio and its range; at the axis' end for one beyond it, or for a twin that falls."""
-    low, middle, high, public = (
-        min(max(value / row.machine, LEAST), MOST) for value in (row.low, row.twin, row.high, row.published)
-    )
+    """Draw a figure's ratio and its range; beyond the axis, or for a twin that falls, a triangle at its end."""
+    ratios = [value / row.machine for value in (row.low, row.twin, row.high, row.published)]
+    low, middle, high, public = (min(max(ratio, LEAST), MOST) for ratio in ratios)
     ax.plot([low, high], [place, place], color=colour, lw=1.4)
-    if not math.isnan(row.published):
-        ax.plot(public, place, "x", color=style.MUTED, ms=4.5)
-    ax.plot(middle, place, MARKS[row.use], color=colour, mfc=style.PAPER if row.use == FITTED else colour, ms=4.5)
+    for at, ratio, mark, ink in (
+        (public, ratios[3], "x", style.MUTED),
+        (middle, ratios[1], MARKS[row.use], colour),
+    ):
+        if math.isnan(ratio):
+            continue
+        shape = ">" if ratio > MOST else "<" if ratio < LEAST else mark
+        filling = style.PAPER if row.use == FITTED and shape == mark else ink
+        ax.plot(at, place, shape, color=ink, mfc=filling, ms=4.5, clip_on=False)

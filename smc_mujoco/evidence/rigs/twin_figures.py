@@ -1,11 +1,11 @@
 """What simulation said of real machines, and what these did: a row for each figure of each public record.
 
     for one in rows("qube_servo"):
-        one.machine, one.twin, one.use            # 0.213, 0.214, "held out"
+        one.machine, one.twin, one.use            # of theta in record 11: 0.2638, 0.2628, "held out"
 
-A twin is a distribution over its parameter sets and seeds, so that each figure has a range. Whether a
-record was used is not written down with the figure but follows from the rig: one that was identified from no record
-here is "unfitted"; of others the records of `Rig.identified_from` are "fitted on", and all the rest are "held out".
+A twin is a distribution over its parameter sets and seeds, so that each figure has a range. Whether a record was used
+is not written down with the figure but follows from the rig: one that was identified from no record here is "unfitted";
+of others the records of `Rig.identified_from` are "fitted on", and all the rest are "held out".
 
 The records do not come with the package. `python benchmarks/machines.py FOLDER` computes the rows from them.
 """
@@ -128,6 +128,11 @@ class Summary(NamedTuple):
         """How far published numbers are from the machine, the median, a share; NaN without any."""
         known = [abs(row.published / row.machine - 1.0) for row in self.rows if not math.isnan(row.published)]
         return float(np.median(known)) if known else math.nan
+
+
+def percent(share: float) -> str:
+    """Return a share as percent; "" for none, and "falls" for a twin that falls."""
+    return "" if math.isnan(share) else "falls" if math.isinf(share) else f"{100.0 * share:.1f}"
 
 
 def summaries(rows: Sequence[TwinFigure]) -> list[Summary]:

@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
+from smc_mujoco.evidence.rigs.machines.quanser import fall_frequency, moved
 
 pytestmark = pytest.mark.quick
 
 STEP = np.genfromtxt(Path(__file__).with_name("qube_servo_3_step.csv"), delimiter=",", names=True)
 FREQUENCY = 2.432  # Hz, of ten falls, while the swings are 8 to 25 degrees
-
-
-def moved(rig, volts, angle, duration):
-    """Return times, the arm's angle and the pendulum's from hanging, of a machine that starts at rest."""
-    held = smc.Constant(volts)
-    trace = smc.run(rig.scenario("none", feedforward=held, x0=(0.0, np.pi + angle), v0=0.0, duration=duration))
-    return trace.t, trace.x[:, 0], trace.x[:, 1] - np.pi
 
 
 def step_error(rig):
@@ -26,27 +20,16 @@ def step_error(rig):
     return np.sqrt(np.mean((np.interp(ahead["t"], t, arm) - ahead["theta"]) ** 2))
 
 
-def frequency(rig):
-    """The mean of the first periods of falls that cover the machine's swings, as a twin's fade faster."""
-    periods = []
-    for angle in np.radians((25.0, 19.0, 13.0)):
-        t, _, a = moved(rig, 0.0, angle, 1.2)
-        i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
-        crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
-        periods.append(crossings[2] - crossings[0])
-    return np.mean(1.0 / np.array(periods))
-
-
 def test_the_twin_turns_and_falls_as_the_machine_does():
     rig = smc.rig("qube_servo_3")
     assert step_error(rig) < 0.02
-    assert frequency(rig) == pytest.approx(FREQUENCY, rel=0.02)
+    assert fall_frequency(rig) == pytest.approx(FREQUENCY, rel=0.02)
 
 
 def test_the_published_numbers_do_not():
     published = smc.rig("qube_servo_3").set("quanser")
     assert step_error(published) > 0.08
-    assert frequency(published) < 0.9 * FREQUENCY
+    assert fall_frequency(published) < 0.9 * FREQUENCY
 
 
 def test_each_quantity_that_was_found_is_needed():
@@ -54,4 +37,4 @@ def test_each_quantity_that_was_found_is_needed():
     rig = smc.rig("qube_servo_3")
     for name in rig.free:
         other = rig.with_values({name: 0.5 * rig.values[name]})
-        assert step_error(other) > 0.02 or abs(frequency(other) / FREQUENCY - 1.0) > 0.02, name
+        assert step_error(other) > 0.02 or abs(fall_frequency(other) / FREQUENCY - 1.0) > 0.02, name

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.pages import ROOT
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
 from smc_mujoco.cli.main import app
-from smc_mujoco.evidence.rigs import rig, twin_figures
+from smc_mujoco.evidence.rigs import figure, rig, twin_figures
 from smc_mujoco.evidence.rigs.figure import twins_figure
 from smc_mujoco.evidence.rigs.machines import emps
 
@@ -90,6 +91,17 @@ def test_a_twin_that_falls_is_told_and_drawn(tmp_path):
     svg, png = twins_figure(drawn, tmp_path / "told.svg")
     assert "twin over machine" in svg.read_text(encoding="utf-8")
     assert png.exists()
+
+
+@pytest.mark.parametrize(("twin", "mark"), [(math.inf, ">"), (9.0, ">"), (0.1, "<"), (2.0, "D")])
+def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, mark):
+    ax = Figure().subplots()
+    one = dataclasses.replace(row("emps", "program of 24.8 s", "rms error"), machine=1.0, twin=twin)
+    figure._row(ax, 0.0, one, "#000000")
+    (drawn,) = [line for line in ax.lines if line.get_marker() not in ("None", "x")]
+    assert drawn.get_marker() == mark
+    (at,) = np.asarray(drawn.get_xdata(), float)
+    assert 0.25 <= at <= 4.0
 
 
 def test_the_command_tells_all_machines_or_one(monkeypatch):

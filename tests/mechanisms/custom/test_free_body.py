@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.analysis.tuning.evaluator import Evaluator
+from smc_mujoco.analysis.tuning.evaluator import Ended, Evaluator
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import shipped
@@ -226,7 +226,7 @@ def refusals():
     yield "law of one channel", {"law": "pid"}, "of many joints"
     yield "disturbance", {"law": "geometric", "disturbance": smc.signals.Relay(0.1, s=1.0)}, "sees the loop"
     yield "friction", {"law": "geometric", "friction": smc.Coulomb(0.1)}, "friction"
-    yield "estimator", {"law": "geometric", "velocity": "levant"}, "levant"
+    yield "estimator", {"law": "geometric", "velocity": "levant"}, "velocity"
     yield "clock", {"law": "geometric", "clock": smc.Clock(missed=0.1)}, "clock"
 
 
@@ -354,3 +354,13 @@ def test_laws_of_a_free_body_are_compared_and_advised_as_any(drone, tmp_path, mo
     assert itae.winner == "geometric"
     tuned = smc.compare("geometric", drone, "nominal", seeds=1, searches=1, budget=1, duration=0.3, progress=False)
     assert tuned.gains["drone"]["geometric"].source.kind == "tuned here"
+
+
+def test_a_log_that_is_not_finite_counts_as_a_failure_where_it_begins(drone):
+    goal = Objective(conditions=("nominal",), duration=0.1, u_max=0.48)
+    evaluate = Evaluator(goal, goal.scenarios(drone, smc.law("geometric")), ("kx",))
+    log = np.zeros((101, 6), [(name, float) for name in ("x", "r", "u")])
+    log["x"][:, 0] = 1.0
+    assert evaluate._terms(0, Ended(None, log))[0] == pytest.approx(0.005, rel=0.02)  # 0.1^2 / 2
+    log["x"][50:, 4] = np.nan
+    assert evaluate._terms(0, Ended(None, log)) == goal.terms_of_failure(0.05)

@@ -6,10 +6,14 @@ The dead bands of the amplifiers are left out.
 
 import math
 
+import numpy as np
+
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.plant import plant
+from smc_mujoco.simulation.run import run
+from smc_mujoco.simulation.signals import Constant
 
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"
@@ -117,6 +121,27 @@ QUBE_SERVO_3 = Rig(
     "makes the arm stick in small falls, which the machine's does not. A cable with hysteresis would err on the way "
     "back from the stop by 0.004 rad in place of 0.012, and have an arm of 8e-5 to 9e-5 kg m^2.",
 )  # fmt: skip
+FALLS = 25.0, 19.0, 13.0  # degrees, of falls that cover the machine's swings of 8 to 25, as a twin's fade faster
+
+
+def moved(twin: Rig, volts: float, angle: float, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, the arm's angle and the pendulum's from hanging, of a QUBE-Servo that starts at rest."""
+    start = {"x0": (0.0, math.pi + angle), "v0": 0.0}
+    trace = run(twin.scenario("none", feedforward=Constant(volts), duration=duration, **start))
+    return trace.t, trace.x[:, 0], trace.x[:, 1] - math.pi
+
+
+def fall_frequency(twin: Rig) -> float:
+    """Return the mean frequency of the first periods of FALLS, Hz."""
+    found = []
+    for angle in map(math.radians, FALLS):
+        t, _, a = moved(twin, 0.0, angle, 1.2)
+        i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
+        crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
+        found.append(1.0 / (crossings[2] - crossings[0]))
+    return float(np.mean(found))
+
+
 SRV02_PENDULUM = Rig(
     name="srv02",
     label="SRV02 with rotary pendulum, by its published parameters",

@@ -162,7 +162,7 @@ STEPPER_FURUTA = Rig(
     machine=machine,
     controller=LAWS[0],
     columns=Columns(x=("theta", "alpha"), u="u", reference="target"),
-    identified_from=("hold, linear", "nudges, linear"),
+    identified_from=tuple(f"{condition}, {PREDICTION.fitted_on}" for condition in PREDICTION.recorded),
     free=NAMES,
     ensemble=tuple(dict(zip(NAMES, values, strict=True)) for values in SETS[1:]),
     laws=LAWS,
