@@ -109,12 +109,7 @@ def test_the_wheel_says_what_it_is_and_needs(wheel):
         about = email.message_from_bytes(archive.read(name))
         assert {Path(name).name for name in archive.namelist() if "/licenses/" in name} == {"LICENSE", "NOTICE"}
     needs = [need for need in about.get_all("Requires-Dist", []) if "extra ==" not in need]
-    assert {named(need) for need in needs} & {
-        "dm-control",
-        "mediapy",
-        "imageio-ffmpeg",
-        "distributed",
-    } == set()
+    assert {named(need) for need in needs} & {"dm-control", "mediapy", "imageio-ffmpeg", "distributed"} == set()
     assert "mujoco<5,>=3.17" in needs
     assert {*about.get_all("Provides-Extra", [])} == {*EXTRAS}
     assert {*EXTRAS} == {"dm", "film", "report", "cluster", "rl", "live", "fmu", "proof", "mcap", "all"}
@@ -210,16 +205,7 @@ def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(
 
 
 # what only extras bring, as it is imported
-OPTIONAL = (
-    "dm_control",
-    "dm_env",
-    "mediapy",
-    "imageio_ffmpeg",
-    "IPython",
-    "jinja2",
-    "distributed",
-    "gymnasium",
-)
+OPTIONAL = ("dm_control", "dm_env", "mediapy", "imageio_ffmpeg", "IPython", "jinja2", "distributed", "gymnasium")
 ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"
 
 
@@ -265,11 +251,7 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
-    "import smc_mujoco.envs.vector_env": [
-        "smc_mujoco.envs.gymnasium_env",
-        "gymnasium",
-        "pip install 'smc-mujoco[rl]'",
-    ],
+    "import smc_mujoco.envs.vector_env": ["smc_mujoco.envs.gymnasium_env", "gymnasium", "pip install 'smc-mujoco[rl]'"],
     "smc.report('r', quick=True)": ["a report", "jinja2", "pip install 'smc-mujoco[report]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
     "films.film([t], 'a')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],

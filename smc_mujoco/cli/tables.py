@@ -178,9 +178,7 @@ def headings(scenario: Scenario) -> dict[Group, str]:
 
 
 def answers(
-    names: Sequence[str],
-    traces: Mapping[str, Mapping[str, Trace]],
-    again: Mapping[str, Again] | None = None,
+    names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]], again: Mapping[str, Again] | None = None
 ) -> list[Table]:
     """Return a table for each metric that applies, or one table of them all if there is only one condition."""
     scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())

@@ -29,8 +29,7 @@ def export(
     gains: options.GainValues = "",
     joints: options.Joints = None,
     numbers: Annotated[
-        str,
-        typer.Option("--type", metavar="double|float|q15", help="C: type of numbers; q15 for observer_free only."),
+        str, typer.Option("--type", metavar="double|float|q15", help="C: type of numbers; q15 for observer_free only.")
     ] = "double",
     surface: Annotated[
         str | None, typer.Option(metavar="NAME|TEXT", help="FMU: a surface, as linear(c=3); default the law's own.")

@@ -36,15 +36,7 @@ from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.signals import after_pauses
-from smc_mujoco.simulation.state import (
-    channel_at,
-    disturbance_at,
-    function_at,
-    log_at,
-    mixer_at,
-    motor_at,
-    state_at,
-)
+from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, mixer_at, motor_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end

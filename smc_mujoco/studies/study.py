@@ -237,12 +237,7 @@ def study(
 
 
 def _by_key(
-    scenarios: Iterator[Scenario],
-    noise_key: int | str,
-    store: Store,
-    out: Path,
-    resume: bool,
-    plants: run_key.Hashes,
+    scenarios: Iterator[Scenario], noise_key: int | str, store: Store, out: Path, resume: bool, plants: run_key.Hashes
 ) -> dict[str, Scenario]:
     """Return hash -> scenario with its noise key, and open the store. No unchecked law runs with a public key."""
     given = list(scenarios) if noise_key == noise.DRAWN else scenarios

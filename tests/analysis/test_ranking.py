@@ -804,10 +804,7 @@ STIFF = smc.plant("duffing", beta=5.0)
         ({"starts": smc.starts(x0=1.0)}, "x0 of classical and pid differ"),
         ({"duration": 2.0}, "duration of classical and pid differ"),
         ({"plants": STIFF}, "plant of classical and pid differ"),
-        (
-            {"conditions": smc.condition("worn", friction=smc.Coulomb(0.2))},
-            "friction of classical and pid differ",
-        ),
+        ({"conditions": smc.condition("worn", friction=smc.Coulomb(0.2))}, "friction of classical and pid differ"),
     ],
 )
 def test_runs_that_differ_in_more_than_the_law_are_not_compared(changed, words):

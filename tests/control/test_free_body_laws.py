@@ -40,8 +40,7 @@ def sag(K, rho, c, heavier):
 
 
 @pytest.mark.parametrize(
-    ("law", "expected"),
-    [("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)), ("geometric", 0.19 * G / 7.0)],
+    ("law", "expected"), [("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)), ("geometric", 0.19 * G / 7.0)]
 )
 def test_an_unknown_weight_sags_by_the_closed_form(drone, law, expected):
     scenario = smc.Scenario(plant=drone, law=law, mismatch={"m": 1.19}, duration=12.0, control_period=2e-3)

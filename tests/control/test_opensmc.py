@@ -90,10 +90,7 @@ def test_reaching_laws_agree(law, theirs):
 @pytest.mark.parametrize(
     ("law", "theirs"),
     [
-        (
-            smc.law("exponential_reaching", k=1.1, q=4.0, c=3.0),
-            lambda: controllers.ClassicalSMC(c=3.0, k=4.0, eta=1.1),
-        ),
+        (smc.law("exponential_reaching", k=1.1, q=4.0, c=3.0), lambda: controllers.ClassicalSMC(c=3.0, k=4.0, eta=1.1)),
         (
             smc.law("fixed_time", k1=2.0, k2=3.0, a=0.6, b=1.4, k=0.0, c=3.0),
             lambda: controllers.FixedTimeSMC(c=3.0, alpha=2.0, beta=3.0, p=0.6, q=1.4),

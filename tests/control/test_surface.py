@@ -129,11 +129,7 @@ def test_the_global_surface_has_no_reaching_phase_and_becomes_the_linear_one():
 
 
 TERMINAL = [  # speed on s = 0, and the time it takes from e
-    (
-        "terminal",
-        lambda g, e: g["b"] * e ** g["p"],
-        lambda g, e: e ** (1 - g["p"]) / (g["b"] * (1 - g["p"])),
-    ),
+    ("terminal", lambda g, e: g["b"] * e ** g["p"], lambda g, e: e ** (1 - g["p"]) / (g["b"] * (1 - g["p"]))),
     (
         "fast_terminal",
         lambda g, e: g["a"] * e + g["b"] * e ** g["p"],
@@ -144,11 +140,7 @@ TERMINAL = [  # speed on s = 0, and the time it takes from e
         lambda g, e: (g["B"] * e) ** (1 / g["p"]),
         lambda g, e: e ** (1 - 1 / g["p"]) / (g["B"] ** (1 / g["p"]) * (1 - 1 / g["p"])),
     ),
-    (
-        "nonsingular_fast_terminal",
-        lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"]),
-        None,
-    ),
+    ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"]), None),
     (
         "predefined_time",
         lambda g, e: math.exp(e ** g["p"]) * e ** (1 - g["p"]) / (g["p"] * g["T"]),

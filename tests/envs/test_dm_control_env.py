@@ -10,17 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from dm_env import StepType, test_utils
-from helpers.episodes import (
-    EVERY,
-    LAW,
-    columns,
-    dm_control_suite,
-    driven_by_dm,
-    flat,
-    one_of_each,
-    run_of,
-    start,
-)
+from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, flat, one_of_each, run_of, start
 
 import smc_mujoco as smc
 from smc_mujoco.common import extras, gl

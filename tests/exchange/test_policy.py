@@ -21,10 +21,7 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange import policy
 from smc_mujoco.studies import run_key
 
-pytestmark = [
-    pytest.mark.quick,
-    pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning"),
-]
+pytestmark = [pytest.mark.quick, pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")]
 
 
 def proportional(observation):

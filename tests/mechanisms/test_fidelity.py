@@ -124,12 +124,7 @@ def test_in_a_row_the_equation_is_the_same(name):
         np.testing.assert_allclose(pull(row, mujoco.MjData(row), x, v), expected, rtol=1e-9)
 
 
-DEVIATIONS = {
-    "duffing": 0.189,
-    "van_der_pol": 0.231,
-    "pendulum_network": 0.164,
-    "inverted_pendulum_network": 0.312,
-}
+DEVIATIONS = {"duffing": 0.189, "van_der_pol": 0.231, "pendulum_network": 0.164, "inverted_pendulum_network": 0.312}
 
 
 def test_every_other_mechanism_has_its_deviation_here():

@@ -271,7 +271,7 @@ def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
         (
             lambda: smc.Scenario(plant="panda", law="none", mismatch={"payload": -1.0}),
             "panda's true payload becomes -1: give other factors",
-        ),
+        )
     ],
 )
 def test_a_payload_below_nothing_is_refused(make, says):

@@ -811,8 +811,7 @@ def test_metrics_respect_their_orders(trace):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["settling_time", "rise_time", "overshoot", "ultimate_bound", "ise", "iae", "itae", "tv", "energy"],
+    "name", ["settling_time", "rise_time", "overshoot", "ultimate_bound", "ise", "iae", "itae", "tv", "energy"]
 )
 def test_refining_the_samples_converges(name):
     def at(h):

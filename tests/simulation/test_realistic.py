@@ -630,11 +630,7 @@ def test_forces_are_means_over_the_control_period():
 
 
 def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, refused):
-    for text in (
-        "t,d\n0,1\n1,\n2,3\n",
-        "t,d\n0,1\n1,nan\n2,3\n",
-        "t,d\n0,1\n1,1\n2,1\n9,1\n",
-    ):
+    for text in ("t,d\n0,1\n1,\n2,3\n", "t,d\n0,1\n1,nan\n2,3\n", "t,d\n0,1\n1,1\n2,1\n9,1\n"):
         path = tmp_path / "force.csv"
         path.write_text(text)
         refused(lambda path=path: smc.signals.TimeSeries.from_csv(path))

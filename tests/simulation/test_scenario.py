@@ -29,21 +29,7 @@ def brief(value) -> str:
     return repr(value)[:20]
 
 
-NO_NUMBERS = [
-    True,
-    None,
-    "1",
-    "fast",
-    b"1",
-    [],
-    [1.0],
-    {},
-    (1.0, 2.0),
-    1 + 2j,
-    np.bool_(True),
-    np.array([1.0]),
-    ...,
-]
+NO_NUMBERS = [True, None, "1", "fast", b"1", [], [1.0], {}, (1.0, 2.0), 1 + 2j, np.bool_(True), np.array([1.0]), ...]
 
 
 def test_a_field_that_is_no_number_is_refused(refused):

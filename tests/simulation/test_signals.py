@@ -283,10 +283,7 @@ def test_every_channel_has_band_limited_noise_of_its_own():
 
 
 def test_a_band_that_is_none_is_refused(refused):
-    for arguments, parts in (
-        ((0.1, 2.0, 2.0), ("high", "2 Hz")),
-        ((0.1, 2.0, 1.0), ("high", "1 Hz", "2 Hz")),
-    ):
+    for arguments, parts in (((0.1, 2.0, 2.0), ("high", "2 Hz")), ((0.1, 2.0, 1.0), ("high", "1 Hz", "2 Hz"))):
         refused(lambda arguments=arguments: BandLimited(*arguments), "BandLimited", *parts)
 
 

@@ -21,12 +21,7 @@ from smc_mujoco.evidence.accuracy import accuracy as accuracies
 from smc_mujoco.evidence.accuracy.accuracy import AccuracyTable, Run, Setup
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.simulation.conditions import find_condition
-from smc_mujoco.studies import (
-    executors,
-    run_key,
-    study,
-    worst_case,
-)
+from smc_mujoco.studies import executors, run_key, study, worst_case
 from smc_mujoco.studies.advice import Choice, ties
 from smc_mujoco.studies.scene import slug
 from smc_mujoco.studies.worst_case import WorstCase, WorstCases, default_budget

@@ -19,10 +19,7 @@ def scenario(**fields) -> smc.Scenario:
 
 def space(*names: str) -> SimpleNamespace:
     """Axes from 0 to 10 s."""
-    return SimpleNamespace(
-        names=names,
-        ends=[(0.0, 10.0, "s")] * len(names),
-    )
+    return SimpleNamespace(names=names, ends=[(0.0, 10.0, "s")] * len(names))
 
 
 def test_indices_of_ishigami_s_function_are_its_closed_forms():

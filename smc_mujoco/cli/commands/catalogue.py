@@ -38,8 +38,7 @@ def list_(
         str | None, typer.Option(metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant.")
     ] = None,
     gains: Annotated[
-        str,
-        typer.Option(metavar="NAME=VALUE,...", help="Of a law in C: its gains, in order, if the file has none."),
+        str, typer.Option(metavar="NAME=VALUE,...", help="Of a law in C: its gains, in order, if the file has none.")
     ] = "",
     memory: Annotated[
         int | None, typer.Option(min=1, help="Of a law in C: numbers of its memory; default as the file says, or 8.")

@@ -58,8 +58,7 @@ def show(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save.")],
     figure: Annotated[Path | None, options.picture("it")] = None,
     export: Annotated[
-        str | None,
-        typer.Option(metavar="FORMAT,...", help="Also write it as csv, mat, mcap or parquet, beside TRACE."),
+        str | None, typer.Option(metavar="FORMAT,...", help="Also write it as csv, mat, mcap or parquet, beside TRACE.")
     ] = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores.

@@ -13,10 +13,7 @@ from smc_mujoco.control.component import Rest
 from smc_mujoco.control.law import command, law_function, sliding
 from smc_mujoco.control.units import FORCE, RATE, SPEED, Gain
 
-REST = Rest(
-    linear=lambda g: (g.k / g.phi, g.c),
-    force=lambda g, x: g.k * np.clip(g.c * x / g.phi, -1.0, 1.0),
-)
+REST = Rest(linear=lambda g: (g.k / g.phi, g.c), force=lambda g, x: g.k * np.clip(g.c * x / g.phi, -1.0, 1.0))
 
 
 @law_function(

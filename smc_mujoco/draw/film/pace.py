@@ -47,11 +47,7 @@ class Clock(NamedTuple):
 
 
 @constrained
-def clock(
-    traces: Trace | Sequence[Trace],
-    fps: Rate,
-    speed: Speed | None = None,
-) -> Clock:
+def clock(traces: Trace | Sequence[Trace], fps: Rate, speed: Speed | None = None) -> Clock:
     """Return the times of a film's frames from t = 0 to the end of the longest trace; `speed` None: the rule above."""
     traces = style.same_plant(traces)
     whole = end(traces)

@@ -110,10 +110,7 @@ def _row(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
     ratios = [value / row.machine for value in (row.low, row.twin, row.high, row.published)]
     low, middle, high, public = (min(max(ratio, LEAST), MOST) for ratio in ratios)
     ax.plot([low, high], [place, place], color=colour, lw=1.4)
-    for at, ratio, mark, ink in (
-        (public, ratios[3], "x", style.MUTED),
-        (middle, ratios[1], MARKS[row.use], colour),
-    ):
+    for at, ratio, mark, ink in ((public, ratios[3], "x", style.MUTED), (middle, ratios[1], MARKS[row.use], colour)):
         if math.isnan(ratio):
             continue
         shape = ">" if ratio > MOST else "<" if ratio < LEAST else mark

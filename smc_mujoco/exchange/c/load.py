@@ -233,12 +233,7 @@ def check(
 
 
 @constrained
-def _library(
-    source: str | Path,
-    symbol: str,
-    flags: Sequence[str],
-    timeout: Timeout,
-) -> sandbox.Library:
+def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: Timeout) -> sandbox.Library:
     """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
     if sys.platform == "win32":
         raise ScenarioError(

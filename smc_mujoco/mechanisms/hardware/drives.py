@@ -24,15 +24,7 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Bound, Number, OneOf
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.part import (
-    Actuator,
-    Natural,
-    NominalDrive,
-    Offset,
-    Positive,
-    drive_ids,
-    drives,
-)
+from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, NominalDrive, Offset, Positive, drive_ids, drives
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:

@@ -471,11 +471,7 @@ def test_a_law_that_fails_later_is_refused_if_no_gains_mend_it(refused):
 
 
 def test_a_bad_objective_is_refused(refused):
-    for changed in (
-        {"conditions": ("calm",)},
-        {"conditions": 3},
-        {"conditions": ()},
-    ):
+    for changed in ({"conditions": ("calm",)}, {"conditions": 3}, {"conditions": ()}):
         refused(lambda changed=changed: Objective(**changed))
 
 

@@ -112,9 +112,7 @@ def test_the_figures_of_known_signals_are_theirs():
     lag = math.radians(80.0)
     found = stepper_record.figures(
         record(
-            lambda t: 2.0 * np.sin(w * t),
-            lambda t: -np.sin(w * t),
-            lambda t: STEPS / 1.2 * w * -np.cos(w * t + lag),
+            lambda t: 2.0 * np.sin(w * t), lambda t: -np.sin(w * t), lambda t: STEPS / 1.2 * w * -np.cos(w * t + lag)
         )
     )
     assert found["alpha_rms"] == pytest.approx(math.sqrt(2.0), rel=1e-3)

@@ -27,10 +27,7 @@ from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
 from smc_mujoco.simulation import reference  # noqa: E402
 from smc_mujoco.simulation.python_controller import gains_of  # noqa: E402
 
-pytestmark = [
-    needs_compiler,
-    pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning"),
-]
+pytestmark = [needs_compiler, pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")]
 FMI1 = 'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
 VARIABLES = {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
 RENAMED = {"variables": VARIABLES, "constants": {"mode": 0.0}}
@@ -216,10 +213,7 @@ def test_periods_that_do_not_fit_are_said(foreign):
         (2.0, r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout="),
         (3.0, r"torque is nan after 1 steps: fix the FMU"),
         (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
-        (
-            5.0,
-            r"the step from t = 0 s changes the arithmetic of its thread \(rounding, flush-to-zero, ",
-        ),
+        (5.0, r"the step from t = 0 s changes the arithmetic of its thread \(rounding, flush-to-zero, "),
     ],
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
@@ -365,10 +359,7 @@ def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
     for path, said in (
         (tmp_path / "text.fmu", "text.fmu is not an FMU, as it is no zip archive: give an FMU for Co-Simulation"),
         (tmp_path / "empty.fmu", "empty.fmu is not an FMU, as there is no modelDescription.xml in it: give an FMU for"),
-        (
-            tmp_path / "none.fmu",
-            f"no functional mock-up unit at {tmp_path / 'none.fmu'}: give the path",
-        ),
+        (tmp_path / "none.fmu", f"no functional mock-up unit at {tmp_path / 'none.fmu'}: give the path"),
         (3, "cannot read 3: give the path of an .fmu file"),
     ):
         with pytest.raises(smc.ScenarioError) as error:

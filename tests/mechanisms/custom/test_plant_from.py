@@ -843,10 +843,7 @@ def test_a_law_gets_no_model_that_there_is_not(arm):
 
 
 def test_a_force_on_a_body_is_refused(arm):
-    with pytest.raises(
-        smc.ScenarioError,
-        match=r"is a force on a body, and disturbances of arm act on its joints",
-    ):
+    with pytest.raises(smc.ScenarioError, match=r"is a force on a body, and disturbances of arm act on its joints"):
         smc.Scenario(plant=arm(), law="none", disturbance=smc.signals.Gust(amplitude=1.0, time=0.1, width=0.1))
 
 

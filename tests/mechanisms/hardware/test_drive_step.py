@@ -199,10 +199,7 @@ def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step(
     trace = smc.run(scenario(motor, plant=free, law=asking(u=6.0 / motor.scale), x0=0.0, u_max=99.0, duration=3.0))
     inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
     system = np.array(
-        [
-            [-motor.resistance / motor.inductance, -motor.constant / motor.inductance],
-            [motor.constant / inertia, 0.0],
-        ]
+        [[-motor.resistance / motor.inductance, -motor.constant / motor.inductance], [motor.constant / inertia, 0.0]]
     )
     rates, modes = np.linalg.eig(system)
     rest = np.array([0.0, 6.0 / motor.constant])

@@ -47,18 +47,7 @@ def test_a_docstring_says_what_is_declared(part):
         assert min(one.high, MAX_PARAMETER) == (float(ends[2]) if ends and ends.re is RANGE else MAX_PARAMETER), name
 
 
-ABOUT = (
-    "drives",
-    "in_callback",
-    "limited",
-    "delay",
-    "scale",
-    "unit",
-    "nominal",
-    "stall",
-    "bristles",
-    "forces",
-)
+ABOUT = ("drives", "in_callback", "limited", "delay", "scale", "unit", "nominal", "stall", "bristles", "forces")
 
 
 def test_a_part_is_of_the_kind_that_is_recorded(snapshot):
