@@ -1,14 +1,22 @@
-"""What laws of free bodies share: the attitude that turns the thrust to a wanted force, and its rate.
+"""What laws of free bodies share: the attitude that turns the thrust to a wanted force, its rate, and their commands.
 
-Attitudes are unit quaternions (w, x, y, z), body to world, see mechanisms/rotation.py.
+A law wants an acceleration v(e, e') of the position's error, of stiffness -dv/de and damping -dv/de'. So it wants the
+force F = m (r'' + v) + h, and F' = m (r''' - stiffness e' - damping e''), from which the wanted attitude's rate wd
+follows. r''' is that of r'' from sample to sample, which has no noise. e'' is the measured e' through p B / (p + B), 0
+at rest, so that no steady error knows of it, and on the path. A gust is followed late, by 1 / B. Attitudes from sample
+to sample would carry the noise of F over the period into wd. The change of wd is left out, as in the Crazyflie's
+firmware. Attitudes are unit quaternions (w, x, y, z), body to world, see mechanisms/rotation.py.
 """
 
 import math
 
+import numpy as np
 from numba import njit
 
-from smc_mujoco.mechanisms.rotation import quaternion, relative, rotation_vector, turned, turned_back
+from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
 
+BANDWIDTH = 10.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less delay
+STEERING = 2  # slots of a law's memory, the first ones, which `steer` keeps
 MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
 MIN_SINE = 1e-6  # chosen: of the angle between thrust and heading, below which the heading says nothing
 
@@ -22,18 +30,48 @@ def of_thrust(F, r):
     """
     size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
     z = (F[0] / size, F[1] / size, F[2] / size) if size > MIN_FORCE else turned(heading, 0.0, 0.0, 1.0)
-    y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
-    sine = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
-    if sine < MIN_SINE:
-        y = _cross(z, turned(heading, 0.0, 0.0, -1.0))
-        sine = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+    ahead = _ahead(z, heading)
+    y = _cross(z, turned(heading, ahead[0], ahead[1], ahead[2]))
+    sine = math.sqrt(_dot(y, y))
     y = y[0] / sine, y[1] / sine, y[2] / sine
     return _of_axes(_cross(y, z), y, z)
 
 
 @njit(error_model="numpy")
+def rate_of(wanted, F, dF, r, dr):
+    """Return the rate of an attitude `of_thrust`, in its own axes, where the force changes by dF, (3,), per second.
+
+    The heading's rotation vector changes by dr, (3,).
+    """
+    size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
+    if size <= MIN_FORCE:
+        return 0.0, 0.0, 0.0
+    x, y, z = turned(wanted, 1.0, 0.0, 0.0), turned(wanted, 0.0, 1.0, 0.0), turned(wanted, 0.0, 0.0, 1.0)
+    along = _dot(z, dF)
+    dz = (dF[0] - along * z[0]) / size, (dF[1] - along * z[1]) / size, (dF[2] - along * z[2]) / size
+    ahead = _ahead(z, heading)
+    turning = _cross(rate(r[0], r[1], r[2], dr[0], dr[1], dr[2]), ahead)
+    b, db = turned(heading, ahead[0], ahead[1], ahead[2]), turned(heading, turning[0], turning[1], turning[2])
+    across = _cross(z, b)
+    yaw = (_dot(x, _cross(dz, b)) + _dot(x, _cross(z, db))) / math.sqrt(_dot(across, across))
+    return -_dot(y, dz), _dot(x, dz), -yaw
+
+
+@njit(error_model="numpy")
+def _ahead(z, heading):
+    """Return the axis of the heading's attitude, in its own axes, to which the first one of `of_thrust` is nearest."""
+    y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
+    return (1.0, 0.0, 0.0) if math.sqrt(_dot(y, y)) >= MIN_SINE else (0.0, 0.0, -1.0)
+
+
+@njit(error_model="numpy")
 def _cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(error_model="numpy")
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(error_model="numpy")
@@ -56,49 +94,55 @@ def _of_axes(x, y, z):
 
 
 @njit(error_model="numpy")
-def rate_of(wanted, memory, dt):
-    """Return the angular velocity of the wanted attitude, in its own axes, since the sample before; 0 at the first.
+def steer(y, v, stiffness, damping, memory):
+    """Return the force for the acceleration v of the position's error, and by how much the attitude is off it.
 
-    memory, (5,), keeps the attitude of the sample before, and whether there was one.
+    Arguments are vectors (3,). The result is the force, (3,), the error quaternion from the wanted attitude, the
+    angular velocity relative to it and that of it, both in the axes of the body. Of the law's memory two slots are
+    kept: the filtered e' and r'' of the sample before, and whether there was one.
     """
-    w = 0.0, 0.0, 0.0
-    if memory[4] != 0.0:
-        turn = relative((memory[0], memory[1], memory[2], memory[3]), wanted)
-        vector = rotation_vector(turn[0], turn[1], turn[2], turn[3])
-        w = vector[0] / dt, vector[1] / dt, vector[2] / dt
-    memory[0], memory[1], memory[2], memory[3], memory[4] = wanted[0], wanted[1], wanted[2], wanted[3], 1.0
-    return w
-
-
-@njit(error_model="numpy")
-def attitude_error(y, wanted, memory):
-    """Return the error quaternion from a wanted attitude, the angular velocity relative to it, and that of it.
-
-    Both angular velocities are in the axes of the body.
-    """
-    error = relative(wanted, quaternion(y.x[3], y.x[4], y.x[5]))
-    w = rate_of(wanted, memory, y.dt)
-    moving = turned_back(error, w[0], w[1], w[2])
-    return error, (y.v[3] - moving[0], y.v[4] - moving[1], y.v[5] - moving[2]), moving
-
-
-@njit(error_model="numpy")
-def put_thrust(y, F, u):
-    """Write into u, (6,), the part of the force F, (3,), along the third axis of the body."""
-    up = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0)
-    thrust = F[0] * up[0] + F[1] * up[1] + F[2] * up[2]
-    u[0], u[1], u[2] = thrust * up[0], thrust * up[1], thrust * up[2]
-
-
-@njit(error_model="numpy")
-def put_torque(y, v, moving, u):
-    """Write into u, (6,), the torque for the change v, (3,), of the angular velocity relative to the wanted one.
-
-    `moving` is the wanted one, in the axes of the body, whose own change is left out, as in the Crazyflie's firmware.
-    """
-    w = (y.v[3], y.v[4], y.v[5])
-    carried = _cross(w, moving)
+    m, F, dF = y.M[0, 0], np.zeros(3), np.zeros(3)
+    if memory[0, 1] == 0.0:
+        memory[:3, 0], memory[3:, 0], memory[0, 1] = y.de[:3], y.ddr[:3], 1.0
     for i in range(3):
+        F[i] = m * (y.ddr[i] + v[i]) + y.h[i]
+        change = BANDWIDTH * (y.de[i] - memory[i, 0]) / (1.0 + y.dt * BANDWIDTH)
+        memory[i, 0] += y.dt * change
+        dF[i] = m * ((y.ddr[i] - memory[3 + i, 0]) / y.dt - stiffness[i] * y.de[i] - damping[i] * change)
+        memory[3 + i, 0] = y.ddr[i]
+    wanted = of_thrust(F, y.r[3:])
+    w = rate_of(wanted, F, dF, y.r[3:], y.dr[3:])
+    error = relative(wanted, quaternion(y.x[3], y.x[4], y.x[5]))
+    moving = turned_back(error, w[0], w[1], w[2])
+    return F, error, (y.v[3] - moving[0], y.v[4] - moving[1], y.v[5] - moving[2]), moving
+
+
+@njit(error_model="numpy")
+def shorter(error, turning):
+    """Return 2 sgn(q0) qv of an error quaternion, and its rate at a relative angular velocity; sgn(0) = 1.
+
+    q and -q are the same attitude, and the sign is that of the shorter way.
+    """
+    sign, angle, change = 1.0 if error[0] >= 0.0 else -1.0, np.zeros(3), np.zeros(3)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        angle[i] = 2.0 * sign * error[1 + i]
+        change[i] = sign * (error[0] * turning[i] + error[1 + j] * turning[k] - error[1 + k] * turning[j])
+    return angle, change
+
+
+@njit(error_model="numpy")
+def wrench(y, F, v, moving):
+    """Return a law's command, (6,): the force F along the body's third axis, and the torque for the change v.
+
+    v, (3,), is that of the angular velocity relative to the wanted one, `moving`. Both are in the axes of the body.
+    """
+    u, w = np.zeros(6), (y.v[3], y.v[4], y.v[5])
+    up, carried = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0), _cross(w, moving)
+    thrust = _dot(F, up)
+    for i in range(3):
+        u[i] = thrust * up[i]
         u[3 + i] = y.h[3 + i]
         for j in range(3):
             u[3 + i] += y.M[3 + i, 3 + j] * (v[j] - carried[j])
+    return u

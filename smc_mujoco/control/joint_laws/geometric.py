@@ -4,9 +4,8 @@
     torque = J (-kR e_R - kW e_W - w x wd) + w x J w,    e_R = vee(Rd' R - R' Rd) / 2,    e_W = w - wd,
 
 with e the error of the position, R the attitude, Rd the one that turns the thrust to F with the first axis of the
-reference's attitude, w the angular velocity, and wd that of Rd, from sample to sample, in the axes of the body. Of the
-reference's attitude only the heading counts. The change of wd is left out, as in the Crazyflie's firmware. s is
-e' + (kx / kv) e and e_W + (kR / kW) e_R: the law slides nowhere.
+reference's attitude, w the angular velocity, and wd that of Rd, which follows from F', in the axes of the body. Of the
+reference's attitude only the heading counts. s is e' + (kx / kv) e and e_W + (kR / kW) e_R: the law slides nowhere.
 Exponentially stable if the attitude starts within 90 degrees of Rd, attractive from almost all others: for exact J,
 no saturation and no lag of the thrust, and |F| above 0.
 Gains: kx [1/s^2], kv [1/s], of the position; kR [1/s^2], kW [1/s], of the attitude. Those of the paper per mass and
@@ -17,7 +16,7 @@ Source: T. Lee, M. Leok & N. H. McClamroch, "Geometric tracking control of a qua
 
 import numpy as np
 
-from smc_mujoco.control.attitude import attitude_error, of_thrust, put_thrust, put_torque
+from smc_mujoco.control.attitude import STEERING, steer, wrench
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.units import RATE, Gain, Unit
 
@@ -36,17 +35,14 @@ from smc_mujoco.control.units import RATE, Gain, Unit
     },
     accuracy={"s": 0, "e": 0},
     label="Geometric",
-    memory=1,
+    memory=STEERING,
 )
 def geometric(y, gains, memory):
-    u, s, v = np.zeros(6), np.zeros(6), np.zeros(3)
-    F = y.M[0, 0] * (y.ddr[:3] - gains.kx * y.e[:3] - gains.kv * y.de[:3]) + y.h[:3]
+    s, v, ones = np.zeros(6), np.zeros(3), np.ones(3)
     s[:3] = y.de[:3] + gains.kx / gains.kv * y.e[:3]
-    error, turning, moving = attitude_error(y, of_thrust(F, y.r[3:]), memory[:, 0])
+    F, error, turning, moving = steer(y, -gains.kv * s[:3], gains.kx * ones, gains.kv * ones, memory)
     for i in range(3):
         e = 2.0 * error[0] * error[i + 1]
         v[i] = -gains.kR * e - gains.kW * turning[i]
         s[3 + i] = turning[i] + gains.kR / gains.kW * e
-    put_thrust(y, F, u)
-    put_torque(y, v, moving, u)
-    return u, s
+    return wrench(y, F, v, moving), s

@@ -14,11 +14,9 @@ Source: A. Yazdanshenas & R. Faieghi, "Quaternion-based sliding mode control for
 of quadrotors", arXiv 2403.10934.
 """
 
-import math
-
 import numpy as np
 
-from smc_mujoco.control.attitude import attitude_error, of_thrust, put_thrust, put_torque
+from smc_mujoco.control.attitude import STEERING, shorter, steer, wrench
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
@@ -39,19 +37,16 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
     },
     accuracy={"s": 0, "e": 0},
     label="Quaternion sliding",
-    memory=1,
+    memory=STEERING,
 )
 def quaternion_sliding(y, gains, memory):
-    u, s, v = np.zeros(6), np.zeros(6), np.zeros(3)
+    s = np.zeros(6)
     s[:3] = y.de[:3] + gains.c * y.e[:3]
-    F = y.M[0, 0] * (y.ddr[:3] - gains.c * y.de[:3] - gains.Kx * tanh(gains.rhox * s[:3])) + y.h[:3]
-    q, w, moving = attitude_error(y, of_thrust(F, y.r[3:]), memory[:, 0])
-    sign = 1.0 if q[0] >= 0.0 else -1.0
+    reached = tanh(gains.rhox * s[:3])
+    slope = gains.Kx * gains.rhox * (1.0 - reached * reached)
+    v = -gains.c * y.de[:3] - gains.Kx * reached
+    F, error, turning, moving = steer(y, v, gains.c * slope, gains.c + slope, memory)
+    angle, change = shorter(error, turning)
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        s[3 + i] = w[i] + gains.lam * sign * q[1 + i]
-        turning = 0.5 * (q[0] * w[i] + q[1 + j] * w[k] - q[1 + k] * w[j])
-        v[i] = -gains.lam * sign * turning - gains.K * math.tanh(gains.rho * s[3 + i])
-    put_thrust(y, F, u)
-    put_torque(y, v, moving, u)
-    return u, s
+        s[3 + i] = turning[i] + 0.5 * gains.lam * angle[i]
+    return wrench(y, F, -0.5 * gains.lam * change - gains.K * tanh(gains.rho * s[3:]), moving), s
