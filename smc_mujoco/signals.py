@@ -4,16 +4,6 @@ from smc_mujoco.simulation.signals import BandLimited, Gust, Impulse, MinimumJer
 from smc_mujoco.simulation.time_series import Held, TimeSeries, Waypoints, cartesian_path
 
 __all__ = [
-    "BandLimited",
-    "Gust",
-    "Held",
-    "Impulse",
-    "MinimumJerk",
-    "OrnsteinUhlenbeck",
-    "Pulse",
-    "Ramp",
-    "Relay",
-    "TimeSeries",
-    "Waypoints",
-    "cartesian_path",
-]
+    "BandLimited", "Gust", "Held", "Impulse", "MinimumJerk", "OrnsteinUhlenbeck", "Pulse", "Ramp", "Relay",
+    "TimeSeries", "Waypoints", "cartesian_path",
+]  # fmt: skip

@@ -380,13 +380,10 @@ def files(random: Random) -> str:
     world()
     kind = random.choice(["trace", "about", "tuned", "json", "table", "csv"])
     source, read = {
-        "trace": ("trace.npz", smc.load),
-        "about": ("trace.npz", smc.load),
-        "tuned": ("tuned.json", tuned.load),
-        "json": ("tuned.json", tuned.load),
-        "table": ("out/results.parquet", smc.Table.read),
+        "trace": ("trace.npz", smc.load), "about": ("trace.npz", smc.load), "tuned": ("tuned.json", tuned.load),
+        "json": ("tuned.json", tuned.load), "table": ("out/results.parquet", smc.Table.read),
         "csv": ("a.csv", smc.signals.TimeSeries.from_csv),
-    }[kind]
+    }[kind]  # fmt: skip
     place = Path(f"damaged{Path(source).suffix}")
     data = Path(source).read_bytes()
     if kind == "json":

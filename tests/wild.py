@@ -52,19 +52,8 @@ NUMBERS += [fractions.Fraction(1, 3), fractions.Fraction(10**400), decimal.Decim
 NUMBERS += [np.timedelta64(1, "s"), np.timedelta64("NaT", "s"), np.datetime64("2026-01-01"), datetime.timedelta(1)]
 TEXTS = ["", " ", "0", "1", "nan", "duffing", "classical", "x", "\0", "a\0b", "\ud800", "a\n b", "../../x", "/", "."]
 TEXTS += [
-    "~",
-    "é" * 300,
-    "x" * 100_000,
-    "\x1b[31m",
-    "con",
-    "a.npz",
-    "%s{0}",
-    "$x_1^",
-    b"1",
-    b"",
-    b"a\0",
-    bytearray(b"1"),
-]
+    "~", "é" * 300, "x" * 100_000, "\x1b[31m", "con", "a.npz", "%s{0}", "$x_1^", b"1", b"", b"a\0", bytearray(b"1"),
+]  # fmt: skip
 ARRAYS = [np.array(0.5), np.array([0.5]), np.zeros(0), np.zeros(2), np.zeros((2, 2)), np.array(["a"]), np.array(None)]
 ARRAYS += [np.array([None, 1], object), np.array([math.nan]), np.zeros(3, bool), np.ma.masked, np.zeros(1, "f4,i4")]
 SEVERAL = [(), [], {}, set(), frozenset(), [1.0], (1.0, 2.0), [math.nan], ["a"], [None], {"a": 1}, {1: 2}, {"a": None}]
@@ -73,24 +62,12 @@ SEVERAL += [nested(50_000), [Shy()], {Shy: Shy()}, [1, "a"], [[1, 2], [3]], [1.0
 OTHERS = [None, ..., NotImplemented, int, float, str, object, object(), Shy(), Awkward(), Shy, print, len, math, smc]
 OTHERS += [lambda: 1, lambda *a, **k: None, lambda x: x, Path("a"), Path("a.npz"), ValueError("x"), type, slice(1)]
 MADE: list[Callable[[], Any]] = [  # made again for each use
-    lambda: iter([]),
-    lambda: iter([1.0, 2.0]),
-    lambda: (x for x in ("a", "b")),
-    lambda: zip([1], [2], strict=True),
-    lambda: smc.Constant(1.0),
-    lambda: smc.Noise(0.1),
-    lambda: smc.law("none"),
-    lambda: smc.law("classical"),
-    lambda: smc.surface("linear"),
-    lambda: smc.estimator("measured"),
-    lambda: smc.plant("duffing"),
-    lambda: smc.Jump(0.0, {}),
-    smc.Encoder,
-    lambda: smc.Coulomb(0.1),
-    lambda: smc.Lag(0.1),
-    lambda: smc.Contact("none"),
-    lambda: smc.Scenario(plant="duffing", law="classical", duration=0.01),
-]
+    lambda: iter([]), lambda: iter([1.0, 2.0]), lambda: (x for x in ("a", "b")), lambda: zip([1], [2], strict=True),
+    lambda: smc.Constant(1.0), lambda: smc.Noise(0.1), lambda: smc.law("none"), lambda: smc.law("classical"),
+    lambda: smc.surface("linear"), lambda: smc.estimator("measured"), lambda: smc.plant("duffing"),
+    lambda: smc.Jump(0.0, {}), smc.Encoder, lambda: smc.Coulomb(0.1), lambda: smc.Lag(0.1),
+    lambda: smc.Contact("none"), lambda: smc.Scenario(plant="duffing", law="classical", duration=0.01),
+]  # fmt: skip
 FIXED = [NUMBERS, TEXTS, ARRAYS, SEVERAL, OTHERS]
 
 

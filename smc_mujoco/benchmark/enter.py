@@ -78,18 +78,11 @@ def enter(
     if number and (target / TABLE).exists():
         marks += _better_on_visible(runs.Runs(target / TABLE), runs.Runs(table))
     about = {
-        "suite": name,
-        "hidden": hashlib.sha256(number.encode()).hexdigest() if number else None,
-        "instances": count,
-        "entry": entry.about,
-        "checked": not first["why_unchecked"],
-        "marks": marks,
-        "sample": first["sample"],
-        "run": report["seconds"],
-        "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(problems),
-        "versions": versions(),
-        "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
-    }
+        "suite": name, "hidden": hashlib.sha256(number.encode()).hexdigest() if number else None, "instances": count,
+        "entry": entry.about, "checked": not first["why_unchecked"], "marks": marks, "sample": first["sample"],
+        "run": report["seconds"], "hashes": {"table": hashlib.sha256(content).hexdigest()} | made_under(problems),
+        "versions": versions(), "machine": f"{platform.machine()}, {platform.system()}, {os.cpu_count()} cores",
+    }  # fmt: skip
     write_json(result, about)
     return target
 

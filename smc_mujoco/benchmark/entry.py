@@ -47,44 +47,21 @@ EVERYWHERE = "all"  # the set of gains of the division "one set"
 MODULES = {"math", "numpy", "smc_mujoco"}  # that a checked law's file may import
 BUILTINS = {
     *(
-        "abs",
-        "all",
-        "any",
-        "bool",
-        "dict",
-        "divmod",
-        "enumerate",
-        "float",
-        "int",
-        "isinstance",
-        "len",
-        "list",
-        "max",
+        "abs", "all", "any", "bool", "dict", "divmod", "enumerate", "float", "int", "isinstance", "len", "list", "max",
         "min",
     ),
     *("pow", "range", "reversed", "round", "set", "sorted", "str", "sum", "tuple", "zip"),
     *("ArithmeticError", "ValueError", "ZeroDivisionError", "__name__"),
-}
+}  # fmt: skip
 FRAMES = {"gi_frame", "cr_frame", "ag_frame", "tb_frame"}  # from which all names of Python can be reached
 WRITERS = {"tofile", "dump"}  # of arrays
 NUMPY_NAMES = {
     *(
-        "arange",
-        "argmax",
-        "argmin",
-        "array",
-        "asarray",
-        "clip",
-        "cross",
-        "diag",
-        "dot",
-        "empty",
-        "eye",
-        "float64",
+        "arange", "argmax", "argmin", "array", "asarray", "clip", "cross", "diag", "dot", "empty", "eye", "float64",
         "full",
     ),
     *("interp", "linspace", "max", "min", "ndarray", "ones", "sum", "trapezoid", "zeros"),
-}
+}  # fmt: skip
 LIBRARY_NAMES = {"law_function", "Measurement", "surface_function", "estimator_function"}  # that it may take from smc
 
 

@@ -27,14 +27,9 @@ GROUPS: dict[str, list[Callable[..., None]]] = {  # heading in the help -> comma
     "Run and look": [catalogue.list_, runs.run, runs.show, runs.view],
     "Compare": [studies.compare, studies.which],
     "Tune and analyse": [
-        analysis.tune,
-        analysis.margins,
-        analysis.worst,
-        analysis.sensitivity,
-        analysis.basin,
-        analysis.chatter,
+        analysis.tune, analysis.margins, analysis.worst, analysis.sensitivity, analysis.basin, analysis.chatter,
     ],
-}
+}  # fmt: skip
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
     for group, commands in annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS.items():
         GROUPS.setdefault(group, []).extend(commands)

@@ -44,14 +44,9 @@ TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on
 
 # Columns of a table of scores: heading -> metric.
 SCORE_COLUMNS = {
-    "settles": "settling_time",
-    "overshoot": "overshoot",
-    "ultimate\nbound": "ultimate_bound",
-    "ITAE": "itae",
-    "max |u|": "max_u",
-    "TV rate": "tv_rate",
-    "spread\nsettles": "spread_settling_time",
-}
+    "settles": "settling_time", "overshoot": "overshoot", "ultimate\nbound": "ultimate_bound", "ITAE": "itae",
+    "max |u|": "max_u", "TV rate": "tv_rate", "spread\nsettles": "spread_settling_time",
+}  # fmt: skip
 FAILED = Text("failed", style="red")
 MAX_PRINTED_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
 MAX_NAMED_JOINTS = 4  # in the heading of a group

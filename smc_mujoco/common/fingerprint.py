@@ -178,13 +178,9 @@ def _function_contents(function: FunctionType) -> list[Any]:
     names = names_in(function.__code__)
     closure = [_cell_contents(cell) for cell in function.__closure__ or ()]
     return [
-        function.__code__,
-        function.__defaults__,
-        function.__kwdefaults__,
-        closure,
-        *_reached(function.__globals__, names.variables, names.attributes, set()),
-        *_overloads(function),
-    ]
+        function.__code__, function.__defaults__, function.__kwdefaults__, closure,
+        *_reached(function.__globals__, names.variables, names.attributes, set()), *_overloads(function),
+    ]  # fmt: skip
 
 
 def _overloads(function: FunctionType) -> list[Any]:

@@ -38,24 +38,8 @@ from smc_mujoco.control.law import Measurement
 ir = internals.ir
 
 BUILTINS = {
-    abs,
-    bool,
-    complex,
-    divmod,
-    enumerate,
-    float,
-    int,
-    len,
-    max,
-    min,
-    pow,
-    range,
-    reversed,
-    round,
-    slice,
-    sum,
-    zip,
-}
+    abs, bool, complex, divmod, enumerate, float, int, len, max, min, pow, range, reversed, round, slice, sum, zip,
+}  # fmt: skip
 NUMPY_NAMES = """
 all allclose any arange argmax argmin argsort around array asarray ascontiguousarray clip concatenate copy cross cumprod
 cumsum diag diff dot eye flip full full_like identity interp isclose kron linspace max mean median min nan_to_num ones

@@ -18,13 +18,10 @@ from smc_mujoco.common.text import joined
 
 NONE, DEFAULT, TUNED, SHIPPED, STUDY, YOURS = "none", "default", "tuned here", "shipped", "study", "yours"
 KINDS = {
-    NONE: "the law has no gains",
-    DEFAULT: "the defaults of the law's own file",
-    TUNED: "result of a search that the user ran",
-    SHIPPED: "those of the package for this plant",
-    STUDY: "those of a published study",
-    YOURS: "given by the user",
-}
+    NONE: "the law has no gains", DEFAULT: "the defaults of the law's own file",
+    TUNED: "result of a search that the user ran", SHIPPED: "those of the package for this plant",
+    STUDY: "those of a published study", YOURS: "given by the user",
+}  # fmt: skip
 
 MAX_SPREAD = 1.0  # larger ones are told as a multiple
 

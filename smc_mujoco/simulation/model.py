@@ -124,24 +124,16 @@ def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int)
     computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
     xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
     indices = {
-        "turn": -1,
-        "gathered": -1,
-        "qpos": model.jnt_qposadr[joint],
-        "qvel": model.jnt_dofadr[joint],
-        "xfrc": xfrc,
-        "sign": sign,
-        "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
+        "turn": -1, "gathered": -1, "qpos": model.jnt_qposadr[joint], "qvel": model.jnt_dofadr[joint], "xfrc": xfrc,
+        "sign": sign, "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
         "force": model.actuator_outadr[drive] if drive >= 0 else -1,
         "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
-        "shaft_qpos": model.jnt_qposadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
-        "horizontal": xfrc,
-        "axis": 0,
-        "hinge_body": -1,
-        "anchor": -1,
+        "shaft_qpos": model.jnt_qposadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1, "horizontal": xfrc,
+        "axis": 0, "hinge_body": -1, "anchor": -1,
         "friction_force": -1 if friction < 0 else model.actuator_outadr[friction],
         "friction_ctrl": model.actuator_ctrladr[friction] if computed else -1,
         "qfrc": model.jnt_dofadr[joint] if direct else -1,
-    }
+    }  # fmt: skip
     if hinge:
         across = int(component == 0)  # a horizontal axis across that of the hinge
         indices |= {"horizontal": 6 * body + across, "axis": across, "hinge_body": 3 * body, "anchor": 3 * joint}

@@ -226,33 +226,17 @@ def _settings(s: Resolved) -> dict[str, Any]:
     sensor, drives = s.sensor or IDEAL_SENSOR, s.drive_step
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
-        "steps": s.steps,
-        "stages": s.stages,
-        "step": s.physics_step,
-        "period": s.control_period,
-        "jitter": s.clock.jitter_steps(s.physics_step),
-        "pause": pause,
-        "pause_samples": samples,
-        "pause_phase": pause_phase(s),
-        "missed": s.clock.missed,
-        "delay": s.delay_steps,
+        "steps": s.steps, "stages": s.stages, "step": s.physics_step, "period": s.control_period,
+        "jitter": s.clock.jitter_steps(s.physics_step), "pause": pause, "pause_samples": samples,
+        "pause_phase": pause_phase(s), "missed": s.clock.missed, "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
-        "has_drives": drives is not None or s.stepper is not None,
-        "drive_step": drives._asdict() if drives else {},
-        "stepper": pulsing(s.stepper)._asdict() if s.stepper else {},
-        "exact_friction": s.exact_friction,
-        "seed": s.noise_seed,
-        "sigma_x": s.noise.position,
-        "sigma_v": s.noise.velocity,
-        "bias": sensor.bias,
-        "counts": 0.0 if sensor.counts == math.inf else sensor.counts,
-        "dropout": sensor.dropout,
-        "read_period": sensor.period or 0.0,
-        "read_delay": sensor.delay,
-        "uses_model": s.model != "none",
-        "drive_gain": s.nominal_drive.gain,
-        "drive_drag": s.nominal_drive.drag,
-    }
+        "has_drives": drives is not None or s.stepper is not None, "drive_step": drives._asdict() if drives else {},
+        "stepper": pulsing(s.stepper)._asdict() if s.stepper else {}, "exact_friction": s.exact_friction,
+        "seed": s.noise_seed, "sigma_x": s.noise.position, "sigma_v": s.noise.velocity, "bias": sensor.bias,
+        "counts": 0.0 if sensor.counts == math.inf else sensor.counts, "dropout": sensor.dropout,
+        "read_period": sensor.period or 0.0, "read_delay": sensor.delay, "uses_model": s.model != "none",
+        "drive_gain": s.nominal_drive.gain, "drive_drag": s.nominal_drive.drag,
+    }  # fmt: skip
 
 
 def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
@@ -268,16 +252,11 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
     if s.drive_step is not None:
         states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
     return motors | {
-        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
-        "a": buffer.reserve(n),
-        "told": buffer.reserve(n) if s.model == "true" else 0,
-        "width": width,
-        "commands": buffer.reserve(2 * width),
-        "states": buffer.put(states.view(float).tolist()),
-        "limits": buffer.put(s.limits),
-        "delay_slots": slots,
+        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")}, "a": buffer.reserve(n),
+        "told": buffer.reserve(n) if s.model == "true" else 0, "width": width, "commands": buffer.reserve(2 * width),
+        "states": buffer.put(states.view(float).tolist()), "limits": buffer.put(s.limits), "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
-    }
+    }  # fmt: skip
 
 
 def known_values(s: Resolved) -> list[float]:

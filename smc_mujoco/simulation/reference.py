@@ -161,16 +161,9 @@ class Loop:
                 # the quotient may round to just beyond the limit
                 applied[self.driven] = np.clip(delayed[self.driven], -limits, limits)
                 sample = (
-                    x,
-                    v,
-                    self.commands[-1],
-                    applied,
-                    self.controller.s,
-                    d,
-                    self.controller.r,
-                    *self.forces / self.scenario.steps,
-                    self.held,
-                )
+                    x, v, self.commands[-1], applied, self.controller.s, d, self.controller.r,
+                    *self.forces / self.scenario.steps, self.held,
+                )  # fmt: skip
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
                 self.forces[:] = self.held[:] = 0.0

@@ -148,22 +148,14 @@ class Compared(Tables):
             worst, times = self.worst.get(plant, {}), self.times.get(plant, {})
             for entry in board.entries:
                 yield {
-                    **{"plant": "", "condition": ""} | dict(board.group),
-                    "law": entry.law,
-                    "gains": ", ".join(dict.fromkeys(origin.kind for origin in entry.sources)),
-                    "metric": board.metric,
-                    "unit": board.unit,
-                    "median": entry.interval.median,
-                    "low": entry.interval.low,
-                    "high": entry.interval.high,
-                    "failed": entry.failed,
-                    "runs": entry.runs,
-                    "best": entry.rank.best,
-                    "winner": board.winner == entry.law,
-                    "worst_found": worst[entry.law].value if worst else math.nan,
+                    **{"plant": "", "condition": ""} | dict(board.group), "law": entry.law,
+                    "gains": ", ".join(dict.fromkeys(origin.kind for origin in entry.sources)), "metric": board.metric,
+                    "unit": board.unit, "median": entry.interval.median, "low": entry.interval.low,
+                    "high": entry.interval.high, "failed": entry.failed, "runs": entry.runs, "best": entry.rank.best,
+                    "winner": board.winner == entry.law, "worst_found": worst[entry.law].value if worst else math.nan,
                     "time": times[entry.law].median if entry.law in times else math.nan,
                     "time_ratio": times[entry.law].ratio if entry.law in times else math.nan,
-                }
+                }  # fmt: skip
 
     def plot(
         self, path: str | os.PathLike[str] | None = None, metrics: Sequence[str] = (), **options: Any

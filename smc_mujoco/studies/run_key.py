@@ -51,18 +51,11 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
     """Return the columns of a table that describe a run. `plants` is as in `key`."""
     data = description(scenario)
     return {
-        "hash": key(scenario, data, plants),
-        "plant": scenario.plant.name,
-        "law": scenario.law.name,
-        "gains": to_json(dict(scenario.law.gains)),
-        **source(scenario),
-        "condition": condition(scenario, data),
-        "seed": scenario.seed,
-        "noise_key": scenario.noise_key,
-        "duration": scenario.duration,
-        "versions": to_json(data["versions"]),
-        "scenario": to_json(data),
-    }
+        "hash": key(scenario, data, plants), "plant": scenario.plant.name, "law": scenario.law.name,
+        "gains": to_json(dict(scenario.law.gains)), **source(scenario), "condition": condition(scenario, data),
+        "seed": scenario.seed, "noise_key": scenario.noise_key, "duration": scenario.duration,
+        "versions": to_json(data["versions"]), "scenario": to_json(data),
+    }  # fmt: skip
 
 
 def withheld(scenario: Scenario) -> dict[str, Any]:

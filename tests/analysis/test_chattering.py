@@ -386,15 +386,10 @@ def relay_with_a_dead_zone(a):
 @pytest.mark.parametrize(
     ("law", "wanted"),  # N at the cycles: 2 p / K
     [
-        (saturation, 1.0 / 1.02),
-        (saturation, 0.7),
-        (saturation, 1.05),
-        (relay, 3.0),
-        (relay_with_a_dead_zone, 5.0),
-        (relay_with_a_dead_zone, 40.0),
-        (relay_with_a_dead_zone, 62.0),
+        (saturation, 1.0 / 1.02), (saturation, 0.7), (saturation, 1.05), (relay, 3.0), (relay_with_a_dead_zone, 5.0),
+        (relay_with_a_dead_zone, 40.0), (relay_with_a_dead_zone, 62.0),
     ],
-)
+)  # fmt: skip
 def test_the_cycles_of_a_closed_form_are_stable_where_its_gain_falls(law, wanted):
     """The largest N of the relay with a dead zone is 63.7, at 0.0141; N = 62 at 0.0126 and 0.0162."""
     turn, places = 40.0, np.geomspace(1e-3, 3.0, 200_001)

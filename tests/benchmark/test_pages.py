@@ -36,13 +36,8 @@ def entered(folder, name, factor, marks=()):
     runs.write(target / TABLE, groups)
     table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()
     entry = {
-        "name": name,
-        "authors": ["A <b>"],
-        "source": "here",
-        "licence": "MIT",
-        "division": "one set",
-        "digest": "0",
-    }
+        "name": name, "authors": ["A <b>"], "source": "here", "licence": "MIT", "division": "one set", "digest": "0",
+    }  # fmt: skip
     about = {"suite": "smc-30@1", "instances": 3, "entry": entry, "checked": not marks, "marks": list(marks)}
     about |= {
         "sample": [1e-8, 2e-8, 1.5],

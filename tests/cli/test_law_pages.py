@@ -185,13 +185,8 @@ def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
 
     said = law_pages.entry(own)
     assert said == (
-        "Own law",
-        "u = -k e",
-        "",
-        "Sampled, it is late.",
-        "It is odd.",
-        'A. Author, "Title", J. Things 1(2):3, 1999.',
-    )
+        "Own law", "u = -k e", "", "Sampled, it is late.", "It is odd.", 'A. Author, "Title", J. Things 1(2):3, 1999.',
+    )  # fmt: skip
     assert law_pages.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
 
 

@@ -51,13 +51,9 @@ scene = smc.Scene(
 )
 '''
 FILES = {
-    f"calm-{LABEL.rstrip('.').replace(' ', '_')}..npz",
-    "noisy-rough.npz",
-    "calm.svg",
-    "calm.png",
-    "noisy.svg",
+    f"calm-{LABEL.rstrip('.').replace(' ', '_')}..npz", "noisy-rough.npz", "calm.svg", "calm.png", "noisy.svg",
     "noisy.png",
-}
+}  # fmt: skip
 
 
 TRACES = {name for name in FILES if name.endswith(".npz")}
@@ -629,16 +625,11 @@ def test_a_file_that_cannot_be_written_is_named(call, scene, folder):
 @pytest.mark.parametrize(
     "words",
     [
-        ["run"],
-        ["show"],
-        ["walk"],
-        ["run", "duffing", "--fast"],
-        ["run", "duffing", "--seed", "-1"],
-        ["run", "duffing", "--seed", "one"],
-        ["run", "duffing", "--threads", "0"],
+        ["run"], ["show"], ["walk"], ["run", "duffing", "--fast"], ["run", "duffing", "--seed", "-1"],
+        ["run", "duffing", "--seed", "one"], ["run", "duffing", "--threads", "0"],
     ],
     ids=" ".join,
-)
+)  # fmt: skip
 def test_a_wrong_command_line_ends_with_code_2_and_shows_the_usage(words, call):
     code, out, err = call(*words)
     assert (code, out) == (2, "")

@@ -12,20 +12,11 @@ from smc_mujoco.common.text import capital, joined, number
 pytestmark = pytest.mark.quick
 
 NUMBERS = {  # value -> with three digits, with one
-    math.nan: ("none", "none"),
-    -math.inf: ("never", "never"),
-    0.0: ("0", "0"),
-    -9.9e-10: ("<1e-9", "<1e-9"),
-    1e-9: ("1.0e-9", "1.0e-9"),
-    9.994e-4: ("1.0e-3", "1.0e-3"),
-    1e-3: ("0.00100", "0.001"),
-    -0.012345: ("-0.0123", "-0.01"),
-    1.0: ("1.00", "1"),
-    98.76: ("98.8", "99"),
-    -12345.6: ("-12346", "-12346"),
-    1e5: ("1.0e5", "1.0e5"),
-    2.56e12: ("2.6e12", "2.6e12"),
-}
+    math.nan: ("none", "none"), -math.inf: ("never", "never"), 0.0: ("0", "0"), -9.9e-10: ("<1e-9", "<1e-9"),
+    1e-9: ("1.0e-9", "1.0e-9"), 9.994e-4: ("1.0e-3", "1.0e-3"), 1e-3: ("0.00100", "0.001"),
+    -0.012345: ("-0.0123", "-0.01"), 1.0: ("1.00", "1"), 98.76: ("98.8", "99"), -12345.6: ("-12346", "-12346"),
+    1e5: ("1.0e5", "1.0e5"), 2.56e12: ("2.6e12", "2.6e12"),
+}  # fmt: skip
 LONG = "a_name_that_is_longer than_twenty"
 TABLE = Tabular(
     title="Laws & gains",

@@ -68,14 +68,10 @@ def test_copies_keep_the_source(kind, tmp_path):
     law = sets()[kind]
     its = law.source
     kept = [
-        pickle.loads(pickle.dumps(law)),
-        pickle.loads(pickle.dumps(law.named("other"))),
-        copy.deepcopy(law),
-        dataclasses.replace(law, memory=9),
-        dataclasses.replace(law, gains=dict(law.gains)),
-        by_channel([law, law]),
+        pickle.loads(pickle.dumps(law)), pickle.loads(pickle.dumps(law.named("other"))), copy.deepcopy(law),
+        dataclasses.replace(law, memory=9), dataclasses.replace(law, gains=dict(law.gains)), by_channel([law, law]),
         by_channel([law, smc.law("none").named("x")]).of_channel(0),
-    ]
+    ]  # fmt: skip
     trace = smc.run(smc.Scenario(plant=PLANT, law=law, duration=0.01))
     kept.append(smc.load(trace.save(tmp_path / "trace.npz")).scenario.law)
     assert [one.source for one in kept] == [its] * len(kept)

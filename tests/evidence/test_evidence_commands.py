@@ -162,17 +162,10 @@ STUBS = {  # of each command: the functions replaced, and what they give
     },
 }
 REFUSED = (
-    "certify",
-    "certify duffing --check d.json",
-    "certify duffing --worst",
-    "claims --json --mutants",
-    "claims --papers --quick",
-    "report --paper gaber --law pid",
-    "rig --fit emps a.csv --set mass=much",
-    "rig emps a.csv b.csv",
-    "rig emps a.csv --starts 3",
-    "rig emps a.csv --seeds 3",
-)
+    "certify", "certify duffing --check d.json", "certify duffing --worst", "claims --json --mutants",
+    "claims --papers --quick", "report --paper gaber --law pid", "rig --fit emps a.csv --set mass=much",
+    "rig emps a.csv b.csv", "rig emps a.csv --starts 3", "rig emps a.csv --seeds 3",
+)  # fmt: skip
 AXIS = ("mass 120.500 0.021 95.1 kg", "offset 6.000 7 -3.16 N", "a.csv 99.0 (99.0) 81.0 (81.5)", "(correlation -0.999)")
 AXIS += ("0 N s/m", "0 (6 ± 7)", "0.0981 times")
 GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces aside

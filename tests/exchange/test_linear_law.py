@@ -125,17 +125,11 @@ def test_systems_of_scipy_and_matrices_are_taken():
 
 def test_what_cannot_be_a_law_is_one_sentence(refused):
     wrong = {
-        "improper": tf([1, 0], [1]),
-        "two outputs": control.rss(2, 2, 1),
-        "three inputs": control.rss(2, 1, 3),
-        "51 states": control.rss(51, 1, 1),
-        "not square": ([[1.0, 2.0]], 1, 1, 0),
-        "not finite": (float("nan"), 1, 1, 0),
-        "not real": (1j, 1, 1, 0),
-        "negative period": (1, 1, 1, 0, -0.1),
-        "a name": "pid",
-        "three matrices": (1, 1, 1),
-    }
+        "improper": tf([1, 0], [1]), "two outputs": control.rss(2, 2, 1), "three inputs": control.rss(2, 1, 3),
+        "51 states": control.rss(51, 1, 1), "not square": ([[1.0, 2.0]], 1, 1, 0),
+        "not finite": (float("nan"), 1, 1, 0), "not real": (1j, 1, 1, 0), "negative period": (1, 1, 1, 0, -0.1),
+        "a name": "pid", "three matrices": (1, 1, 1),
+    }  # fmt: skip
     for K in wrong.values():
         refused(lambda K=K: smc.exchange.law_from_control(K))
     refused(lambda: smc.exchange.law_from_control(LEAD, ["y"]))

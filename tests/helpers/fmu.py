@@ -72,14 +72,8 @@ def archived(folder: Path, sources: list[Path], name: str, system: str, about: s
     headers, library = Path(fmpy.__file__).parent / "c-code", folder / f"{name}.so"
     if not library.exists():
         command = [
-            *build.compiler(),
-            *build.LIBRARY_FLAGS,
-            f"-I{headers}",
-            *map(str, sources),
-            "-o",
-            str(library),
-            "-lm",
-        ]
+            *build.compiler(), *build.LIBRARY_FLAGS, f"-I{headers}", *map(str, sources), "-o", str(library), "-lm",
+        ]  # fmt: skip
         subprocess.run(command, check=True)
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", about)

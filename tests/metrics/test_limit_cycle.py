@@ -84,20 +84,13 @@ def test_slow_waves_and_drifts_do_not_count():
 @pytest.mark.parametrize(
     "s",
     [
-        np.zeros(len(T)),
-        np.exp(-3.0 * T),
-        np.exp(-3.0 * T) * np.sin(60.0 * T),
-        np.exp(3.0 * T) * np.sin(60.0 * T),
-        0.5 * np.sin(6.0 * T),
-        (2.0 / math.pi) * np.arcsin(np.sin(math.tau * 2.0 * T)),
-        np.random.default_rng(0).normal(size=len(T)),
-        1.0 + 1e-12 * wave(30.0),
-        np.where(T < 1.0, wave(30.0), math.nan),
-        wave(30.0)[:10],
-        1e160 * wave(30.0),
+        np.zeros(len(T)), np.exp(-3.0 * T), np.exp(-3.0 * T) * np.sin(60.0 * T), np.exp(3.0 * T) * np.sin(60.0 * T),
+        0.5 * np.sin(6.0 * T), (2.0 / math.pi) * np.arcsin(np.sin(math.tau * 2.0 * T)),
+        np.random.default_rng(0).normal(size=len(T)), 1.0 + 1e-12 * wave(30.0),
+        np.where(T < 1.0, wave(30.0), math.nan), wave(30.0)[:10], 1e160 * wave(30.0),
     ],
     ids=["zero", "decay", "dying", "growing", "slow", "slow triangle", "noise", "rounding", "broken", "short", "huge"],
-)
+)  # fmt: skip
 def test_what_does_not_oscillate_steadily_has_no_limit_cycle(s):
     amplitude, frequency = limit_cycle(T[: len(s)], s)
     assert math.isnan(amplitude)

@@ -106,14 +106,11 @@ FIELDS = {
     "jitter": {"clock": smc.Clock(jitter=5e-4)},
     "missed": {"clock": smc.Clock(missed=0.3), "input_delay": 3e-3},
     "all": {
-        "clock": smc.Clock(jitter=9e-4, missed=0.3),
-        "physics_step": 2.5e-4,
-        "input_delay": 2.25e-3,
-        "sensor": smc.Encoder(4096, period=1.25e-3, delay=5e-4, dropout=0.2),
-        "noise": smc.Noise(0.01, 0.05),
+        "clock": smc.Clock(jitter=9e-4, missed=0.3), "physics_step": 2.5e-4, "input_delay": 2.25e-3,
+        "sensor": smc.Encoder(4096, period=1.25e-3, delay=5e-4, dropout=0.2), "noise": smc.Noise(0.01, 0.05),
         "actuator": smc.Lag(0.01),
     },
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(

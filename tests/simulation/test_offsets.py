@@ -250,14 +250,10 @@ def userdata(kind, size):
 @pytest.mark.parametrize(
     ("size", "kind"),
     [
-        (0, "zeros"),
-        (1, "nearly our magic number"),
-        (callback.USERDATA, "nearly our magic number"),
-        (callback.USERDATA, "ones"),
-        (500, "numbers"),
-        (500, "nan"),
+        (0, "zeros"), (1, "nearly our magic number"), (callback.USERDATA, "nearly our magic number"),
+        (callback.USERDATA, "ones"), (500, "numbers"), (500, "nan"),
     ],
-)
+)  # fmt: skip
 def test_strangers_are_not_touched(size, kind):
     model = smc.plant("pendulum_network").load(nuserdata=size)
     ends = []

@@ -268,16 +268,11 @@ def test_contacts_that_differ_in_numbers_are_one_batch(name, kind):
 @pytest.mark.parametrize(
     "fields",
     [
-        {"friction": smc.Coulomb(0.1)},
-        {"friction": LUGRE},
-        {"actuator": smc.DCMotor()},
-        {"actuator": MOTOR},
-        {"actuator": smc.Backlash(0.1)},
-        {"contact": "stops"},
-        {"mechanism": "springs"},
+        {"friction": smc.Coulomb(0.1)}, {"friction": LUGRE}, {"actuator": smc.DCMotor()}, {"actuator": MOTOR},
+        {"actuator": smc.Backlash(0.1)}, {"contact": "stops"}, {"mechanism": "springs"},
         {"sensor": smc.Encoder(delay=1e-3)},
     ],
-)
+)  # fmt: skip
 def test_scenarios_of_other_parts_are_other_batches_and_run_together(fields):
     common = {"physics_step": 2.5e-4, "integrator": "implicitfast"}
     ideal, realistic = scenario(**common), scenario(**common, **fields)

@@ -477,15 +477,10 @@ def with_array(y, gains, memory):
 
 def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin():
     rich = {
-        "duration": 0.1,
-        "plant": smc.plant("pendulum_network", n=3),
-        "control_period": 2e-3,
-        "noise": smc.Noise(0.01, 0.05),
-        "disturbance": [smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.2, 0.1)],
-        "input_delay": 3e-3,
-        "jump": smc.Jump(0.05, {"mass": 2.0}),
-        "seed": 3,
-    }
+        "duration": 0.1, "plant": smc.plant("pendulum_network", n=3), "control_period": 2e-3,
+        "noise": smc.Noise(0.01, 0.05), "disturbance": [smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.2, 0.1)],
+        "input_delay": 3e-3, "jump": smc.Jump(0.05, {"mass": 2.0}), "seed": 3,
+    }  # fmt: skip
     twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
     for function in (with_json, WithClass(), Unhashable(), with_array):
         with pytest.warns(smc.errors.PlainLoopWarning, match="reference loop"):

@@ -256,15 +256,10 @@ def test_a_reference_that_is_noise_is_refused(refused):
 
 
 SIGNALS = [
-    smc.Constant(1.0),
-    smc.Sine(1.0, 2.0, 3.0),
-    smc.Step(1.0, 2.0),
-    smc.signals.Pulse(1.0, 2.0, 3.0),
-    smc.signals.OrnsteinUhlenbeck(1.0, 2.0, 3.0),
-    smc.signals.Impulse(1.0, 2.0, 3.0),
-    smc.signals.Gust(1.0, 2.0, 3.0),
+    smc.Constant(1.0), smc.Sine(1.0, 2.0, 3.0), smc.Step(1.0, 2.0), smc.signals.Pulse(1.0, 2.0, 3.0),
+    smc.signals.OrnsteinUhlenbeck(1.0, 2.0, 3.0), smc.signals.Impulse(1.0, 2.0, 3.0), smc.signals.Gust(1.0, 2.0, 3.0),
     smc.signals.BandLimited(1.0, 2.0, 3.0),
-]
+]  # fmt: skip
 
 
 def test_a_noise_that_is_no_noise_is_refused(refused):

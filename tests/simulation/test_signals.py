@@ -44,21 +44,11 @@ FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 4)
 NOISE = BandLimited(0.3, 5.0, 15.0)
 UNEVEN = TimeSeries([0.1, 0.2, 0.25, 0.7, 1.3], [1.0, -2.0, 0.5, 0.0, 3.0])
 EVERY = [
-    Constant(1.5),
-    Sine(0.7, 11.0, 0.3),
-    Step(1.5, 0.3),
-    Pulse(-2.0, 0.3, 0.2),
-    Impulse(0.02, 0.3),
-    Gust(2.0, 0.3, 0.7),
-    OrnsteinUhlenbeck(0.5, 0.1),
-    NOISE,
-    UNEVEN,
-    Ramp(2.0, 0.3),
-    MinimumJerk(1.0, 0.2, 0.5),
-    Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)),
-    Held((0.1, 0.2, 0.7), (1.0, -2.0, 0.5)),
+    Constant(1.5), Sine(0.7, 11.0, 0.3), Step(1.5, 0.3), Pulse(-2.0, 0.3, 0.2), Impulse(0.02, 0.3),
+    Gust(2.0, 0.3, 0.7), OrnsteinUhlenbeck(0.5, 0.1), NOISE, UNEVEN, Ramp(2.0, 0.3), MinimumJerk(1.0, 0.2, 0.5),
+    Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)), Held((0.1, 0.2, 0.7), (1.0, -2.0, 0.5)),
     Relay(0.5, s=0.3, rate=1.0, error=-0.2, slope=0.1),
-]
+]  # fmt: skip
 BLOW = Push("cart", x=2.0, z=-1.0, time=0.3, width=0.2)  # on a body, which not every plant has
 SEEN = 0.3, -0.2, 0.1  # e, e' and s
 LED = [signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)]  # what a reference may be

@@ -18,17 +18,9 @@ FOLDER = Path(smc.__file__).parents[1] / "scenes"
 FILES = sorted(FOLDER.glob("*.py"))
 EVERY = pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 TEN = {
-    "inverted_pendulum",
-    "van_der_pol",
-    "duffing",
-    "pendulum_network",
-    "vdp_nominal",
-    "vdp_noise",
-    "vdp_disturbance",
-    "control_signals",
-    "delay",
-    "parameter_jump",
-}
+    "inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "vdp_nominal", "vdp_noise", "vdp_disturbance",
+    "control_signals", "delay", "parameter_jump",
+}  # fmt: skip
 LAWS = ["observer_free", "classical", "adaptive", "super_twisting"]
 
 
@@ -178,20 +170,10 @@ JUMPS = {
     },
 }
 COMMON = {
-    "duration": 10.0,
-    "control_period": 0.001,
-    "physics_step": 0.001,
-    "u_max": 6.0,
-    "integrator": "RK4",
-    "seed": 0,
-    "reference": smc.Constant(0.0),
-    "disturbance": (),
-    "noise": smc.Noise(),
-    "input_delay": 0.0,
-    "velocity": smc.estimator("measured"),
-    "mismatch": {},
-    "jump": None,
-}
+    "duration": 10.0, "control_period": 0.001, "physics_step": 0.001, "u_max": 6.0, "integrator": "RK4", "seed": 0,
+    "reference": smc.Constant(0.0), "disturbance": (), "noise": smc.Noise(), "input_delay": 0.0,
+    "velocity": smc.estimator("measured"), "mismatch": {}, "jump": None,
+}  # fmt: skip
 PLANTS = {
     "inverted_pendulum": ({"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81}, (0.5,)),
     "van_der_pol": ({"M": 1.0, "mu": 1.0, "k": 1.0}, (2.0,)),

@@ -111,17 +111,8 @@ def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
 def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
     laws = "fast: observer_free(lam=6, k1=2), adaptive"
     options = [
-        "--condition",
-        "nominal",
-        "--seeds",
-        "16",
-        "--duration",
-        "2",
-        "--gains",
-        "default",
-        "--out",
-        str(tmp_path),
-    ]
+        "--condition", "nominal", "--seeds", "16", "--duration", "2", "--gains", "default", "--out", str(tmp_path),
+    ]  # fmt: skip
     for extra in ([], ["--defaults"]):
         with pytest.raises(SystemExit):
             main.main(["compare", "duffing", "--law", laws, *options, "--out", str(tmp_path), *extra])

@@ -33,14 +33,9 @@ from smc_mujoco.simulation.trace import Trace
 MIN_TIP_HEIGHT = 0.9  # of the length of both links, which the tip must exceed
 # Criterion -> weight and norm in version 1, norm in version 2.
 V1 = {
-    "swing_up_time": (0.2, 10.0),
-    "max_torque": (0.1, 6.0),
-    "energy": (0.1, 100.0),
-    "integrated_torque": (0.1, 60.0),
-    "torque_cost": (0.1, 360.0),
-    "torque_smoothness": (0.2, 12.0),
-    "velocity_cost": (0.2, 1000.0),
-}
+    "swing_up_time": (0.2, 10.0), "max_torque": (0.1, 6.0), "energy": (0.1, 100.0), "integrated_torque": (0.1, 60.0),
+    "torque_cost": (0.1, 360.0), "torque_smoothness": (0.2, 12.0), "velocity_cost": (0.2, 1000.0),
+}  # fmt: skip
 V2 = {"swing_up_time": 20.0, "energy": 60.0, "torque_cost": 20.0, "torque_smoothness": 0.1, "velocity_cost": 400.0}
 VERSIONS = {"v1": V1, "v2": V2}
 ROBOTS = ("acrobot", "pendubot")

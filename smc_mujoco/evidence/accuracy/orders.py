@@ -100,13 +100,9 @@ def _write_orders(ax: Axes, last: float, ends: Sequence[tuple[float, float, str,
     for (error, period, colour, words), y in zip(ends, _apart(ends_at, 1.3 * size / (dots * box.height)), strict=True):
         place = (1.0 - share + 1.5 * size / (dots * box.width), y)
         line = {
-            "arrowstyle": "-",
-            "color": colour,
-            "ls": ":",
-            "lw": style.points(0.8),
-            "shrinkA": 0.0,
+            "arrowstyle": "-", "color": colour, "ls": ":", "lw": style.points(0.8), "shrinkA": 0.0,
             "shrinkB": style.points(4),
-        }
+        }  # fmt: skip
         look = {"fontsize": size, "va": "center", "annotation_clip": False}
         ax.annotate(words, (period, error), place, "data", "axes fraction", arrowprops=line, **look)
 

@@ -28,25 +28,14 @@ TEXTS = {"format", "name", "mechanism", "unit", "theorem", "seal"}  # what may h
 ABSENT = {"u_max", "slope", "w_max", "boxes"}  # what may be null: an infinite number
 FIELDS = {
     "the certificate": "format plant law u_max unit disturbance slope leaves_out parts seal",
-    "plant": "name n parameters mechanism",
-    "law": "name gains",
-    "inverted_pendulum": "m l b grav",
-    "pendulum_network": "m l b grav kc",
-    "inverted_pendulum_network": "m l b grav kc",
-    "duffing": "M delta alpha beta",
-    "van_der_pol": "M mu k",
-    "observer_free": "lam k1",
-    "boundary_layer": "k c phi",
-    "classical": "k c",
-    "terminal": "k b p bound",
-    "super_twisting": "k1 k2 c w_max",
-    "lqr": "q1 q2 r a1 a2 b",
-    "pid": "kp ki kd tau tt",
+    "plant": "name n parameters mechanism", "law": "name gains", "inverted_pendulum": "m l b grav",
+    "pendulum_network": "m l b grav kc", "inverted_pendulum_network": "m l b grav kc", "duffing": "M delta alpha beta",
+    "van_der_pol": "M mu k", "observer_free": "lam k1", "boundary_layer": "k c phi", "classical": "k c",
+    "terminal": "k b p bound", "super_twisting": "k1 k2 c w_max", "lqr": "q1 q2 r a1 a2 b", "pid": "kp ki kd tau tt",
     "saturated PD": "theorem holds conditions V",
     "level sets": "theorem holds conditions x s W start P inner outer bound",
-    "reaching": "theorem holds conditions X S",
-    "super-twisting": "theorem holds conditions P L q X",
-}
+    "reaching": "theorem holds conditions X S", "super-twisting": "theorem holds conditions P L q X",
+}  # fmt: skip
 MAY_LACK = {"P"}  # of level sets
 MARGIN_TOLERANCE, MAX_HALVINGS = 3e-4, 6  # share below the true margin; halvings of a box in both directions
 

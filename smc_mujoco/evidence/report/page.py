@@ -32,17 +32,11 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parent / "templates"
 SECTIONS = {
-    "overview": "The answer",
-    "accuracy": "How accurate is it",
-    "claims": "The paper’s claims",
-    "tradeoffs": "Error against effort",
-    "margins": "Margins",
-    "chattering": "How much will it chatter",
-    "regions": "Regions of attraction",
-    "rigs": "On the rig",
-    "films": "Films and traces",
+    "overview": "The answer", "accuracy": "How accurate is it", "claims": "The paper’s claims",
+    "tradeoffs": "Error against effort", "margins": "Margins", "chattering": "How much will it chatter",
+    "regions": "Regions of attraction", "rigs": "On the rig", "films": "Films and traces",
     "method": "How it was computed",
-}
+}  # fmt: skip
 
 Row = TypeVar("Row", bound=Hashable)
 Column = TypeVar("Column", bound=Hashable)
@@ -76,17 +70,11 @@ def page(findings: Findings) -> str:
 
     made, share = environment(), findings.about.plan.relevant
     made.globals |= {
-        "f": findings,
-        "about": findings.about,
-        "first_film": next((scene for scene in findings.scenes if scene.film), None),
-        "gains_set": GAINS,
-        "infinity": math.inf,
-        "answer": answer,
-        "charts": charts,
-        "rigs": rigs,
-        "oscillation": oscillation,
+        "f": findings, "about": findings.about,
+        "first_film": next((scene for scene in findings.scenes if scene.film), None), "gains_set": GAINS,
+        "infinity": math.inf, "answer": answer, "charts": charts, "rigs": rigs, "oscillation": oscillation,
         "link": link,
-    }
+    }  # fmt: skip
     return made.get_template("page.jinja").render(
         css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),

@@ -91,14 +91,9 @@ HELPERS = {
 }
 SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
 POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
-    "power_2": "a * a",
-    "power_3": f"a * {SQUARE}",
-    "power_4": FOURTH,
-    "power_5": f"a * {FOURTH}",
-    "power_6": f"{SQUARE} * {FOURTH}",
-    "power_7": f"a * {SQUARE} * {FOURTH}",
-    "power_8": f"({FOURTH} * {FOURTH})",
-}
+    "power_2": "a * a", "power_3": f"a * {SQUARE}", "power_4": FOURTH, "power_5": f"a * {FOURTH}",
+    "power_6": f"{SQUARE} * {FOURTH}", "power_7": f"a * {SQUARE} * {FOURTH}", "power_8": f"({FOURTH} * {FOURTH})",
+}  # fmt: skip
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""

@@ -80,13 +80,9 @@ def law_to_fmu(
       ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no compiler.
     """
     chosen = {
-        "surface": surface,
-        "velocity": velocity,
-        "control_period": control_period,
-        "u_max": u_max,
-        "model": model,
+        "surface": surface, "velocity": velocity, "control_period": control_period, "u_max": u_max, "model": model,
         "joints": joints,
-    }
+    }  # fmt: skip
     if isinstance(law, Scenario):
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:

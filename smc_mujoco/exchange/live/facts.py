@@ -85,12 +85,8 @@ def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence
         "max_state": controller.MAX_STATE,
         "max_control": controller.MAX_CONTROL,
         "arrow": {
-            "arc": arrows.HINGE_LENGTH,
-            "of_radius": arrows.RADIUS_SHARE,
-            "of_length": arrows.LENGTH_SHARE,
-            "long": arrows.LONG_PENDULUM,
-            "off_arc": arrows.ARC_DISTANCE,
-            "off_rail": arrows.RAIL_DISTANCE,
+            "arc": arrows.HINGE_LENGTH, "of_radius": arrows.RADIUS_SHARE, "of_length": arrows.LENGTH_SHARE,
+            "long": arrows.LONG_PENDULUM, "off_arc": arrows.ARC_DISTANCE, "off_rail": arrows.RAIL_DISTANCE,
             "shortest": arrows.MIN_LENGTH,
         },
         "own": [law.name for law in users],
@@ -98,7 +94,7 @@ def facts(chosen: Sequence[Plant], offered: Sequence[Component], users: Sequence
         "laws": {law.name: _component(law) | _law(law) for law in kinds["law"]},
         "surfaces": {surface.name: _component(surface) for surface in kinds["surface"]},
         "estimators": {estimator.name: _component(estimator) for estimator in kinds["estimator"]},
-    }
+    }  # fmt: skip
 
 
 def _component(component: Component) -> dict[str, Any]:

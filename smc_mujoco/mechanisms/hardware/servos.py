@@ -105,20 +105,12 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
 
 VOLTAGE = 15.0 * 0.9625  # V: the supply times the largest duty cycle; bam/dynamixel/actuator.py
 BAM_FIELDS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
-    "friction_viscous": ("kv",),
-    "friction_base": ("kc",),
-    "friction_stribeck": ("kcs",),
-    "load_friction_base": ("km", "ke"),
-    "load_friction_stribeck": ("kms", "kes"),
-    "load_friction_motor": ("km",),
-    "load_friction_external": ("ke",),
-    "load_friction_motor_stribeck": ("kms",),
-    "load_friction_external_stribeck": ("kes",),
-    "load_friction_motor_quad": ("kmq",),
-    "load_friction_external_quad": ("keq",),
-    "dtheta_stribeck": ("vs",),
-    "alpha": ("alpha",),
-}
+    "friction_viscous": ("kv",), "friction_base": ("kc",), "friction_stribeck": ("kcs",),
+    "load_friction_base": ("km", "ke"), "load_friction_stribeck": ("kms", "kes"), "load_friction_motor": ("km",),
+    "load_friction_external": ("ke",), "load_friction_motor_stribeck": ("kms",),
+    "load_friction_external_stribeck": ("kes",), "load_friction_motor_quad": ("kmq",),
+    "load_friction_external_quad": ("keq",), "dtheta_stribeck": ("vs",), "alpha": ("alpha",),
+}  # fmt: skip
 # Servo -> model -> numbers of Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: kt in N m/A, R in ohm, armature in
 # kg m^2, and the keys of BAM_FIELDS in the units of ServoFriction.
 SERVOS: Mapping[str, Mapping[str, Mapping[str, float]]] = read_json(Path(__file__).with_name("servos.json"))

@@ -69,19 +69,8 @@ FURUTA = Plant(
     label="Furuta pendulum",
     # kg m^2, m, kg, m, kg m^2, N m s/rad, N m s/rad, N m, N m, N m/rad, m/s^2, 1, 1
     parameters={
-        "J": 4e-6 + 0.095 * 0.085**2 / 12,
-        "L": 0.085,
-        "m": 0.024,
-        "l": 0.129 / 2,
-        "Jc": 0.024 * 0.129**2 / 12,
-        "b": 0.0,
-        "bq": 0.0,
-        "cf": 0.0,
-        "cfq": 0.0,
-        "k": 0.0,
-        "grav": 9.81,
-        "tx": 0.0,
-        "ty": 0.0,
+        "J": 4e-6 + 0.095 * 0.085**2 / 12, "L": 0.085, "m": 0.024, "l": 0.129 / 2, "Jc": 0.024 * 0.129**2 / 12,
+        "b": 0.0, "bq": 0.0, "cf": 0.0, "cfq": 0.0, "k": 0.0, "grav": 9.81, "tx": 0.0, "ty": 0.0,
     },
     mass="m",
     unit="rad",
@@ -95,4 +84,4 @@ FURUTA = Plant(
     underactuated=True,
     limits=(STALL_TORQUE,),
     dry=("cf", "cfq"),
-)
+)  # fmt: skip

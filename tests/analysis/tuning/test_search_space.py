@@ -32,19 +32,12 @@ FIXED = {
 } | {name: TANH for name in LAWS if name.startswith("observer_free") and name != "observer_free_third"}
 WITHOUT_MODEL = dict.fromkeys(
     (
-        "discrete_time",
-        "implicit_first_order",
-        "implicit_super_twisting",
-        "integral",
-        "nonsingular_fast_terminal",
-        "nonsingular_terminal",
-        "prescribed_time",
-        "proper_conditioned_super_twisting",
-        "proper_super_twisting",
+        "discrete_time", "implicit_first_order", "implicit_super_twisting", "integral", "nonsingular_fast_terminal",
+        "nonsingular_terminal", "prescribed_time", "proper_conditioned_super_twisting", "proper_super_twisting",
         "terminal",
     ),
     G_IS_1,
-)
+)  # fmt: skip
 
 
 VISIBLE = {"N": 5.0, "least": 3.0, "bound": 0.3, "w_max": 0.5}  # so that they act in a run as short as these

@@ -96,16 +96,11 @@ YES, NO, ASIDE = check("yes", 1.0, "<", 2.0), check("no", 3.0, "<", 2.0), Beside
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
-        ([YES], SUPPORTED),
-        ([YES, check("also", 1.0, ">", 0.0)], SUPPORTED),
-        ([NO], REFUTED),
-        ([YES, NO], REFUTED),
-        ([], NOT_TESTABLE),
-        ([ASIDE], NOT_TESTABLE),
-        ([NO, ASIDE], REFUTED),
+        ([YES], SUPPORTED), ([YES, check("also", 1.0, ">", 0.0)], SUPPORTED), ([NO], REFUTED), ([YES, NO], REFUTED),
+        ([], NOT_TESTABLE), ([ASIDE], NOT_TESTABLE), ([NO, ASIDE], REFUTED),
         ([check("x", math.nan, "<", 1.0)], REFUTED),
     ],
-)
+)  # fmt: skip
 def test_the_verdict_is_of_the_checks_alone(found, expected):
     assert verdict(found) == expected
 
@@ -117,14 +112,11 @@ OTHER = YES._replace(what="other", sentence="b")
 @pytest.mark.parametrize(
     ("found", "quantifier", "expected"),
     [
-        ([YES, NO], UNIVERSAL, REFUTED),
-        ([YES, NO], EXISTENTIAL, SUPPORTED),
-        ([NO], EXISTENTIAL, NOT_SHOWN),
-        ([*ABOUT, OTHER], NAMED, PARTLY),
-        ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
+        ([YES, NO], UNIVERSAL, REFUTED), ([YES, NO], EXISTENTIAL, SUPPORTED), ([NO], EXISTENTIAL, NOT_SHOWN),
+        ([*ABOUT, OTHER], NAMED, PARTLY), ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
         ([ABOUT[1], OTHER], UNIVERSAL, PARTLY),
     ],
-)
+)  # fmt: skip
 def test_a_sentence_holds_with_all_its_checks_and_an_existential_one_with_one(found, quantifier, expected):
     assert verdict(found, quantifier) == expected
 

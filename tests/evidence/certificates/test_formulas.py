@@ -348,14 +348,11 @@ def test_what_is_given_instead_of_a_class_or_a_scenario_is_named():
 @pytest.mark.parametrize(
     ("signals", "bounds"),
     [
-        ((), (0.0, 0.0)),
-        (smc.Constant(-0.5), (0.5, 0.0)),
-        (smc.Sine(-0.5, 3.0), (0.5, 1.5)),
-        ((smc.Sine(0.5, 3.0), smc.Constant(0.25)), (0.75, 1.5)),
-        (smc.Step(0.5, 1.0), (0.5, math.inf)),
+        ((), (0.0, 0.0)), (smc.Constant(-0.5), (0.5, 0.0)), (smc.Sine(-0.5, 3.0), (0.5, 1.5)),
+        ((smc.Sine(0.5, 3.0), smc.Constant(0.25)), (0.75, 1.5)), (smc.Step(0.5, 1.0), (0.5, math.inf)),
         (smc.signals.Pulse(-0.5, 1.0, 2.0), (0.5, math.inf)),
     ],
-)
+)  # fmt: skip
 def test_bounds_of_a_disturbance_are_those_of_its_sum(signals, bounds):
     assert maker._bounds(smc.Scenario(plant="duffing", law="pid", disturbance=signals)) == pytest.approx(bounds)
 

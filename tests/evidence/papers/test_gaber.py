@@ -323,13 +323,9 @@ def test_complexity_is_judged_by_the_fastest_rival(time, expected, monkeypatch):
 def test_wind_up_alone_does_not_support_the_largest_oscillation(plain, conditioned, expected):
     """Claim 32: both the plain law, which never settles here, and the conditioned one must swing furthest."""
     told = {
-        OURS: (1.0, 1.5),
-        CLASSICAL: (1.0, 0.0),
-        ADAPTIVE: (1.0, 2.0),
-        HOSMC: (never, plain),
-        CONDITIONED: (1.0, conditioned),
-        UNCLAMPED: (never, 9.0),
-    }
+        OURS: (1.0, 1.5), CLASSICAL: (1.0, 0.0), ADAPTIVE: (1.0, 2.0), HOSMC: (never, plain),
+        CONDITIONED: (1.0, conditioned), UNCLAMPED: (never, 9.0),
+    }  # fmt: skip
     assert judged(Stub(by_law(**told)), "32") == expected
 
 

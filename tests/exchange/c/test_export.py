@@ -38,13 +38,8 @@ FIELDS = ("x", "v", "u", "applied", "s")
 OF_PLANT = {"a1": 0.5, "a2": -0.2, "b": 2.0}  # which a scenario gives to a law of the library, and to none in C
 # Laws whose C takes every turn there is: powers, roots, tables, loops, branches, several results, state.
 SINGLE = (
-    "extended_state",
-    "fuzzy_gain",
-    "nested_third_order",
-    "observer_free_table",
-    "observer_free_taylor",
-    "terminal",
-)
+    "extended_state", "fuzzy_gain", "nested_third_order", "observer_free_table", "observer_free_taylor", "terminal",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -99,14 +99,11 @@ def test_an_fmu_gives_what_a_run_gives(made, folder, name):
 @pytest.mark.parametrize("name", CASES)
 def test_its_inputs_are_those_that_the_law_reads(made, name):
     read = {
-        "computed_torque_sliding": "x v r dr ddr M h",
-        "hybrid_sliding": "x v r dr ddr M h J",
-        "observer_free_joint": "x r dr",
-        "passivity_based": "x v r dr ddr M h C",
-        "super_twisting_computed_torque": "x v r dr ddr M h",
-        "time_delay_sliding": "x r dr ddr",
+        "computed_torque_sliding": "x v r dr ddr M h", "hybrid_sliding": "x v r dr ddr M h J",
+        "observer_free_joint": "x r dr", "passivity_based": "x v r dr ddr M h C",
+        "super_twisting_computed_torque": "x v r dr ddr M h", "time_delay_sliding": "x r dr ddr",
         "unit_vector": "x v r dr ddr M h",
-    }[name]
+    }[name]  # fmt: skip
     known = {v.name: v for v in fmpy.read_model_description(str(made[name][0])).modelVariables}
     inputs = {one.partition("[")[0] for one, v in known.items() if v.causality == "input"}
     assert inputs == set(read.split())

@@ -465,17 +465,8 @@ def test_files_that_others_name_in_folders_of_their_own_count(tmp_path):
     """An attached model has its own meshdir, and a compiler that is included sets that of the whole."""
     corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
     faces = [
-        "f 1 2 3",
-        "f 2 3 4",
-        "f 5 6 7",
-        "f 6 7 8",
-        "f 1 2 5",
-        "f 2 5 6",
-        "f 3 4 7",
-        "f 4 7 8",
-        "f 1 3 5",
-        "f 2 4 6",
-    ]
+        "f 1 2 3", "f 2 3 4", "f 5 6 7", "f 6 7 8", "f 1 2 5", "f 2 5 6", "f 3 4 7", "f 4 7 8", "f 1 3 5", "f 2 4 6",
+    ]  # fmt: skip
     body = (
         '<asset><mesh name="c" file="c.obj"/></asset><worldbody><body name="b"><joint name="j"/>'
         '<geom type="mesh" mesh="c" mass="1"/></body></worldbody>'
@@ -1054,14 +1045,10 @@ def test_a_text_with_includes_is_read_with_them(tmp_path):
 
 
 LOST = {
-    "no file": (MESHED, None),
-    "no bytes": (MESHED, {"c.obj": "text"}),
-    "assets of a file": ("arm.xml", {}),
-    "broken": ("<mujoco>", None),
-    "unnamed": ("<mujoco/>", None),
-    "empty spec": (mujoco.MjSpec(), None),
+    "no file": (MESHED, None), "no bytes": (MESHED, {"c.obj": "text"}), "assets of a file": ("arm.xml", {}),
+    "broken": ("<mujoco>", None), "unnamed": ("<mujoco/>", None), "empty spec": (mujoco.MjSpec(), None),
     "number": (3, None),
-}
+}  # fmt: skip
 
 
 def test_what_a_model_lacks_that_is_no_file_is_one_sentence(refused):

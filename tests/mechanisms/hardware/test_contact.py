@@ -25,17 +25,11 @@ STUDIES = [pair for pair in OFFERED if pair[1] != "bobs"]  # bobs in a row need 
 CARTS = pytest.mark.parametrize("name", ["duffing", "van_der_pol"])
 # Where a mechanism that nothing else moves meets its obstacle, and the way it goes there.
 MEETS = {
-    ("duffing", "floor"): (1.7, 1),
-    ("duffing", "stops"): (-1.7, -1),
-    ("duffing", "peg"): (0.5, -1),
-    ("van_der_pol", "floor"): (2.2, 1),
-    ("van_der_pol", "stops"): (-2.2, -1),
-    ("van_der_pol", "peg"): (0.5, -1),
-    ("inverted_pendulum", "floor"): (2.44, 1),
-    ("inverted_pendulum", "stops"): (1.0, 1),
-    ("inverted_pendulum", "wall"): (0.7, 1),
-    ("inverted_pendulum", "peg"): (0.2, -1),
-}
+    ("duffing", "floor"): (1.7, 1), ("duffing", "stops"): (-1.7, -1), ("duffing", "peg"): (0.5, -1),
+    ("van_der_pol", "floor"): (2.2, 1), ("van_der_pol", "stops"): (-2.2, -1), ("van_der_pol", "peg"): (0.5, -1),
+    ("inverted_pendulum", "floor"): (2.44, 1), ("inverted_pendulum", "stops"): (1.0, 1),
+    ("inverted_pendulum", "wall"): (0.7, 1), ("inverted_pendulum", "peg"): (0.2, -1),
+}  # fmt: skip
 # The same where a second joint takes part in the blow; their blows: tests/mechanisms/test_underactuated.py.
 ALSO = {("cart_pole", "stops"): (-1.7, -1), ("overhead_crane", "stops"): (-1.7, -1)}
 HITS = pytest.mark.parametrize(("name", "kind"), MEETS, ids=["-".join(pair) for pair in MEETS])

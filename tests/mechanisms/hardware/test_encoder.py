@@ -242,20 +242,10 @@ def expected(sensor, changes, name):
 
 
 TIMES = [
-    {"delay": 2.5e-4},
-    {"delay": 1e-3},
-    {"delay": 7.5e-4},
-    {"delay": 0.0335},
-    {"period": 5e-3},
-    {"period": 2.5e-3},
-    {"period": 7.5e-4},
-    {"period": 2.5e-4},
-    {"period": 0.1},
-    {"period": 5e-3, "delay": 2e-3},
-    {"period": 5e-3, "delay": 5e-3},
-    {"period": 3e-3, "delay": 0.01175},
-    {"period": 0.0125, "delay": 2.5e-4},
-]
+    {"delay": 2.5e-4}, {"delay": 1e-3}, {"delay": 7.5e-4}, {"delay": 0.0335}, {"period": 5e-3}, {"period": 2.5e-3},
+    {"period": 7.5e-4}, {"period": 2.5e-4}, {"period": 0.1}, {"period": 5e-3, "delay": 2e-3},
+    {"period": 5e-3, "delay": 5e-3}, {"period": 3e-3, "delay": 0.01175}, {"period": 0.0125, "delay": 2.5e-4},
+]  # fmt: skip
 SOLVERS = pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 
 

@@ -174,19 +174,13 @@ def test_your_own_robot_of_one_joint_has_it_too():
 @pytest.mark.parametrize(
     "fields",
     [
-        {"integrator": "implicitfast"},
-        {"actuator": smc.DCMotor()},
-        {"actuator": smc.Backlash(0.01)},
-        {"contact": "stops"},
-        {"friction": smc.hardware.LuGre(0.1, 0.2, 0.05)},
-        {"friction": (smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05))},
-        {"friction": smc.Viscous(0.1)},
-        {"mechanism": "springs"},
-        {"disturbance": smc.Push("cart", 1.0, 0.0, 0.0)},
-        {"plant": "cart_pole"},
+        {"integrator": "implicitfast"}, {"actuator": smc.DCMotor()}, {"actuator": smc.Backlash(0.01)},
+        {"contact": "stops"}, {"friction": smc.hardware.LuGre(0.1, 0.2, 0.05)},
+        {"friction": (smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05))}, {"friction": smc.Viscous(0.1)},
+        {"mechanism": "springs"}, {"disturbance": smc.Push("cart", 1.0, 0.0, 0.0)}, {"plant": "cart_pole"},
     ],
     ids=str,
-)
+)  # fmt: skip
 def test_all_else_keeps_mujocos_friction(fields):
     scenario = smc.Scenario(**{"plant": "duffing", "law": "none", "friction": smc.Coulomb(0.1)} | fields)
     assert not scenario.exact_friction
