@@ -110,16 +110,18 @@ def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
 def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table]:
     """Return a table of how far twins are from their machines, by what their records were used for, and the orders."""
     right = functools.partial(Column, justify="right", no_wrap=True)
-    named, used = Column("machine", no_wrap=True), Column("records\nare", no_wrap=True)
+    named = functools.partial(Column, "machine", no_wrap=True)  # a column keeps the cells of its table
     heads = [right(head) for head in ("\nrows", "median\n%", "largest\n%", "within\nrange", "public\n%")]
-    table = titled("How far the twin is from the machine", named, used, *heads, pad_edge=False)
+    table = titled(
+        "How far the twin is from the machine", named(), Column("records\nare", no_wrap=True), *heads, pad_edge=False
+    )
     for group in twin_figures.summaries(rows):
         apart = (twin_figures.percent(share) for share in (group.median, group.largest))
         table.add_row(
             group.rig, group.use, f"{len(group.rows)}", *apart, f"{group.inside}", twin_figures.percent(group.published)
         )
     ends = right("sets in the\nmachine's order"), right("tau")
-    orders = titled("Laws in the machine's order", named, "condition", "twin", *ends, pad_edge=False)
+    orders = titled("Laws in the machine's order", named(), "condition", "twin", *ends, pad_edge=False)
     for one in by_laws:
         counts = f"{one.ordered} of {one.sets}", f"{one.tau:z.2f}"
         orders.add_row(one.rig, one.condition, one.variant or "whole", *counts)

@@ -34,6 +34,7 @@ BAND = 2.0, 9.0  # Hz, of centroid and peak
 MIN_ROWS = 1000
 UNITS = {  # of the figures
     **dict.fromkeys(("alpha_rms", "alpha_max", "theta_rms", "theta_std", "theta_max", "phase", "lag"), "deg"),
+    **dict.fromkeys(("second_25", "second_50", "second_75", "second_90", "resting_50", "resting_90"), "deg"),
     **dict.fromkeys(("alpha_rate_rms", "theta_rate_rms"), "deg/s"),
     **dict.fromkeys(("acceleration_rms", "acceleration_max"), "steps/s^2"),
     **dict.fromkeys(("centroid", "peak"), "Hz"), **dict.fromkeys(("running", "resting", "ratio", "gain"), ""),
@@ -97,9 +98,11 @@ def logged(trace: Trace) -> dict[str, np.ndarray]:
 def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Return the figures of a recording from SINCE on, in degrees, steps and seconds.
 
-    Its keys: rms and largest values; `running`, the share of rows with a speed above the stop band; `starts`, from rest
-    a minute; `resting`, the share of time in rests of REST and more; of Welch's spectra `centroid` and `peak` of alpha
-    in Hz, `ratio` and `phase` of alpha over theta there, `gain` and `lag` of theta' over the speed command.
+    Its keys: rms and largest values; `second_50`, alpha's standard deviation in a second that half of them exceed;
+    `running`, the share of rows with a speed above the stop band; `starts`, from rest a minute; `resting`, the share of
+    time in rests of REST and more, and `resting_50`, what half of |alpha| exceeds there; of Welch's spectra `centroid`
+    and `peak` of alpha in Hz, `ratio` and `phase` of alpha over theta there, `gain` and `lag` of theta' over the speed
+    command.
     """
     from scipy import signal
 
@@ -113,9 +116,12 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
         return float(np.sqrt(np.mean(values**2)))
 
     runs = np.abs(speed) >= STOP_BAND
-    edges = np.flatnonzero(np.diff(np.concatenate(([True], runs, [True])).astype(int)))
-    rests = np.diff(edges)[::2] if len(edges) else np.zeros(0)
     row, starts = float(np.median(np.diff(t))), np.sum(np.diff(runs.astype(int)) == 1)
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], runs, [True])).astype(int))).reshape(-1, 2)
+    long = edges[np.diff(edges)[:, 0] * row >= REST]
+    rests = np.concatenate([np.abs(alpha[first:last]) for first, last in long] or [np.zeros(0)])
+    second = round(1.0 / row)
+    seconds = alpha[: len(alpha) // second * second].reshape(-1, second).std(axis=1)
     settings = {"fs": 1.0 / row, "window": "hann", "nperseg": SEGMENT, "noverlap": SEGMENT // 2}
     f, power = signal.welch(alpha, **settings)
     inside = (f >= BAND[0]) & (f <= BAND[1])
@@ -132,7 +138,9 @@ def figures(record: Mapping[str, np.ndarray]) -> dict[str, float]:
         "theta_rate_rms": rms(theta_rate), "acceleration_rms": rms(acceleration),
         "acceleration_max": float(np.abs(acceleration).max()), "speed_rms": rms(speed),
         "running": float(runs.mean()), "starts": float(60.0 * starts / (len(runs) * row)),
-        "resting": float(rests[rests * row >= REST].sum() / len(runs)),
+        "resting": len(rests) / len(runs),
+        **{f"resting_{p}": float(np.percentile(rests, p)) if len(rests) else np.nan for p in (50, 90)},
+        **{f"second_{p}": float(np.percentile(seconds, p)) for p in (25, 50, 75, 90)},
         "centroid": float(np.average(f[inside], weights=power[inside])) if power[at] > 0.0 else np.nan,
         "peak": float(f[at]),
         "ratio": abs(tilt), "phase": float(np.degrees(np.angle(tilt)) % 360.0 - 360.0),

@@ -6,11 +6,13 @@ the callback simulates Coulomb friction on joints that move alone, see `coulomb_
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
+from typing import Annotated
 
 import mujoco
 import numpy as np
 
+from smc_mujoco.common.constraints import Flag
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.part import (
     HARD_SOLIMP,
@@ -20,6 +22,8 @@ from smc_mujoco.mechanisms.hardware.part import (
     Natural,
     Positive,
     dof_ids,
+    drive_ids,
+    drives,
     joint_ids,
     joints,
 )
@@ -136,6 +140,7 @@ class LuGre(Friction):
         default parameters: 2.2 for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast
         counts damping h as inertia, 0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too
         long.
+      driven: whether only joints with an actuator have it, such as the arm that a cable with hysteresis bends.
     """
 
     bristles = True
@@ -146,6 +151,7 @@ class LuGre(Friction):
     stribeck: Positive
     stiffness: Positive = 1e3
     damping: Natural | None = None
+    driven: Annotated[bool, Flag()] = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -154,8 +160,11 @@ class LuGre(Friction):
                 f"LuGre's static {self.static:g} is less than its coulomb {self.coulomb:g}: give static >= coulomb"
             )
 
+    def structure(self) -> Hashable:
+        return type(self), self.driven
+
     def edit(self, spec: mujoco.MjSpec) -> None:
-        for joint in joints(spec):
+        for joint in joints(spec)[: len(drives(spec)) if self.driven else None]:
             name, on_joint = PASSIVE + joint.name, mujoco.mjtTrn.mjTRN_JOINT
             spec.add_actuator(name=name, target=joint.name, trntype=on_joint).set_to_dcmotor(
                 motorconst=(1e-9, 1e-9),  # a dcmotor needs a motor constant: too small to notice
@@ -165,8 +174,9 @@ class LuGre(Friction):
             )
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
-        bristles = [model.actuator(PASSIVE + model.joint(joint).name).id for joint in joint_ids(model)]
+        count = len(drive_ids(model)) if self.driven else None
+        bristles = [model.actuator(PASSIVE + model.joint(joint).name).id for joint in joint_ids(model)[:count]]
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
-        damping = RELATIVE_DAMPING * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)])
+        damping = RELATIVE_DAMPING * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)[:count]])
         yield Field("actuator_dynprm", (bristles, DAMPING), damping if self.damping is None else self.damping)
         yield Field("actuator_biasprm", (bristles, LEVELS), (self.coulomb, self.static, self.stribeck))

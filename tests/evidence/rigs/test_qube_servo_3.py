@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.rigs.machines.quanser import fall_frequency, moved
+from smc_mujoco.evidence.rigs.machines.quanser import falls, moved
 
 pytestmark = pytest.mark.quick
 
 STEP = np.genfromtxt(Path(__file__).with_name("qube_servo_3_step.csv"), delimiter=",", names=True)
-FREQUENCY = 2.432  # Hz, of ten falls, while the swings are 8 to 25 degrees
+FREQUENCY, DAMPING = 2.432, 0.0261  # Hz and "", of ten falls, while the swings are 8 to 25 degrees
 
 
 def step_error(rig):
@@ -23,18 +23,39 @@ def step_error(rig):
 def test_the_twin_turns_and_falls_as_the_machine_does():
     rig = smc.rig("qube_servo_3")
     assert step_error(rig) < 0.02
-    assert fall_frequency(rig) == pytest.approx(FREQUENCY, rel=0.02)
+    frequency, damping = falls(rig)
+    assert frequency == pytest.approx(FREQUENCY, rel=0.02)
+    assert damping == pytest.approx(DAMPING, rel=0.06)
 
 
 def test_the_published_numbers_do_not():
     published = smc.rig("qube_servo_3").set("quanser")
     assert step_error(published) > 0.08
-    assert fall_frequency(published) < 0.9 * FREQUENCY
+    frequency, damping = falls(published)
+    assert frequency < 0.9 * FREQUENCY
+    assert damping > 2.0 * DAMPING
+
+
+def test_the_cable_takes_energy_from_a_turn_and_hardly_any_from_a_fall():
+    """Friction that slips at once would stop the falls, and none would leave the step without its loss."""
+    rig = smc.rig("qube_servo_3")
+    stiff, none = rig.with_values({"cable_stiffness": 10.0}), rig.with_values({"cable_friction": 0.0})
+    assert falls(stiff)[1] > 3.0 * DAMPING
+    assert step_error(none) > 0.1
+
+
+def test_a_motor_that_brakes_damps_falls_more():
+    rig = smc.rig("qube_servo_3")
+    a = [np.abs(moved(rig, volts, np.radians(25.0), 0.6)[2]) for volts in (None, 0.0)]
+    late = [one[200:].max() for one in a]
+    assert late[1] < 0.9 * late[0]
 
 
 def test_each_quantity_that_was_found_is_needed():
-    """Halved, each spoils the step or the fall."""
+    """Halved, each spoils the step or the falls."""
     rig = smc.rig("qube_servo_3")
     for name in rig.free:
         other = rig.with_values({name: 0.5 * rig.values[name]})
-        assert step_error(other) > 0.02 or abs(fall_frequency(other) / FREQUENCY - 1.0) > 0.02, name
+        frequency, damping = falls(other)
+        apart = abs(frequency / FREQUENCY - 1.0), abs(damping / DAMPING - 1.0)
+        assert step_error(other) > 0.02 or apart[0] > 0.02 or apart[1] > 0.06, name

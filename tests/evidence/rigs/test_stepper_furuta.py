@@ -135,6 +135,18 @@ def test_rests_count_from_a_fifth_of_a_second():
     assert found["starts"] == pytest.approx(60.0 * 2 / 0.64, rel=0.02)
 
 
+def test_seconds_count_about_their_mean_and_rests_by_their_angle():
+    """A rest at 2 degrees, a third of it at 4, then swings with the motor running."""
+
+    def alpha(t):
+        return np.where(t < 43.0, 2.0, np.where(t < 63.0, -4.0, 9.0 * np.sin(math.tau * t)))
+
+    found = stepper_record.figures(record(alpha=alpha, speed=lambda t: np.where(t < 63.0, 0.0, 60.0), duration=73.0))
+    assert found["second_50"] == pytest.approx(0.0, abs=1e-9)
+    assert found["second_90"] == pytest.approx(9.0 / math.sqrt(2.0), rel=1e-3)
+    assert (found["resting_50"], found["resting_90"]) == (2.0, 4.0)
+
+
 def test_a_run_is_logged_as_the_firmware_sees_it():
     """Its rows are every fourth tick, its angles rounded and trimmed, its speed the sum of its accelerations."""
     rig = smc.rig("stepper_furuta")

@@ -110,6 +110,9 @@ def test_the_command_tells_all_machines_or_one(monkeypatch):
     for name in {one.rig for one in twin_figures.rows()}:
         assert name in every
     assert "held out" in every
+    orders = every.split("Laws in the machine's order")[1]
+    assert orders.count("stepper_furuta") == len(twin_figures.orders())
+    assert "qube_servo" not in orders  # which ran one law
     assert "falls" in CliRunner().invoke(app, ["rig", "qube_servo"]).output
     refused = CliRunner().invoke(app, ["rig", "srv02"])
     assert refused.exit_code != 0

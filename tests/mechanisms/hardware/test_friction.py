@@ -215,8 +215,8 @@ def test_friction_is_on_every_joint_of_a_network(part):
 
 def test_numbers_are_kept_as_floats():
     made = LuGre(1, 2, np.float32(0.5), damping=4)
-    assert dataclasses.astuple(made) == (1.0, 2.0, 0.5, 1000.0, 4.0)
-    assert all(type(value) is float for value in dataclasses.astuple(made))
+    assert dataclasses.astuple(made) == (1.0, 2.0, 0.5, 1000.0, 4.0, False)
+    assert all(type(value) is float for value in dataclasses.astuple(made)[:-1])
 
 
 def test_a_joint_breaks_away_at_no_less_than_it_slides_with():
@@ -224,3 +224,18 @@ def test_a_joint_breaks_away_at_no_less_than_it_slides_with():
         ScenarioError, match=r"LuGre's static 0\.1 is less than its coulomb 0.2: give static >= coulomb"
     ):
         LuGre(0.2, 0.1, 0.01)
+
+
+def test_lugre_of_driven_joints_leaves_the_free_joint_alone():
+    """Both kinds in one batch, too: they have different actuators."""
+    at = plant("furuta")
+    both, arm = LuGre(0.01, 0.01, 1.0), LuGre(0.01, 0.01, 1.0, driven=True)
+    assert [build(at, part).actuator(1).name for part in (both, arm)] == ["passive:arm"] * 2
+    assert [build(at, part).nactuator for part in (both, arm)] == [3, 2]
+    assert both.structure() != arm.structure()
+    free = build(at, arm)
+    data = mujoco.MjData(free)
+    data.qvel[:] = 0.5, 0.5
+    mujoco.mj_step(free, data)
+    assert data.qfrc_actuator[0] != 0.0
+    assert data.qfrc_actuator[1] == 0.0
