@@ -64,43 +64,52 @@ def residual_figure(
 
 
 MARKS = {UNFITTED: "D", HELD_OUT: "o", FITTED: "o"}  # filled, but for records that were fitted on
-ROW, LEAST, MOST = 0.17, 0.25, 4.0  # inches a row; ends of the axis: a triangle there stands for what is beyond
+PHONE_WIDTH = 4.0  # inches of the page of twins, whose letters are read on a phone
+ROW, BESIDE = 0.2, 0.35  # inches a row; rows from one record of a figure to the next
+LEAST, MOST = 0.25, 4.0  # ends of the axis: a triangle there stands for what is beyond
 
 
 def twins_figure(rows: Sequence[TwinFigure], path: str | Path) -> list[Path]:
-    """Draw the twin's figures over the machine's, a row for each, with its range. Write PATH.svg and PATH.png.
+    """Draw the twin's figures over the machine's, a row for each with a mark for each record. Write PATH.svg, PATH.png.
 
-    Figures that are kept aside, and variants of a twin, are left out. A cross is by published numbers.
+    A line is a mark's range, a cross is by published numbers. Figures that are kept aside, and variants of a twin, are
+    left out.
     """
     paths = pages.files(Path(path).with_suffix(""))
-    drawn = [row for row in rows if not row.variant and not math.isnan(row.machine)]
-    names = list(dict.fromkeys(row.rig for row in drawn))
+    groups: dict[tuple[str, str, str], list[TwinFigure]] = {}
+    for row in rows:
+        if not row.variant and not math.isnan(row.machine):
+            groups.setdefault((row.rig, row.use, row.figure), []).append(row)
+    names = list(dict.fromkeys(rig for rig, _, _ in groups))
     colours = dict(zip(names, style.spread(len(names)), strict=True))
-    with style.page():
+    with style.page(PHONE_WIDTH):
         keys = [
             Line2D(
                 [], [], color=style.INK, marker=MARKS[use], ls="", mfc=style.PAPER if use == FITTED else None, label=use
             )
-            for use in dict.fromkeys(row.use for row in drawn)
+            for use in dict.fromkeys(use for _, use, _ in groups)
         ]
         keys.append(Line2D([], [], color=style.MUTED, marker="x", ls="", label="published numbers"))
-        height = pages.head_height(style.FULL_WIDTH, keys) + ROW * (len(drawn) + 1.5 * len(names)) + 0.7
-        page = pages.blank(style.FULL_WIDTH, height)
+        height = len(names) * 1.2 + sum(1.0 + BESIDE * (len(its) - 1) for its in groups.values())
+        page = pages.blank(PHONE_WIDTH, pages.head_height(PHONE_WIDTH, keys) + ROW * height + 0.6)
         ax = page.subplots()
         place, ticks = 0.0, []
-        for name in names:
-            place += 1.5
-            ax.text(LEAST * 1.03, place - 0.85, name, color=colours[name], fontweight="bold", va="center")
-            for row in (one for one in drawn if one.rig == name):
-                _row(ax, place, row, colours[name])
-                ticks.append((place, f"{row.record}: {row.figure}"))
-                place += 1.0
+        for (rig, _, figure), its in groups.items():
+            if rig in names:  # its first
+                names.remove(rig)
+                ax.text(LEAST * 1.05, place + 0.6, rig, color=colours[rig], fontweight="bold", va="center")
+                place += 1.2
+            for k, row in enumerate(its):
+                _row(ax, place + 0.5 + BESIDE * k, row, colours[rig])
+            deep = 1.0 + BESIDE * (len(its) - 1)
+            ticks.append((place + 0.5 * deep, f"{figure}, {len(its)} records" if len(its) > 1 else figure))
+            place += deep
         ax.axvline(1.0, color=style.RULE, lw=0.8, zorder=0)
-        ax.set(xscale="log", xlim=(LEAST, MOST), ylim=(place, -0.3), xlabel="twin over machine")
-        ax.set_yticks([at for at, _ in ticks], [words for _, words in ticks], fontsize=pages.TEXT_SIZE - 1)
-        ax.set_xticks([0.25, 0.5, 0.8, 1.0, 1.25, 2.0, 4.0], ["¼", "½", "0.8", "1", "1.25", "2", "4"])
+        ax.set(xscale="log", xlim=(LEAST, MOST), ylim=(place + 0.2, 0.0), xlabel="twin over machine")
+        ax.set_yticks([at for at, _ in ticks], [words for _, words in ticks])
+        ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
         ax.xaxis.set_minor_locator(NullLocator())
-        pages.set_head(page, style.FULL_WIDTH, "What simulation said, and what the machine did", keys)
+        pages.set_head(page, PHONE_WIDTH, "What simulation said, and what the machine did", keys)
         pages.write(page, paths)
     return paths
 
@@ -109,10 +118,10 @@ def _row(ax: Axes, place: float, row: TwinFigure, colour: str) -> None:
     """Draw a figure's ratio and its range; beyond the axis, or for a twin that falls, a triangle at its end."""
     ratios = [value / row.machine for value in (row.low, row.twin, row.high, row.published)]
     low, middle, high, public = (min(max(ratio, LEAST), MOST) for ratio in ratios)
-    ax.plot([low, high], [place, place], color=colour, lw=1.4)
+    ax.plot([low, high], [place, place], color=colour, lw=1.0)
     for at, ratio, mark, ink in ((public, ratios[3], "x", style.MUTED), (middle, ratios[1], MARKS[row.use], colour)):
         if math.isnan(ratio):
             continue
         shape = ">" if ratio > MOST else "<" if ratio < LEAST else mark
         filling = style.PAPER if row.use == FITTED and shape == mark else ink
-        ax.plot(at, place, shape, color=ink, mfc=filling, ms=4.5, clip_on=False)
+        ax.plot(at, place, shape, color=ink, mfc=filling, ms=3.5, clip_on=False)

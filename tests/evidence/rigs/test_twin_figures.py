@@ -93,6 +93,17 @@ def test_a_twin_that_falls_is_told_and_drawn(tmp_path):
     assert png.exists()
 
 
+def test_a_figure_has_one_row_for_all_its_records_and_is_read_on_a_phone(tmp_path):
+    """Its page is no wider than a phone, with letters of 8 points: a page as wide as its column keeps their size."""
+    rows = [one for one in twin_figures.rows("qube_servo") if not one.variant]
+    svg, _ = twins_figure(rows, tmp_path / "told.svg")
+    text = svg.read_text(encoding="utf-8")
+    assert float(re.search(r'width="([\d.]+)pt"', text)[1]) <= 0.75 * 390
+    assert text.count("<!-- theta rms, 8 records -->") == 1
+    assert text.count("<!-- theta rms -->") == 1  # of the record that is held out
+    assert len(re.findall(r'<use [^>]*y="', text)) >= 2 * len(rows)  # a mark and a cross each
+
+
 @pytest.mark.parametrize(("twin", "mark"), [(math.inf, ">"), (9.0, ">"), (0.1, "<"), (2.0, "D")])
 def test_what_is_beyond_the_axis_is_a_triangle_at_its_end(twin, mark):
     ax = Figure().subplots()
