@@ -17,9 +17,6 @@ def told(y, gains, memory):
     return 1.0, y.f
 
 
-FRICTION = (smc.Coulomb(0.1), smc.Viscous(0.05))
-
-
 @pytest.mark.parametrize(("fields", "force"), [
     ({"disturbance": smc.Constant(0.3)}, lambda trace: 0.3),
     ({"disturbance": smc.Sine(amplitude=0.2, omega=5.0)}, lambda trace: 0.2 * np.sin(5.0 * trace.t[1:])),

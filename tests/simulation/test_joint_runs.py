@@ -109,17 +109,6 @@ def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
     assert_same(trace, reference.run(trace.scenario))
 
 
-def test_bits_do_not_depend_on_threads(arm):
-    scenarios = [
-        smc.Scenario(plant=arm, law="computed_torque_sliding", seed=i, noise=smc.Noise(1e-3), duration=0.05)
-        for i in range(9)
-    ]
-    first = smc.run(scenarios, threads=1)
-    for threads in (2, 4):
-        for one, other in zip(first, smc.run(scenarios, threads=threads), strict=True):
-            assert_same(one, other)
-
-
 def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
     """M a + h is the force that MuJoCo's inverse dynamics ask for at random states; g is h at rest."""
     rng = np.random.default_rng(1)

@@ -41,22 +41,8 @@ def shortened(s, duration):
 
 
 @pytest.mark.slow
-def test_callback_equals_plain_loop_in_every_condition_of_the_study():
-    """One plant and one law after the other."""
-    laws, plants = itertools.cycle(STUDIED), itertools.cycle(smc.paper.GAINS)
-    scenarios = [
-        shortened(smc.paper.scenario(next(plants), next(laws), condition, seed=7), 0.05)
-        for condition in (*smc.paper.CONDITIONS, *list(smc.paper.CONDITIONS)[:11])
-    ]
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        assert trace.failure is None
-        assert_same(trace, reference.run(scenario))
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("plant", smc.paper.GAINS)
 def test_callback_equals_plain_loop_under_every_law_of_the_study_in_every_condition(plant):
-    """The whole product, of which the test above has a part."""
     scenarios = [
         shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.05)
         for law in STUDIED
@@ -476,17 +462,6 @@ class Policy:
 def uncompiled(think=lambda: None, duration=0.05):
     """A scenario under a Policy."""
     return smc.Scenario(plant="duffing", law=smc.law_function()(Policy(think))(), duration=duration)
-
-
-def test_a_law_that_does_not_compile_takes_the_plain_loop_and_says_so():
-    @smc.law_function()
-    def compiled(y, gains, memory):
-        return -3.0 * y.e - y.de, y.e
-
-    with pytest.warns(smc.errors.PlainLoopWarning, match="Policy"):
-        trace = smc.run(uncompiled())
-    other = smc.run(dataclasses.replace(uncompiled(), law=compiled()))
-    np.testing.assert_array_equal(trace.x, other.x)
 
 
 def predict():

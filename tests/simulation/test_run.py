@@ -8,9 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
-import warnings
 from pathlib import Path
 
 import mujoco
@@ -146,12 +144,6 @@ def test_a_bad_number_of_threads_is_refused(refused):
         refused(lambda threads=threads: smc.run([scenario()], threads=threads))
 
 
-@pytest.mark.parametrize("threads", [1, 2, 64, np.int64(2)])
-def test_the_number_of_threads_changes_nothing(threads):
-    many = [scenario(seed=seed, noise=smc.Noise(0.1), duration=0.1) for seed in range(5)]
-    assert all(map(same, smc.run(many, threads=threads), smc.run(many)))
-
-
 def test_progress_is_shown_on_a_terminal_and_changes_nothing(capfd, monkeypatch):
     many = [scenario(seed=seed) for seed in range(3)]
     assert all(map(same, smc.run(many, progress=True), smc.run(many)))
@@ -186,26 +178,6 @@ def test_a_failed_run_has_no_reference_from_then_on_either():
 
 def test_a_state_that_starts_outside_the_world_has_diverged_at_once():
     failed(smc.run(scenario(x0=1e6)), 0.0, "the plant diverged")
-
-
-def test_a_run_that_fails_leaves_those_beside_it_alone():
-    def sour(y, gains, memory):
-        if y.t > 0.0055:
-            raise ValueError("sour")
-        return 0.0, 0.0
-
-    good = [scenario(seed=seed, noise=smc.Noise(0.1)) for seed in range(4)]
-    bad = [
-        scenario(made(sour)),
-        scenario("none", plant=UNSTABLE),
-        scenario(made(lambda y, gains, memory: (math.nan, 0.0))),
-    ]
-    for threads in (1, 2):
-        traces = smc.run([good[0], bad[0], good[1], bad[1], good[2], bad[2], good[3]], threads=threads)
-        assert all(map(same, traces[::2], smc.run(good)))
-        failed(traces[1], 0.006, "law 'sour'", "ValueError", "sour")
-        failed(traces[3], traces[3].diverged_at, "the plant diverged")
-        failed(traces[5], 0.0, "returned")
 
 
 @pytest.mark.parametrize(("which", "bad"), [("u", math.nan), ("u", -math.inf), ("s", math.inf)])
@@ -336,16 +308,6 @@ def test_endless_recursion_is_a_failure_like_any_other():
         return endless(y, gains, memory)
 
     failed(plainly(scenario(made(endless))), 0.0, "RecursionError")
-
-
-def test_an_estimator_that_raises_is_named():
-    @smc.estimator_function()
-    def sour(y, gains, memory):
-        if y.x < 2.0:
-            raise ValueError("sour")
-        return y.v
-
-    failed(smc.run(scenario(velocity=sour())), 0.0, "estimator 'sour'", "ValueError")
 
 
 @pytest.mark.parametrize("value", ["x", None, (1.0, 2.0, 3.0), 10**400], ids=lambda v: type(v).__name__)
@@ -502,25 +464,6 @@ def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_calle
         smc.run(scenario(velocity=loaded()))
 
 
-def test_a_law_may_simulate_a_model_of_its_own():
-    model = mujoco.MjModel.from_xml_string(
-        "<mujoco><worldbody><body><joint type='slide'/><geom size='1'/></body></worldbody></mujoco>"
-    )
-
-    def predicts(y, gains, memory):
-        data = mujoco.MjData(model)
-        data.qvel[0] = y.v
-        mujoco.mj_step(model, data)
-        return -2.0 * y.de - 2.0 * y.e, y.e
-
-    def twin(y, gains, memory):
-        return -2.0 * y.de - 2.0 * y.e, y.e
-
-    assert same(
-        plainly(scenario(made(predicts))), plainly(scenario(made(lambda y, g, m: (json.dumps(1), twin(y, g, m))[1])))
-    )
-
-
 def test_a_law_from_a_file_without_its_code_is_refused(tmp_path, refused):
     smc.run(scenario(made(lambda y, gains, memory: (0.0, 0.0)))).save(tmp_path / "a.npz")
     refused(lambda: smc.run(smc.load(tmp_path / "a.npz").scenario))
@@ -584,36 +527,6 @@ def test_a_stream_holds_one_batch_and_diverging_runs_print_nothing_and_leave_no_
     assert int(held) < 0.3 * logs
     assert said == "done"
     assert [path.name for path in tmp_path.iterdir()] == ["job.py"]
-
-
-@pytest.mark.slow
-def test_runs_of_two_python_threads_do_not_meet():
-    slow = scenario(made(with_json, {"k": 2.0}), duration=0.1, mismatch={"M": 2.0})
-    fast = [
-        scenario(made(native, {"k": 2.0}), seed=seed, noise=smc.Noise(0.1), mismatch={"M": 1.0 + seed})
-        for seed in range(3)
-    ]
-    expected = plainly([slow, *fast])
-    wrong: list = []
-
-    def work(scenarios, traces, rounds):
-        for _ in range(rounds):
-            try:
-                found = smc.run(scenarios)
-                wrong.extend(s for s, a, b in zip(scenarios, found, traces, strict=True) if not same(a, b))
-            except Exception as error:
-                wrong.append(error)
-
-    jobs = [([slow], expected[:1], 5), (fast, expected[1:], 20), (fast, expected[1:], 20)]
-    threads = [threading.Thread(target=work, args=job) for job in jobs]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert wrong == []
-    assert mujoco.get_mjcb_control() is None
 
 
 def test_a_callback_that_was_installed_is_put_back():

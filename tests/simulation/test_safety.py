@@ -331,19 +331,6 @@ class Sour(smc.Signal):
         return 0.1, 0.0, 0.0
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_reference_that_raises_in_mid_run_fails_its_own_run_only(threads):
-    good = [scenario(seed=seed, noise=smc.Noise(0.1), reference=smc.Sine(0.1, 5.0)) for seed in range(4)]
-    bad = scenario(reference=Sour())
-    first, trace, *others = smc.run([good[0], bad, *good[1:]], threads=threads)
-    assert trace.diverged_at == pytest.approx(0.01)
-    assert "Sour raised ValueError (sour)" in trace.failure
-    assert (trace.r[:10] == 0.1).all()
-    assert np.isfinite(trace.x[:10]).all()
-    assert np.isnan(trace.x[10:]).all()
-    assert all(map(same, [first, *others], smc.run(good)))
-
-
 # (f) other people's callbacks
 
 FIRST = """
@@ -483,16 +470,6 @@ def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
     said = [re.sub(r"expected a nonnegative input, got [-.\d]+", "math domain error", words) for words in said]  # 3.14
     assert all(words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0]) for words in said)
     assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
-
-
-def test_a_law_of_python_that_exits_fails_its_own_run_alone():
-    def leaves(y, gains, memory):
-        json.dumps(y.t)  # not for numba
-        raise SystemExit(3)
-
-    first, second = plainly([scenario(made(leaves)), scenario()])
-    assert first.failure == "law 'leaves' raised SystemExit (3) in channel 0, at t = 0 s"
-    assert second.failure is None
 
 
 def test_a_singular_nominal_model_ends_a_run_of_python_instead_of_hanging_it():

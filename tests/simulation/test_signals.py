@@ -509,17 +509,6 @@ def test_a_part_that_is_not_at_hand_is_named(monkeypatch, refused):
     refused(lambda: serialise._restored(about), "Sticker", "test_signals")
 
 
-def test_a_realistic_scenario_survives_json():
-    parts = {
-        "friction": (smc.Viscous(0.1), smc.Coulomb(0.05)),
-        "actuator": (smc.Lag(0.01), smc.Backlash(0.02)),
-        "sensor": smc.Encoder(counts=math.inf, dropout=0.1),
-        "contact": smc.Contact("stops", restitution=0.5),
-    }
-    made = scenario(**parts)
-    assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made
-
-
 def test_first_row_of_nan_is_no_header(tmp_path):
     path = tmp_path / "gap.csv"
     path.write_text("nan,nan\n0,1\n1,2\n")

@@ -564,33 +564,6 @@ def test_an_existing_file_is_replaced(ending, trace, traces, tmp_path):
     assert names(tmp_path) == [f"a.{ending}"]
 
 
-REAL = """
-import smc_mujoco as smc
-from smc_mujoco.simulation import serialise
-from smc_mujoco.simulation import serialise
-scenario = smc.Scenario(
-    plant="duffing", law="classical", duration=0.01, contact="floor", mechanism="springs",
-    sensor=smc.Encoder(delay=0.001),
-    friction=(smc.Viscous(0.1), smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05)),
-    actuator=(smc.DCMotor(), smc.Backlash(0.01)),
-    disturbance=(smc.signals.Gust(1.0, 0.0, 0.1), smc.signals.BandLimited(0.1, 1.0, 5.0),
-                 smc.signals.TimeSeries((0.0, 1.0), (0.0, 1.0))),
-)
-"""
-
-
-def test_a_file_of_a_real_mechanism_loads_in_a_fresh_process(tmp_path):
-    exec(REAL, made := {})
-    smc.run(made["scenario"]).save(tmp_path / "a.npz")
-    environment = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
-    code = "import smc_mujoco as smc; print(smc.load('a.npz').scenario)"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "LuGre" in done.stdout
-
-
 def test_a_voltage_and_a_feedforward_come_back_and_have_their_unit(tmp_path):
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
     trace = smc.run(

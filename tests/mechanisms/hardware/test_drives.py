@@ -5,7 +5,6 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from mujoco.batch import Batch
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
@@ -217,39 +216,6 @@ def test_play_comes_after_any_drive(name, order):
         assert not data.warning.number.any()
         rotors = [model.joint(ROTOR + model.joint(i).name).qposadr[0] for i in range(n)]
         assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.0105
-
-
-SWEEPS = {
-    "DCMotor": [
-        MOTOR,
-        DCMotor(0.5, 2e-3, 0.05, 5.0, 2e-5, 3e-3, 7.0, 12.0, 5.0),
-        DCMotor(2.0, 5e-3, 0.2, 1.0, 1e-4, 0.1, 3.0, math.inf, math.inf),
-    ],
-    "DCMotor without inductance": [DCMotor(0.3, 0.0), DCMotor(1.0, 0.0, gear=3.0), DCMotor(0.3, 0.0, voltage=2.0)],
-    "Backlash": [Backlash(0.0), Backlash(0.02, 2e-3, 0.01), Backlash(0.1, 5e-3, 0.1)],
-}
-
-
-@pytest.mark.parametrize(
-    ("name", "parts"), list(zip(["inverted_pendulum", "duffing", "pendulum_network"], SWEEPS.values(), strict=True))
-)
-def test_every_number_is_per_simulation(name, parts):
-    models = [build(plant(name), part) for part in parts]
-    assert len({part.structure() for part in parts}) == 1
-    batch = Batch(models[0], nsim=len(parts), nthread=1)
-    for field in {field.name for part, model in zip(parts, models, strict=True) for field in part.fields(model)}:
-        batch.expand(field)[:] = [field_array(model, field) for model in models]
-    batch.set_const()
-    qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
-    singles = [mujoco.MjData(model) for model in models]
-    for k in range(600):
-        ctrl[:] = 3.0 * math.sin(0.02 * k)
-        batch.step()
-        for model, data in zip(models, singles, strict=True):
-            data.ctrl[:] = 3.0 * math.sin(0.02 * k)
-            mujoco.mj_step(model, data)
-    assert (qpos == [data.qpos for data in singles]).all()
-    assert len({row.tobytes() for row in np.asarray(qpos)}) == len(parts)
 
 
 def test_only_a_motor_takes_anything_but_newton_metres():

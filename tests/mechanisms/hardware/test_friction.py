@@ -6,7 +6,6 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from mujoco.batch import Batch
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
@@ -157,46 +156,6 @@ def test_lugre_is_the_formula_of_its_docstring():
         rate = v - LUGRE.stiffness * abs(v) / g * 4e-5
         damping = 0.2 * math.sqrt(LUGRE.stiffness * 1.0)  # of the cart of 1 kg
         assert data.qfrc_actuator[0] == pytest.approx(-(LUGRE.stiffness * 4e-5 + damping * rate), rel=1e-9)
-
-
-@EACH
-def test_friction_never_adds_energy(part):
-    for name, inertia in INERTIA.items():
-        v = coasting(bare(name, part), 1.0, 4.0)[:, 1]
-        energy = 0.5 * inertia * v**2
-        lent = (
-            0.5 * LUGRE.static**2 / LUGRE.stiffness if isinstance(part, LuGre) else 1e-20
-        )  # J, what bristles can hold
-        assert np.all(energy[1:] <= np.minimum.accumulate(energy)[:-1] + lent)
-
-
-@pytest.mark.parametrize("name", ["inverted_pendulum", "pendulum_network"])
-@pytest.mark.parametrize(
-    "parts",
-    [
-        [Viscous(0.0), Viscous(0.1), Viscous(2.0)],
-        [Coulomb(0.0), Coulomb(0.05), Coulomb(1.0)],
-        [LUGRE, LuGre(0.2, 0.5, 0.1, 300.0, 2.0), LuGre(1.0, 1.0, 1e-3, 2e3, 5.0)],
-    ],
-    ids=lambda parts: type(parts[0]).__name__,
-)
-def test_every_number_is_per_simulation(name, parts):
-    models = [build(plant(name), part) for part in parts]
-    assert len({part.structure() for part in parts}) == 1
-    batch = Batch(models[0], nsim=len(parts), nthread=1)
-    for field in {field.name for part, model in zip(parts, models, strict=True) for field in part.fields(model)}:
-        batch.expand(field)[:] = [field_array(model, field) for model in models]
-    batch.set_const()
-    qpos, ctrl = batch.bind("qpos"), batch.bind("ctrl")
-    singles = [mujoco.MjData(model) for model in models]
-    for k in range(400):
-        ctrl[:] = math.sin(0.02 * k)
-        batch.step()
-        for model, data in zip(models, singles, strict=True):
-            data.ctrl[:] = math.sin(0.02 * k)
-            mujoco.mj_step(model, data)
-    assert (qpos == [data.qpos for data in singles]).all()
-    assert len({row.tobytes() for row in np.asarray(qpos)}) == len(parts)
 
 
 @EACH

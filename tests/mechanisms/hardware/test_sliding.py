@@ -237,12 +237,6 @@ def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():
         assert_same(one, smc.run(other))
 
 
-def test_a_trace_with_a_friction_by_a_formula_is_read_back(tmp_path):
-    trace = smc.run(next(scenarios()))
-    trace.save(tmp_path / "run.npz")
-    assert_same(smc.load(tmp_path / "run.npz"), trace)
-
-
 # servos: the published code, in numpy
 
 
