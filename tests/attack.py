@@ -203,11 +203,8 @@ class World:
         self.tuned = smc.tune("duffing", "classical", budget=1, objective=Objective(duration=0.2), searches=1)
         self.tuned.save("tuned.json")
         self.sane = SANE | {
-            "scenarios": [self.scenario],
-            "trace": self.trace,
-            "traces": self.trace,
-            "table": self.table,
-        }
+            "scenarios": [self.scenario], "trace": self.trace, "traces": self.trace, "table": self.table,
+        }  # fmt: skip
         self.sane |= {"path": "a", "conditions_": None, "environment": self.trace.scenario.plant}
         self.calls = dict(self._calls())
 

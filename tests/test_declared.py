@@ -32,12 +32,9 @@ pytestmark = pytest.mark.quick
 
 NO_NUMBERS = ["1", None, True, [], 1j]
 GIVEN = {  # what a class also needs, or two fields that depend on each other
-    "Scenario": {"plant": "duffing", "law": "classical"},
-    "Jump": {"factors": {}},
-    "Contact": {"kind": "stops"},
-    "Push": {"body": "bob"},
-    "BandLimited": {"high": 2.0},
-}
+    "Scenario": {"plant": "duffing", "law": "classical"}, "Jump": {"factors": {}}, "Contact": {"kind": "stops"},
+    "Push": {"body": "bob"}, "BandLimited": {"high": 2.0},
+}  # fmt: skip
 
 
 def below(x):
@@ -77,15 +74,12 @@ def told_number(one):
 
 
 BAD = {  # of another kind, and just beyond each end
-    OrNone: lambda one: [value for value in bad(one.one) if value is not None],
-    Number: bad_numbers,
+    OrNone: lambda one: [value for value in bad(one.one) if value is not None], Number: bad_numbers,
     Whole: lambda one: [*NO_NUMBERS, math.nan, 2.5, one.low - 1, one.high + 1] + [math.inf] * (not one.infinite),
     OneOf: lambda one: [None, 3, "", "nobody", f"{one.names[0].upper()}?", [one.names[0]]],
-    Flag: lambda one: [None, 1, 0.0, "yes"],
-    Each: bad_by_channel,
-    Range: bad_ranges,
+    Flag: lambda one: [None, 1, 0.0, "yes"], Each: bad_by_channel, Range: bad_ranges,
     FilePath: lambda one: [None, 3, b"x", ["x"]],
-}
+}  # fmt: skip
 GOOD = {  # a plain value, and the ends themselves
     OrNone: lambda one: [*good(one.one), None],
     Number: good_numbers,
@@ -97,15 +91,12 @@ GOOD = {  # a plain value, and the ends themselves
     FilePath: lambda one: [Path("a"), Path("b/c")],
 }
 TOLD = {
-    OrNone: lambda one: f"{told(one.one)}, or None",
-    Number: told_number,
+    OrNone: lambda one: f"{told(one.one)}, or None", Number: told_number,
     Whole: lambda one: f"whole {one.low} to {one.high}" + " or inf" * one.infinite,
-    OneOf: lambda one: f"one of {', '.join(one.names)}",
-    Flag: lambda one: "flag",
+    OneOf: lambda one: f"one of {', '.join(one.names)}", Flag: lambda one: "flag",
     Each: lambda one: f"{told(one.one)}, or one for each channel",
-    Range: lambda one: f"range of {told(Number(above=one.above, low=one.low))}",
-    FilePath: lambda one: "path",
-}
+    Range: lambda one: f"range of {told(Number(above=one.above, low=one.low))}", FilePath: lambda one: "path",
+}  # fmt: skip
 
 
 def bad(one):

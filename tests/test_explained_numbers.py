@@ -69,12 +69,9 @@ SAID = {
     ],
     region.basin: [f"V is {region.VELOCITY_RATIO:g} X per second"],
     search: [
-        {12: "twelve in a comparison"}[search.SEARCHES],
-        f"A search has {search.BUDGET} evaluations for each gain",
-        f"An {part(search.SCREENED_SHARE)} screens",
-        f"A {part(search.EVOLVED_SHARE)} evolves",
-        f"lower J by less than {percent(search.PATIENCE)}",
-        f"differ by more than {percent(search.AGREEMENT)}",
+        {12: "twelve in a comparison"}[search.SEARCHES], f"A search has {search.BUDGET} evaluations for each gain",
+        f"An {part(search.SCREENED_SHARE)} screens", f"A {part(search.EVOLVED_SHARE)} evolves",
+        f"lower J by less than {percent(search.PATIENCE)}", f"differ by more than {percent(search.AGREEMENT)}",
         f"rounded to {WORDS[search.GAIN_DIGITS]} digits",
     ],
     search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
@@ -145,7 +142,7 @@ SAID = {
         f"differ by more than {percent(search.AGREEMENT)}",
     ],
     ROOT / "docs" / "design.md": [f"fails at |x| or |v| beyond {short(controller.MAX_STATE)}"],
-}
+}  # fmt: skip
 
 
 def named(place) -> str:

@@ -195,12 +195,8 @@ def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(t
         ["bash", "-c", step["run"]], env=environment, capture_output=True, text=True, check=True
     ).stdout
     assert out.splitlines() == [
-        "enter",
-        given["folder"],
-        "--suite",
-        "smc-30@1",
-        *["--against", against] * bool(against),
-    ]
+        "enter", given["folder"], "--suite", "smc-30@1", *["--against", against] * bool(against),
+    ]  # fmt: skip
 
 
 def test_every_action_of_others_is_pinned_to_a_commit():

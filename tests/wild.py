@@ -228,28 +228,22 @@ def fields(random: Random) -> dict[str, Any]:
         return random.choice([None, random.uniform(-3, 3), [wide(random) for _ in range(n)]])
 
     sane: dict[str, Callable[[], Any]] = {
-        "control_period": lambda: held * step,
-        "physics_step": lambda: random.choice([None, step]),
-        "u_max": lambda: random.choice([random.uniform(0.1, 100.0), math.inf, 1e-300, 1e10, 2e10, 1e308]),
-        "x0": state,
-        "v0": state,
-        "reference": lambda: smooth(random),
+        "control_period": lambda: held * step, "physics_step": lambda: random.choice([None, step]),
+        "u_max": lambda: random.choice([random.uniform(0.1, 100.0), math.inf, 1e-300, 1e10, 2e10, 1e308]), "x0": state,
+        "v0": state, "reference": lambda: smooth(random),
         "disturbance": lambda: random.choice([None, signal(random), [signal(random) for _ in range(2)]]),
         "noise": lambda: random.choice([None, smc.Noise(positive(random), positive(random))]),
         "input_delay": lambda: random.randint(0, 6) * step,
         "velocity": lambda: component(random, smc.estimator, smc.laws(kind="estimator")),
         "surface": lambda: random.choice([None, component(random, smc.surface, smc.laws(kind="surface"))]),
-        "model": lambda: random.choice([None, "none", "nominal"]),
-        "mismatch": lambda: factors(random, where),
+        "model": lambda: random.choice([None, "none", "nominal"]), "mismatch": lambda: factors(random, where),
         "jump": lambda: smc.Jump(random.uniform(0.0, 0.03), factors(random, where)),
         "seed": lambda: random.randrange(2**53),
         "integrator": lambda: random.choice([None, "RK4", "Euler", "implicitfast", "implicit"]),
-        "friction": lambda: friction(random),
-        "actuator": lambda: actuator(random),
+        "friction": lambda: friction(random), "actuator": lambda: actuator(random),
         "sensor": lambda: changed(random, smc.Encoder, [], ["counts", "bias", "dropout", "period", "delay"]),
-        "contact": lambda: random.choice(offered),
-        "mechanism": lambda: random.choice(builds),
-    }
+        "contact": lambda: random.choice(offered), "mechanism": lambda: random.choice(builds),
+    }  # fmt: skip
     names = {*few(random, sorted(sane), random.choice([2, 5, len(sane)])), "law", "duration"}
     sane |= {"law": lambda: law(random), "duration": lambda: random.uniform(1e-3, 0.03)}
     found = {name: value(random) if random.random() < 1 / 40 else sane[name]() for name in sorted(names)}

@@ -74,18 +74,13 @@ def print_page(template: Template, console: Console, package: str, text: str) ->
     call = ", ".join([f'"{text}"', *(f"{k}={v:g}" for k, v in list(template.defaults.items())[:2])])
     rows = {
         "gains": "\n".join([*_gains(template), *filter(None, [parts.gains])]),
-        "conditions": "\n".join(template.conditions) or "none on the gains alone",
-        "degree": _degree(template),
-        "family": template.family,
-        "promises": _promises(template),
+        "conditions": "\n".join(template.conditions) or "none on the gains alone", "degree": _degree(template),
+        "family": template.family, "promises": _promises(template),
         "reads": ", ".join(f for f in Measurement._fields if f in reads(template)) * is_law,
         "plants": (", ".join(template.plants) or "all with an actuator at each joint") * is_law,
-        "discretisation": parts.discretisation,
-        "known": parts.known,
-        "source": parts.source,
-        "package": package,
+        "discretisation": parts.discretisation, "known": parts.known, "source": parts.source, "package": package,
         "use": CALL_TEMPLATES[template.kind].format(call),
-    }
+    }  # fmt: skip
     table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
     for label, words in rows.items():
         if words:

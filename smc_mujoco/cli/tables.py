@@ -33,14 +33,11 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 Again = Mapping[str, Sequence[Trace]]  # label -> the same run at half the physics step, and from a nudged start
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
-    "largest\nerror": ("max_error", "mm", 1e3),
-    "error at\nthe end": ("last_error", "mm", 1e3),
-    "mean\nforce": ("mean_force", "N", 1.0),
-    "off the\nwanted": ("force_error", "%", 1.0),
-    "force\nvaries by": ("force_ripple", "N", 1.0),
-    "touching": ("touching", "%", 1.0),
+    "largest\nerror": ("max_error", "mm", 1e3), "error at\nthe end": ("last_error", "mm", 1e3),
+    "mean\nforce": ("mean_force", "N", 1.0), "off the\nwanted": ("force_error", "%", 1.0),
+    "force\nvaries by": ("force_ripple", "N", 1.0), "touching": ("touching", "%", 1.0),
     "deepest": ("depth", "mm", 1e3),
-}
+}  # fmt: skip
 
 # Columns of a table of scores: heading -> metric.
 SCORE_COLUMNS = {

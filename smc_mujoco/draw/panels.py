@@ -54,11 +54,8 @@ WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"
 KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"}
 KINDS["applied"] = "control"
 WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
-    "tip": "tip off its path (mm)",
-    "contact": "force of contact (N)",
-    "settling": "|x − r|",
-    "largest": "largest |u|",
-}
+    "tip": "tip off its path (mm)", "contact": "force of contact (N)", "settling": "|x − r|", "largest": "largest |u|",
+}  # fmt: skip
 PEAKS = ("settling", "tip")  # drawn as `peaks`, on a logarithmic axis
 SINGLE = ("spread", *WHOLE_LABELS)  # one number a sample, whatever the number of channels
 UNBANDED = ("x", "e", *SINGLE)  # drawn sample by sample, without a mean over time
@@ -67,21 +64,15 @@ MARGIN = 0.08  # of a panel's height, above and below its curves
 REFERENCE, AGREED = "reference", "agreed"  # ids of a reference's lines, and of those of several traces that agree
 
 QUANTITIES: dict[str, Callable[[Trace], np.ndarray]] = {  # name -> (K+1, n)
-    "x": lambda trace: trace.x,
-    "e": lambda trace: trace.x - trace.r,
-    "v": lambda trace: trace.v,
-    "u": lambda trace: trace.u,
-    "applied": lambda trace: trace.applied,
-    "d": lambda trace: trace.d,
-    "s": lambda trace: trace.s,
-    "force": lambda trace: trace.force,
-    "reaction": lambda trace: trace.reaction,
+    "x": lambda trace: trace.x, "e": lambda trace: trace.x - trace.r, "v": lambda trace: trace.v,
+    "u": lambda trace: trace.u, "applied": lambda trace: trace.applied, "d": lambda trace: trace.d,
+    "s": lambda trace: trace.s, "force": lambda trace: trace.force, "reaction": lambda trace: trace.reaction,
     "spread": lambda trace: np.ptp(trace.x, axis=1, keepdims=True),
     "tip": lambda trace: peaks(1e3 * tip.tip_error(trace), trace),
     "contact": lambda trace: tip.contacts(trace).force[:, None],
     "settling": lambda trace: peaks(np.abs(trace.x - trace.r).max(axis=1), trace),
     "largest": lambda trace: np.abs(trace.u).max(axis=1, keepdims=True),
-}
+}  # fmt: skip
 
 
 class Panel(NamedTuple):

@@ -442,15 +442,12 @@ def _defaults(s: Scenario) -> dict[str, Any]:
     """Return the defaults of the fields that are None, and the law with what it takes from the plant."""
     in_order = s.contact.kind == "bobs"  # pendulums in a row must not start beyond each other
     defaults = {
-        "model": "nominal" if s.law.requires_model else "none",
-        "physics_step": s.control_period / _default_steps(s),
-        "u_max": _default_bound(s),
-        "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
-        "v0": (0.0,) * s.plant.n,
-        "reference": coerce.suggested_reference(s.plant),
+        "model": "nominal" if s.law.requires_model else "none", "physics_step": s.control_period / _default_steps(s),
+        "u_max": _default_bound(s), "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
+        "v0": (0.0,) * s.plant.n, "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
         "integrator": "RK4" if s.plain_equation or s.exact_friction else "implicitfast",
-    }
+    }  # fmt: skip
     missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
     return missing | {"law": design.at_plant(s.law, s.plant)}
 

@@ -391,19 +391,16 @@ def test_laws_that_do_the_same_are_never_separated():
 @pytest.mark.parametrize(
     ("value", "low", "high", "words"),
     [
-        (0.71, 0.6, 0.8, "29 % less (20 to 40 %)"),
-        (1.2, 1.1, 1.3, "20 % more (10 to 30 %)"),
-        (0.9, 0.7, 1.2, "10 % less (-20 to 30 %)"),
-        (1.2, 0.9, 1.5, "20 % more (-10 to 50 %)"),
+        (0.71, 0.6, 0.8, "29 % less (20 to 40 %)"), (1.2, 1.1, 1.3, "20 % more (10 to 30 %)"),
+        (0.9, 0.7, 1.2, "10 % less (-20 to 30 %)"), (1.2, 0.9, 1.5, "20 % more (-10 to 50 %)"),
         (0.01, 0.005, 0.02, "100 times less (50.0 to 200 times)"),
         (0.01, 0.0, 0.02, "100 times less (50.0 times or more)"),
         (1.7e9, 2.8e8, math.inf, "1.7e9 times as much (2.8e8 times or more)"),
         (0.71, 0.0, math.inf, "29 % less (too few for an interval)"),
         (0.0, 0.0, 0.1, "the other has no value in most runs"),
-        (math.inf, 2.0, math.inf, "the other alone has a value in most runs"),
-        (1.0, 1.0, 1.0, "no difference"),
+        (math.inf, 2.0, math.inf, "the other alone has a value in most runs"), (1.0, 1.0, 1.0, "no difference"),
     ],
-)
+)  # fmt: skip
 def test_a_difference_has_its_interval_or_says_that_there_is_none(value, low, high, words):
     assert size_in_words(Effect(value, low, high, 1, 1, True, 0.1)) == words
 

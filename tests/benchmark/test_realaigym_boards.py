@@ -559,30 +559,22 @@ def test_a_mistake_is_one_sentence(refused):
     short, duffing = boards.entry("acrobot", duration=0.01), smc.Scenario(plant="duffing", law="none", duration=0.01)
     rows, law = boards.SIMULATION["acrobot"]["v2"], {"plant": "acrobot", "law": "none"}
     mistakes = [
-        lambda: boards.entry("acrobat"),
-        lambda: boards.entry("acrobot", "slide"),
-        lambda: boards.experiments("acrobat"),
-        lambda: boards.board(smc.run(short)),
-        lambda: boards.board(smc.run(duffing)),
-        lambda: boards.board(ruled(x0=3.0)),
+        lambda: boards.entry("acrobat"), lambda: boards.entry("acrobot", "slide"),
+        lambda: boards.experiments("acrobat"), lambda: boards.board(smc.run(short)),
+        lambda: boards.board(smc.run(duffing)), lambda: boards.board(ruled(x0=3.0)),
         lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))),
-        lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))),
-        lambda: boards.board(ruled(u_max=3.0)),
-        lambda: boards.board(ruled(), "TVLQR"),
-        lambda: boards.board(ruled(), "\n"),
+        lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), lambda: boards.board(ruled(u_max=3.0)),
+        lambda: boards.board(ruled(), "TVLQR"), lambda: boards.board(ruled(), "\n"),
         lambda: boards.robustness_board("acrobat", {"mine": ALL}),
         lambda: boards.robustness_board("acrobot", {boards.ROBUSTNESS["acrobot"][0].name: ALL}),
-        lambda: boards.criteria(smc.run(duffing)),
-        lambda: boards.score({"energy": 1.0}),
-        lambda: boards.score(rows[0], "v1"),
-        lambda: boards.score(rows[0], "v3"),
-        lambda: boards.score(rows[0]._replace(energy=-1.0)),
-        lambda: Machine(duffing),
+        lambda: boards.criteria(smc.run(duffing)), lambda: boards.score({"energy": 1.0}),
+        lambda: boards.score(rows[0], "v1"), lambda: boards.score(rows[0], "v3"),
+        lambda: boards.score(rows[0]._replace(energy=-1.0)), lambda: Machine(duffing),
         lambda: Machine(smc.Scenario(**law, reference=smc.Sine(1.0, 2.0))),
         lambda: Machine(smc.Scenario(**law, feedforward=smc.Constant(1.0))),
         lambda: Machine(smc.Scenario(**law, surface=smc.surface("linear", c=1.0))),
         lambda: Machine(boards.on_board("acrobot", raising())).simulate(Case()),
-    ]
+    ]  # fmt: skip
     for wrong in mistakes:
         refused(wrong)
 

@@ -225,17 +225,13 @@ scene = smc.Scene(title="Seen", conditions={"calm": {"only": run}}, camera=(60, 
 @pytest.mark.parametrize("fails", [False, True], ids=["all well", "one fails"])
 def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns(plant, fails, call, undrawn, folder):
     lines = [
-        "import smc_mujoco as smc",
-        "@smc.law_function",
-        "def sour(y, gains, memory):",
-        "    if y.t > 0.05:",
-        "        raise ValueError('sour')",
-        "    return 0.0, 0.0",
+        "import smc_mujoco as smc", "@smc.law_function", "def sour(y, gains, memory):", "    if y.t > 0.05:",
+        "        raise ValueError('sour')", "    return 0.0, 0.0",
         f"common = dict(plant={plant!r}, duration=0.2, reference=smc.Constant(1e-3))",
         f"runs = {{{LABEL!r}: smc.Scenario(law='adaptive', noise=smc.Noise(0.1, 0.5), **common)}}",
         "runs |= {'sour': smc.Scenario(law=sour(), **common)}" if fails else "",
         "scene = smc.Scene(title='Wide', conditions={'nominal': runs})",
-    ]
+    ]  # fmt: skip
     (folder / "wide.py").write_text("\n".join(lines))
     code, out, _ = call("run", "wide.py", "--no-film", "--out", "out")
     assert code == 0
@@ -505,23 +501,14 @@ def test_show_of_a_failed_run_says_why(call, folder):
 
 
 REFUSED = {  # command line -> what the sentence names
-    "run duffin": ("'duffin'", "did you mean 'duffing'?"),
-    "run xyz": ("'xyz'", "inverted_pendulum", "vdp_noise"),
-    "run not/there.py": ("not/there.py",),
-    "run .": (".",),
-    "run empty.py": ("empty.py", "declares no scene"),
-    "run torn.py": ("torn.py", "line 2"),
-    "run mine.py --no-film --seed 100000000000000000000": ("seed",),
-    "show not/there.npz": ("not/there.npz",),
-    "show torn.npz": ("torn.npz",),
-    "show one.npz --export csv,mta": ("did you mean 'mat'?",),
-    "show one.npz --export one.csv": ("one.csv", "csv"),
-    "chatter duffing --law ,": ("',' holds no name",),
-    "chatter duffing --actuator lagg:0.01": ("lag",),
-    "chatter duffing --actuator lag": ("lag:0.01",),
-    "chatter duffing --actuator lag:-1": ("-1",),
-    "chatter duffing --channel 3": ("give 0 to 0",),
-    "chatter duffing --law clasical": ("classical",),
+    "run duffin": ("'duffin'", "did you mean 'duffing'?"), "run xyz": ("'xyz'", "inverted_pendulum", "vdp_noise"),
+    "run not/there.py": ("not/there.py",), "run .": (".",), "run empty.py": ("empty.py", "declares no scene"),
+    "run torn.py": ("torn.py", "line 2"), "run mine.py --no-film --seed 100000000000000000000": ("seed",),
+    "show not/there.npz": ("not/there.npz",), "show torn.npz": ("torn.npz",),
+    "show one.npz --export csv,mta": ("did you mean 'mat'?",), "show one.npz --export one.csv": ("one.csv", "csv"),
+    "chatter duffing --law ,": ("',' holds no name",), "chatter duffing --actuator lagg:0.01": ("lag",),
+    "chatter duffing --actuator lag": ("lag:0.01",), "chatter duffing --actuator lag:-1": ("-1",),
+    "chatter duffing --channel 3": ("give 0 to 0",), "chatter duffing --law clasical": ("classical",),
     "chatter duffing --out chatter.gif": ("chatter.gif",),
     "worst duffing --law pid --disturbance 2 --bound mass=": ("'mass='", "mass=0.7:1.3"),
     "worst duffing --law pid --disturbance 2 --bound mass=heavy": ("mass=heavy", "mass=0.7:1.3"),
@@ -529,7 +516,7 @@ REFUSED = {  # command line -> what the sentence names
     "worst duffing --law pid --disturbance 2 --bound disturbance=1": ("--disturbance",),
     "worst duffing --law pid --disturbance 2 --bound delai=0:1": ("'delai'", "delay", "delta", "mass"),
     "which arm.xm:shoulder --quick": ("'arm.xm'", ".xml"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.usefixtures("coarse_grid", "scene", "trace")

@@ -88,15 +88,11 @@ REFUSED = [  # call, what the sentence says
     (lambda: find("law", 3, dict.fromkeys(LAWS)), "unknown law 3: choose from lqr, super_twisting, terminal"),
 ]
 NAMES = {  # what is typed -> what is said of it
-    "STA": "did you mean 'super_twisting'?",
-    "STSMC": "did you mean 'super_twisting'?",
-    "TSM": "did you mean 'terminal'?",
-    "STX": "choose from lqr, super_twisting, terminal",
-    "sta": "choose from lqr, super_twisting, terminal",
-    "Terminal": "did you mean 'terminal'?",
-    "twist": "did you mean 'super_twisting'?",
-    "": "choose from lqr, super_twisting, terminal",
-}
+    "STA": "did you mean 'super_twisting'?", "STSMC": "did you mean 'super_twisting'?",
+    "TSM": "did you mean 'terminal'?", "STX": "choose from lqr, super_twisting, terminal",
+    "sta": "choose from lqr, super_twisting, terminal", "Terminal": "did you mean 'terminal'?",
+    "twist": "did you mean 'super_twisting'?", "": "choose from lqr, super_twisting, terminal",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("call", range(len(TAKEN)))

@@ -46,18 +46,14 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
 @pytest.mark.parametrize(
     ("name", "attributes"),
     [
-        ("FunctionIdentity", "_unique_ids"),
-        ("FunctionCache", "_impl_class _index_key save_overload"),
+        ("FunctionIdentity", "_unique_ids"), ("FunctionCache", "_impl_class _index_key save_overload"),
         ("IndexDataCacheFile", "_load_index _load_data _data_path _open_for_write"),
-        ("CFunc", "compile address cache_hits"),
-        ("CPUCodeLibrary", "has_dynamic_globals add_linking_library"),
-        ("RuntimeLinker", "PREFIX"),
-        ("Dispatcher", "compile get_call_template"),
-        ("builtin_registry", "globals"),
+        ("CFunc", "compile address cache_hits"), ("CPUCodeLibrary", "has_dynamic_globals add_linking_library"),
+        ("RuntimeLinker", "PREFIX"), ("Dispatcher", "compile get_call_template"), ("builtin_registry", "globals"),
         ("global_compiler_lock", "__enter__"),
         *((name, "") for name in ("TypingError", "normalize_signature", "dynamic_modname", "dynamic_module")),
     ],
-)
+)  # fmt: skip
 def test_a_private_name_of_numba_exists(name, attributes):
     """The next numba is to fail here, and not in a user's run."""
     thing = getattr(numba_internals, name)

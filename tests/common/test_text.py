@@ -23,17 +23,14 @@ TABLE = Tabular(
     headings=["law", "gains", "ITAE (m s^2)", "bound (m)", "time until it rests (s)"],
     rows=[
         [
-            Cell("pid", "yours"),
-            "kp=3_0",
-            Cell("1.2e-4", "1.1–1.3", strong=True),
-            "3 %",
+            Cell("pid", "yours"), "kp=3_0", Cell("1.2e-4", "1.1–1.3", strong=True), "3 %",
             Cell("never", alarm="2 of 9 fail"),
         ],
         [Cell(LONG, colour="red"), "", Cell("2.5", "2.25–12.75"), Cell("−4 ± 1", "a\nb"), "λ₂ < x²"],
     ],
     notes=["A note.", "Another."],
     left=2,
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("value", NUMBERS)

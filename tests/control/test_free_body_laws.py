@@ -189,11 +189,8 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
     for k, t in enumerate(trace.t[:-1]):
         r, dr, ddr = (np.array([of(one, t) for one in path[:3]]) for of in (value, rate, acceleration))
         R, w, e, de = (
-            Rotation.from_rotvec(trace.x[k, 3:].copy()),
-            trace.v[k, 3:],
-            trace.x[k, :3] - r,
-            trace.v[k, :3] - dr,
-        )
+            Rotation.from_rotvec(trace.x[k, 3:].copy()), trace.v[k, 3:], trace.x[k, :3] - r, trace.v[k, :3] - dr,
+        )  # fmt: skip
         slow, earlier = before or (de, ddr)
         slow = (slow + dt * 10.0 * de) / (1.0 + dt * 10.0)  # the implicit step of slow' = 10 (de - slow)
         dde, jerk, before = 10.0 * (de - slow), (ddr - earlier) / dt, (slow, ddr)

@@ -52,17 +52,12 @@ def tuned():
 @pytest.mark.parametrize(
     ("text", "name", "gains"),
     [
-        ("twisting", "twisting", {}),
-        ("twisting(r1=5, r2=2e0)", "twisting", {"r1": 5.0, "r2": 2.0}),
-        ("slow: twisting(r1=5)", "slow", {"r1": 5.0}),
-        ("twisting(r1=(5, 6))", "twisting", {"r1": (5.0, 6.0)}),
-        ("mine.py", "mine", {"k": 2.0}),
-        ("bound.py", "mine", {"k": 2.0}),
-        ("theirs.py", "theirs", {}),
-        ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}),
-        ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
+        ("twisting", "twisting", {}), ("twisting(r1=5, r2=2e0)", "twisting", {"r1": 5.0, "r2": 2.0}),
+        ("slow: twisting(r1=5)", "slow", {"r1": 5.0}), ("twisting(r1=(5, 6))", "twisting", {"r1": (5.0, 6.0)}),
+        ("mine.py", "mine", {"k": 2.0}), ("bound.py", "mine", {"k": 2.0}), ("theirs.py", "theirs", {}),
+        ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}), ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
     ],
-)
+)  # fmt: skip
 def test_a_text_is_its_law(files, text, name, gains):
     law = smc.law(text)
     assert law.name == name

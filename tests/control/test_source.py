@@ -44,11 +44,8 @@ def test_one_name_with_three_sets_of_gains_is_told_apart():
 
 def test_a_law_is_the_users_only_with_gains_of_the_user():
     assert [law.source.kind for law in (my_law(), my_law(k=2.0), smc.law("pid"), smc.law("pid", kp=9.0))] == [
-        "default",
-        "yours",
-        "default",
-        "yours",
-    ]
+        "default", "yours", "default", "yours",
+    ]  # fmt: skip
     assert smc.Scenario(plant=PLANT, law=my_law).law.source.kind == "default"
     assert (smc.law("none").source.kind, smc.law("none").named("idle").source.kind) == ("none", "none")
     assert gain_sets.law(PLANT, LAW, "default").source.kind == "default"

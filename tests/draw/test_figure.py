@@ -155,11 +155,8 @@ def test_a_film_has_a_chart_of_each_joint():
     trace = cart_and_pole()
     parts = panels.strip([trace])
     assert [(name, group.unit) for name, group, *_ in parts] == [
-        ("x", "m"),
-        ("x", "rad"),
-        ("settling", "m"),
-        ("u", "m"),
-    ]
+        ("x", "m"), ("x", "rad"), ("settling", "m"), ("u", "m"),
+    ]  # fmt: skip
     np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
 
 

@@ -123,17 +123,13 @@ def basins() -> list[Basin]:
 
 LAWS = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("adaptive", order=math.nan)]
 PAGES = {
-    "machines": lambda: figure(machines()),
-    "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
+    "machines": lambda: figure(machines()), "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
     "every panel": lambda: figure(cart(), size="ieee-column", panels=ALL, labels=["small"]),
-    "arm": lambda: figure(arm(), labels=["near", "far"]),
-    "signals": lambda: signals(conditions(), None, "Duffing"),
-    "lags": lags,
-    "balance": balance,
+    "arm": lambda: figure(arm(), labels=["near", "far"]), "signals": lambda: signals(conditions(), None, "Duffing"),
+    "lags": lags, "balance": balance,
     "orders": lambda: orders([accuracy("super_twisting"), accuracy("super_twisting", "van_der_pol")]),
-    "orders of laws": lambda: orders(LAWS, size="ieee-column"),
-    "maps": lambda: region.draw(basins()),
-}
+    "orders of laws": lambda: orders(LAWS, size="ieee-column"), "maps": lambda: region.draw(basins()),
+}  # fmt: skip
 
 
 def places(line: Line2D) -> np.ndarray:

@@ -25,12 +25,9 @@ from smc_mujoco.evidence.rigs.rig import Fall
 CHECKS = {
     "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
     "largest step of u in the period, over that of the classical law (TV rate)": {
-        "value": 1.25,
-        "relation": "<=",
-        "limit": 1.0,
-        "holds": False,
+        "value": 1.25, "relation": "<=", "limit": 1.0, "holds": False,
     },
-}
+}  # fmt: skip
 EMPS = smc.rig("emps")
 CLAIMS = Claims(
     [

@@ -183,17 +183,14 @@ def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, ord
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]  # laws
 HALF = 0.25  # s
 CONDITIONS = {
-    "nominal": {},
-    "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
+    "nominal": {}, "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
     "sines": {"disturbance": (SINE, smc.Sine(amplitude=1.0, omega=30.0))},
     "step": {"disturbance": smc.Step(0.2, time=HALF)},
     "pulse": {"disturbance": smc.signals.Pulse(2.0, time=HALF, width=0.1)},
     "process_noise": {"disturbance": smc.signals.OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
-    "delay": {"input_delay": 0.02},
-    "light": {"mismatch": {"mass": 0.7}},
-    "differenced": {"velocity": "filtered_difference"},
-    "jump": {},
-}
+    "delay": {"input_delay": 0.02}, "light": {"mismatch": {"mass": 0.7}},
+    "differenced": {"velocity": "filtered_difference"}, "jump": {},
+}  # fmt: skip
 
 
 def disturbance(trace, since):

@@ -22,11 +22,8 @@ STATES = 1000
 # plant -> parameters that have friction and rotors of every kind
 ROUGH = {
     "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5, "k": 4e-3, "tx": 0.1, "ty": -0.2},
-    "double_pendulum": MODEL_1_0,
-    "pendubot": MODEL_1_0,
-    "acrobot": MODEL_1_0,
-    "servo_axis": {},
-}
+    "double_pendulum": MODEL_1_0, "pendubot": MODEL_1_0, "acrobot": MODEL_1_0, "servo_axis": {},
+}  # fmt: skip
 PLANTS = pytest.mark.parametrize("name", ROUGH)
 # Channels of a plant -> its joints in the order of the equation below.
 ORDER = {"acrobot": [1, 0]}

@@ -186,22 +186,18 @@ def test_the_stops_end_the_rail(name):
 
 
 PARTS = {
-    "ideal": {},
-    "viscous": {"friction": smc.Viscous(0.05)},
-    "coulomb": {"friction": smc.Coulomb(0.001)},
+    "ideal": {}, "viscous": {"friction": smc.Viscous(0.05)}, "coulomb": {"friction": smc.Coulomb(0.001)},
     "lugre": {"friction": smc.hardware.LuGre(coulomb=0.001, static=0.0012, stribeck=0.05)},
-    "lag": {"actuator": smc.Lag(0.01)},
-    "motor": {"actuator": smc.DCMotor()},
+    "lag": {"actuator": smc.Lag(0.01)}, "motor": {"actuator": smc.DCMotor()},
     "rate": {"actuator": smc.hardware.RateLimit(200.0)},
-    "backlash": {"actuator": (smc.Lag(0.005), smc.Backlash(0.002))},
-    "encoder": {"sensor": smc.Encoder(counts=20_000)},
+    "backlash": {"actuator": (smc.Lag(0.005), smc.Backlash(0.002))}, "encoder": {"sensor": smc.Encoder(counts=20_000)},
     "late": {"sensor": smc.Encoder(counts=20_000, bias=1e-3, dropout=0.05, period=2e-3, delay=2e-3)},
     "stops": {"contact": "stops"},
     "noise": {"noise": smc.Noise(1e-3, 1e-2), "disturbance": smc.signals.OrnsteinUhlenbeck(0.1, tau=0.1)},
     "gust": {"disturbance": smc.signals.Gust(0.3, time=0.1, width=0.2)},
     "jump": {"jump": smc.Jump(time=0.1, factors={"M": 1.2, "m": 0.8, "l": 1.1, "grav": 1.01})},
     "delay": {"input_delay": 5e-3},
-}
+}  # fmt: skip
 
 
 @pytest.mark.slow

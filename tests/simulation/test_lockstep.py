@@ -275,12 +275,8 @@ def test_a_feedforward_that_raises_says_so():
 def test_applied_is_the_command_of_the_delay_ago():
     delays = (0.0, 0.001, 0.004, 0.007, 0.01, 0.19)
     common = {
-        "plant": "duffing",
-        "law": "observer_free",
-        "duration": 0.2,
-        "control_period": 0.005,
-        "physics_step": 0.001,
-    }
+        "plant": "duffing", "law": "observer_free", "duration": 0.2, "control_period": 0.005, "physics_step": 0.001,
+    }  # fmt: skip
     scenarios = [smc.Scenario(**common, noise=smc.Noise(0.1, 0.1), input_delay=delay) for delay in delays]
     for trace in smc.run(scenarios):
         samples = math.ceil(round(trace.scenario.input_delay / 0.001) / 5)  # a command acts from the next sample on

@@ -239,12 +239,9 @@ def userdata(kind, size):
     """What a stranger may keep in userdata."""
     rng = np.random.default_rng(size)
     return {
-        "zeros": np.zeros(size),
-        "ones": np.ones(size),
-        "numbers": rng.normal(size=size) * 1e6,
-        "nan": np.full(size, np.nan),
-        "nearly our magic number": np.full(size, callback.magic() + 1),
-    }[kind]
+        "zeros": np.zeros(size), "ones": np.ones(size), "numbers": rng.normal(size=size) * 1e6,
+        "nan": np.full(size, np.nan), "nearly our magic number": np.full(size, callback.magic() + 1),
+    }[kind]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -456,13 +456,10 @@ PASSIVE = {
 @pytest.mark.parametrize(
     ("name", "part"),
     [
-        ("duffing", "springs"),
-        ("duffing", "both"),
-        ("inverted_pendulum", "lugre"),
-        ("pendulum_network", "backlash"),
+        ("duffing", "springs"), ("duffing", "both"), ("inverted_pendulum", "lugre"), ("pendulum_network", "backlash"),
         ("inverted_pendulum_network", "coulomb"),
     ],
-)
+)  # fmt: skip
 def test_a_passive_mechanism_never_gains_energy(name, part):
     s = scenario(name, "none", duration=2.0, v0=0.5, **PASSIVE[part])
     energy = energies(s)
@@ -561,26 +558,18 @@ def test_a_motors_force_is_its_torque(name):
 
 
 LOSSLESS = {  # so that the sum below knows every force from the trace
-    "duffing": {"delta": 0.0},
-    "inverted_pendulum": {"b": 0.0},
-    "pendulum_network": {"b": 0.0},
-    "inverted_pendulum_network": {"b": 0.0},
-    "van_der_pol": {"mu": 0.0},
-}
+    "duffing": {"delta": 0.0}, "inverted_pendulum": {"b": 0.0}, "pendulum_network": {"b": 0.0},
+    "inverted_pendulum_network": {"b": 0.0}, "van_der_pol": {"mu": 0.0},
+}  # fmt: skip
 PUSHED = {
-    "coulomb": {"friction": smc.Coulomb(0.4)},
-    "lugre": {"friction": LUGRE},
-    "both": {"friction": (LUGRE, smc.Coulomb(0.1))},
-    "lag": {"actuator": smc.Lag(0.02), "friction": smc.Coulomb(0.4)},
+    "coulomb": {"friction": smc.Coulomb(0.4)}, "lugre": {"friction": LUGRE},
+    "both": {"friction": (LUGRE, smc.Coulomb(0.1))}, "lag": {"actuator": smc.Lag(0.02), "friction": smc.Coulomb(0.4)},
     "rate limit": {"actuator": smc.hardware.RateLimit(50.0)},
     "motor": {"actuator": dataclasses.replace(MOTOR, rotor_inertia=0.0), "friction": LUGRE},
-    "backlash": {"actuator": smc.Backlash(0.05, rotor_inertia=0.01)},
-    "stops": {"contact": "stops", "v0": 5.0},
-    "bobs": {"contact": "bobs", **APART},
-    "floor": {"contact": "floor"},
-    "peg": {"contact": "peg"},
+    "backlash": {"actuator": smc.Backlash(0.05, rotor_inertia=0.01)}, "stops": {"contact": "stops", "v0": 5.0},
+    "bobs": {"contact": "bobs", **APART}, "floor": {"contact": "floor"}, "peg": {"contact": "peg"},
     "wall": {"contact": "wall", "v0": 5.0},
-}
+}  # fmt: skip
 
 
 def pushed():

@@ -115,14 +115,11 @@ def test_no_scenarios_give_no_traces():
 
 def test_plants_sizes_and_durations_mix_in_one_call():
     many = [
-        scenario(plant="duffing"),
-        scenario(plant=smc.plant("pendulum_network", n=2)),
-        scenario(plant=smc.plant("pendulum_network", n=3)),
-        scenario(plant="duffing", duration=0.03),
-        scenario(plant="duffing", integrator="Euler"),
-        scenario(plant="duffing", control_period=2e-3),
+        scenario(plant="duffing"), scenario(plant=smc.plant("pendulum_network", n=2)),
+        scenario(plant=smc.plant("pendulum_network", n=3)), scenario(plant="duffing", duration=0.03),
+        scenario(plant="duffing", integrator="Euler"), scenario(plant="duffing", control_period=2e-3),
         scenario(plant="duffing", physics_step=5e-4),
-    ]
+    ]  # fmt: skip
     traces = smc.run(many)
     assert [trace.x.shape for trace in traces] == [(21, 1), (21, 2), (21, 3), (31, 1), (21, 1), (11, 1), (21, 1)]
     assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
@@ -249,13 +246,10 @@ def test_a_law_s_memory_starts_at_zero_in_every_channel_and_every_run():
 
 
 RETURNS = {
-    "nothing": lambda y, gains, memory: None,
-    "text": lambda y, gains, memory: ("a", "b"),
-    "complex": lambda y, gains, memory: (1j, 0.0),
-    "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
-    "memory": lambda y, gains, memory: memory,
-    "huge": lambda y, gains, memory: (json.loads("1") * 10**400, 0.0),
-}
+    "nothing": lambda y, gains, memory: None, "text": lambda y, gains, memory: ("a", "b"),
+    "complex": lambda y, gains, memory: (1j, 0.0), "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
+    "memory": lambda y, gains, memory: memory, "huge": lambda y, gains, memory: (json.loads("1") * 10**400, 0.0),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", RETURNS)

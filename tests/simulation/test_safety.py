@@ -737,16 +737,11 @@ MAPPINGS = {
     "parameters": lambda s: s.plant.parameters,
 }
 CHANGES = {
-    "set": lambda m, key: m.__setitem__(key, -1.0),
-    "new": lambda m, key: m.__setitem__("new", -1.0),
-    "delete": lambda m, key: m.__delitem__(key),
-    "update": lambda m, key: m.update({key: -1.0}),
-    "or": lambda m, key: m.__ior__({key: -1.0}),
-    "setdefault": lambda m, key: m.setdefault("new", -1.0),
-    "pop": lambda m, key: m.pop(key),
-    "popitem": lambda m, key: m.popitem(),
-    "clear": lambda m, key: m.clear(),
-}
+    "set": lambda m, key: m.__setitem__(key, -1.0), "new": lambda m, key: m.__setitem__("new", -1.0),
+    "delete": lambda m, key: m.__delitem__(key), "update": lambda m, key: m.update({key: -1.0}),
+    "or": lambda m, key: m.__ior__({key: -1.0}), "setdefault": lambda m, key: m.setdefault("new", -1.0),
+    "pop": lambda m, key: m.pop(key), "popitem": lambda m, key: m.popitem(), "clear": lambda m, key: m.clear(),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("mapping", MAPPINGS)

@@ -15,12 +15,9 @@ pytestmark = pytest.mark.quick
 
 PENDULUM = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01)
 DEGREES = [
-    {"x0": 30.0},
-    {"x0": -10.0},
-    {"reference": smc.Constant(30.0)},
-    {"reference": smc.Sine(amplitude=-90.0, omega=1.0)},
-    {"reference": smc.Step(720.0)},
-]
+    {"x0": 30.0}, {"x0": -10.0}, {"reference": smc.Constant(30.0)},
+    {"reference": smc.Sine(amplitude=-90.0, omega=1.0)}, {"reference": smc.Step(720.0)},
+]  # fmt: skip
 
 
 SUSPICIOUS = [  # fields of a number, and the ends of the numbers that are taken for another unit, with the end or not

@@ -149,13 +149,10 @@ def test_a_gust_gives_a_free_mass_its_impulse():
 @pytest.mark.parametrize(
     ("name", "angle"),
     [
-        ("inverted_pendulum", 0.0),
-        ("pendulum_network", 1.0),
-        ("inverted_pendulum_network", -1.0),
-        ("inverted_pendulum", math.pi / 2),
-        ("pendulum_network", 2.5),
+        ("inverted_pendulum", 0.0), ("pendulum_network", 1.0), ("inverted_pendulum_network", -1.0),
+        ("inverted_pendulum", math.pi / 2), ("pendulum_network", 2.5),
     ],
-)
+)  # fmt: skip
 def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
     """Against the same force on the joint, times l cos x at the start: the step is short, the angle stays."""
     size = {"n": 3} if smc.plant(name).n > 1 else {}

@@ -67,11 +67,8 @@ def network(**fields):
         v0=1 / 3,
         reference=smc.Sine(0.1, 2.0, 0.3),
         disturbance=[
-            smc.Constant(0.1),
-            smc.Step(0.1, 0.005),
-            smc.signals.Pulse(0.1, 0.005, 0.01),
-            smc.signals.OrnsteinUhlenbeck(0.1, 0.1, 2e-3),
-            Ramp(0.5),
+            smc.Constant(0.1), smc.Step(0.1, 0.005), smc.signals.Pulse(0.1, 0.005, 0.01),
+            smc.signals.OrnsteinUhlenbeck(0.1, 0.1, 2e-3), Ramp(0.5),
         ],
         noise=smc.Noise(0.01, 0.05),
         input_delay=3e-3,
@@ -81,7 +78,7 @@ def network(**fields):
         integrator="implicitfast",
         u_max=math.inf,
         **fields,
-    )
+    )  # fmt: skip
 
 
 SCENARIOS = {

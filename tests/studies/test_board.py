@@ -38,17 +38,13 @@ class Stand:
         noise = np.random.default_rng(0).uniform(0.9, 1.1, (laws, count))
         sizes = np.array([[1.0], [2.0], [4e-7]])
         self.columns = {
-            "plant": ["duffing"] * laws * count,
-            "law": np.repeat(LAWS, count),
+            "plant": ["duffing"] * laws * count, "law": np.repeat(LAWS, count),
             "condition": np.tile(np.repeat(conditions, seeds), laws),
-            "seed": np.tile(np.arange(seeds), laws * len(conditions)),
-            "failure": [None] * laws * count,
-            "diverged_at": np.full(laws * count, math.nan),
-            "itae": (sizes[:] * noise).ravel(),
-            "settling_time": np.repeat([0.5, 1.0, math.inf], count),
-            "tv_rate": np.repeat([3.0, 2.0, 1.0], count),
+            "seed": np.tile(np.arange(seeds), laws * len(conditions)), "failure": [None] * laws * count,
+            "diverged_at": np.full(laws * count, math.nan), "itae": (sizes[:] * noise).ravel(),
+            "settling_time": np.repeat([0.5, 1.0, math.inf], count), "tv_rate": np.repeat([3.0, 2.0, 1.0], count),
             "ultimate_bound": np.repeat([0.1, 0.1, 0.1], count),
-        }
+        }  # fmt: skip
 
     def column(self, name: str) -> np.ndarray:
         return np.asarray(find("column", name, self.columns))

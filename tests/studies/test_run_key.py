@@ -106,14 +106,11 @@ def written(law="-gains.k * helper(y.e)", helper="GAIN * x", constant="2.0", sig
 @pytest.mark.parametrize(
     "edit",
     [
-        {"law": "-2.0 * gains.k * helper(y.e)"},
-        {"law": "gains.k * helper(y.e)"},
-        {"helper": "GAIN * math.tanh(x)"},
-        {"constant": "3.0"},
-        {"signal": "2.0 * p.amplitude"},
+        {"law": "-2.0 * gains.k * helper(y.e)"}, {"law": "gains.k * helper(y.e)"}, {"helper": "GAIN * math.tanh(x)"},
+        {"constant": "3.0"}, {"signal": "2.0 * p.amplitude"},
     ],
     ids=["constant of the law", "sign", "helper", "global constant", "signal"],
-)
+)  # fmt: skip
 def test_an_edited_law_is_another_run(edit):
     assert written() != written(**edit)
 
@@ -231,17 +228,14 @@ def package(factor: float) -> ModuleType:
 @pytest.mark.parametrize(
     "made",
     [
-        lambda k: Weighted(k).law,
-        lambda k: functools.partial(Weighted.law, weight=k),
-        lambda k: reaching(functools.partial(max, k)),
-        lambda k: reaching(np.vectorize(lambda x: k * x)),
-        lambda k: reaching(np.poly1d([k, 1.0])),
-        lambda k: reaching(package(k), "THING.inner.helper(y.e)"),
+        lambda k: Weighted(k).law, lambda k: functools.partial(Weighted.law, weight=k),
+        lambda k: reaching(functools.partial(max, k)), lambda k: reaching(np.vectorize(lambda x: k * x)),
+        lambda k: reaching(np.poly1d([k, 1.0])), lambda k: reaching(package(k), "THING.inner.helper(y.e)"),
         lambda k: reaching(type("Table", (), {"values": (k, 1.0)}), "THING.values[0]"),
         lambda k: reaching(None, "helper(y.e)", f"@functools.cache\ndef helper(x): return {k} * x"),
     ],
     ids=["method", "partial", "global partial", "vectorized", "object", "package", "class", "kept results"],
-)
+)  # fmt: skip
 def test_everything_that_a_law_reaches_is_in_its_fingerprint(made):
     assert fingerprint.of(made(1.0)) == fingerprint.of(made(1.0)) != fingerprint.of(made(2.0))
 

@@ -155,20 +155,14 @@ CONDITIONS = {
 }
 JUMPS = {
     "jump_mild": {
-        "inverted_pendulum": {"mass": 2.0},
-        "pendulum_network": {"mass": 2.0},
-        "inverted_pendulum_network": {"mass": 2.0},
-        "van_der_pol": {"mu": 3.0},
-        "duffing": {"alpha": 3.0},
+        "inverted_pendulum": {"mass": 2.0}, "pendulum_network": {"mass": 2.0},
+        "inverted_pendulum_network": {"mass": 2.0}, "van_der_pol": {"mu": 3.0}, "duffing": {"alpha": 3.0},
     },
     "jump_hard": {
-        "inverted_pendulum": {"mass": 25.912},
-        "pendulum_network": {"mass": 11.062},
-        "inverted_pendulum_network": {"mass": 22.681},
-        "van_der_pol": {"mu": 9.0},
-        "duffing": {"alpha": 27.684},
+        "inverted_pendulum": {"mass": 25.912}, "pendulum_network": {"mass": 11.062},
+        "inverted_pendulum_network": {"mass": 22.681}, "van_der_pol": {"mu": 9.0}, "duffing": {"alpha": 27.684},
     },
-}
+}  # fmt: skip
 COMMON = {
     "duration": 10.0, "control_period": 0.001, "physics_step": 0.001, "u_max": 6.0, "integrator": "RK4", "seed": 0,
     "reference": smc.Constant(0.0), "disturbance": (), "noise": smc.Noise(), "input_delay": 0.0,

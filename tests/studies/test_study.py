@@ -104,18 +104,13 @@ def test_the_grid_takes_iterators():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"plants": ["dufing"]}, "did you mean 'duffing'"),
-        ({"laws": ["clasical"]}, "did you mean 'classical'"),
-        ({"conditions": ["noisy"]}, "unknown condition"),
-        ({"seeds": 0}, "seeds is 0"),
-        ({"seeds": [-1]}, "seed is -1"),
-        ({"plants": 3}, "plants is 3: give several"),
-        ({"plants": [3]}, "plant is 3"),
-        ({"conditions": []}, "give several"),
-        ({"seeds": None}, "seeds is None: give a whole number"),
+        ({"plants": ["dufing"]}, "did you mean 'duffing'"), ({"laws": ["clasical"]}, "did you mean 'classical'"),
+        ({"conditions": ["noisy"]}, "unknown condition"), ({"seeds": 0}, "seeds is 0"),
+        ({"seeds": [-1]}, "seed is -1"), ({"plants": 3}, "plants is 3: give several"), ({"plants": [3]}, "plant is 3"),
+        ({"conditions": []}, "give several"), ({"seeds": None}, "seeds is None: give a whole number"),
         ({"plants": paper.PLANTS, "seeds": 10**6}, "5,000,000 runs: give fewer seeds"),
     ],
-)
+)  # fmt: skip
 def test_what_the_grid_cannot_make_is_one_sentence(change, said):
     arguments = {"plants": ["duffing"], "laws": ["classical"], "conditions": ["noise"], "seeds": 1, "gains": "study"}
     with pytest.raises(smc.ScenarioError, match=said) as error:

@@ -109,11 +109,8 @@ def test_check_tells_all_limits_that_were_missed_at_once(session):
     assert "AssertionError: settling_time is never, not <= 1; overshoot is 11.3" in said
     told = [line[1:].split() for line in said.splitlines() if re.match(r"E +\w+  ", line)]
     assert [(line[0], line[-1]) for line in told] == [
-        ("metric", "ok"),
-        ("settling_time", "NO"),
-        ("overshoot", "NO"),
-        ("max_u", "yes"),
-    ]
+        ("metric", "ok"), ("settling_time", "NO"), ("overshoot", "NO"), ("max_u", "yes"),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("value", "kept"), [(0.9, False), (1.0, True), (2.0, True), (2.1, False)])

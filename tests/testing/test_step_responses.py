@@ -9,12 +9,9 @@ pytestmark = pytest.mark.quick
 
 STEP = 0.2  # rad or m
 SETTLES = {  # s, chosen: a tenth above the slowest of the discontinuous laws
-    "inverted_pendulum": 0.45,
-    "van_der_pol": 2.0,
-    "duffing": 1.35,
-    "pendulum_network": 2.0,
+    "inverted_pendulum": 0.45, "van_der_pol": 2.0, "duffing": 1.35, "pendulum_network": 2.0,
     "inverted_pendulum_network": 1.3,
-}
+}  # fmt: skip
 
 
 def law(plant, name):

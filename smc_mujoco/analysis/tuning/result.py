@@ -193,18 +193,13 @@ class Tuned(Tables):
         """Return what `control.gain_sets` stores of it, without the history."""
         first = self.searches[0].chosen
         return {
-            "gains": list(self.bounds),
-            "sets": [one.gains for one in self.sets],
-            "objectives": [_short(one.objective) for one in self.sets],
-            "evaluations": self.evaluations,
-            "seed": self.seed,
-            "at_bound": self.at_bound,
+            "gains": list(self.bounds), "sets": [one.gains for one in self.sets],
+            "objectives": [_short(one.objective) for one in self.sets], "evaluations": self.evaluations,
+            "seed": self.seed, "at_bound": self.at_bound,
             "near": {name: tuple(map(_short, ends)) for name, ends in self.near.items()},
             "front": [(_short(one.tracking), _short(one.variation)) for one in self.front],
-            "first": (_short(first.tracking), _short(first.variation)),
-            "rule": self.rule,
-            "versions": self.versions,
-        }
+            "first": (_short(first.tracking), _short(first.variation)), "rule": self.rule, "versions": self.versions,
+        }  # fmt: skip
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""

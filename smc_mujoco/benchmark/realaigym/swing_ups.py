@@ -111,11 +111,8 @@ def global_experiments(robot: str) -> dict[str, Scenario]:
     made, gains = global_entry(robot), GAINS[robot]
     straight = {name: NEVER_BENDS * gains[name] for name in ("K", "phi")}
     return {
-        GLOBAL_NAME: made,
-        "the same, linear": global_entry(robot, **straight),
-        "the same, no pump": global_entry(robot, A=1e-9),
-        "the same, no catch": global_entry(robot, level=0.0),
+        GLOBAL_NAME: made, "the same, linear": global_entry(robot, **straight),
+        "the same, no pump": global_entry(robot, A=1e-9), "the same, no catch": global_entry(robot, level=0.0),
         "linear law alone": global_entry(robot, level=1e99),
-        "trajectory + Riccati*": entry(robot, velocity="measured"),
-        "u = 0": on_board(robot, "none"),
-    }
+        "trajectory + Riccati*": entry(robot, velocity="measured"), "u = 0": on_board(robot, "none"),
+    }  # fmt: skip

@@ -57,11 +57,9 @@ PAPER_FIELDS = {  # field of a paper -> its type and what to write
     **{name: (dict, f"a table, under a line [{name}]") for name in ("plants", "conditions", "gains", "allowed")},
 }
 CLAIM_FIELDS = {  # the same of a claim
-    "id": A_TEXT,
-    "text": A_TEXT,
+    "id": A_TEXT, "text": A_TEXT,
     "whose": (str, '"paper" for a sentence of the paper, "derived" for what follows from one, "ours" for a question'),
-    "where": A_TEXT,
-    "function": (str, "the name of a function"),
+    "where": A_TEXT, "function": (str, "the name of a function"),
     "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
     "how": (str, "a text: how it is derived, or why it is asked"),
     "over": (str, '"all" or "some" of the gains in [allowed.LAW]'),
@@ -69,11 +67,9 @@ CLAIM_FIELDS = {  # the same of a claim
     "rivals": (str, "a set of gains: that of the other laws in the search; what other sets give is told beside it"),
     "late": (bool, "true or false"),
     **dict.fromkeys(("read", "words", "measured", "note", "instead", "shown_by", "quantifier"), A_TEXT),
-    **dict.fromkeys(("quick", "varies", "immune"), A_TEXT),
-    **dict.fromkeys(("plants", "laws", "conditions"), A_LIST),
-    "runs": (str, FIELDS_CURE),
-    "values": (dict, "a table of numbers"),
-}
+    **dict.fromkeys(("quick", "varies", "immune"), A_TEXT), **dict.fromkeys(("plants", "laws", "conditions"), A_LIST),
+    "runs": (str, FIELDS_CURE), "values": (dict, "a table of numbers"),
+}  # fmt: skip
 REQUIRED_FIELDS = ("title", "authors", "source", "read", "claim"), tuple(CLAIM_FIELDS)[:6]  # of a paper, of a claim
 
 

@@ -71,12 +71,9 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
         "format": checker.FORMAT,
         "plant": {"name": plant.name, "n": plant.n, "parameters": values, "mechanism": scenario.mechanism},
         "law": {"name": law.name, "gains": {name: finite(value) for name, value in law.gains.items()}},
-        "u_max": finite(u_max),
-        "unit": plant.unit,
-        "disturbance": d0,
-        "slope": finite(rate),
+        "u_max": finite(u_max), "unit": plant.unit, "disturbance": d0, "slope": finite(rate),
         "leaves_out": left_out(scenario),
-    }
+    }  # fmt: skip
     document["parts"] = _parts(document, scenario, checker)
     document["seal"] = checker.seal(document)
     certificate = Certificate(data=document)
@@ -96,13 +93,10 @@ def left_out(scenario: Scenario) -> dict[str, dict[str, dict[str, float]]]:
     return {
         "sampling": {"samples": {name: value for name, value in clock.items() if value}},
         "delay": {"input_delay": {"time": s.input_delay}} if s.input_delay else {},
-        "noise": measured | _numbers([s.sensor] if s.sensor else []),
-        "dry friction": _numbers(s.friction),
-        "contact": {} if s.contact.kind == "none" else {s.contact.kind: {}},
-        "drive": _numbers(s.actuator),
-        "other parameters": {"jump": jump} if jump else {},
-        "rounding": {s.integrator: {"step": s.physics_step}},
-    }
+        "noise": measured | _numbers([s.sensor] if s.sensor else []), "dry friction": _numbers(s.friction),
+        "contact": {} if s.contact.kind == "none" else {s.contact.kind: {}}, "drive": _numbers(s.actuator),
+        "other parameters": {"jump": jump} if jump else {}, "rounding": {s.integrator: {"step": s.physics_step}},
+    }  # fmt: skip
 
 
 def _numbers(parts: Sequence[Any]) -> dict[str, dict[str, float]]:

@@ -73,15 +73,12 @@ def _print_claim(claim: Claim, console: Console) -> None:
     console.print(Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim")))
     about, lost = plain(Column(style="dim"), ""), claim.verdict != verdicts.SUPPORTED
     parts = {
-        "whose": claim.source + (f": {claim.how}" if claim.how else ""),
-        "kind": claim.quantifier,
-        "gains": f"{claim.over} gains that the paper allows" if claim.over else "",
-        "measured": claim.measured,
-        "holds if": claim.holds_if,
-        "note": claim.note,
+        "whose": claim.source + (f": {claim.how}" if claim.how else ""), "kind": claim.quantifier,
+        "gains": f"{claim.over} gains that the paper allows" if claim.over else "", "measured": claim.measured,
+        "holds if": claim.holds_if, "note": claim.note,
         "instead": f"{claim.instead} ({claim.shown_by})" if lost and claim.instead else "",
         "verdict": Text(f"{claim.verdict}{', flips with the gains' * claim.flips}", f"bold {COLOURS[claim.verdict]}"),
-    }
+    }  # fmt: skip
     for label, text in parts.items():
         if text:
             about.add_row(label, Text(text) if isinstance(text, str) else text)

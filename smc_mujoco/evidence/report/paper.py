@@ -19,11 +19,8 @@ from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.page import TEMPLATES, environment, uri
 
 SECTIONS = {
-    "claims": "The claims",
-    "checks": "How far from the thresholds",
-    "gains": "Gains",
-    "method": "How it was computed",
-}
+    "claims": "The claims", "checks": "How far from the thresholds", "gains": "Gains", "method": "How it was computed",
+}  # fmt: skip
 
 
 def report(

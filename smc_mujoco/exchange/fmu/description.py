@@ -15,13 +15,10 @@ JOINT_UNITS = {
 }
 # Kind of variable -> causality, variability, initial.
 VARIABLE_ROLES = {
-    "SMC_CLOCK": ("independent", "continuous", None),
-    "SMC_INPUT": ("input", "discrete", None),
-    "SMC_COMPUTED": ("local", "discrete", "calculated"),
-    "SMC_PARAMETER": ("parameter", "tunable", "exact"),
-    "SMC_CONSTANT": ("local", "constant", "exact"),
-    "SMC_STATE": ("local", "discrete", "exact"),
-}
+    "SMC_CLOCK": ("independent", "continuous", None), "SMC_INPUT": ("input", "discrete", None),
+    "SMC_COMPUTED": ("local", "discrete", "calculated"), "SMC_PARAMETER": ("parameter", "tunable", "exact"),
+    "SMC_CONSTANT": ("local", "constant", "exact"), "SMC_STATE": ("local", "discrete", "exact"),
+}  # fmt: skip
 
 
 def unit_name(unit: Unit, joint: str) -> str:

@@ -115,14 +115,11 @@ def _law(law: Component) -> dict[str, Any]:
     """Return the facts that only laws have."""
     read = reads(law.template) if law.template is not None else frozenset(Measurement._fields)
     return {
-        "label": style.law_name(law),
-        "colour": style.law_colour(law),
+        "label": style.law_name(law), "colour": style.law_colour(law),
         "colour_dark": style.lighter(style.law_colour(law)),
-        "family": law.template.family if law.template is not None else "",
-        "requires_model": law.requires_model,
-        "reads_model": bool(read & MODEL_FIELDS),
-        "takes_surface": "has_surface" in read and law.relative_degree == 1,
-    }
+        "family": law.template.family if law.template is not None else "", "requires_model": law.requires_model,
+        "reads_model": bool(read & MODEL_FIELDS), "takes_surface": "has_surface" in read and law.relative_degree == 1,
+    }  # fmt: skip
 
 
 def _plant(plant: Plant, kinds: Mapping[str, Sequence[Component]], users: Sequence[Component]) -> dict[str, Any]:

@@ -90,12 +90,9 @@ def by_runs(cases, names, gains, goal=SECOND):
 
 
 CONTINUOUS = [
-    ("duffing", "observer_free"),
-    ("inverted_pendulum", "pid"),
-    ("van_der_pol", MINE),
-    ("pendulum_network", "extended_state"),
-    ("inverted_pendulum_network", "boundary_layer"),
-]
+    ("duffing", "observer_free"), ("inverted_pendulum", "pid"), ("van_der_pol", MINE),
+    ("pendulum_network", "extended_state"), ("inverted_pendulum_network", "boundary_layer"),
+]  # fmt: skip
 CHATTERING = [("duffing", "twisting"), ("inverted_pendulum", "classical"), ("van_der_pol", "super_twisting")]
 
 

@@ -45,13 +45,10 @@ def test_angles_are_those_of_mujoco_s_free_camera():
 @pytest.mark.parametrize(
     ("chosen", "sentence"),
     [
-        ((1.0,), "give the name of a camera"),
-        ((1.0, 2.0, 3.0), "give the name of a camera"),
-        ((0.0, 91.0), "camera's elevation is 91"),
-        (("a", 0.0), "camera's azimuth"),
-        (3.0, "give a list"),
+        ((1.0,), "give the name of a camera"), ((1.0, 2.0, 3.0), "give the name of a camera"),
+        ((0.0, 91.0), "camera's elevation is 91"), (("a", 0.0), "camera's azimuth"), (3.0, "give a list"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_camera_is_refused(chosen, sentence):
     with pytest.raises(smc.ScenarioError, match=sentence):
         camera.checked(chosen)

@@ -30,12 +30,9 @@ BESIDE = Beside("theory", 7.0)
 
 def claim(id, evidence, **about):
     told = {
-        "text": f"sentence {id} of <this> & $that$",
-        "where": "p. 1",
-        "measured": "m",
-        "holds_if": "h",
+        "text": f"sentence {id} of <this> & $that$", "where": "p. 1", "measured": "m", "holds_if": "h",
         "read": "abstract",
-    }
+    }  # fmt: skip
     return judged(Statement(id=id, **told | about), evidence)
 
 
@@ -102,11 +99,8 @@ def test_a_badge_has_a_field_for_each_verdict_of_the_paper_s_own_sentences(claim
     text = badge("a <b>", claims)
     assert "<b>" not in text
     assert re.findall(r">([^<>]+)</text>", text) == [
-        "claims of a &lt;b&gt;",
-        "2 supported",
-        "2 partly",
-        "1 not testable",
-    ]
+        "claims of a &lt;b&gt;", "2 supported", "2 partly", "1 not testable",
+    ]  # fmt: skip
     at, wide, colours = zip(*re.findall(r'<rect x="(\d+)" width="(\d+)" height="20" fill="(#\w+)"', text), strict=True)
     assert [int(x) for x in at] == [sum(map(int, wide[:k])) for k in range(4)]
     assert f'width="{sum(map(int, wide))}" height="20"' in text

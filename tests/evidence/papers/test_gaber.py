@@ -237,39 +237,26 @@ def held_by(factor: float) -> Told:
 
 
 SCORED += [
-    ("1", estimated_later(1.25), SUPPORTED),
-    ("1", estimated_later(0.7), REFUTED),
+    ("1", estimated_later(1.25), SUPPORTED), ("1", estimated_later(0.7), REFUTED),
     ("1", estimated_later(never), REFUTED),
     ("1", lambda s: {"settling_time": 1.5 if s.resolved.velocity.gains.get("tau") == 0.005 else 1.0}, PARTLY),
-    ("1", lambda s: {"settling_time": never}, REFUTED),
-    ("3", by_plant("tv_rate", others=0.009), SUPPORTED),
-    ("3", by_plant("tv_rate", duffing=0.01), REFUTED),
-    ("3", by_plant("tv_rate", others=0.01), REFUTED),
-    ("4", of_ours("max_u", 1.0), SUPPORTED),
-    ("4", of_ours("max_u", 1.001), REFUTED),
+    ("1", lambda s: {"settling_time": never}, REFUTED), ("3", by_plant("tv_rate", others=0.009), SUPPORTED),
+    ("3", by_plant("tv_rate", duffing=0.01), REFUTED), ("3", by_plant("tv_rate", others=0.01), REFUTED),
+    ("4", of_ours("max_u", 1.0), SUPPORTED), ("4", of_ours("max_u", 1.001), REFUTED),
     ("4", of_ours("max_u", never), REFUTED),
     ("5", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.resolved.x0))}, SUPPORTED),
     ("5", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.resolved.x0))}, REFUTED),
-    ("7", sized(2.0, 2.0), SUPPORTED),
-    ("7", sized(2.0, 2.1), REFUTED),
-    ("7", sized(2.1, never), REFUTED),
-    ("11", of_ours("tv_rate", 0.9e-3), SUPPORTED),
-    ("11", of_ours("tv_rate", 1.1e-3), REFUTED),
-    ("12", against(1.1, 1.1), SUPPORTED),
-    ("12", against(1.1, 1.2), PARTLY),
-    ("12", against(1.2, never), REFUTED),
-    ("13", joined(0.9, never), SUPPORTED),
-    ("13", joined(0.9, 0.9), PARTLY),
-    ("13", joined(never, never), REFUTED),
+    ("7", sized(2.0, 2.0), SUPPORTED), ("7", sized(2.0, 2.1), REFUTED), ("7", sized(2.1, never), REFUTED),
+    ("11", of_ours("tv_rate", 0.9e-3), SUPPORTED), ("11", of_ours("tv_rate", 1.1e-3), REFUTED),
+    ("12", against(1.1, 1.1), SUPPORTED), ("12", against(1.1, 1.2), PARTLY), ("12", against(1.2, never), REFUTED),
+    ("13", joined(0.9, never), SUPPORTED), ("13", joined(0.9, 0.9), PARTLY), ("13", joined(never, never), REFUTED),
     ("15", lambda s: {"ultimate_bound": 0.049 * max(map(abs, s.resolved.x0))}, SUPPORTED),
     ("15", lambda s: {"settling_time": never}, REFUTED),
-    ("15", lambda s: {"settling_time": never, "ultimate_bound": 9.0}, REFUTED),
-    ("20", held_by(0.4), SUPPORTED),
-    ("20", held_by(0.9), REFUTED),
-    ("20", lambda s: {"ultimate_bound": 9.0}, REFUTED),
+    ("15", lambda s: {"settling_time": never, "ultimate_bound": 9.0}, REFUTED), ("20", held_by(0.4), SUPPORTED),
+    ("20", held_by(0.9), REFUTED), ("20", lambda s: {"ultimate_bound": 9.0}, REFUTED),
     ("21", lambda s: {"ultimate_bound": 0.0}, SUPPORTED),
     ("25", lambda s: {"ultimate_bound": 0.051 * max(map(abs, s.resolved.x0))}, REFUTED),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("id", dict.fromkeys(id for id, *_ in SCORED))
@@ -332,13 +319,10 @@ def test_wind_up_alone_does_not_support_the_largest_oscillation(plain, condition
 @pytest.mark.parametrize(
     ("ours", "expected"),
     [
-        ((0.9, 1.0), SUPPORTED),
-        ((1.09, 2.1), SUPPORTED),
-        ((1.2, 2.1), PARTLY),
-        ((1.2, 2.3), REFUTED),
+        ((0.9, 1.0), SUPPORTED), ((1.09, 2.1), SUPPORTED), ((1.2, 2.1), PARTLY), ((1.2, 2.3), REFUTED),
         ((never, 0.0), REFUTED),
     ],
-)
+)  # fmt: skip
 def test_near_first_is_within_a_tenth_of_the_best_rival_in_each_metric(ours, expected):
     """Claim 35; the best in settling and the best in overshoot are different rivals."""
     told = by_law(observer_free=ours, classical=(1.0, 4.0), adaptive=(3.0, 2.0), super_twisting=(never, 9.0))
@@ -548,12 +532,8 @@ def test_the_table_has_its_twenty_cells_with_the_papers_marks():
     """Rows as the paper prints them: classical, HOSMC, adaptive, proposed."""
     marks = [one.what.partition("(paper: ")[2].partition(")")[0] for one in of(Stub(paper_like), "T")]
     assert [" ".join(marks[row : row + 4]) for row in range(0, 20, 4)] == [
-        "-- + + +",
-        "+ -- -- +",
-        "-- + + +",
-        "-- + -- +",
-        "-- -- -- +",
-    ]
+        "-- + + +", "+ -- -- +", "-- + + +", "-- + -- +", "-- -- -- +",
+    ]  # fmt: skip
 
 
 @law_function(gains={"lam": 1.0, "k1": 1.0})
@@ -638,11 +618,8 @@ def test_the_time_of_a_law_is_the_least_of_its_rounds_on_states_that_vary(monkey
     measured.nanoseconds(laws, quick=True)
     sample, states = seen[0]
     assert {name: sample[measured.FIELD_INDEX[name]] for name in ("dt", "g", "limit", "model")} == {
-        "dt": 1e-3,
-        "g": 8.0,
-        "limit": 6.0,
-        "model": 0.0,
-    }
+        "dt": 1e-3, "g": 8.0, "limit": 6.0, "model": 0.0,
+    }  # fmt: skip
     assert states.shape == (20_000, 2)
     np.testing.assert_allclose(np.diff(states[:, 0]) / 1e-3, states[:-1, 1], atol=0.01)
     assert states[:, 0].max() == pytest.approx(0.3, rel=1e-3)

@@ -58,13 +58,10 @@ def run_of(signal):
 @pytest.mark.parametrize(
     ("signal", "time"),
     [
-        ([3.0, 1.0, 0.5, -0.5], 0.1),
-        ([3.0, 1.0, 2.0, 0.5], 0.3),
-        ([0.5, 0.5, 0.5, 0.5], 0.0),
-        ([3.0, 1.0, 0.5, 2.0], math.inf),
-        ([3.0, 1.0, math.nan, math.nan], math.inf),
+        ([3.0, 1.0, 0.5, -0.5], 0.1), ([3.0, 1.0, 2.0, 0.5], 0.3), ([0.5, 0.5, 0.5, 0.5], 0.0),
+        ([3.0, 1.0, 0.5, 2.0], math.inf), ([3.0, 1.0, math.nan, math.nan], math.inf),
     ],
-)
+)  # fmt: skip
 def test_a_signal_is_settled_from_where_it_stays_within_a_band(signal, time):
     assert settled(*run_of(signal), 1.0) == pytest.approx(time)
 

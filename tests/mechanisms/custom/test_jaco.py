@@ -41,12 +41,9 @@ def test_the_arm_has_a_model_and_its_ranges(jaco):
 
 # law -> largest error on any joint, rad
 FOLLOW = {
-    "computed_torque_sliding": 2e-3,
-    "super_twisting_computed_torque": 2e-3,
-    "unit_vector": 2e-3,
-    "time_delay_sliding": 0.01,
-    "passivity_based": 0.1,
-}
+    "computed_torque_sliding": 2e-3, "super_twisting_computed_torque": 2e-3, "unit_vector": 2e-3,
+    "time_delay_sliding": 0.01, "passivity_based": 0.1,
+}  # fmt: skip
 
 
 def test_laws_of_many_joints_track_on_every_joint(jaco):

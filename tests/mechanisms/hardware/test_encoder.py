@@ -55,13 +55,10 @@ PERFECT = smc.Encoder(counts=math.inf)
 @pytest.mark.parametrize(
     ("plant", "turn", "counts"),
     [
-        ("duffing", 1.0, 2),
-        ("duffing", 1.0, 2**32),
-        ("van_der_pol", 1.0, 100),
-        ("inverted_pendulum", 2 * math.pi, 3),
+        ("duffing", 1.0, 2), ("duffing", 1.0, 2**32), ("van_der_pol", 1.0, 100), ("inverted_pendulum", 2 * math.pi, 3),
         ("inverted_pendulum", 2 * math.pi, 4096),
     ],
-)
+)  # fmt: skip
 def test_a_reading_is_the_nearest_count(plant, turn, counts):
     trace, x, _ = read(smc.Encoder(counts=counts), plant=plant)
     q = turn / counts

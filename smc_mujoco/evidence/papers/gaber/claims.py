@@ -756,12 +756,9 @@ def delay_tolerant(runs):
 
 TABLE_COLUMNS = {"classical": CLASSICAL, "HOSMC": HOSMC, "adaptive": ADAPTIVE, "proposed": OURS}
 TABLE_MARKS = {  # the paper's rows: property -> a mark a column
-    "no chattering": "-+++",
-    "observer-free": "+--+",
-    "bounded input": "-+++",
-    "delay-tolerant": "-+-+",
+    "no chattering": "-+++", "observer-free": "+--+", "bounded input": "-+++", "delay-tolerant": "-+-+",
     "smoothness": "---+",
-}
+}  # fmt: skip
 ESTIMATED_FIELDS = ("a", "q", "dq")  # of a Measurement: acceleration, and a joint that moves along
 OPPOSITE_RELATIONS = {"<": ">=", "<=": ">", ">": "<="}
 # Cells that hold for any runs: of the law that is the reference, of laws without estimates, of tanh.
