@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from smc_mujoco.benchmark.results import MEASURE, TITLES, WORDS, Board, Results, sound
+from smc_mujoco.common import html
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import replacing, slug
 from smc_mujoco.common.text import number
@@ -61,16 +62,9 @@ def _write(path: Path, made: "Environment", template: str, **values: Any) -> Non
 
 def _environment() -> "Environment":
     """Return the jinja2 environment of the templates."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    made = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
+    made = html.environment(TEMPLATES)
     made.globals |= {
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         "titles": TITLES, "words": WORDS, "measure": MEASURE, "asks": ASKS, "curves": curves, "scale": scale,

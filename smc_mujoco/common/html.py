@@ -3,6 +3,11 @@
 import base64
 import html
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 MAX_ROWS = 12  # lines of a table: chosen, so that a cell's output stays short
 _CELL = "padding:2px 10px;vertical-align:top;text-align:"
@@ -76,3 +81,11 @@ def in_notebook() -> bool:
     from rich.console import Console
 
     return Console().is_jupyter
+
+
+def environment(templates: Path) -> "Environment":
+    """Return the jinja2 environment of a folder of templates: what they insert is escaped, a missing name an error."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    options = {"autoescape": True, "undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    return Environment(loader=FileSystemLoader(templates), **options)

@@ -1,13 +1,38 @@
 """python -m smc_mujoco.benchmark.realaigym: swing-ups among the published rows of RealAIGym."""
 
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.table import Column, Table
 
+from smc_mujoco.benchmark.realaigym.published import GlobalRow, RobustnessRow, Row
 from smc_mujoco.cli.commands import options
+from smc_mujoco.cli.tables import titled
 from smc_mujoco.cli.terminal import Terminal, errors_as_sentences
 from smc_mujoco.common.interrupts import delay_ctrl_c
+
+ONE = 2, 2, 2, 3, 1, 3  # digits of a row of the simulation board
+BOARDS = {  # kind of row -> title, headings of columns, digits after the point
+    Row: ("simulation, version 2",
+          ("up at\ns", "energy\nJ", "torque\nN²m²s", "smooth\nN m", "speed\nrad²/s", "score"), ONE),
+    RobustnessRow: ("survived, version 2",
+                    ("model\n%", "noise\nof v %", "noise\nof u %", "lag\n%", "delay\n%", "blows\n%", "score"),
+                    (1,) * 6 + (3,)),
+    GlobalRow: ("a minute of resets, version 3", ("swing-ups", "up for\ns", "score"), (1, 3, 3)),
+}  # fmt: skip
+
+
+def table(robot: str, rows: Sequence[Row | RobustnessRow | GlobalRow], bold: Collection[str]) -> Table:
+    """Return a board of RealAIGym for a robot, with the rows named in `bold` in bold."""
+    title, heads, digits = BOARDS[type(rows[0])]
+    columns = [Column(head, justify="right") for head in heads]
+    made = titled(f"{robot}, {title}", "controller", *columns, pad_edge=False)
+    for row in rows:
+        cells = [f"{value:.{places}f}" for value, places in zip(row[1:], digits, strict=False)]
+        made.add_row(row.name, *cells, style="bold" if row.name in bold else None)
+    return made
 
 
 def board(
@@ -37,7 +62,6 @@ def board(
     with delay_ctrl_c():
         from smc_mujoco.benchmark import entry as entries
         from smc_mujoco.benchmark import realaigym as boards
-        from smc_mujoco.benchmark.realaigym import tables
         from smc_mujoco.cli.scene import filmed
         from smc_mujoco.common.files import with_ending, writable
         from smc_mujoco.common.progress import bar
@@ -51,18 +75,16 @@ def board(
         mine = rows
     writable(figure, film and with_ending(film, ".mp4"))
     traces = dict(zip(rows, run(list(rows.values())), strict=True))
-    terminal.print(tables.board(robot, boards.board(traces), rows))
+    terminal.print(table(robot, boards.board(traces), rows))
     if robustness:
         with bar(f"robustness of {robot}") as drawn:
             results = {
                 name: boards.robustness(scenario, lambda done, all, i=i: drawn.reached(i * all + done, len(rows) * all))
                 for i, (name, scenario) in enumerate(rows.items())
             }
-        terminal.print(tables.board(robot, boards.robustness_board(robot, results), rows))
+        terminal.print(table(robot, boards.robustness_board(robot, results), rows))
     terminal.print(
-        tables.board(
-            robot, boards.global_board(robot, [boards.global_row(name, run) for name, run in mine.items()]), mine
-        )
+        table(robot, boards.global_board(robot, [boards.global_row(name, run) for name, run in mine.items()]), mine)
     )
     about = "" if entry else f"{boards.KEY}. "
     terminal.note(f"{about}On the board of 2025 they are means over four seeds of the resets.", "dim", wrap=True)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from smc_mujoco.analysis.step_halving import APART, NUDGED
 from smc_mujoco.analysis.tuning.objective import Objective
+from smc_mujoco.common import html
 from smc_mujoco.control.law import laws
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.audit.verdict import Claim
@@ -45,16 +46,9 @@ Cell = TypeVar("Cell")
 
 def environment() -> "Environment":
     """Return the jinja2 environment of the templates, with their filters and shared functions."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    made = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    made = html.environment(TEMPLATES)
     made.filters |= {
         "embedded": lambda *of: Markup(charts.embedded(*of)),
         "margin_kind": words.kind,
