@@ -2,15 +2,13 @@
 
 import ast
 import functools
-import os
 import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from helpers.commands import python
 
 import smc_mujoco as smc
 
@@ -77,22 +75,6 @@ def module(name: str) -> str:
     return name
 
 
-def python(code: str, *, folder: Path = ROOT, path: Path = ROOT) -> str:
-    """What a fresh interpreter prints, which takes the package from `path`."""
-    environment = os.environ | {"PYTHONPATH": str(path)}
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", code],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 # which way imports point
 
 
@@ -142,7 +124,7 @@ for name in "exchange law_from live audit claims rig identify report boards pape
         raise AssertionError(name)
 main(["compare", "duffing", "--law", "pid", "--seeds", "1", "--duration", "0.1", "--out", "compared"])
 """
-    run_without = python(code, folder=tmp_path, path=tmp_path)
+    run_without = python("-c", code, folder=tmp_path, path=tmp_path).stdout
     assert "pid" in run_without
 
 
@@ -162,7 +144,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 @pytest.mark.parametrize("name", ["smc_mujoco", "smc_mujoco.common.gl"])
 def test_importing_the_package_imports_nothing_heavy(name):
-    loaded = set(python(f"import {name}, sys; print(*sys.modules)").split())
+    loaded = set(python("-c", f"import {name}, sys; print(*sys.modules)").stdout.split())
     assert loaded & HEAVY == set()
 
 
@@ -175,13 +157,13 @@ smc.score(trace), smc.figure(trace), smc.film
 smc.compare("pid", "duffing", "nominal", seeds=1, duration=0.1, out="compared", progress=False)
 print(*{module.__file__ for name, module in sys.modules.items() if name.startswith("smc_mujoco")})
 """
-    loaded = [Path(file) for file in python(code, folder=tmp_path).splitlines()[-1].split()]
+    loaded = [Path(file) for file in python("-c", code, folder=tmp_path).stdout.splitlines()[-1].split()]
     assert [label(file) for file in loaded if file.relative_to(PACKAGE).parts[0] in ANNEXES] == []
     assert sum(len(file.read_text().splitlines()) for file in loaded) <= 27_000
 
 
 def test_importing_the_command_line_starts_no_simulator():
-    loaded = set(python("import smc_mujoco.cli.main, sys; print(*sys.modules)").split())
+    loaded = set(python("-c", "import smc_mujoco.cli.main, sys; print(*sys.modules)").stdout.split())
     assert loaded & (HEAVY - {"rich", "typer", "numpy"}) == set()
 
 
@@ -270,7 +252,7 @@ assert trace.diverged_at is None
 again = smc.load(trace.save("{catalogue}.npz"))
 assert again.scenario == trace.scenario
 """
-    assert python(code + "print('done')", folder=tmp_path) == "done\n"
+    assert python("-c", code + "print('done')", folder=tmp_path).stdout == "done\n"
 
 
 # how files look

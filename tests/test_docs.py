@@ -4,14 +4,12 @@ import contextlib
 import importlib
 import importlib.metadata
 import io
-import os
 import pydoc
 import re
 import runpy
-import subprocess
-import sys
 
 import pytest
+from helpers.commands import python
 from helpers.pages import ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
@@ -132,14 +130,7 @@ def test_the_tutorial_s_tests_pass_and_tell_a_law_that_is_too_soft(tmp_path):
         soft = text.replace('"width": 0.3', '"width": 3.0').replace("my_law", "soft_law")
         (tmp_path / name.replace("my_law", "soft_law")).write_text(soft)
     asked = ("test_my_law.py", "test_soft_law.py::test_it_settles", "--smc-out=failed")
-    done = subprocess.run(
-        [sys.executable, "-B", "-m", "pytest", *PLUGIN, *asked],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = python("-m", "pytest", *PLUGIN, *asked, folder=tmp_path, fine=False)
     assert "1 failed, 7 passed" in done.stdout, done.stdout + done.stderr
     assert re.search(r"assert \S+ < 0.6", done.stdout)
     assert re.search(r"^metric +value", done.stdout, re.MULTILINE)
@@ -208,10 +199,9 @@ def test_a_page_has_the_equation_and_the_units_of_a_plant(generator, name):
 def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path, known):
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: make docs does")
     pytest.importorskip("mkdocstrings_handlers.python")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", CONFIGURATION, "-d", tmp_path]
-    environment = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert (done.returncode, [line for line in done.stderr.splitlines() if not line.startswith("INFO")]) == (0, [])
+    command = "-m", "mkdocs", "build", "--strict", "-f", CONFIGURATION, "-d", tmp_path
+    done = python(*command, NO_MKDOCS_2_WARNING="1")
+    assert [line for line in done.stderr.splitlines() if not line.startswith("INFO")] == []
     built = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
     pages = {f"{folder}/{name}" for folder, names in (("laws", smc.laws()), ("plants", smc.plants())) for name in names}
     pages |= {name.removesuffix(".md") for name in [*NAV, *known.reference()]} | {"404", "surfaces", "estimators"}

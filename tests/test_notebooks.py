@@ -2,13 +2,11 @@
 
 import ast
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from helpers.commands import python
 from helpers.public import public_names, there
 
 from smc_mujoco.common import gl
@@ -90,16 +88,8 @@ def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
     if any("smc.show(" in text for text in code(path)) and gl.missing():
         pytest.skip(str(gl.missing()))
     said = "\n".join(line.strip() for line in SAID[path.stem].strip().splitlines())
-    done = subprocess.run(
-        [sys.executable, "-B", KERNEL, path, "shown.json", QUICK, said],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    done = python(KERNEL, path, "shown.json", QUICK, said, folder=tmp_path)
+    assert (done.stdout, done.stderr) == ("", "")
     shown = json.loads((tmp_path / "shown.json").read_text())
     for text, outputs in zip(code(path), shown, strict=True):
         last = ast.parse(text).body[-1]

@@ -2,11 +2,10 @@
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from helpers.commands import python
 
 import smc_mujoco as smc
 from smc_mujoco.cli import law_pages, main
@@ -228,17 +227,9 @@ def added(tmp_path):
     return tmp_path
 
 
-def python(added, *words):
+def with_law(added, *words):
     """What a fresh interpreter with that law prints."""
-    environment = os.environ | {
-        "PYTHONPATH": f"{ROOT}{os.pathsep}{added}",
-        "COLUMNS": "80",
-        "PYTHONIOENCODING": "utf-8",
-    }
-    done = subprocess.run([sys.executable, "-B", *words], cwd=ROOT, env=environment, capture_output=True, text=True,
-                          timeout=300, check=False)  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return python(*words, folder=ROOT, path=f"{ROOT}{os.pathsep}{added}", COLUMNS="80").stdout
 
 
 def test_a_new_law_is_one_file_in_the_lists_and_on_its_page(added):
@@ -251,7 +242,7 @@ for words in (["list"], ["list", "brand_new"]):
     with contextlib.suppress(SystemExit):
         cli.main(words)
 """
-    out = python(added, "-c", code)
+    out = with_law(added, "-c", code)
     assert out.count("brand_new") >= 3
     for words in ("k > c", "J. Nothing 1(1):1, 2001", "c = 2.5"):
         assert words in flat(out)
@@ -261,7 +252,7 @@ for words in (["list"], ["list", "brand_new"]):
 def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
     files = [*map(str, (ROOT / "tests" / "control").glob("test_laws*.py"))]
     files += [str(ROOT / "tests" / "cli" / "test_law_pages.py")]
-    out = python(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
+    out = with_law(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
                  "-k", "brand_new", *files)  # fmt: skip
     cases = [line for line in out.splitlines() if "::" in line]
     assert len(cases) >= 3  # and the tests that walk the catalogue in one case

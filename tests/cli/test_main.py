@@ -1,6 +1,7 @@
 """What the command line promises: tables that fit, files where they were asked for, one sentence for every mistake."""
 
 import dataclasses
+import functools
 import itertools
 import json
 import os
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import commands
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.step_halving import UNTRIED
@@ -59,6 +61,9 @@ FILES = {
 TRACES = {name for name in FILES if name.endswith(".npz")}
 
 
+python = functools.partial(commands.python, fine=False, COLUMNS="80")
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """An empty working folder, a terminal of 80 columns, and nothing of the process changed for good."""
@@ -97,19 +102,6 @@ def undrawn(monkeypatch):
 @pytest.fixture
 def trace(folder) -> Path:
     return smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2)).save(folder / "one.npz")
-
-
-def python(*words: object, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
-    """A fresh interpreter, with this package, that answers in text."""
-    return subprocess.run(
-        [sys.executable, *map(str, words)],
-        cwd=cwd,
-        env=environment(**variables),
-        capture_output=True,
-        encoding="utf-8",
-        timeout=120,
-        check=False,
-    )
 
 
 def environment(**variables: str) -> dict[str, str]:
@@ -321,7 +313,7 @@ def test_without_a_renderer_only_the_film_is_missing_and_one_line_says_the_cure(
 def test_with_rendering_turned_off_only_the_film_is_missing(scene, folder):
     code = "import sys; from smc_mujoco.cli.main import main; main(sys.argv[1:])"
     undrawn = f"from smc_mujoco.cli import scene; scene.figures = lambda *_: []; {code}"
-    done = python("-c", undrawn, "run", scene, "--out", "out", cwd=folder, MUJOCO_GL="disabled")
+    done = python("-c", undrawn, "run", scene, "--out", "out", folder=folder, MUJOCO_GL="disabled")
     assert (done.returncode, done.stderr) == (0, "")
     (line,) = [line for line in done.stdout.splitlines() if line.startswith("no film: ")]
     assert "MUJOCO_GL" in line
@@ -329,7 +321,7 @@ def test_with_rendering_turned_off_only_the_film_is_missing(scene, folder):
 
 
 def test_a_word_in_mujoco_gl_that_is_no_backend_stops_no_command(folder):
-    done = python("-m", "smc_mujoco", "show", "none.npz", cwd=folder, MUJOCO_GL="nonsense")
+    done = python("-m", "smc_mujoco", "show", "none.npz", folder=folder, MUJOCO_GL="nonsense")
     assert done.returncode == 2
     assert "none.npz" in done.stderr.splitlines()[-1]
 
@@ -683,7 +675,7 @@ print(*({"mujoco", "numba", "llvmlite", "matplotlib", "scipy", "PIL"} & set(sys.
 
 
 def test_help_and_version_import_neither_mujoco_numba_nor_matplotlib(tmp_path):
-    done = python("-c", HELP, cwd=tmp_path)
+    done = python("-c", HELP, folder=tmp_path)
     assert done.stderr == ""
     *said, heavy = done.stdout.split("\n")[:-1]
     for words, text in zip((("run", "show", "list"), ("--seed", "--threads"), ("--export",), ()), said, strict=False):
@@ -727,7 +719,7 @@ def script(tmp_path_factory):
     (folder / "scenes").mkdir()
     (folder / "scenes" / "once.py").write_text(SCRIPT)
     (folder / "scenes" / "beside_it.py").write_text("LEVEL = 2.0\n")
-    return folder, python("scenes/once.py", "--no-film", cwd=folder)
+    return folder, python("scenes/once.py", "--no-film", folder=folder)
 
 
 def test_a_scene_run_as_a_script_is_executed_once(script):
@@ -768,7 +760,7 @@ def test_a_terminal_that_knows_ascii_only_gets_all_there_is(scene, folder, trace
             "    except SystemExit as end: assert not end.code, words",
         ]
     )
-    done = python("-c", code, cwd=folder, PYTHONIOENCODING="ascii")
+    done = python("-c", code, folder=folder, PYTHONIOENCODING="ascii")
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.isascii()
     for word in ("Plants", "noisy-rough.npz", "settling_time"):

@@ -4,17 +4,15 @@ import dataclasses
 import itertools
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 import warnings
-from pathlib import Path
 
 import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers.commands import python
 from numba import types
 
 import smc_mujoco as smc
@@ -278,11 +276,7 @@ thread.join()
 
 
 def test_a_policy_and_another_thread_may_import_the_batches_at_once():
-    root = str(Path(smc.__file__).parents[1])
-    environment = os.environ | {"PYTHONPATH": root}
-    done = subprocess.run(
-        [sys.executable, "-c", IMPORTS], env=environment, capture_output=True, text=True, timeout=60, check=False
-    )
+    done = python("-c", IMPORTS)
     assert (done.stdout, done.stderr) == ("None\n", "")
 
 

@@ -1,12 +1,10 @@
 """A new law is one file: it alone makes the law listed, tunable, coloured, labelled, reported and known to theory."""
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from helpers.commands import python
 
 ROOT = Path(__file__).parents[2]
 NEW = '''"""Brand new: u = -k sat(s / phi), s = de + c e. Source: N. Body, "Of no use", J. Nothing 1(1):1, 2001."""
@@ -75,10 +73,7 @@ def found(tmp_path_factory):
     folder = tmp_path_factory.mktemp("more")
     (folder / "brand_new.py").write_text(NEW)
     (folder / "plain_one.py").write_text(PLAIN)
-    done = subprocess.run([sys.executable, "-B", "-c", CODE, str(folder)], cwd=ROOT, capture_output=True, text=True,
-                          timeout=300, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)})  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
+    return json.loads(python("-c", CODE, folder).stdout.splitlines()[-1])
 
 
 def test_new_law_is_listed_and_ranked(found):

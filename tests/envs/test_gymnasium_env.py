@@ -1,13 +1,12 @@
 """gymnasium environments, single and in batches: the physics of smc.run, its own checkers pass, ids are found."""
 
 import copy
-import os
 import pickle
-import subprocess
 import sys
 
 import numpy as np
 import pytest
+from helpers.commands import python
 from helpers.episodes import LAW, SHORT, columns, driven_by_gym, one_of_each, run_of, start
 
 import smc_mujoco as smc
@@ -336,16 +335,7 @@ def test_it_is_seen():
 
 
 def fresh(code, **environment):
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-        env=os.environ | environment,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split()
+    return python("-c", code, **environment).stdout.split()
 
 
 @pytest.mark.parametrize(

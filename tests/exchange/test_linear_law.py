@@ -1,14 +1,13 @@
 """Linear controllers as laws, against python-control's own simulation, and linear models of plants."""
 
 import pickle
-import subprocess
-import sys
 from typing import Any
 
 import control
 import numpy as np
 import pytest
 import scipy.signal
+from helpers.commands import python
 from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
@@ -147,7 +146,7 @@ def test_a_discrete_one_runs_at_its_own_period_only():
 
 def test_python_control_is_not_imported_for_matrices():
     code = "import sys, smc_mujoco as smc; smc.exchange.law_from_control((0, 1, 1, 0)); print('control' in sys.modules)"
-    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"
+    assert python("-c", code).stdout == "False\n"
 
 
 # the linear model of a plant

@@ -10,8 +10,6 @@ import importlib
 import itertools
 import math
 import os
-import subprocess
-import sys
 import threading
 import warnings
 from pathlib import Path
@@ -19,6 +17,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from helpers.commands import python
+from helpers.pages import ROOT
 from helpers.runs import ARRAYS, assert_same
 
 import smc_mujoco as smc
@@ -340,9 +340,9 @@ def test_another_process_gives_the_same_bits_and_a_python_law_may_simulate_a_mod
     """A predictive law steps MuJoCo inside the callback: the worst case is an abort of the process."""
     here = Path(__file__).parent
     code = "import smc_mujoco as smc, test_lockstep as t; print(t.digest(smc.run(t.batch()))); t.predict()"
-    env = os.environ | {"PYTHONPATH": f"{here.parent}{os.pathsep}{here}"}
-    run = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, timeout=100, check=True)
-    assert run.stdout.strip() == digest(together)
+    assert python("-c", code, path=f"{here.parent}{os.pathsep}{here}{os.pathsep}{ROOT}").stdout.strip() == digest(
+        together
+    )
 
 
 def test_another_seed_gives_other_bits(together):

@@ -6,15 +6,14 @@ import json
 import math
 import os
 import signal
-import subprocess
 import sys
 import time
-from pathlib import Path
 
 import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 
 import smc_mujoco as smc
@@ -77,16 +76,6 @@ def failed(trace, at: float, *words: str):
         array = getattr(trace, name)
         assert np.isfinite(array[before]).all(), name
         assert np.isnan(array[~before]).all(), name
-
-
-def python(code: str, folder: Path) -> subprocess.CompletedProcess:
-    """A fresh interpreter running a file with this code, in an empty folder."""
-    (folder / "job.py").write_text(code)
-    command = [sys.executable, "-B", "job.py"]
-    environment = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
 
 
 # what goes in and comes out
@@ -514,13 +503,13 @@ print(peak() - before)
 
 @pytest.mark.skipif(sys.platform == "win32", reason="resource")
 def test_a_stream_holds_one_batch_and_diverging_runs_print_nothing_and_leave_no_file(tmp_path):
-    done = python(MANY + WILD, tmp_path)
+    done = python("-c", MANY + WILD, folder=tmp_path)
     assert done.stderr == ""
     held, said = done.stdout.splitlines()
     logs = 500 * 6 * 501 * 8
     assert int(held) < 0.3 * logs
     assert said == "done"
-    assert [path.name for path in tmp_path.iterdir()] == ["job.py"]
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_callback_that_was_installed_is_put_back():
@@ -579,6 +568,6 @@ if __name__ == "__main__":
     assert not trace.x.flags.writeable
     print("done")
 """
-    done = python(code, tmp_path)
+    done = python("-c", code, folder=tmp_path)
     assert done.stderr == ""
     assert done.stdout == "done\n"

@@ -15,7 +15,6 @@ import pickle
 import re
 import shutil
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -28,6 +27,7 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers.commands import python
 from helpers.runs import made, plainly, same, scenario
 from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
@@ -352,10 +352,7 @@ print("done")
 
 
 def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
-    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
-    done = subprocess.run(
-        [sys.executable, "-c", FIRST], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+    done = python("-c", FIRST, folder=tmp_path)
     assert (done.stdout, done.stderr) == ("done\n", "")
 
 

@@ -10,7 +10,6 @@ import math
 import os
 import pickle
 import re
-import subprocess
 import sys
 import tracemalloc
 import zipfile
@@ -18,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.commands import python
 from helpers.runs import scenario
 from pyarrow import parquet
 from scipy.io import loadmat
@@ -177,7 +177,7 @@ def test_a_file_brings_the_parts_and_signals_that_nothing_has_used(tmp_path):
     )  # fmt: skip
     path = smc.run(made).save(tmp_path / "a.npz")
     code = f"import smc_mujoco as smc; s = smc.load({str(path)!r}).scenario; print(s.reference, s.friction)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python("-c", code)
     assert done.stdout.strip() == f"{made.reference} {made.friction}"
 
 

@@ -6,11 +6,11 @@ thread. A life says through a pipe what it does; what was there when it was kill
 
 import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from helpers.commands import python
 
 from smc_mujoco.simulation.grid import grid
 from smc_mujoco.studies.study import study
@@ -116,22 +116,10 @@ main([*words.split(), str(out)])
 """
 
 
-def python(code: str, out: Path) -> subprocess.CompletedProcess[str]:
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-c", code, str(out)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-
-
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="lives are forked")
 @pytest.mark.slow
 def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_twice(tmp_path):
-    done = python(LOADED + KILLER, tmp_path)
+    done = python("-c", LOADED + KILLER, tmp_path, fine=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["same"]
@@ -144,7 +132,7 @@ def test_killed_twenty_times_a_study_ends_with_the_same_table_and_does_nothing_t
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 def test_on_a_full_disk_a_study_stops_with_one_sentence_and_later_goes_on(tmp_path):
-    done = python(LOADED + FULL, tmp_path)
+    done = python("-c", LOADED + FULL, tmp_path, fine=False)
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("smc-mujoco: cannot write")
     assert done.stderr.rstrip().endswith("choose another folder or make room")

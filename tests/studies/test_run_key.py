@@ -2,10 +2,7 @@
 
 import dataclasses
 import functools
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from helpers import runs
+from helpers.commands import python
 from llvmlite import ir
 from numba import from_dtype, types
 
@@ -140,18 +138,8 @@ def test_another_order_of_a_class_s_definitions_is_no_edit():
 
 def test_a_key_does_not_depend_on_the_process():
     made = "grid(['duffing'], ['adaptive'], ['noise'], [3], 'study')[0]"
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            f"from smc_mujoco import grid; from smc_mujoco.studies.run_key import key; print(key({made}))",
-        ],
-        env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
+    code = f"from smc_mujoco import grid; from smc_mujoco.studies.run_key import key; print(key({made}))"
+    done = python("-c", code, PYTHONHASHSEED="1")
     assert done.stdout.strip() == key(grid(["duffing"], ["adaptive"], ["noise"], [3], "study")[0])
 
 

@@ -12,19 +12,16 @@ import math
 import os
 import re
 import shutil
-import subprocess
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.commands import python
 
 from smc_mujoco.analysis import chattering
 from smc_mujoco.common import gl
 from smc_mujoco.common.cache import cached
 from smc_mujoco.control import gain_sets as gains
-from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, films, page, report, stages, words
 from smc_mujoco.evidence.report import scores as scores_of
 from smc_mujoco.evidence.report.plan import QUICK, Bars, Work
@@ -487,9 +484,7 @@ def test_without_a_renderer_the_report_says_so_in_one_sentence(folder, findings,
 
 def test_the_command_is_light_to_import():
     code = "import smc_mujoco.evidence.commands.report, sys; print(*sys.modules)"
-    environment = os.environ | {"PYTHONPATH": str(Path(scenarios.__file__).parents[3])}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert {"mujoco", "numba", "jinja2", "pyarrow", "scipy"} & set(done.stdout.split()) == set()
+    assert {"mujoco", "numba", "jinja2", "pyarrow", "scipy"} & set(python("-c", code).stdout.split()) == set()
 
 
 # in a browser

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.commands import python
 from helpers.compiler import needs_compiler
 
 import smc_mujoco as smc
@@ -78,14 +79,6 @@ def call(capsys):
 def scenario(law: object, plant: str = "duffing", **more: object) -> smc.Scenario:
     common = {"duration": 0.3, "noise": smc.Noise(0.01, 0.05), "disturbance": smc.Sine(0.5, 7.0)}
     return smc.Scenario(plant=plant, law=law, **common | more)
-
-
-def python(code: str) -> str:
-    """What another process prints."""
-    variables = os.environ | {"PYTHONPATH": str(Path(smc.__file__).parents[1])}
-    return subprocess.run(
-        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
-    ).stdout
 
 
 def same(one: smc.Trace, other: smc.Trace) -> bool:
@@ -225,7 +218,7 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
     assert same(reference.run(one), trace)
     Path(tmp_path / "my_law.c").unlink()
     code = f"import pickle, smc_mujoco as smc; print(smc.run(pickle.loads({pickle.dumps(first)!r})).u[:, 0].tolist())"
-    assert eval(python(code)) == trace.u[:, 0].tolist()
+    assert eval(python("-c", code).stdout) == trace.u[:, 0].tolist()
 
 
 def test_a_law_of_floats_is_as_large_in_another_process(file):
@@ -620,6 +613,6 @@ def test_gains_may_have_any_name_that_python_takes(file):
 
 def test_nothing_is_left_behind(file):
     code = f"import smc_mujoco as smc; smc.exchange.law_from_c({str(file(MINE))!r})\n"
-    folder = python(code + "from smc_mujoco.exchange.c import build; print(build.folder())").strip()
+    folder = python("-c", code + "from smc_mujoco.exchange.c import build; print(build.folder())").stdout.strip()
     assert folder
     assert not Path(folder).exists()

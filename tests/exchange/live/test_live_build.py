@@ -4,12 +4,12 @@ import json
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from helpers.commands import python
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
@@ -201,8 +201,7 @@ def test_an_npm_that_fails_is_quoted_and_leaves_no_cache(tmp_path, monkeypatch):
 
 def test_the_command_is_light_to_import():
     code = "import smc_mujoco.exchange.commands, sys; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert {"mujoco", "numba", "scipy", "smc_mujoco.draw"} & set(done.stdout.split()) == set()
+    assert {"mujoco", "numba", "scipy", "smc_mujoco.draw"} & set(python("-c", code).stdout.split()) == set()
 
 
 def test_what_npm_fetches_is_kept_with_its_licences_and_fetched_once(tmp_path, monkeypatch):

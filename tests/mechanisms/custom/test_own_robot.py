@@ -1,13 +1,12 @@
 """A robot of one's own: what a text says of its channels, bounds, mistakes in laws, and the shapes of a URDF."""
 
 import re
-import subprocess
-import sys
 import warnings
 
 import mujoco
 import numpy as np
 import pytest
+from helpers.commands import python
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl
@@ -205,8 +204,7 @@ trace = smc.run(smc.Scenario(plant="old.xml:tilt(motor,u_max=9)", law="pid", dur
 smc.worst_case(trace.scenario, budget=2, within=smc.Uncertainty(mass=(0.9, 1.1)))
 smc.tune("duffing", "pid", budget=1, searches=1, progress=False)
 smc.worst_case(dataclasses.replace(trace.scenario, law="classical"), budget=2)"""
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stderr.count("settotalmass") == 1
+    assert python("-c", script).stderr.count("settotalmass") == 1
 
 
 def test_a_machine_without_shapes_cannot_be_filmed_and_says_so(folder):
