@@ -13,9 +13,11 @@ import math
 import numpy as np
 from numba import njit
 
+from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
 
-BANDWIDTH = 10.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less delay
+BANDWIDTH = 20.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
+LEAST = 0.127  # of the weight, of the thrust: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
 STEERING = 2  # slots of a law's memory, the first ones, which `steer` keeps
 MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
 MIN_SINE = 1e-6  # chosen: of the angle between thrust and heading, below which the heading says nothing
@@ -94,6 +96,18 @@ def _of_axes(x, y, z):
 
 
 @njit(error_model="numpy")
+def slide(y, c, K, rho):
+    """Return s = e' + c e of the position, v = -c e' - K tanh(rho s), its stiffness and its damping, (3,) each.
+
+    c, K and rho are numbers, or vectors (3,).
+    """
+    s = y.de[:3] + c * y.e[:3]
+    reached = tanh(rho * s)
+    slope = K * rho * (1.0 - reached * reached)
+    return s, -c * y.de[:3] - K * reached, c * slope, c + slope
+
+
+@njit(error_model="numpy")
 def steer(y, v, stiffness, damping, memory):
     """Return the force for the acceleration v of the position's error, and by how much the attitude is off it.
 
@@ -135,11 +149,12 @@ def shorter(error, turning):
 def wrench(y, F, v, moving):
     """Return a law's command, (6,): the force F along the body's third axis, and the torque for the change v.
 
-    v, (3,), is that of the angular velocity relative to the wanted one, `moving`. Both are in the axes of the body.
+    The force is at least `LEAST` of the weight, also upside down. v, (3,), is that of the angular velocity relative to
+    the wanted one, `moving`, both in the axes of the body.
     """
     u, w = np.zeros(6), (y.v[3], y.v[4], y.v[5])
     up, carried = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0), _cross(w, moving)
-    thrust = _dot(F, up)
+    thrust = max(_dot(F, up), LEAST * math.sqrt(_dot(y.h, y.h)))
     for i in range(3):
         u[i] = thrust * up[i]
         u[3 + i] = y.h[3 + i]

@@ -16,7 +16,7 @@ of quadrotors", arXiv 2403.10934.
 
 import numpy as np
 
-from smc_mujoco.control.attitude import STEERING, shorter, steer, wrench
+from smc_mujoco.control.attitude import STEERING, shorter, slide, steer, wrench
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.control.law import FREE_BODY, law_function
 from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
@@ -41,11 +41,8 @@ from smc_mujoco.control.units import ACCELERATION, RATE, Gain, Unit
 )
 def quaternion_sliding(y, gains, memory):
     s = np.zeros(6)
-    s[:3] = y.de[:3] + gains.c * y.e[:3]
-    reached = tanh(gains.rhox * s[:3])
-    slope = gains.Kx * gains.rhox * (1.0 - reached * reached)
-    v = -gains.c * y.de[:3] - gains.Kx * reached
-    F, error, turning, moving = steer(y, v, gains.c * slope, gains.c + slope, memory)
+    s[:3], v, stiffness, damping = slide(y, gains.c, gains.Kx, gains.rhox)
+    F, error, turning, moving = steer(y, v, stiffness, damping, memory)
     angle, change = shorter(error, turning)
     for i in range(3):
         s[3 + i] = turning[i] + 0.5 * gains.lam * angle[i]
