@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from helpers.sketch import failed
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
@@ -19,7 +20,6 @@ from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.simulation import reference
-from smc_mujoco.simulation.trace import ARRAYS
 
 LAWS = ("observer_free", "classical")
 
@@ -41,12 +41,9 @@ def pair() -> list[smc.Trace]:
 
 def broken(trace: smc.Trace, at: int, failure: str = reference.PLANT_DIVERGED) -> smc.Trace:
     """The trace as if it had diverged at sample `at`, on its way to 1e5."""
-    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
-    arrays["x"][max(at - 5, 0) : at] = 1e5
-    for array in arrays.values():
-        array[at:] = np.nan
-    at_time = float(trace.t[at])
-    return dataclasses.replace(trace, **arrays, diverged_at=at_time, failure=f"{failure}, at t = {at_time:g} s")
+    x = trace.x.copy()
+    x[max(at - 5, 0) : at] = 1e5
+    return failed(dataclasses.replace(trace, x=x), at, f"{failure}, at t = {trace.t[at]:g} s")
 
 
 def words(page) -> str:

@@ -7,6 +7,7 @@ import json
 import matplotlib.text
 import numpy as np
 import pytest
+from helpers.sketch import failed
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -16,7 +17,6 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
-from smc_mujoco.simulation import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
 PAGE, COLUMN = "ieee-page", "ieee-column"
@@ -39,14 +39,6 @@ def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
 
 def ten(trace: smc.Trace) -> list[smc.Trace]:
     return [under(trace, law, 1.0 - 0.05 * k) for k, law in enumerate(TEN)]
-
-
-def failed(trace: smc.Trace, at: int) -> smc.Trace:
-    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
-    for array in arrays.values():
-        array[at:] = np.nan
-    sentence = f"{reference.PLANT_DIVERGED}, at t = {trace.t[at]:g} s"
-    return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure=sentence)
 
 
 @pytest.fixture(scope="module")

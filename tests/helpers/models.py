@@ -1,4 +1,8 @@
-"""What the tests of mechanisms ask of a compiled model."""
+"""Models with parts, and what the tests of mechanisms ask of a compiled model."""
+
+import mujoco
+
+from smc_mujoco.mechanisms.plant import write
 
 SORTS = {
     "geom": "ngeom", "body": "nbody", "joint": "njnt", "pair": "npair", "site": "nsite", "tendon": "ntendon",
@@ -10,3 +14,16 @@ def unnamed(model) -> list[tuple[str, int]]:
     """(sort, id) of what has no name in a model."""
     things = [(sort, i) for sort, count in SORTS.items() for i in range(getattr(model, count))]
     return [(sort, i) for sort, i in things if not getattr(model, sort)(i).name]
+
+
+def build(p, *parts, h=2.5e-4, integrator=mujoco.mjtIntegrator.mjINT_IMPLICITFAST):
+    """The plant's model with the parts in it."""
+    spec = p.spec()
+    for part in parts:
+        part.edit(spec)
+    model = spec.compile()
+    model.opt.timestep, model.opt.integrator = h, integrator
+    for part in parts:
+        write(model, part.fields(model))
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model

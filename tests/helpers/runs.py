@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 
 import smc_mujoco as smc
+from smc_mujoco.simulation import reference
 
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 
@@ -37,6 +38,16 @@ def assert_same(a, b):
     assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
     for name in ARRAYS:
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
+
+
+def assert_loops_agree(scenarios, rounding=0.0):
+    """Fail unless runs of the callback are those of the reference loop, to the bit or to a rounding, and go well."""
+    for one, trace in zip(scenarios, smc.run(scenarios), strict=True):
+        assert trace.failure is None
+        other = reference.run(one)
+        for name in ARRAYS:
+            a, b = getattr(trace, name), getattr(other, name)
+            np.testing.assert_allclose(a, b, rtol=rounding, atol=rounding, err_msg=f"{name} of {trace!r}")
 
 
 @smc.law_function(gains={"k": 1.0, "when": 0.02})

@@ -20,6 +20,7 @@ from matplotlib.text import Annotation, Text
 from PIL import ImageDraw
 
 import smc_mujoco as smc
+from smc_mujoco.simulation.reference import PLANT_DIVERGED
 from smc_mujoco.simulation.trace import ARRAYS
 
 
@@ -44,8 +45,9 @@ def made(scenario: smc.Scenario) -> smc.Trace:
     return smc.Trace(t=t, **waves, scenario=scenario)
 
 
-def failed(trace: smc.Trace, at: int, failure: str) -> smc.Trace:
-    """Return the trace as if it had failed at sample `at`."""
+def failed(trace: smc.Trace, at: int, failure: str = "") -> smc.Trace:
+    """Return the trace as if it had failed at sample `at`; by default the plant diverged."""
+    failure = failure or f"{PLANT_DIVERGED}, at t = {trace.t[at]:g} s"
     arrays = {name: getattr(trace, name).copy() for name in ARRAYS[1:]}
     for array in arrays.values():
         array[at:] = np.nan

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from helpers.commands import python
 from helpers.pages import ROOT
-from helpers.runs import ARRAYS, assert_same
+from helpers.runs import ARRAYS, assert_loops_agree, assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import reference
@@ -48,9 +48,7 @@ def test_callback_equals_plain_loop_under_every_law_of_the_study_in_every_condit
         for law in STUDIED
         for condition in smc.paper.CONDITIONS
     ]
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        assert trace.failure is None
-        assert_same(trace, reference.run(scenario))
+    assert_loops_agree(scenarios)
 
 
 def test_callback_equals_plain_loop_under_every_law():
@@ -61,7 +59,7 @@ def test_callback_equals_plain_loop_under_every_law():
         plants = [name for name in smc.plants() if law in smc.laws(name)]
         model, velocity = next(ways)
         scenarios.append(noisy(plants[i % len(plants)], law, model, velocity))
-    assert_close(scenarios)
+    assert_loops_agree(scenarios, 1e-9)
 
 
 @pytest.mark.slow
@@ -69,7 +67,7 @@ def test_callback_equals_plain_loop_under_every_law():
 def test_callback_equals_plain_loop_under_every_law_of_a_plant(plant):
     """The whole product, of which the test above has a part."""
     ways = itertools.product(smc.laws(plant), ("none", "nominal"), ("measured", "levant"))
-    assert_close([noisy(plant, *way) for way in ways])
+    assert_loops_agree([noisy(plant, *way) for way in ways], 1e-9)
 
 
 def noisy(plant, law, model, velocity):
@@ -78,23 +76,12 @@ def noisy(plant, law, model, velocity):
     return smc.Scenario(plant=plant, law=law, model=model, velocity=velocity, **common)
 
 
-def assert_close(scenarios):
-    """Compare runs of the callback with those of the plain loop, to rounding."""
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        other = reference.run(scenario)
-        assert trace.failure is None
-        for name in ARRAYS:
-            np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
-
-
 @pytest.mark.parametrize("surface", smc.laws(kind="surface"))
 def test_callback_equals_plain_loop_on_every_surface(surface):
     scenario = smc.Scenario(
         plant="inverted_pendulum", law="boundary_layer", surface=surface, model="nominal", duration=0.2
     )
-    trace, other = smc.run(scenario), reference.run(scenario)
-    for name in ARRAYS:
-        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-12, atol=1e-12, err_msg=name)
+    assert_loops_agree([scenario], 1e-12)
 
 
 @pytest.mark.parametrize("velocity", smc.laws(kind="estimator"))
@@ -102,9 +89,7 @@ def test_callback_equals_plain_loop_with_every_estimator(velocity):
     scenario = smc.Scenario(
         plant="duffing", law="classical", velocity=velocity, noise=smc.Noise(0.01), duration=0.3, seed=4
     )
-    trace, other = smc.run(scenario), reference.run(scenario)
-    for name in ARRAYS:
-        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+    assert_loops_agree([scenario], 1e-9)
 
 
 @smc.law_function(gains={"a": 1.0, "b": 2.0}, memory=2)
@@ -158,19 +143,14 @@ def scattered(number):
 
 def test_callback_equals_plain_loop_in_scattered_scenarios():
     scenarios = [scattered(number) for number in range(36)]
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        assert trace.failure is None
-        assert_same(trace, reference.run(scenario))
+    assert_loops_agree(scenarios)
 
 
 @pytest.mark.slow
 def test_a_users_law_sees_the_same_measurement_in_both_loops():
     """To rounding only: numba multiplies x**3 of the nominal Duffing spring out, Python takes a power."""
     scenarios = [dataclasses.replace(scattered(number), law=curious(a=3.0)) for number in range(80, 92)]
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        other = reference.run(scenario)
-        for name in ARRAYS:
-            np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-12, atol=1e-12)
+    assert_loops_agree(scenarios, 1e-12)
 
 
 @PLANTS
@@ -182,9 +162,7 @@ def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
         factors = {key: 1.0 + off * (1 + i % 3) / 3 for i, key in enumerate(keys)}
         factors |= {"delta": 0.3} if "delta" in keys else {}  # a share, 0 to 1, to which this is added
         scenarios.append(smc.Scenario(mismatch=factors, jump=smc.Jump(time, dict(reversed(factors.items()))), **common))
-    for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
-        assert trace.failure is None
-        assert_same(trace, reference.run(scenario))
+    assert_loops_agree(scenarios)
 
 
 def test_a_jump_at_the_last_step_is_in_the_last_sample():

@@ -225,16 +225,6 @@ def test_a_run_puts_a_users_own_callback_back(native):
     np.testing.assert_array_equal(trace.x, alone.x)
 
 
-def test_a_run_that_is_interrupted_puts_the_callback_back():
-    def interrupt(steps):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        list(smc.stream([SCENARIO], report=interrupt))
-    assert mujoco.get_mjcb_control() is None
-    assert smc.run(SCENARIO).failure is None
-
-
 def userdata(kind, size):
     """What a stranger may keep in userdata."""
     rng = np.random.default_rng(size)

@@ -12,6 +12,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from helpers.films import without_charts
+from helpers.sketch import failed
 from PIL import Image
 
 import smc_mujoco as smc
@@ -26,7 +27,6 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre
 from smc_mujoco.mechanisms.plant import Variant
 from smc_mujoco.metrics.conventions import groups
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation.trace import ARRAYS
 
 LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 SIZE = (480, 270)
@@ -40,14 +40,6 @@ def runs(plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration
 def driven(traces):
     """The first group of channels of a trace's plant."""
     return groups(traces[0].scenario.plant)[0]
-
-
-def broken(trace: smc.Trace, at: int) -> smc.Trace:
-    """The trace as if it had diverged at sample `at`."""
-    arrays = {name: getattr(trace, name).copy() for name in ARRAYS if name != "t"}
-    for array in arrays.values():
-        array[at:] = np.nan
-    return dataclasses.replace(trace, **arrays, diverged_at=float(trace.t[at]), failure="it blew up")
 
 
 def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
@@ -179,7 +171,7 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
     goals = []
     monkeypatch.setattr(Stage, "aim", lambda stage, k, r: goals.append((k, r is None or r[0] - traces[k].r[0, 0])))
     traces = good, bad
-    before, after, later = pictures([good, broken(bad, 150)], [0.1, 0.2, 0.3])
+    before, after, later = pictures([good, failed(bad, 150)], [0.1, 0.2, 0.3])
     assert goals == [(0, 0.0), (1, 0.0), *[(0, 0.0), (1, True)] * 2]
     orange = style.law_colour(LAWS[1])
     assert share(before, orange) > 3e-4
@@ -192,10 +184,10 @@ def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypa
 @renders
 def test_a_machine_that_fails_at_once_is_grey_from_the_start():
     good, bad = runs("pendulum_network", laws=LAWS[::3])
-    first, last = pictures([broken(bad, 0)], [0.0, 0.3])
+    first, last = pictures([failed(bad, 0)], [0.0, 0.3])
     assert share(first, style.law_colour(LAWS[3])) == 0.0
     assert np.abs(machines(first).astype(int) - machines(last)).max() < 30
-    pictures([good, broken(bad, 0)], [0.0, 0.3], charts=True)
+    pictures([good, failed(bad, 0)], [0.0, 0.3], charts=True)
 
 
 @pytest.mark.slow
@@ -217,7 +209,7 @@ def test_a_jump_changes_the_machine_and_is_told():
 
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
 def test_long_words_stay_in_the_picture(plant):
-    bad = [broken(trace, 150) for trace in runs(plant)]
+    bad = [failed(trace, 150) for trace in runs(plant)]
     names, size = ["a label of more than forty letters, number " + str(i) for i in range(4)], (1280, 460)
     scales, row = {driven(bad): Scale(6.0, 0.2)}, plant != "duffing"
     caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, scales, row=row)
@@ -491,9 +483,9 @@ def test_several_channels_are_told_in_one():
 
 
 def test_a_failed_machine_has_no_state(stuck):
-    told = states.timeline(broken(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
+    told = states.timeline(failed(stuck, 500), np.array([0.1, 0.49, 0.5, 1.0]))
     assert [now is None for now in told] == [False, False, True, True]
-    assert states.timeline(film.finite(broken(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
+    assert states.timeline(film.finite(failed(stuck, 0)), np.array([0.0, 1.0])) == [None, None]
 
 
 @pytest.mark.slow
@@ -536,7 +528,7 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
 @renders
 def test_a_realistic_machine_that_fails_is_filmed():
     parts = {"actuator": smc.Backlash(0.2), "friction": Coulomb(0.3), "contact": "stops"}
-    pictures([broken(realistic(duration=0.2, **parts), 0)], [0.0, 0.2], charts=True)
+    pictures([failed(realistic(duration=0.2, **parts), 0)], [0.0, 0.2], charts=True)
 
 
 @renders

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.sketch import failed
 
 import smc_mujoco as smc
 from smc_mujoco.draw import states, style
 from smc_mujoco.draw.film import pace
-from smc_mujoco.simulation.trace import ARRAYS
 
 pytestmark = pytest.mark.quick
 
@@ -97,11 +97,7 @@ def test_frames_whose_middle_is_near_that_of_a_push_are_slowest(base, monkeypatc
 
 def test_a_diverged_run_does_not_make_the_others_rest(base):
     good = moving(base, lambda t: np.clip(t / 0.3, 0.0, 1.0))
-    arrays = {name: getattr(base, name).copy() for name in ARRAYS if name != "t"}
-    arrays["x"][:, 0] = np.exp(40.0 * base.t)
-    for array in arrays.values():
-        array[2000:] = np.nan
-    bad = dataclasses.replace(base, **arrays, diverged_at=2.0, failure="the plant diverged")
+    bad = failed(dataclasses.replace(base, x=np.exp(40.0 * base.t)[:, None]), 2000)
     assert at([good, bad], (0.1,)) == [0.125]
     assert len(pace.clock([bad], FPS).times) > 10
 

@@ -463,16 +463,12 @@ def test_includes_and_their_contents_count(tmp_path):
 
 def test_files_that_others_name_in_folders_of_their_own_count(tmp_path):
     """An attached model has its own meshdir, and a compiler that is included sets that of the whole."""
-    corners = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
-    faces = [
-        "f 1 2 3", "f 2 3 4", "f 5 6 7", "f 6 7 8", "f 1 2 5", "f 2 5 6", "f 3 4 7", "f 4 7 8", "f 1 3 5", "f 2 4 6",
-    ]  # fmt: skip
     body = (
         '<asset><mesh name="c" file="c.obj"/></asset><worldbody><body name="b"><joint name="j"/>'
         '<geom type="mesh" mesh="c" mass="1"/></body></worldbody>'
     )
     (tmp_path / "sub" / "assets").mkdir(parents=True)
-    (tmp_path / "sub" / "assets" / "c.obj").write_text("\n".join([*corners, *faces]))
+    (tmp_path / "sub" / "assets" / "c.obj").write_text("\n".join([*CORNERS, *FACES]))
     (tmp_path / "sub" / "child.xml").write_text(f'<mujoco><compiler meshdir="assets"/>{body}</mujoco>')
     (tmp_path / "attaching.xml").write_text(
         '<mujoco><asset><model name="m" file="sub/child.xml"/></asset>'

@@ -5,6 +5,7 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from helpers.models import build
 
 import smc_mujoco as smc
 from smc_mujoco.common.errors import ScenarioError
@@ -12,26 +13,13 @@ from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, Lag, RateLimit, drive_step, rippled
 from smc_mujoco.mechanisms.hardware.friction import LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import ROTOR, dof_ids, drive_ids
-from smc_mujoco.mechanisms.plant import field_array, plant, write
+from smc_mujoco.mechanisms.plant import field_array, plant
 from smc_mujoco.simulation.python_controller import Controller
 
 H = 2.5e-4  # s
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
 NAMES = pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network", "panda"])
 MOTOR = DCMotor()
-
-
-def build(p, *parts, h=H, integrator=IMPLICIT):
-    """The plant's model with the parts in it."""
-    spec = p.spec()
-    for part in parts:
-        part.edit(spec)
-    model = spec.compile()
-    model.opt.timestep, model.opt.integrator = h, integrator
-    for part in parts:
-        write(model, part.fields(model))
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
 
 
 def bare(*parts, name="duffing", h=H):

@@ -373,13 +373,6 @@ def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
         same(trace, reference.run(s) if i % 4 else smc.run(s, threads=1))
 
 
-def test_encoders_that_differ_in_numbers_share_one_batch_whatever_the_longest_delay():
-    sensors = [smc.Encoder(counts, delay=delay) for counts, delay in ((100, 1e-3), (math.inf, 0.5), (4096, 0.02))]
-    together = smc.run([scenario(sensor) for sensor in sensors], threads=1)
-    for sensor, trace in zip(sensors, together, strict=True):
-        same(trace, smc.run(scenario(sensor)))
-
-
 @SOLVERS
 def test_a_perfect_encoder_with_a_tachometer_is_no_encoder(integrator):
     changes = {"integrator": integrator, "velocity": "measured", "law": "observer_free", "noise": smc.Noise(0.1, 0.1)}

@@ -6,11 +6,12 @@ import math
 import mujoco
 import numpy as np
 import pytest
+from helpers.models import build
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, LuGre, Viscous
 from smc_mujoco.mechanisms.hardware.part import drive_ids
-from smc_mujoco.mechanisms.plant import field_array, plant, write
+from smc_mujoco.mechanisms.plant import field_array, plant
 
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
 INERTIA = {"inverted_pendulum": 0.125, "duffing": 1.0}  # kg m^2, kg
@@ -20,19 +21,6 @@ BRISTLES = pytest.mark.parametrize("h", [2.5e-4, 1e-3])
 LUGRE = LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
 ALL = [Viscous(0.1), Coulomb(0.05), LUGRE]
 EACH = pytest.mark.parametrize("part", ALL, ids=lambda part: type(part).__name__)
-
-
-def build(p, *parts, h=2.5e-4, integrator=IMPLICIT):
-    """The plant's model with the parts in it."""
-    spec = p.spec()
-    for part in parts:
-        part.edit(spec)
-    model = spec.compile()
-    model.opt.timestep, model.opt.integrator = h, integrator
-    for part in parts:
-        write(model, part.fields(model))
-    mujoco.mj_setConst(model, mujoco.MjData(model))
-    return model
 
 
 def bare(name, *parts, h=2.5e-4, integrator=IMPLICIT):
