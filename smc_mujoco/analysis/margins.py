@@ -156,6 +156,8 @@ def _critical_delay(base: Scenario) -> float | None:
 
 
 def _tolerated_force(base: Scenario) -> float | None:
+    if not base.force_command:
+        return None  # not in the theory
     largest_error = TOLERATED_ERROR * (max(map(abs, base.resolved.x0)) or 1.0)
     return theory.tolerated_force(base.plant, base.law, largest_error, min(base.limits))
 

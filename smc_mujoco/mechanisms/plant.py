@@ -203,8 +203,8 @@ class Plant:
     @property
     def unscaled(self) -> str:
         """Why tuning cannot derive its scales from the plant, or ""."""
-        if self.underactuated or (self.mixed and not self.pose):
-            return "it has free joints, or channels of two units: choose a plant that has neither"
+        if self.mixed and not self.pose:
+            return "its channels have two units: choose a plant whose channels have one"
         return f"it has no nominal model, which tuning takes its scales from: {self.unmodelled}" * bool(self.unmodelled)
 
     def spec(self) -> mujoco.MjSpec:

@@ -33,7 +33,7 @@ def test_every_general_law_of_a_release_has_gains():
 def test_every_law_of_a_set_has_gains_and_these_are_all_that_tuning_moves(gain_set, plant):
     for name, known in shipped(gain_set, plant).items():
         law = gains.law(plant, name, gain_set)
-        scales = search_space.scales(grid.as_plant(plant), scenarios.U_MAX, with_model=False)
+        scales = search_space.scales(grid.as_plant(plant), scenarios.U_MAX)
         assert all(set(one) == set(search_space.box(law, scales)) for one in known.sets), name
 
 

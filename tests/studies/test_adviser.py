@@ -441,7 +441,7 @@ def test_a_laws_own_gains_are_taken_where_no_tried_set_is_better(folder, monkeyp
 def test_a_plant_that_cannot_be_tuned_has_default_gains_and_says_so(folder):
     found = smc.which("overhead_crane", "nominal", "fast", seeds=2, duration=1.0, out=folder)
     assert found.law == smc.law("hierarchical")
-    assert found.choices[0].gains.startswith("gains: default; tuning is not possible here: it has free joints")
+    assert found.choices[0].gains.startswith("gains: default; tuning is not possible here: its channels have two units")
 
 
 # what is asked

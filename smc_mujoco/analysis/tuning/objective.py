@@ -113,6 +113,19 @@ class Objective:
         common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
         return Scenario(plant=plant, law=law, **common)
 
+    def commanded(self, plant: Plant | str, law: Component) -> Scenario:
+        """Return that run with the drive of the conditions, whose command is a force, a voltage or an acceleration."""
+        first = self.undisturbed(plant, law)
+        fields = [one.on(first.plant, self.duration) for one in self.conditions]
+        driven = [
+            dataclasses.replace(first, **{name: one[name] for name in ("plant", "actuator", "u_max") if name in one})
+            for one in fields
+        ]
+        if len(units := sorted({one.efforts[0] for one in driven})) > 1:
+            both = f"{units[0]} and {units[1]}"
+            raise ScenarioError(f"the conditions of a tuning have commands in {both}: tune for each drive alone")
+        return driven[0]
+
     def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
         first = self.undisturbed(plant, law)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]

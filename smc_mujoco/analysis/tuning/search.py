@@ -341,11 +341,12 @@ def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed
 
 def _planned(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
     """Return the same without a check of the conditions."""
-    first = goal.undisturbed(plant, law)
-    bound = goal.u_max or default_u_max(first.plant)
+    first = goal.commanded(plant, law)
+    bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
-    scales = search_space.scales(first.plant, bound, first.model != "none", reach)
+    per_u = None if first.stepper else first.nominal_drive.gain
+    scales = search_space.scales(first.plant, bound, reach, per_u)
     box = search_space.box(first.law, scales)
     return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
 

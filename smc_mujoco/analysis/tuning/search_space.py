@@ -3,8 +3,8 @@
 The plant has four scales, from which each gain's scale follows:
 
     X = max |x0|        position, rad or m
-    F = u_max           force, N m or N; F = u_max / M if the law has the nominal model and computes accelerations
-    M = 1 / g(0)        inertia, kg m^2 or kg
+    F = u_max           force, N m or N
+    M = 1 / g(0)        inertia, kg m^2 or kg; of the driven joints, where others are free
     T = sqrt(M X / u_max)   time in which the actuator moves the plant by X (by X / 2, from rest)
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5, and a search may leave
@@ -13,18 +13,23 @@ every law alike, so a law with 2 a in place of lambda, or 1 / tau in place of k,
 a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as
 a force, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
+Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest |x0| of all joints,
+also of free ones, which must have one unit: on a cart with a pole, in m and rad, no distance says how far the pole may
+lean.
+
 A free body has these scales twice, as its forces and torques differ: of its position, with X the largest distance from
 rest at the start, and of its attitude, with X = 1 rad, since it tilts to move wherever it starts. A gain that is
 declared with `turns=True` is of the attitude.
 
 A law declares the unit of each gain, and which gains the search leaves as they are: initial values, exponents, table
-sizes, a plant's parameters, filters and number formats of a processor. A gain of unknown unit is searched over as many
-decades about its default:
+sizes, a plant's parameters, filters and number formats of a processor. A gain that a law was given as 0 stays 0, which
+says what terms the law has. A gain of unknown unit is searched over as many decades about its default:
 
     @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
 
 Some laws contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this
-number unchanged. A law without the model takes g as 1, so it treats forces and accelerations in the same way.
+number unchanged. A law that takes g as 1 treats forces and accelerations in the same way; one that needs the nominal
+model declares which of both a gain is.
 """
 
 import dataclasses
@@ -34,6 +39,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.control import source
 from smc_mujoco.control.component import Component, unit_cure
 from smc_mujoco.control.units import Gain, Unit
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
@@ -81,32 +87,42 @@ def _scales_of(gain: Gain, scales: Mapping[str, float]) -> Mapping[str, float]:
     return {name: scales.get(name + OF_TURNS * gain.turns, scales[name]) for name in ("F", "X", "T")}
 
 
-def scales(plant: Plant, u_max: float, with_model: bool, reach: float | None = None) -> dict[str, float]:
-    """Return the plant's X, F, M and T in SI units; `reach` is X, rad or m, by default max |x0| of the plant.
+def scales(plant: Plant, u_max: float, reach: float | None = None, per_u: float | None = 1.0) -> dict[str, float]:
+    """Return the plant's X, F, M and T in SI units. Those of a free body's attitude have names that end in OF_TURNS.
 
-    Those of a free body's attitude have names that end in OF_TURNS.
+    Args:
+      plant: of which g is taken.
+      u_max: bound on u.
+      reach: X, rad or m; by default max |x0| of the plant.
+      per_u: force per unit of u, N m/V or N/V; None: u is an acceleration.
     """
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
     if plant.pose and isinstance(plant.nominal, NominalModel):
         M, limits = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M, plant.limits
         force, torque = (min([u_max, *limits[i : i + 3]]) for i in (0, 3))
-        of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, with_model, 1.0)
-        own = _scales(1.0 / M[0, 0], force, with_model, SPREAD if reach is None else reach)
+        of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, 1.0)
+        own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
         return own | {name + OF_TURNS: value for name, value in of_turns.items()}
     zeros = np.zeros(plant.n)
-    g = min(abs(plant.nominal(zeros, zeros, i, plant.values({}))[1]) for i in range(plant.n))
+    g = min(abs(plant.nominal(zeros, zeros, i, plant.values({}))[1]) for i in range(plant.driven))
+    g = 1.0 if per_u is None else g * per_u
     X = max(abs(x) for x in plant.x0) if reach is None else reach
     if not X > 0.0:
         raise ScenarioError(f"{plant.name} starts at 0, where a law has nothing to do: {START_CURE}")
     if not (math.isfinite(g) and g > 0.0):
         raise ScenarioError(f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant")
-    return _scales(g, u_max, with_model, X)
+    return _scales(g, u_max, X)
 
 
-def _scales(g: float, u_max: float, with_model: bool, X: float) -> dict[str, float]:
+def _scales(g: float, u_max: float, X: float) -> dict[str, float]:
     """Return the scales of channels with this g, bound on u and X."""
-    return {"X": X, "F": u_max * g if with_model else u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
+    return {"X": X, "F": u_max, "M": 1.0 / g, "T": math.sqrt(X / (g * u_max))}
+
+
+def left_out(law: Component, name: str) -> bool:
+    """Return whether a gain was given as 0, which leaves out a term of the law."""
+    return law.source.kind != source.DEFAULT and law.gains[name] == 0.0
 
 
 def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -120,7 +136,7 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
             if not defaults[name] > 0.0:
                 unit(law, name)  # raises: there is neither a unit nor a size
             bounds[name] = (defaults[name] * 10**-HALF_WIDTH, defaults[name] * 10**HALF_WIDTH)
-        elif (gain_unit := unit(law, name)) is not None and not _gain(law, name).held:
+        elif (gain_unit := unit(law, name)) is not None and not (_gain(law, name).held or left_out(law, name)):
             scale = gain_unit.of(_scales_of(_gain(law, name), plant_scales))
             bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**HALF_WIDTH)
     if not bounds:

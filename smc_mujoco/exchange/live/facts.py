@@ -269,7 +269,7 @@ def _ranges(component: Component, plant: Plant, values: Mapping[str, float]) -> 
     """Return gain -> least and largest value of its slider, for gains to be chosen: no exponent or initial value."""
     known: Mapping[str, tuple[float, float]] = {}
     with contextlib.suppress(ScenarioError):
-        scales = search_space.scales(plant, defaults.default_u_max(plant), with_model=component.requires_model)
+        scales = search_space.scales(plant, defaults.default_u_max(plant))
         if component.kind != "estimator":  # an estimator's gains follow from noise and sampling, not from the plant
             known = search_space.box(component, scales)
     ranges = {}

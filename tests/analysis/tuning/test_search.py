@@ -230,10 +230,44 @@ def test_the_front_is_what_no_other_evaluation_beats(found):
 
 
 def test_scales_are_those_of_the_plant():
-    scales = search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, with_model=False)
+    scales = search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0)
     assert scales == {"X": 1.5, "F": 4.0, "M": pytest.approx(6.0), "T": pytest.approx(1.5)}
-    assert search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0, with_model=True)["F"] == pytest.approx(4.0 / 6.0)
-    assert search_space.scales(smc.plant("inverted_pendulum"), 6.0, False)["M"] == pytest.approx(0.5 * 0.5**2)
+    assert search_space.scales(smc.plant("inverted_pendulum"), 6.0)["M"] == pytest.approx(0.5 * 0.5**2)
+
+
+@pytest.mark.quick
+def test_a_law_is_searched_about_the_bound_on_its_command():
+    """In N m, V or rad/s^2, with the inertia per unit of it. A motor's winding changes neither."""
+    motor = smc.DCMotor(command="voltage", voltage=12.0)
+    per_volt = motor.constant / motor.resistance
+    stepper = smc.condition("steps", actuator=smc.hardware.Stepper(torque=20.0, ramp=50.0))
+    for condition, F, M in (
+        ("nominal", 6.0, 0.125),
+        (smc.condition("volts", actuator=motor), 12.0, 0.125 / per_volt),
+        (stepper, 50.0, 1.0),
+    ):
+        goal = Objective(conditions=(condition,))
+        task = search._planned("inverted_pendulum", smc.law("pid"), goal, 8, 0, 1)
+        T = math.sqrt(M * 0.5 / F)
+        assert task.scales == {"X": 0.5, "F": F, "M": pytest.approx(M), "T": pytest.approx(T)}
+        assert task.goal.u_max == F
+        assert math.sqrt(math.prod(task.box["kp"])) == pytest.approx(F / 0.5)
+    with pytest.raises(smc.ScenarioError, match=r"commands in N and m/s\^2: tune for each drive alone"):
+        search._planned("duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1)
+
+
+def test_the_driven_joint_has_the_scales_of_a_machine_with_a_free_one():
+    task = search._planned("furuta", smc.law("rotary_swing_up"), Objective(), 8, 0, 1)
+    p = smc.plant("furuta").values({})
+    Jp, lever = p.Jc + p.m * p.l**2, p.m * p.L * p.l
+    assert task.scales["M"] == pytest.approx(p.J + p.m * p.L**2 - lever**2 / Jp)
+    assert task.scales["X"] == 0.2  # of the free joint
+
+
+def test_a_gain_given_as_0_stays_0():
+    scales = {"X": 2.0, "F": 6.0, "M": 1.0, "T": 0.5}
+    assert set(search_space.box(smc.law("pid"), scales)) == {"kp", "ki", "kd", "tt"}
+    assert set(search_space.box(smc.law("pid", ki=0.0), scales)) == {"kp", "kd", "tt"}
 
 
 def test_a_gain_is_searched_three_decades_wide_about_its_scale():

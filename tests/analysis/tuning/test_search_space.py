@@ -141,4 +141,4 @@ def test_a_plant_without_a_scale_is_refused(refused):
         dataclasses.replace(duffing, nominal=lambda x, v, i, p: (0.0, 0.0)),
         smc.plant("cart_pole"),
     ):
-        refused(lambda plant=plant: search_space.scales(plant, 6.0, with_model=False))
+        refused(lambda plant=plant: search_space.scales(plant, 6.0))

@@ -281,6 +281,11 @@ REFUSED = {
     "environment": (lambda: Setting(PLANT, "regulate", {"actuator": MOTOR}), "no Stepper"),
     "FMU": (lambda: smc.exchange.law_to_fmu(scenario(MOTOR, None, law="pid"), "never.fmu"), "a Stepper.*u_max"),
     "prediction": (lambda: chattering(scenario(MOTOR, None, law="pid")), "measure it in a run"),
+    "certificate": (lambda: smc.certify(scenario(MOTOR, None, law="classical")), "no theorem for an acceleration"),
+    "both drives": (
+        lambda: smc.tune("inverted_pendulum", "pid", conditions=("nominal", "stepper"), budget=1, searches=1),
+        "commands in N m and rad/s.2: tune for each drive alone",
+    ),
 }
 
 
@@ -290,3 +295,42 @@ def test_what_a_stepper_cannot_have_is_refused_in_a_sentence(name):
     with pytest.raises(ScenarioError, match=words) as refusal:
         made()
     assert "\n" not in str(refusal.value)
+
+
+HELD, ON = smc.law("pid", kp=100.0, kd=20.0), "inverted_pendulum"  # a law of an acceleration
+
+
+def held():
+    return smc.grid([ON], [HELD], ["stepper"], duration=1.0)[0]
+
+
+TAKEN = {  # an analysis -> what it finds
+    "margins": lambda out: smc.margins("duffing", HELD, ["noise"], quick=True, condition="stepper")[0].value > 0.0,
+    "basin": lambda out: smc.basin(ON, HELD, (3, 3), duration=1.0, condition="stepper").outcome[1, 1] == 1,
+    "worst case": lambda out: smc.worst_case(held(), within=smc.Uncertainty(disturbance=1.0), budget=8).value > 0.0,
+    "sensitivity": lambda out: "share" in str(smc.sensitivity(held(), points=8)),
+    "order of accuracy": lambda out: smc.accuracy(HELD, ON, (2e-3, 1e-3), "stepper", 1, duration=0.5)[0].law == "pid",
+    "tuning": lambda out: smc.tune(ON, "pid", conditions=["stepper"], budget=1, searches=1).objective > 0.0,
+    "identification": lambda out: (
+        abs(smc.identify(smc.plant(ON), smc.run(held()), ["m"], starts=1).values["m"] - 0.5) < 0.01
+    ),
+    "comparison": lambda out: (
+        smc.compare(HELD, ON, ["stepper"], 2, False, out=out, duration=1.0, progress=False).verdicts
+    ),
+    "advice": lambda out: smc.which(ON, "stepper", (), [HELD, "lqr"], 3, 1.0, None, out, True).choices,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", TAKEN)
+def test_an_analysis_takes_a_stepper(name, tmp_path):
+    assert TAKEN[name](tmp_path / "out")
+
+
+@pytest.mark.slow
+def test_no_theory_of_a_force_is_told_of_an_acceleration():
+    """Linear theory knows the torque that a law of forces bears, and not the motor that holds the joint itself."""
+    for condition, told in (("nominal", True), ("stepper", False)):
+        (one,) = smc.margins(ON, "observer_free", ["disturbance"], quick=True, condition=condition)
+        assert (one.theory is not None) == told
