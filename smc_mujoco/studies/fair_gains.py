@@ -102,14 +102,15 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
     return Candidate(made, (made,), remark)
 
 
-def _candidate(default: Component, tuned: "Tuned") -> Candidate:
-    """Return a law, given with its defaults, with the gains of a search."""
+def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
+    """Return a law with the gains of each search, or with those that it had if no search found better ones."""
     from smc_mujoco.analysis.tuning import search_space
 
     its = tuned.law.source
     if tuned.before < tuned.objective:
+        its_own = "defaults" if default.source.kind == source.DEFAULT else "own gains"
         default = default.sourced(its.kind, its.search)
-        return Candidate(default, (default,), "its defaults, better than those tried")
+        return Candidate(default, (default,), f"its {its_own}, better than those tried")
     gains = [dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True)) for tried in tuned.sets]
     sets = tuple(dataclasses.replace(default, gains=values).sourced(its.kind, its.search) for values in gains)
     without_unit = list(search_space.without_unit(default))
@@ -267,7 +268,7 @@ class Trial(NamedTuple):
             raise
         except ScenarioError as error:
             return _default(law, f"{NOT_TUNED}{error}")
-        return _candidate(default, tuned)
+        return candidate_of(default, tuned)
 
     def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any) -> Table:
         """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""

@@ -72,6 +72,9 @@ def compare(
     condition: options.Conditions = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")] = 12,
     tune: Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")] = True,
+    searches: Annotated[
+        int | None, typer.Option(min=1, help="Searches of a tuning; default 12. With --rig: tune all its laws anew.")
+    ] = None,
     worst: Annotated[bool, typer.Option("--worst", help="Also search the worst case of each law.")] = False,
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
@@ -94,8 +97,8 @@ def compare(
     A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of the package for the
     plant, or is tuned by the same rule, seconds to minutes for each law on each plant. If you stop the command, it
     continues when you start it again. Laws whose code is unchecked are marked, and none is named the winner over
-    checked ones without --unchecked. --law all compares every general law. With --rig a line for each metric says if
-    one law wins on all sets.
+    checked ones without --unchecked. --law all compares every general law. With --rig laws have the gains of the
+    machine, or those of --searches on its parameter sets, and a line for each metric says if one law wins on all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
 
@@ -111,15 +114,16 @@ def compare(
             others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
             raise ScenarioError(f"--rig brings its own plant, parameter sets and gains: leave out {others}")
         _compare_on_rig(
-            rig, law, seeds, duration, start, relevant, defaults, unchecked, out, executor, key, threads, terminal
-        )
+            rig, law, seeds, searches, duration, start, relevant, defaults, unchecked, out, executor, key, threads,
+            terminal,
+        )  # fmt: skip
         return
     options.check_files(None, latex, *files(figure))
     machines = options.names(plants)
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        unchecked=unchecked,        relevant=relevant, traces=traces, noise_key=key, threads=threads,
+        unchecked=unchecked, searches=searches, relevant=relevant, traces=traces, noise_key=key, threads=threads,
     )  # fmt: skip
     terminal.print(comparison)
     if latex:
@@ -132,8 +136,9 @@ def compare(
 
 
 def _compare_on_rig(
-    rig: str, law: list[str] | None, seeds: int, duration: float | None, starts: "Starts | None", relevant: float,
-    defaults: bool, unchecked: bool, out: Path, executor: str, key: int | str, threads: int | None, terminal: Terminal,
+    rig: str, law: list[str] | None, seeds: int, searches: int | None, duration: float | None,
+    starts: "Starts | None", relevant: float, defaults: bool, unchecked: bool, out: Path, executor: str,
+    key: int | str, threads: int | None, terminal: Terminal,
 ) -> None:  # fmt: skip
     """Compare laws over the parameter sets of a rig, and say if one law wins on all sets."""
     from smc_mujoco.common import annexes
@@ -143,10 +148,15 @@ def _compare_on_rig(
     ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
     chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
+    if searches is not None:
+        tuning = {"folder": out / "searches", "threads": threads, "progress": True}
+        chosen = ensemble.tuned(machine, chosen, searches, starts=starts, **tuning)
     scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
     table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, half_steps=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant, unchecked=unchecked)
     terminal.print(boards)
+    for one in chosen or () if searches is not None else ():
+        terminal.note(f"{one.law}{one.remark and f': {one.remark}'}", wrap=True)
     terminal.note(ensemble.verdict(boards))
     _finish(table, out, terminal)
 

@@ -1,16 +1,42 @@
-"""Controllers of real rigs, as laws, with which records of their closed loops are replayed.
+"""Controllers of real rigs, as laws, with which records of their closed loops are replayed, and laws beside them.
 
-They are not in the catalogue of laws, because the gains of each belong to one machine.
+The controllers are not in the catalogue of laws, because the gains of each belong to one machine.
 """
 
-from smc_mujoco.control.law import law_function
-from smc_mujoco.control.units import Gain
+import math
+from collections.abc import Mapping
+
+from smc_mujoco.control.law import Law, law_function
+from smc_mujoco.control.laws.rotary_swing_up import rotary_swing_up
+from smc_mujoco.control.source import SHIPPED
+from smc_mujoco.control.units import FORCE_PER_POSITION, FORCE_PER_SPEED, RATE, Gain
+
+KINDS = {  # of the catalogue's law for a rotary pendulum -> its gains in scene furuta, N m
+    "relay": {"k": 0.04, "phi": 1e-4, "k1": 0.0, "k2": 0.0},
+    "boundary layer": {"k": 0.05, "phi": 0.025, "k1": 0.0, "k2": 0.0},
+    "super-twisting": {"k": 0.0, "phi": 1.0, "k1": 0.2, "k2": 0.1},
+    "regulator": {"k": 1.0, "phi": 1.0, "k1": 0.0, "k2": 0.0},
+}
+
+
+def rotary(torque: float, surface: Mapping[str, float]) -> tuple[Law, ...]:
+    """Return the laws of scene furuta for a machine with `torque` N m per unit of u, on its own surface c1 .. c4.
+
+    The surface is that of least quadratic cost for its quantities, with the weights of `rotary_swing_up`.
+    """
+    force, made = 1.0 / torque, []
+    for name, gains in KINDS.items():
+        own = {**{key: value * force for key, value in gains.items()}, "k1": gains["k1"] * math.sqrt(force)}
+        law = rotary_swing_up(**own, w_max=0.03 * force, catch=0.05 * force, **surface)
+        made.append(law.named(name).sourced(SHIPPED))
+    return tuple(made)
 
 
 @law_function(
     gains={
-        "kp": Gain(6.0), "kd": Gain(1.8), "kp_free": Gain(30.0), "kd_free": Gain(2.5),
-        "cutoff": Gain(50.0, positive=True),
+        "kp": Gain(6.0, FORCE_PER_POSITION), "kd": Gain(1.8, FORCE_PER_SPEED),
+        "kp_free": Gain(30.0, FORCE_PER_POSITION), "kd_free": Gain(2.5, FORCE_PER_SPEED),
+        "cutoff": Gain(50.0, RATE, positive=True, held=True),
     },
     memory=5,
     plants=("furuta", "cart_pole"),

@@ -1,27 +1,37 @@
 """Rankings of laws over a rig's parameter sets: does a winner win whichever of them is true?
 
-table = smc.study(ensemble.runs(smc.rig("qube_servo")), "qube")
-print(ensemble.verdict(smc.leaderboard(table)))
+    table = smc.study(ensemble.runs(smc.rig("qube_servo")), "qube")
+    print(ensemble.verdict(smc.leaderboard(table)))
+
+`tuned` gives every law gains by one rule: the searches of `smc.tune`, each candidate once on every parameter set.
 """
 
 import dataclasses
+import math
+import os
+import warnings
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Objective
+from smc_mujoco.analysis.tuning.search import tune
+from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.law import Law
 from smc_mujoco.evidence.rigs.rig import Rig, Values
-from smc_mujoco.simulation.grid import Starts, grid
+from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.conditions import Condition
+from smc_mujoco.simulation.grid import Starts, all_combinations, grid
 from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.studies.fair_gains import NOT_TUNED, Candidate, candidate_of
 
 BY_STARTS = ("x0", "v0")  # fields of a rig's machine that the starts of the grid replace
 
 
 def runs(
     rig: Rig,
-    laws: Sequence[str | Law] | None = None,
+    laws: Sequence[str | Law | Candidate] | None = None,
     seeds: int = 20,
     gains: str = "default",
     duration: float = 10.0,
@@ -29,9 +39,70 @@ def runs(
 ) -> list[Scenario]:
     """Return scenarios of every law on every parameter set from every seed. The set is the condition.
 
-    `laws`: by default the rig's own; the name of one of these means it, with its gains. `seeds`, `gains`, `duration`
-    and `starts` are as in `smc.grid`; starts are by default within 20 % of the rig's x0.
+    `laws`: by default the rig's own; the name of one of these means it, with its gains; or those that `tuned` returns.
+    `seeds`, `gains`, `duration` and `starts` are as in `smc.grid`; starts are by default within 20 % of the rig's x0.
     """
+    chosen = _chosen(rig, laws)
+    given, found = ([law for law in chosen if isinstance(law, Candidate) == searched] for searched in (False, True))
+    scenarios, around = [], _starts(rig, starts)
+    for name, fields in _machines(rig).items():
+        free = dict(fields)
+        plant = free.pop("plant")
+        base = grid([plant], given, ["nominal"], seeds, gains, duration, around) if given else []
+        if found:
+            nominal = [Condition("nominal", {})]
+            base += all_combinations([plant], lambda _: found, nominal, range(seeds), duration, around)
+        bounded = free | {"u_max": _bound(free["u_max"])}
+        for one in base:
+            own = rig.controller is not None and one.law.template is rig.controller.template
+            scenarios.append(dataclasses.replace(one, **(free if own else bounded)).named(name))
+    return scenarios
+
+
+def objective(rig: Rig, starts: Starts | None = None) -> Objective:
+    """Return what `tuned` minimises: the J of tuning, with a run on each parameter set in place of each condition."""
+    machines = {name: fields | {"u_max": _bound(fields["u_max"])} for name, fields in _machines(rig).items()}
+    first = Scenario(**machines["set 1"], law="none", x0=_starts(rig, starts).x0)
+    period = first.control_period
+    sets = tuple(Condition(name, fields) for name, fields in machines.items())
+    return Objective(
+        conditions=sets, starts=_starts(rig, starts), control_period=period, weight=period, u_max=min(first.limits)
+    )  # fmt: skip
+
+
+def tuned(
+    rig: Rig,
+    laws: Sequence[str | Law] | None = None,
+    searches: int = SEARCHES,
+    budget: int = BUDGET,
+    starts: Starts | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    progress: bool = False,
+) -> list[Candidate]:
+    """Return laws with the gains of every search, by one rule for all, see `smc.tune`.
+
+    A law that has no gains to search keeps its own, and its remark says why. `laws` and `starts` are as in `runs`;
+    `folder` keeps each search.
+    """
+    goal, plant, found = objective(rig, starts), _machines(rig)["set 1"]["plant"], []
+    for law in map(coerce.law, _chosen(rig, laws)):
+        try:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the remark says so
+                made = tune(plant, law, budget, objective=goal, searches=searches, folder=folder, threads=threads,
+                            progress=progress)  # fmt: skip
+        except BrokenLawError:
+            raise
+        except ScenarioError as error:
+            found.append(Candidate(law, (law,), f"{NOT_TUNED}{error}"))
+        else:
+            found.append(candidate_of(law, made))
+    return found
+
+
+def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
+    """Return the laws to compare: the rig's own have its gains."""
     if not rig.ensemble:
         raise ScenarioError(
             f"{rig.name} has only one parameter set: choose a rig with an ensemble, such as qube_servo, or identify it "
@@ -40,13 +111,25 @@ def runs(
     shipped, given = {law.name: law for law in rig.laws}, rig.laws if laws is None else laws
     if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
         raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
-    scenarios, around = [], Starts(x0=rig.x0) if starts is None else starts
+    return chosen
+
+
+def _starts(rig: Rig, starts: Starts | None) -> Starts:
+    return Starts(x0=rig.x0) if starts is None else starts
+
+
+def _bound(u_max: float | None) -> float | None:
+    """Return the bound on u of a law that is not the machine's own: the drive's where firmware has its own bounds."""
+    return None if u_max == math.inf else u_max
+
+
+def _machines(rig: Rig) -> dict[str, dict[str, Any]]:
+    """Return set -> the fields of a Scenario that a rig's machine has, without where runs begin."""
+    found = {}
     for name, member in rig.members().items():
         fields: dict[str, Any] = {"u_max": None, "physics_step": None} | member.machine(Values(**member.values))
-        free = {key: value for key, value in fields.items() if key not in BY_STARTS}
-        base = grid([free.pop("plant")], chosen, ["nominal"], seeds, gains, duration, around)
-        scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
-    return scenarios
+        found[name] = {key: value for key, value in fields.items() if key not in BY_STARTS}
+    return found
 
 
 def verdict(boards: Sequence[Any]) -> str:

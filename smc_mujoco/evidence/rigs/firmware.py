@@ -114,9 +114,9 @@ def acceleration(kind, alpha, m, since, ref_acceleration):
 
 @law_function(
     gains={
-        "kind": Gain(LINEAR, nonnegative=True),
-        "top": Gain(20e3, positive=True),
-        "speed": Gain(15e3, positive=True),
+        "kind": Gain(LINEAR, nonnegative=True, held=True),
+        "top": Gain(20e3, positive=True, held=True),
+        "speed": Gain(15e3, positive=True, held=True),
     },
     memory=15,
     label="Firmware of the stepper's pendulum",

@@ -91,7 +91,7 @@ class Told:
 def predicted(
     rig: Any, seeds: int = 4, sets: int = 0, ablate: bool = True, report: Callable[[int], None] = lambda count: None
 ) -> Told:
-    """Run every law of a Rig on every parameter set from every seed, in all conditions.
+    """Run the laws that a Rig's machine ran on every parameter set from every seed, in all conditions.
 
     Without parts of the twin, only in the first condition, and from a quarter of the seeds.
 
@@ -100,7 +100,7 @@ def predicted(
     if (prediction := rig.prediction) is None:
         raise ScenarioError(f"{rig.name} has no figures to predict: give a record, which its twin repeats")
     members = dict(list(rig.members().items())[: sets or None])
-    laws = {law.name: law for law in rig.laws}
+    laws = {law.name: law for law in rig.laws if law.name in prediction.order}
     first = next(iter(prediction.conditions))
     values = {}
     for without in ("", *(prediction.left_out if ablate else ())):

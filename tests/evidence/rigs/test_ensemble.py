@@ -1,11 +1,15 @@
 """Rankings over a rig's parameter sets, and the commands that make them and identify rigs."""
 
+import dataclasses
 import json
+import math
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import smc_mujoco as smc
+from smc_mujoco.analysis.tuning import search
 from smc_mujoco.cli.main import app
 from smc_mujoco.evidence.rigs import ensemble
 from smc_mujoco.studies.board import heading
@@ -57,6 +61,79 @@ def test_a_rig_has_laws_and_a_start_of_its_own():
     assert all(0.24 - 1e-9 <= run.resolved.x0[0] <= 0.36 + 1e-9 for run in many)
     with pytest.raises(smc.ScenarioError, match="no laws have gains for realaigym_acrobot: give some"):
         ensemble.runs(smc.rig("realaigym_acrobot"))
+
+
+@pytest.mark.parametrize(
+    ("name", "torque", "drag"), [("qube_servo", 5.07081e-3, True), ("stepper_furuta", 1.104e-3, False)]
+)
+def test_the_laws_of_a_rotary_pendulum_slide_on_its_own_surface_of_least_cost(name, torque, drag):
+    """With the weights of `rotary_swing_up`, by a Riccati equation of the linear machine, in its unit of u."""
+    from scipy.linalg import solve_continuous_are
+
+    rig = smc.rig(name)
+    p, q = rig.scenario("none").plant.values({}), rig.values
+    Jp, lever, weight = p.Jc + p.m * p.l**2, p.m * p.L * p.l, p.m * p.grav * p.l
+    A, b = np.zeros((4, 4)), np.zeros((4, 1))
+    A[0, 2] = A[1, 3] = 1.0
+    if drag:  # a motor on a voltage turns the arm
+        inverse = np.linalg.inv([[p.J + p.m * p.L**2, lever], [lever, Jp]])
+        A[2:, 1], A[2:, 2] = inverse @ [0.0, weight], inverse @ [-q["back_emf"] * torque, 0.0]
+        A[2:, 3], b[2:, 0] = inverse @ [0.0, -p.bq], inverse @ [torque, 0.0]
+    else:  # the arm has the wanted acceleration
+        A[3, 1], b[2:, 0] = weight / Jp, [1.0, -lever / Jp]
+    R = 2000.0 * torque**2
+    (c,) = b.T @ solve_continuous_are(A, b, np.diag([1.0, 10.0, 0.05, 0.05]), [[R]]) / R
+    for law in rig.laws:
+        if law.template.name == "rotary_swing_up":
+            assert [law.gains[f"c{i}"] for i in (1, 2, 3, 4)] == pytest.approx(c, rel=1e-5), law.name
+            assert law.gains["catch"] == pytest.approx(0.05 / torque)
+
+
+def test_laws_are_tuned_on_every_set_of_the_machine_by_one_rule():
+    """A volt and an acceleration are searched about their bounds, terms that a law lacks stay away."""
+    for name, bound, count in (("qube_servo", 10.0, 4), ("stepper_furuta", 20e3 * math.tau / 1600.0, 8)):
+        rig = smc.rig(name)
+        goal = ensemble.objective(rig)
+        assert goal.u_max == pytest.approx(bound)
+        assert goal.weight == goal.control_period == rig.scenario("none").control_period
+        cases = goal.scenarios(rig.scenario("none").plant, rig.laws[-1])
+        assert len(cases) == count
+        assert [case.plant for case in cases] == [one.scenario("none").plant for one in rig.members().values()]
+    goal = ensemble.objective(smc.rig("qube_servo"))
+    boxes = {
+        law.name: set(search._planned(rig.scenario("none").plant, law, goal, 8, 0, 1).box)
+        for rig in [smc.rig("qube_servo")]
+        for law in rig.laws
+    }
+    assert boxes["relay"] == boxes["boundary layer"] == boxes["regulator"] == {"k"}
+    assert boxes["super-twisting"] == {"k1", "k2"}
+    assert boxes["state_feedback"] == {"kp", "kd", "kp_free", "kd_free"}
+
+
+def test_runs_take_the_gains_of_the_searches_in_turn_and_firmware_keeps_its_own():
+    rig = smc.rig("stepper_furuta")
+    regulator = next(law for law in rig.laws if law.name == "regulator")
+    two = [dataclasses.replace(regulator, gains=dict(regulator.gains) | {"k": k}) for k in (300.0, 600.0)]
+    found = ensemble.Candidate(two[1], tuple(two))
+    (linear,) = ensemble.tuned(rig, ["linear"], searches=1, budget=1)
+    assert linear.sets == (rig.laws[0],)
+    assert linear.remark == "not tuned: law 'linear' has no gain to tune: choose another"
+    runs = [one for one in ensemble.runs(rig, [found, linear], seeds=3, duration=0.5) if one.condition == "set 2"]
+    assert [one.law.gains["k"] for one in runs if one.law.name == "regulator"] == [300.0, 600.0, 300.0]
+    bounds = {one.law.name: one.limits[0] for one in runs}
+    assert bounds == {"regulator": pytest.approx(20e3 * math.tau / 1600.0), "linear": math.inf}
+
+
+@pytest.mark.slow
+def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path):
+    words = ["compare", "--rig", "simple_pendulum_ak80", "--law", "pid", "--law", "twisting", "--searches", "1"]
+    more = ["--seeds", "1", "--duration", "0.5", "--defaults", "--out", str(tmp_path)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ensemble.tuned, "__defaults__", (None, 1, 1, None, None, None, False))
+        done = CliRunner().invoke(app, [*words, *more])
+    assert done.exit_code == 0, done.output
+    assert "twisting(" in done.output
+    assert list((tmp_path / "searches").glob("*-twisting-0*.json"))
 
 
 def test_a_law_by_name_has_the_gains_of_the_rig_and_every_place_says_so(tmp_path):

@@ -98,7 +98,7 @@ def test_a_figure_has_one_row_for_all_its_records_and_is_read_on_a_phone(tmp_pat
     rows = [one for one in twin_figures.rows("qube_servo") if not one.variant]
     svg, _ = twins_figure(rows, tmp_path / "told.svg")
     text = svg.read_text(encoding="utf-8")
-    assert float(re.search(r'width="([\d.]+)pt"', text)[1]) <= 0.75 * 390
+    assert float(re.findall(r'width="([\d.]+)pt"', text)[0]) <= 0.75 * 390
     assert text.count("<!-- theta rms, 8 records -->") == 1
     assert text.count("<!-- theta rms -->") == 1  # of the record that is held out
     assert len(re.findall(r'<use [^>]*y="', text)) >= 2 * len(rows)  # a mark and a cross each

@@ -8,9 +8,7 @@ import math
 
 import numpy as np
 
-from smc_mujoco.control.laws.rotary_swing_up import rotary_swing_up
-from smc_mujoco.control.source import SHIPPED
-from smc_mujoco.evidence.rigs.controllers import state_feedback
+from smc_mujoco.evidence.rigs.controllers import rotary, state_feedback
 from smc_mujoco.evidence.rigs.records import STATE_SAMPLES, Columns, Record, rate
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
@@ -125,14 +123,6 @@ TORQUE_PER_VOLT = 5.07081e-3  # N m/V, of the quantities below
 SURFACE = {"c1": -4.40969, "c2": -49.8874, "c3": -2.08797, "c4": -4.10042}
 
 
-def law(name, k, phi, k1=0.0, k2=0.0):
-    """Return a law on SURFACE, with gains in volts: those of scene furuta, in N m, over the torque per volt."""
-    force = 1.0 / TORQUE_PER_VOLT
-    gains = {"k": k * force, "phi": phi * force, "k1": k1 * math.sqrt(force), "k2": k2 * force}
-    made = rotary_swing_up(**gains, w_max=0.03 * force, catch=0.05 * force, **SURFACE)
-    return made.named(name).sourced(SHIPPED)
-
-
 NAMES = (
     "pendulum_length", "arm_length", "arm_inertia", "arm_friction", "pendulum_damping", "torque_per_volt", "back_emf",
     "slope_x", "slope_y", "encoder_offset",
@@ -193,13 +183,7 @@ QUBE_SERVO = Rig(
         },
     },
     ensemble=tuple(dict(zip(NAMES, values, strict=True)) for values in ENSEMBLE),
-    laws=(
-        law("relay", k=0.04, phi=1e-4),
-        law("boundary layer", k=0.05, phi=0.025),
-        law("super-twisting", k=0.0, phi=1.0, k1=0.2, k2=0.1),
-        law("regulator", k=1.0, phi=1.0),
-        state_feedback(),
-    ),
+    laws=(*rotary(TORQUE_PER_VOLT, SURFACE), state_feedback()),
     x0=(0.0, 0.1),
     about=(
         "Records: decargroup/closed_loop_koopman (MIT, 2023). Identified on eight records; 11 was not used. "
