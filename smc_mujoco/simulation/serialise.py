@@ -67,10 +67,14 @@ def _versions() -> dict[str, str]:
     return packages | {"arithmetic": arithmetic()}
 
 
-def restore(data: dict) -> Scenario:
-    """Return the scenario that `describe` wrote. A law that is not installed here has no code."""
-    fields = {name: data[name] for name in Scenario.fields()}
-    fields |= {name: RESTORERS.get(name, _restored)(value) for name, value in fields.items() if value}
+def restore(data: dict, plant: Plant | None = None) -> Scenario:
+    """Return the scenario that `describe` wrote. A law that is not installed here has no code.
+
+    `plant`: that of the scenario, if it is known; one that a script defines cannot be found by its name.
+    """
+    fields = {name: data[name] for name in Scenario.fields()} | ({"plant": plant} if plant else {})
+    its = {name: value for name, value in fields.items() if value and value is not plant}
+    fields |= {name: RESTORERS.get(name, _restored)(value) for name, value in its.items()}
     fields["law"] = components.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
     with_defaults = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))

@@ -262,7 +262,7 @@ class Trial(NamedTuple):
                     depends,
                     lambda: search.tune(plant, law, budget, 0, goal, self.threads, self.progress, **options),
                     lambda made, path: made.save(path),
-                    result.load,
+                    lambda path: result.load(path, plant),
                 )
         except BrokenLawError:
             raise

@@ -121,6 +121,16 @@ def test_its_numbers_are_those_of_the_leaderboard_in_every_form(found):
     assert len(found.plot().axes) == 6
 
 
+def test_a_plant_that_a_script_defines_keeps_the_gains_of_its_searches(tmp_path):
+    """No catalogue has it, so its name says nothing to what reads the file of a tuning."""
+    plant = dataclasses.replace(smc.plant("van_der_pol"), name="mine")
+    trial = fair_gains.Trial([plant], (), 1.0, None, tmp_path, 1, False)
+    made, read = (trial.gains_on(plant, [smc.law("classical").template], 2, 32) for _ in range(2))
+    assert made[0].remark == ""
+    assert len(made[0].sets) == 2
+    assert [law.gains for law in made[0].sets] == [law.gains for law in read[0].sets]
+
+
 def test_traces_are_those_of_the_first_seed(found):
     assert len(found.traces) == 12
     assert {trace.scenario.seed for trace in found.traces} == {0}

@@ -215,11 +215,11 @@ class Tuned(Tables):
         return write_json(path, data)
 
 
-def load(path: str | os.PathLike[str]) -> Tuned:
-    """Read the tuning that `Tuned.save` wrote."""
+def load(path: str | os.PathLike[str], plant: Plant | None = None) -> Tuned:
+    """Read the tuning that `Tuned.save` wrote, of this plant if it is given."""
     with reading(path, "tuning", "give a .json file that Tuned.save wrote") as file:
         data = read_json(file)
-        scenario = serialise.restore(data["scenario"])
+        scenario = serialise.restore(data["scenario"], plant)
         fields: dict[str, Any] = {name: data[name] for name in SAVED_FIELDS}
         fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
         return Tuned(
