@@ -136,6 +136,40 @@ def designs(points: int, k: int, seed: int) -> np.ndarray:
     return np.concatenate([a, b, *mixed])
 
 
+def estimates(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # scipy's
+    """Return the first-order and total indices of outputs, (s, k) each; (s, n) at A and at B, (k, s, n) mixed.
+
+    A total index is M. J. W. Jansen's (Computer Physics Communications 117:35, 1999). A first-order index is the
+    coefficient of B's outputs in the regression of mixed outputs on those at A and B, all of unit variance: a
+    correlation without what the two samples have in common by chance (G. Glen & K. Isaacs, Environmental Modelling &
+    Software 37:157, 2012).
+    """
+    a, b, mixed = (_standardised(f) for f in (f_A, f_B, f_AB))
+    common = (a * b).mean(-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alone = ((mixed * b).mean(-1) - common * (mixed * a).mean(-1)) / (1.0 - common**2)
+    whole = ((f_A - f_AB) ** 2).mean(-1) / (2.0 * np.var([f_A, f_B], axis=(0, -1)))
+    return np.where(common**2 < 1.0, alone, 0.0).T, whole.T
+
+
+def _standardised(f: np.ndarray) -> np.ndarray:
+    """Return outputs of mean 0 and variance 1; 0 where they do not vary."""
+    centred = f - f.mean(-1, keepdims=True)
+    deviation = centred.std(-1, keepdims=True)
+    return np.divide(centred, deviation, out=np.zeros_like(centred), where=deviation > 0.0)
+
+
+def possible(first: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """Return estimates (k,) each, as (2, k), within what indices obey: 0 <= first <= total <= 1, sums up to and from 1.
+
+    Sums beyond are scaled.
+    """
+    total = np.clip(total, 0.0, 1.0)
+    total = np.minimum(total / min(total.sum() or 1.0, 1.0), 1.0)
+    first = np.clip(first, 0.0, total)
+    return np.stack([first / max(first.sum(), 1.0), total])
+
+
 def indices(
     space: Space, scores: np.ndarray, points: int, shares: np.ndarray, values: np.ndarray, seed: int
 ) -> list[Axis]:
@@ -151,14 +185,13 @@ def indices(
             """Return both indices of each axis, (2, k), from some of the points."""
             some = np.stack([parts[:, at]] * 2)  # twice: scipy fails on one axis of one output, and centres in place
             outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}
-            found = sobol_indices(func=outputs, n=points)
-            alone, whole = np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0]
-            return np.stack([np.minimum(alone, whole), whole])  # the first is never larger, its estimate may be
+            found = sobol_indices(func=outputs, n=points, method=estimates)
+            return possible(*np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0])
 
         draws = np.random.default_rng(seed).integers(points, size=(RESAMPLES, points))
         resampled = np.array([of(at) for at in draws if np.ptp(parts[:2, at])])
         ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
-        whole = np.clip([of(np.arange(points)), *ends], 0.0, 1.0)  # (3, 2, k); estimates may lie beyond
+        whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
         first, total = (
             [Interval(at, low, high, points) for at, low, high in whole[:, kind].T.tolist()] for kind in (0, 1)
         )

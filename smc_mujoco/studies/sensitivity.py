@@ -4,10 +4,11 @@
 
 The uncertainties vary together, each uniformly within its bounds. An axis's first-order index is the share of the
 score's variance that the axis alone explains. Its total index also counts what it does together with others, so it is
-0 only for an axis that changes nothing (A. Saltelli et al., Computer Physics Communications 181:259, 2010;
-scipy.stats.sobol_indices). The variance is that of the score's logarithm if all scores are positive, because scores are
-compared by their ratio. What chance decides, such as the realisation of noise, is an axis, too, so that it is not taken
-for the work of another. Intervals are bootstraps over the sampled points.
+0 only for an axis that changes nothing. First-order indices add up to at most 1, total ones to at least 1, and so do
+their estimates (`analysis.sensitivity.estimates`, `possible`; design by A. Saltelli et al., Computer Physics
+Communications 181:259, 2010). The variance is that of the score's logarithm if all scores are positive, because scores
+are compared by their ratio. What chance decides, such as the realisation of noise, is an axis, too, so that it is not
+taken for the work of another. Intervals are bootstraps over the sampled points.
 
 A region where runs fail has bounds on at most two axes. Half of the runs choose it, and the other half, which are
 independent, give its rate. The axis to improve is chosen and told in the same way.
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
 METRIC = "rms_error"
 DEFAULT_STEPS = 3_600_000  # physics steps by default, for a plant of one channel: up to 20 s of a core
 MIN_POINTS, MAX_POINTS = 8, 4096  # of the default, powers of 2
-ROUGH_POINTS = 32  # with fewer, intervals of total indices cover less than 85 %, see docs/worst_case.md
+ROUGH_POINTS = 32  # with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
 DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)  # of the default class: control periods, rad or m; chosen
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
