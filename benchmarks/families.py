@@ -2,15 +2,17 @@
 
     python benchmarks/families.py PLANT [PLANT ...] [--lot SEED] [--out families.json]
 
-Each law has the gains of its twelve shipped searches, run i those of search i, from start i. A level is told without
-units: the load's frequency and the delay by the bandwidth wc of the tuned ADRC, noise by the start, dry friction by
-u_max. Only the force of the load at 0.5 wc is in N or N m. With `--lot`, levels are drawn within the range of each
+A plant is a name, FILE.xml:joint, or a FILE.py that defines a Plant. Each law has the gains of twelve searches, run i
+those of search i, from start i: shipped ones, or searches of the same rule and budget, which are kept beside --out. A
+level is told without units: the load's frequency and the delay by the bandwidth wc of the tuned ADRC, noise by the
+start, dry friction by u_max. Only the force of a load is in N or N m; where u_max is not 6, it is more or less in
+proportion. With `--lot`, levels are drawn within the range of each
 sentence of the page, to check it. The error is rms_error, of the last three quarters of 8 s, at least 1e-4 of the
 start. The cost is what the gains were searched for, ITAE/|x0| plus the weighted variation of u, of this one run.
 
 In each family the law is chosen by half of the runs and told by the other half, and the reverse, so the larger family
 has no advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), and it is
-told at half the physics step, too. A plant of one channel takes about 6 minutes of processor time.
+told at half the physics step, too. A plant of one channel takes about 6 minutes of processor time, and 4 for searches.
 """
 
 import argparse
@@ -21,6 +23,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -30,22 +33,26 @@ from smc_mujoco.analysis.paired_runs import EPS
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, interval
 from smc_mujoco.analysis.step_halving import halved
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.control import gain_sets
+from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.scripts import execute
+from smc_mujoco.control.gain_sets import OBJECTIVES
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.evidence.report.families import FAMILIES
 from smc_mujoco.evidence.report.families import told as told_by
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
-from smc_mujoco.mechanisms.plant import plant as find_plant
+from smc_mujoco.mechanisms.named import as_plant
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.metrics.conventions import by_group
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.run import stream
-from smc_mujoco.simulation.scenario import Scenario
+from smc_mujoco.simulation.scenario import U_MAX, Scenario, default_u_max
 from smc_mujoco.simulation.signals import Noise, Sine
+from smc_mujoco.studies.fair_gains import Candidate, Trial
 
-RUNS, DURATION, U_MAX, LOAD = 12, 8.0, 6.0, 1.0  # runs a cell; s; N or N m
+RUNS, DURATION, LOAD = 12, 8.0, 1.0  # runs a cell; s; N or N m, where the bound on |u| is 6 N or N m
 FORCE_AT = 0.5  # of wc, the frequency of the loads whose force varies
 DRAWN = 3  # levels a sentence, by lot
 FORCE = "load at 0.5 wc, N or N m"
@@ -80,20 +87,76 @@ COLOURS, FIGURE_WIDTH, ROW_HEIGHT, LIMIT = (
 FAILED = 1e3  # score of a run that fails, times its scale: chosen, beyond all others
 
 
-def changes(axis: str, level: float, wc: float, start: float, run: int) -> dict:
-    """Return the fields of a scenario that a level sets."""
-    if axis.startswith("load"):
-        return {"disturbance": Sine(*load(axis, level, wc), math.tau * run / RUNS)}
-    if axis.startswith("delay"):
-        return {"input_delay": round(1e3 * level / wc) * 1e-3}
-    if axis.startswith("noise"):
-        return {"noise": Noise(position=level * start, velocity=VELOCITY_NOISE_RATIO * level * start)}
-    return {"friction": [Coulomb(level * U_MAX)]}
+class Subject(NamedTuple):
+    """A plant, and its laws with gains of twelve searches, run i those of search i."""
+
+    plant: Plant
+    laws: dict[str, Candidate]
+    condition: str  # that a level changes
+
+    @property
+    def wc(self) -> float:
+        """The bandwidth of the tuned ADRC, rad/s."""
+        return self.laws["adrc"].law.gains["wc"]
+
+    @property
+    def bound(self) -> float:
+        """The bound on |u|, N or N m."""
+        return default_u_max(self.plant)
+
+    def load(self, axis: str, level: float) -> tuple[float, float]:
+        """Return the force of a load, N or N m, and its frequency, rad/s."""
+        force, omega = (level, FORCE_AT) if axis == FORCE else (LOAD, level)
+        return force * self.bound / U_MAX, omega * self.wc
+
+    def changes(self, axis: str, level: float, run: int) -> dict:
+        """Return the fields of a scenario that a level sets."""
+        if axis.startswith("load"):
+            return {"disturbance": Sine(*self.load(axis, level), math.tau * run / RUNS)}
+        if axis.startswith("delay"):
+            return {"input_delay": round(1e3 * level / self.wc) * 1e-3}
+        if axis.startswith("noise"):
+            noise = level * max(map(abs, self.plant.x0))
+            return {"noise": Noise(position=noise, velocity=VELOCITY_NOISE_RATIO * noise)}
+        return {"friction": [Coulomb(level * self.bound)]}
+
+    def scenarios(self, axis: str, level: float, law: str) -> list[Scenario]:
+        """Return the runs of a law at a level."""
+        changes = [self.changes(axis, level, run) for run in range(RUNS)]
+        laws = [self.laws[law](run) for run in range(RUNS)]
+        return [case(self.plant, laws[i], self.condition, DURATION, seed=i, changes=changes[i]) for i in range(RUNS)]
+
+    def admitted(self, axis: str, level: float) -> dict[str, list[bool]]:
+        """Return whether the gains of each run admit a load from FORCE_AT wc on, for the laws of SURE."""
+        if not axis.startswith("load") or (axis != FORCE and level < FORCE_AT):
+            return {}
+        force, omega = self.load(axis, level)
+        sizes = {"d": force, "d'": force * omega}
+        its = {law: (what, catalogue()[law].admits[what]) for law, what in SURE.items() if law in self.laws}
+        return {
+            law: [sizes[what] < most(SimpleNamespace(**self.laws[law](run).gains)) for run in range(RUNS)]
+            for law, (what, most) in its.items()
+        }
 
 
-def load(axis: str, level: float, wc: float) -> tuple[float, float]:
-    """Return the force of a load, N or N m, and its frequency, rad/s."""
-    return (level, FORCE_AT * wc) if axis == FORCE else (LOAD, level * wc)
+def subject(text: str, folder: Path, condition: str = "nominal", gains: str = "tuned") -> Subject:
+    """Return a plant as its name, FILE.xml:joint or FILE.py says, and its laws; the folder keeps what is tuned."""
+    plant = of_file(Path(text)) if text.endswith(".py") else as_plant(text)
+    templates = [catalogue()[law] for laws in FAMILIES.values() for law in laws]
+    trial = Trial([plant], (), DURATION, None, folder, None, progress=True)
+    tuned = trial.gains({plant.name: templates}, defaults=False, gains=gains)[plant.name]
+    for its in tuned:
+        if its.remark:
+            print(f"{plant.name}, {its.law.name}: {its.remark}", file=sys.stderr)
+    return Subject(plant, {its.law.name: its for its in tuned}, condition)
+
+
+def of_file(path: Path) -> Plant:
+    """Return the plant that a Python file defines."""
+    found = [value for value in execute(path).values() if isinstance(value, Plant)]
+    if len(found) != 1:
+        raise ScenarioError(f"{path} defines {len(found)} plants: give a file with one")
+    return found[0]
 
 
 def by_lot(seed: int) -> dict[str, list[float]]:
@@ -103,31 +166,6 @@ def by_lot(seed: int) -> dict[str, list[float]]:
         first = lowest or LEVELS[axis][1]  # no delay has no ratio to others
         levels[axis] += np.exp(rng.uniform(math.log(first), math.log(highest), DRAWN)).tolist()
     return {axis: sorted(its) for axis, its in levels.items()}
-
-
-def laws_of(plant: str, names: Sequence[str]) -> list[str]:
-    """Return the laws that have twelve searches on a plant."""
-    return [
-        name for name in names if gain_sets.in_set(find_plant(plant), name, "tuned") and searches(plant, name) >= RUNS
-    ]
-
-
-def bandwidth(plant: str) -> float:
-    """Return wc of the tuned ADRC, rad/s."""
-    return gain_sets.tuned(find_plant(plant), "adrc", "tuned").best["wc"]
-
-
-def searches(plant: str, name: str) -> int:
-    """Return the number of a law's searches on a plant."""
-    return len(gain_sets.tuned(find_plant(plant), name, "tuned").sets)
-
-
-def scenarios(plant: str, axis: str, level: float, law: str) -> Iterator[Scenario]:
-    """Yield the runs of a law at a level."""
-    wc = bandwidth(plant)
-    start = max(map(abs, find_plant(plant).x0))
-    for run in range(RUNS):
-        yield case(plant, law, "nominal", DURATION, "tuned", run, changes=changes(axis, level, wc, start, run))
 
 
 def scores(made: Sequence[Scenario]) -> np.ndarray:
@@ -141,9 +179,9 @@ def scores(made: Sequence[Scenario]) -> np.ndarray:
     return values
 
 
-def cells(plant: str, axis: str, level: float, families: dict[str, list[str]]) -> Iterator[dict]:
+def cells(subject: Subject, axis: str, level: float, families: dict[str, list[str]]) -> Iterator[dict]:
     """Yield the lead of sliding mode at a level, of each kind in each score: above 1, it is that many times better."""
-    made = {law: list(scenarios(plant, axis, level, law)) for laws in families.values() for law in laws}
+    made = {law: subject.scenarios(axis, level, law) for laws in families.values() for law in laws}
     values = {law: scores(its) for law, its in made.items()}
     fine: dict[str, np.ndarray] = {}
     for k, score in enumerate(SCORES):
@@ -160,10 +198,11 @@ def cells(plant: str, axis: str, level: float, families: dict[str, list[str]]) -
         for kind in KINDS:
             lead, low, high = map(math.exp, interval(np.log(told["rivals"] / told[kind]), 0.025))
             at_half = math.exp(interval(np.log(told_fine["rivals"] / told_fine[kind]), 0.025)[0])
-            cell = {"plant": plant, "axis": axis, "level": level, "score": score, "kind": kind}
+            cell = {"plant": subject.plant.name, "axis": axis, "level": level, "score": score, "kind": kind}
             cell |= {"lead": lead, "low": low, "high": high, "half": at_half, "law": best[kind]}
             runs = {law: its[k].tolist() for law, its in values.items()}
-            yield cell | {"rival": best["rivals"], "medians": medians, "runs": runs}
+            cell |= {"rival": best["rivals"], "medians": medians, "runs": runs}
+            yield cell | {"admitted": subject.admitted(axis, level)}
 
 
 def draw(known: Sequence[dict], path: Path) -> None:
@@ -198,15 +237,12 @@ def borders(known: Sequence[dict]) -> Iterator[str]:
     for law, what in SURE.items():
         leads: dict[bool, list[float]] = {True: [], False: []}
         for one in known:
-            wanted = one["axis"].startswith("load") and (one["axis"] == FORCE or one["level"] >= FORCE_AT)
-            if not wanted or one["score"] != "error" or one["kind"] != KINDS[0]:
+            if one["score"] != "error" or one["kind"] != KINDS[0] or law not in one["admitted"]:
                 continue
-            plant, runs = find_plant(one["plant"]), one["runs"]
-            force, omega = load(one["axis"], one["level"], bandwidth(one["plant"]))
+            runs = one["runs"]
             rivals, _ = told_by(np.array([runs[rival] for rival in FAMILIES["rivals"] if rival in runs]))
-            for run, gains in enumerate(gain_sets.tuned(plant, law, "tuned").sets[:RUNS]):
-                most = catalogue()[law].admits[what](SimpleNamespace(**gains))
-                leads[force * (omega if what == "d'" else 1.0) < most].append(rivals[run] / runs[law][run])
+            for within, rival, own in zip(one["admitted"][law], rivals, runs[law], strict=True):
+                leads[within].append(rival / own)
         for within, its in leads.items():
             low, middle, high = np.quantile(its, [0.25, 0.5, 0.75]) if its else [math.nan] * 3
             where = "within" if within else "beyond"
@@ -232,29 +268,31 @@ def judged(known: Sequence[dict]) -> Iterator[str]:
 def main() -> None:
     """Print a line a cell, and write them all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("plants", nargs="*")
+    parser.add_argument("plants", nargs="*", help="names, FILE.xml:joint of your model, or FILE.py with a Plant")
     parser.add_argument("--lot", type=int, metavar="SEED", help="levels drawn by lot, to check the page's sentences")
+    parser.add_argument("--condition", default="nominal", help="a condition of the suite, which the levels change")
     parser.add_argument("--without", metavar="LAW", help="leave this law out")
-    parser.add_argument("--figure", type=Path, help="draw the cells of --out, without plants those of an earlier call")
+    parser.add_argument("--gains", default="tuned", choices=OBJECTIVES, help="the set of shipped gains")
+    parser.add_argument("--read", nargs="+", type=Path, default=[], metavar="FILE", help="cells of earlier calls, too")
+    parser.add_argument("--figure", type=Path, help="draw the cells, as this file")
     parser.add_argument("--out", type=Path, default=Path("families.json"))
-    asked, known = parser.parse_args(), []
-    if not asked.plants:
-        known = json.loads(asked.out.read_text())
-    for plant in asked.plants:
-        compared = {family: [name for name in names if name != asked.without] for family, names in FAMILIES.items()}
-        families = {family: laws_of(plant, names) for family, names in compared.items()}
-        print(plant, families, file=sys.stderr)
+    asked = parser.parse_args()
+    known = [one for path in asked.read for one in json.loads(path.read_text())]
+    read = len(known)
+    compared = {family: [name for name in names if name != asked.without] for family, names in FAMILIES.items()}
+    for text in asked.plants:
+        it = subject(text, asked.out.with_suffix(""), asked.condition, asked.gains)
         for axis, levels in (LEVELS if asked.lot is None else by_lot(asked.lot)).items():
             for level in levels:
-                for one in cells(plant, axis, level, families):
+                for one in cells(it, axis, level, compared):
                     its = f"{one['lead']:.3g} ({one['low']:.3g} to {one['high']:.3g}; half step {one['half']:.3g})"
                     laws = " | ".join("/".join(dict.fromkeys(one[who])) for who in ("law", "rival"))
                     print(
-                        f"| {plant} | {axis} {level:.3g} | {one['score']} | {one['kind']} | {its} | {laws} |",
+                        f"| {it.plant.name} | {axis} {level:.3g} | {one['score']} | {one['kind']} | {its} | {laws} |",
                         flush=True,
                     )
                     known.append(one)
-                asked.out.write_text(json.dumps(known, indent=1))
+                asked.out.write_text(json.dumps(known[read:], indent=1))
     print(*judged(known), *borders(known), sep="\n")
     if asked.figure:
         draw(known, asked.figure)

@@ -9,6 +9,7 @@ runs by this package, then by the second coding. Noise is drawn otherwise in eac
 """
 
 from collections.abc import Callable
+from pathlib import Path
 
 import families
 import numpy as np
@@ -85,15 +86,16 @@ def simulate(plant: str, law: Callable, x: np.ndarray, omega: float, load: float
     return np.array([error, np.trapezoid(t[:, None] * np.abs(xs), t, axis=0) / start + WEIGHT * variation])
 
 
-def leads(plant: str, axis: str, level: float) -> tuple[np.ndarray, np.ndarray]:
+def leads(subject: families.Subject, axis: str, level: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the median leads in error and cost, by this package and by the second coding, (2,) each."""
+    plant = subject.plant.name
     ours, theirs = {}, {}
     for name, law in LAWS.items():
-        made = list(families.scenarios(plant, axis, level, name))
+        made = subject.scenarios(axis, level, name)
         ours[name] = families.scores(made)
         starts = np.array([np.ravel(one.resolved.x0)[0] for one in made])
         gains = [[its[gain] for gain in its] for its in gain_sets.tuned(plant, name, "tuned").sets[:RUNS]]
-        load, omega = families.load(axis, level, families.bandwidth(plant)) if axis.startswith("load") else (0.0, 0.0)
+        load, omega = subject.load(axis, level) if axis.startswith("load") else (0.0, 0.0)
         noise = 0.0 if load else level * max(map(abs, made[0].plant.x0))
         theirs[name] = simulate(plant, law(np.array(gains).T), starts, omega, load, noise)
     by_ours, by_theirs = (np.median(its["adrc"] / its["super_twisting"], axis=1) for its in (ours, theirs))
@@ -103,6 +105,7 @@ def leads(plant: str, axis: str, level: float) -> tuple[np.ndarray, np.ndarray]:
 if __name__ == "__main__":
     print("plant, condition: lead in error, in cost | by the second coding")
     for plant in PLANTS:
+        subject = families.subject(plant, Path("foreign"))
         for axis, level in CELLS:
-            ours, theirs = (", ".join(f"{value:.3f}" for value in its) for its in leads(plant, axis, level))
+            ours, theirs = (", ".join(f"{value:.3f}" for value in its) for its in leads(subject, axis, level))
             print(f"{plant}, {axis} {level:g}: {ours} | {theirs}", flush=True)

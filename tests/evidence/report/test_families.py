@@ -6,12 +6,25 @@ from typing import Any
 import numpy as np
 import pytest
 
+import smc_mujoco as smc
 from benchmarks import families as script
 from smc_mujoco.control import gain_sets
 from smc_mujoco.evidence.report import families
+from smc_mujoco.studies.fair_gains import Candidate
 
 pytestmark = pytest.mark.quick
 RUNS = 12
+MODEL = """
+<mujoco model="slide">
+  <worldbody>
+    <body>
+      <joint name="slide" type="slide" axis="1 0 0"/>
+      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
+    </body>
+  </worldbody>
+  <actuator><motor joint="slide" gear="60" ctrlrange="-1 1"/></actuator>
+</mujoco>
+"""
 
 
 def lead(sets=None, floor=0.0, **scores) -> Any:
@@ -75,10 +88,44 @@ def test_levels_by_lot_are_within_the_sentences_and_of_their_seed():
 
 
 def test_a_lead_is_told_where_the_gains_admit_the_load_and_where_not():
-    """On the hanging chain implicit_first_order has k of 0.65 to 0.8 N m, super_twisting k2 of 1 to 8 N m / s."""
     runs = {law: np.ones(RUNS) for law in script.SURE} | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 9.0))
-    cell = {"plant": "pendulum_network", "axis": script.FORCE, "score": "error", "kind": "switching", "runs": runs}
+    cell = {"score": "error", "kind": "switching", "runs": runs, "admitted": dict.fromkeys(script.SURE, [True] * RUNS)}
     weaker = runs | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 2.0))
-    told = [*script.borders([cell | {"level": 0.6}, cell | {"level": 1.0, "runs": weaker}])]
+    beyond = cell | {"runs": weaker, "admitted": {"implicit_first_order": [False] * RUNS}}
+    told = [*script.borders([cell, beyond, cell | {"kind": "smoothed"}, cell | {"admitted": {}}])]
     assert [line.split(": ")[1] for line in told[:2]] == ["9 (9 to 9), 12 runs", "2 (2 to 2), 12 runs"]
-    assert "24 runs" in told[3]  # the load's rate, 14 N m / s at least, is beyond every k2
+    assert told[2].endswith("9 (9 to 9), 12 runs")
+    assert told[3].endswith(" 0 runs")
+
+
+def test_gains_admit_a_load_below_k_and_a_rate_below_k2(tmp_path):
+    """On the hanging chain implicit_first_order has k of 0.65 to 0.8 N m, super_twisting k2 of 1 to 8 N m / s."""
+    found = script.subject("pendulum_network", tmp_path)
+    within, beyond = (found.admitted(script.FORCE, level) for level in (0.6, 1.0))
+    assert within == {"implicit_first_order": [True] * RUNS, "super_twisting": [False] * RUNS}  # 14 N m / s at least
+    assert not any(beyond["implicit_first_order"])
+    assert not found.admitted("load, omega / wc", 0.25)
+    assert not found.admitted("noise / start", 1e-3)
+
+
+def test_a_load_and_friction_are_in_proportion_to_the_bound():
+    """The twelve runs of a plant of one's own, whose motor gives 60 N, take turns in the gains of its searches."""
+    plant = smc.plant_from(MODEL, channels={"slide": smc.Channel(x0=0.3)})
+    laws = [smc.law("adrc", wc=float(i + 1)) for i in range(RUNS)]
+    found = script.Subject(plant, {"adrc": Candidate(laws[1], tuple(laws))}, "heavy")
+    assert found.load(script.FORCE, 0.5) == (5.0, 1.0)
+    assert found.load("load, omega / wc", 0.25) == (10.0, 0.5)
+    runs = found.scenarios("friction / u_max", 0.1, "adrc")
+    assert [run.law.gains["wc"] for run in runs] == [law.gains["wc"] for law in laws]
+    assert {run.friction[0].level for run in runs} == {6.0}
+    assert {run.mismatch["mass"] for run in runs} == {1.3}
+    assert len({run.resolved.x0 for run in runs}) == RUNS
+
+
+def test_a_plant_may_be_what_a_python_file_defines(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text("import smc_mujoco as smc\nMINE, N = smc.plant('duffing', beta=2.0), 3\n")
+    assert script.of_file(path).parameters["beta"] == 2.0
+    path.write_text("N = 3\n")
+    with pytest.raises(smc.ScenarioError, match=r"mine.py defines 0 plants: give a file with one"):
+        script.of_file(path)
