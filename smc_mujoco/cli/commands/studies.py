@@ -148,14 +148,13 @@ def _compare_on_rig(
     ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
     chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
-    if searches is not None:
-        tuning = {"folder": out / "searches", "threads": threads, "progress": True}
-        chosen = ensemble.tuned(machine, chosen, searches, starts=starts, **tuning)
-    scenarios = ensemble.runs(machine, chosen, seeds, "default", length, starts)
+    tuning = {"starts": starts, "folder": out / "searches", "threads": threads, "progress": True}
+    found = [] if searches is None else ensemble.tuned(machine, chosen, searches, **tuning)
+    scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, starts)
     table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, half_steps=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant, unchecked=unchecked)
     terminal.print(boards)
-    for one in chosen or () if searches is not None else ():
+    for one in found:
         terminal.note(f"{one.law}{one.remark and f': {one.remark}'}", wrap=True)
     terminal.note(ensemble.verdict(boards))
     _finish(table, out, terminal)

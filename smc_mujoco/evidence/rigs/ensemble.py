@@ -61,7 +61,9 @@ def runs(
 
 def objective(rig: Rig, starts: Starts | None = None) -> Objective:
     """Return what `tuned` minimises: the J of tuning, with a run on each parameter set in place of each condition."""
-    machines = {name: fields | {"u_max": _bound(fields["u_max"])} for name, fields in _machines(rig).items()}
+    machines: dict[str, dict[str, Any]] = {
+        name: fields | {"u_max": _bound(fields["u_max"])} for name, fields in _machines(rig).items()
+    }
     first = Scenario(**machines["set 1"], law="none", x0=_starts(rig, starts).x0)
     period = first.control_period
     sets = tuple(Condition(name, fields) for name, fields in machines.items())
