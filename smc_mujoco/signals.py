@@ -1,9 +1,20 @@
-"""References and disturbances beyond those at the root: pulses, paths, gusts, recorded series."""
+"""References and disturbances beyond those at the root: pulses, paths, gusts, wind, recorded series."""
 
-from smc_mujoco.simulation.signals import BandLimited, Gust, Impulse, MinimumJerk, OrnsteinUhlenbeck, Pulse, Ramp, Relay
+from smc_mujoco.simulation.signals import (
+    BandLimited,
+    Dryden,
+    Gust,
+    Impulse,
+    MinimumJerk,
+    OrnsteinUhlenbeck,
+    Pulse,
+    Ramp,
+    Relay,
+    Wind,
+)  # fmt: skip
 from smc_mujoco.simulation.time_series import Held, TimeSeries, Waypoints, cartesian_path
 
 __all__ = [
-    "BandLimited", "Gust", "Held", "Impulse", "MinimumJerk", "OrnsteinUhlenbeck", "Pulse", "Ramp", "Relay",
-    "TimeSeries", "Waypoints", "cartesian_path",
+    "BandLimited", "Dryden", "Gust", "Held", "Impulse", "MinimumJerk", "OrnsteinUhlenbeck", "Pulse", "Ramp", "Relay",
+    "TimeSeries", "Waypoints", "Wind", "cartesian_path",
 ]  # fmt: skip

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 INSTANT_STEP = 1e-9  # s, physics step while rates are linearised
 FLAGS = mujoco.mjtDisableBit
-NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value | FLAGS.mjDSBL_FRICTIONLOSS.value  # not linear
+# What is not linear
+NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value | FLAGS.mjDSBL_FRICTIONLOSS.value
+NONLINEAR_FLAGS |= FLAGS.mjDSBL_CLAMPCTRL.value
 MAX_REST_ACCELERATION = 1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
 
 
@@ -28,7 +30,8 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     """Linearise a plant at rest as a `control.StateSpace`: x' = A x + B u, y = C x.
 
     The states are the positions of its joints, then their velocities, the channels first in their order; u are the
-    commands of the driven channels, and y the positions of all channels. SI units. Drives are ideal; contacts, limits
+    commands of the driven channels, and y the positions of all channels; of a free body the states are errors of its
+    pose, and u the forces of its actuators. SI units. Drives are ideal; contacts, limits
     and dry friction are left out. A and B are central differences of the accelerations that MuJoCo computes.
 
     Args:
@@ -58,9 +61,10 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     n = len(order)
     a, b = block[:n, :n][np.ix_(order, order)], block[:n, n:][np.ix_(order, driven)]
     names = joint_names(plant)
-    labels = [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
+    labels = names if plant.pose else [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
     states = [f"{kind}[{name}]" for kind in ("x", "v") for name in labels]
-    inputs, outputs = [f"u[{name}]" for name in names[: plant.driven]], [f"x[{name}]" for name in names]
+    drives = [model.actuator(i).name for i in driven] if plant.pose else names[: plant.driven]
+    inputs, outputs = [f"u[{name}]" for name in drives], [f"x[{name}]" for name in names]
     return StateSpace(a, b, np.eye(plant.n, n), 0.0, states=states, inputs=inputs, outputs=outputs, name=plant.name)
 
 

@@ -46,6 +46,8 @@ class Setting:
         """
         plant = as_plant(plant)
         self.task, known = find("task", task, TASKS), tasks(plant)
+        if not known:
+            raise ScenarioError(f"{plant.name} is a free body, which environments lack: give another plant")
         if task not in known:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)

@@ -171,9 +171,9 @@ def reward(e: np.ndarray, w: np.ndarray) -> Any:
 
 
 def tasks(plant: Plant | str) -> list[str]:
-    """Return the names of the tasks that a plant has."""
+    """Return the names of the tasks that a plant has; none of a free body."""
     plant = as_plant(plant)
-    return [name for name, task in TASKS.items() if task.applies_to(plant)]
+    return [name for name, task in TASKS.items() if task.applies_to(plant) and not plant.pose]
 
 
 def starts(task: Task, plant: Plant) -> Pair:

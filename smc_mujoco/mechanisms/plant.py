@@ -26,6 +26,7 @@ from smc_mujoco.common.mjcb import compiled
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
 MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
+TINY = 1e-12  # SI units; least value of a parameter above 0 that is neither a mass nor a length
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
 Values = SimpleNamespace  # parameters by name: p.m, p.l, ...
@@ -126,6 +127,9 @@ class Plant:
     unmodelled: str = ""  # why there is no nominal model; "" if there is one
     friction: Any = None  # hardware.part.Friction of its joints according to its source, for a scenario; or None
     limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
+    reach: Callable[[Values], tuple[float, ...]] | None = None  # `limits` of other parameters, if they depend on them
+    sets: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)  # name -> published parameters
+    above_zero: tuple[str, ...] = ()  # parameters that must be greater than 0, beside masses and lengths
     ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
@@ -139,7 +143,8 @@ class Plant:
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms", "placed", "added"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "jumps", frozen({size: frozen(factors) for size, factors in self.jumps.items()}))
+        for name in ("jumps", "sets"):
+            object.__setattr__(self, name, frozen({key: frozen(part) for key, part in getattr(self, name).items()}))
 
     def __repr__(self) -> str:
         values = [f"{name}={value:g}" for name, value in self.parameters.items()]
@@ -147,12 +152,15 @@ class Plant:
 
     @property
     def positive(self) -> frozenset[str]:
-        """Parameters that must be greater than 0: masses and lengths."""
-        return frozenset({self.mass, "M", "m", "l"}) & frozenset(self.parameters)
+        """Parameters that must be greater than 0: masses, lengths, and those of `above_zero`."""
+        return frozenset({self.mass, "M", "m", "l", *self.above_zero}) & frozenset(self.parameters)
 
     def constraint(self, parameter: str) -> Number:
         """Return what a parameter may be."""
-        low = 1e-6 if parameter in self.positive else 0.0 if parameter in (*self.dry, *self.added) else -MAX_PARAMETER
+        if parameter in self.positive:
+            low = TINY if parameter in self.above_zero else 1e-6
+        else:
+            low = 0.0 if parameter in (*self.dry, *self.added) else -MAX_PARAMETER
         return Number(low=low, high=MAX_PARAMETER)
 
     @property
@@ -221,7 +229,9 @@ class Plant:
     def change(self, factors: Mapping[str, float]) -> str:
         """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those of `values`."""
         return ", ".join(
-            f"{name} + {factor:g} {self.added[name]}".rstrip() if name in self.added else f"{name} × {factor:g}"
+            f"{name} {'−' if factor < 0.0 else '+'} {abs(factor):g} {self.added[name]}".rstrip()
+            if name in self.added
+            else f"{name} × {factor:g}"
             for name, factor in factors.items()
         )
 
@@ -289,18 +299,23 @@ def catalogue() -> Catalogue[Plant]:
     return catalogue_of("smc_mujoco.mechanisms.plants", Plant, "smc_mujoco.plants")
 
 
-def plant(name: str, **parameters: float) -> Plant:
-    """Return the plant `name`, with some of its parameters (or its size n) changed, else a ScenarioError."""
+def plant(name: str, *, set: str | None = None, **parameters: float) -> Plant:  # as users say it
+    """Return the plant `name`, with some of its parameters (or its size n) changed, else a ScenarioError.
+
+    `set` is the name of published numbers, for a plant that has several, such as plant("quadrotor", set="gym").
+    """
     base = find("plant", name, catalogue())
     n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
     values = dict(base.parameters)
+    values.update(find(f"set of {name}", set, base.sets) if set is not None else {})
     for key, value in parameters.items():
         if key not in values:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
         values[key] = base.constraint(key)(f"{name}'s {key}", value)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
     smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth
-    return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth)
+    limits = base.reach(Values(**values)) if base.reach else base.limits
+    return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth, limits=limits)
 
 
 def plants() -> list[str]:

@@ -43,10 +43,11 @@ C_TYPES = {
     "int": ctypes.c_int, "float": ctypes.c_float, "size_t": ctypes.c_size_t, "uintptr_t": ctypes.c_size_t,
     "uint64_t": ctypes.c_uint64,
 }  # fmt: skip
-PROBE_MODEL = """<mujoco><size nuserdata="12345"/><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
+PROBE_MODEL = """<mujoco><size nuserdata="12345" nuser_actuator="1" nuser_body="1"/>
+  <worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
 
-OF_MODEL = "nuserdata", "dof_frictionloss"  # fields of mjModel; all others are of mjData
+OF_MODEL = "nuserdata", "dof_frictionloss", "actuator_user", "body_user"  # fields of mjModel; all others are of mjData
 # Bytes from the start of mjModel or mjData to the fields. All but nuserdata are pointers.
 Offsets = namedtuple("Offsets", ("nuserdata", "userdata", *Arrays._fields))
 
@@ -133,7 +134,8 @@ def callback():
             pointer(integers(data + at.qfrc_constraint)[0]), pointer(integers(data + at.qfrc_bias)[0]),
             pointer(integers(data + at.qfrc_spring)[0]), pointer(integers(data + at.qfrc_passive)[0]),
             pointer(integers(data + at.qfrc_actuator)[0]), pointer(integers(data + at.qLDiagInv)[0]),
-            pointer(integers(model + at.dof_frictionloss)[0]),
+            pointer(integers(model + at.dof_frictionloss)[0]), integers(model + at.actuator_user)[0],
+            integers(model + at.body_user)[0],
         )  # fmt: skip
         run_simulation(address, simulation_at(address, 0), arrays)
 

@@ -32,6 +32,7 @@ from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware import stepper
 from smc_mujoco.mechanisms.hardware.drives import rippled
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
+from smc_mujoco.mechanisms.hardware.rotors import DRAG_AXES, rotor_at, speed_for, spun, thrust_at
 from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
@@ -43,11 +44,12 @@ LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, 
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
-# Arrays of one mjData, and of its mjModel the levels of dry friction, as pointers to their numbers.
+# Arrays of one mjData, as pointers to their numbers; of its mjModel the levels of dry friction, and the addresses of
+# what rotors and drag have.
 Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis actuator_force qfrc_constraint qfrc_bias
-    qfrc_spring qfrc_passive qfrc_actuator qLDiagInv dof_frictionloss""",
+    qfrc_spring qfrc_passive qfrc_actuator qLDiagInv dof_frictionloss actuator_user body_user""",
 )
 
 
@@ -74,6 +76,7 @@ def control(address, sim, data):
         _actuate(sim, data, step)
     elif sim.drive_step.rise_first != 0.0:
         _give_moment(sim, data, stage)
+    _fly(sim, data, step, stage)
     if sim.disturbance_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
         sample = k if stage + within == 0 else -1
@@ -506,6 +509,47 @@ def _step_drives(factors, state, v):
 _rippled = njit(error_model="numpy", inline="always")(rippled)
 
 
+@njit(error_model="numpy")
+def _fly(sim, data, step, stage):
+    """Give a free body its rotors' thrust, their gyroscopic torque and its drag at a stage, see hardware/rotors.py."""
+    if sim.rotors == 0:
+        return
+    if stage == 0:
+        lifted = 0.0
+        for j in range(sim.actuators):
+            rotor, state = rotor_at(data.actuator_user, j), state_at(sim.states, j)
+            if step > 0:
+                state.first = spun(rotor, state.first, state.second, sim.step)[0]
+            lifted += thrust_at(rotor, state.first)
+        for j in range(sim.actuators):
+            rotor, state = rotor_at(data.actuator_user, j), state_at(sim.states, j)
+            state.second = speed_for(rotor, state.delayed) * max(0.0, 1.0 - rotor.sag * lifted)
+    passed = sim.step * (0.5 if sim.stages == 1 else 0.5 * ((stage + 1) // 2))
+    momentum, change = 0.0, 0.0
+    for j in range(sim.actuators):
+        rotor, state = rotor_at(data.actuator_user, j), state_at(sim.states, j)
+        W, rate = spun(rotor, state.first, state.second, passed)
+        data.ctrl[channel_at(sim.channels, j).ctrl] = thrust_at(rotor, W)
+        momentum += rotor.inertia * rotor.spin * W
+        change += rotor.inertia * rotor.spin * rate
+    dof = channel_at(sim.channels, 0).qvel
+    v, drag = data.qvel, _drag(sim, data, data.qvel[dof], data.qvel[dof + 1], data.qvel[dof + 2])
+    for i in range(3):
+        data.qfrc_applied[dof + i] = -drag[i]
+    data.qfrc_applied[dof + 3] = -v[dof + 4] * momentum
+    data.qfrc_applied[dof + 4] = v[dof + 3] * momentum
+    data.qfrc_applied[dof + 5] = -change
+
+
+@njit(error_model="numpy")
+def _drag(sim, data, x, y, z):
+    """Return R diag(drag) R' times a velocity (x, y, z) in the axes of the world, N."""
+    place, first = channel_at(sim.channels, 0), channel_at(sim.channels, 3).qpos
+    q = data.qpos[first], data.qpos[first + 1], data.qpos[first + 2], data.qpos[first + 3]
+    along, drag = rotation.turned_back(q, x, y, z), pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6))
+    return rotation.turned(q, drag[0] * along[0], drag[1] * along[1], drag[2] * along[2])
+
+
 @njit(error_model="numpy", inline="always")
 def _zero_inputs(sim, data):
     """Set all commands and disturbances to 0."""
@@ -545,6 +589,26 @@ def _apply_pushes(address, sim, data):
     return record.FINE
 
 
+@njit(error_model="numpy")
+def _apply_wind(address, sim, data):
+    """Apply the force of the air that moves past a free body with drag."""
+    x, y, z = 0.0, 0.0, 0.0
+    for j in range(sim.disturbance_count if sim.rotors != 0 else 0):
+        signal = disturbance_at(sim.disturbances, j)
+        sim.instant.stream = signal.stream
+        for i in range(3 if signal.air != 0 else 0):
+            sim.instant.channel = i
+            if _call(signal.function, i, address + record.AT.instant, address + record.AT.motion) != 0:
+                return record.RAISED
+            part = sim.motion.value * signal.peak[i]
+            x, y, z = x + part * (i == 0), y + part * (i == 1), z + part * (i == 2)
+    if sim.rotors != 0:
+        force = _drag(sim, data, x, y, z)
+        for i in range(3):
+            data.xfrc_applied[channel_at(sim.channels, i).xfrc] += force[i]
+    return record.FINE
+
+
 @njit(error_model="numpy", inline="always")
 def _add_force(data, channel, force, cartesian):
     """Add a force to a channel: a horizontal one on its body, or one on its joint, if an actuator acts there."""
@@ -574,12 +638,12 @@ def _apply_disturbances(address, sim, data, t, k):
     """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at all others."""
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
-    if _apply_pushes(address, sim, data) != record.FINE:
+    if _apply_pushes(address, sim, data) != record.FINE or _apply_wind(address, sim, data) != record.FINE:
         return record.RAISED
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         instant.stream = signal.stream
-        if signal.body >= 0:
+        if signal.body >= 0 or signal.air != 0:
             continue
         for i in range(sim.n):
             channel = channel_at(sim.channels, i)
@@ -714,7 +778,7 @@ def _log(sim, data, k):
         if channel.ctrl < 0:
             sample.applied = 0.0
         elif sim.mixer != 0:
-            sample.applied = data.ctrl[channel.ctrl]
+            sample.applied = state.delayed if sim.rotors != 0 else data.ctrl[channel.ctrl]
         else:
             applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
             # the quotient may round to just beyond the limit

@@ -7,6 +7,7 @@ values of model fields. A Batch has those values separately for each simulation.
 import collections
 import copy
 import dataclasses
+import functools
 import itertools
 import weakref
 from collections.abc import Collection, Hashable
@@ -30,7 +31,7 @@ from smc_mujoco.mechanisms.hardware.part import (
     initial_pose,
     joint_ids,
 )
-from smc_mujoco.mechanisms.plant import DIRECT_TEXT, compiled_for_runs, field_array
+from smc_mujoco.mechanisms.plant import DIRECT_TEXT, Plant, compiled_for_runs, field_array
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.state import CHANNEL
@@ -165,11 +166,13 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
     return table.astype(CHANNEL)
 
 
-def mixer(model: mujoco.MjModel) -> np.ndarray:
+@functools.lru_cache(maxsize=32)
+def mixer(plant: Plant) -> np.ndarray:
     """Return what the actuators of a free body get of a force and a torque, and their bounds, (actuators, 8).
 
-    It is the pseudoinverse of what they exert: exact for what they can exert together, else nearest to it.
+    It is the pseudoinverse of what they nominally exert: exact for what they can exert together, else nearest to it.
     """
+    model = plant.load()
     drives = drive_ids(model)
     forces = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
     limited = model.actuator_ctrllimited[drives].astype(bool)[:, None]

@@ -13,6 +13,7 @@ import re
 from collections.abc import Hashable, Mapping
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
@@ -25,10 +26,11 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
+from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
 from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import cfunctions, philox, state
-from smc_mujoco.simulation.model import Mechanism, check_start, mechanism, mixer, with_values
+from smc_mujoco.simulation.model import Mechanism, check_start, field_values, mechanism, mixer, with_values
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
@@ -150,7 +152,7 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, state.Buffer()
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
-    values = _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, buffer)
+    values = _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, mechanism.model, buffer)
     if s.law.joint:
         values |= _joint_measurement(s, nominal, values, buffer)
     for name, shared in (("laws", "law"), ("references", "reference")):
@@ -163,10 +165,11 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {"n": s.plant.n, "driven": s.plant.driven, "nq": mechanism.model.nq, "nv": mechanism.model.nv}
-    rows = mixer(mechanism.model) if s.plant.pose else np.zeros((0, 8))
+    rows = mixer(s.plant) if s.plant.pose else np.zeros((0, 8))
     low, high = rows[:, 6], rows[:, 7]
     alike = len(rows) > 0 and np.ptp(high) == 0.0 and np.all(low >= 0.0)
     values |= {"actuators": len(rows), "mixer": state.address(rows) if len(rows) else 0, "keeps_torques": alike}
+    values |= {"rotors": has_rotors(mechanism.model)}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
     return buffer.as_tuple(state.SIMULATION, values), Packed(numbers, **arrays, nominal=nominal, mixer=rows)
@@ -193,7 +196,7 @@ def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str
         "frictions": _frictions(prepared, buffer),
         "disturbances": [
             {"function": _signal(d, buffer, n), "stream": s.noise_stream(i)}
-            | {"cartesian": d.cartesian, "sees": d.sees, "peak": (d.x, d.y, d.z) if isinstance(d, Push) else (0.0,) * 3}
+            | {"cartesian": d.cartesian, "sees": d.sees, "air": d.air, "peak": d.along}
             | {"body": 6 * prepared.mechanism.model.body(d.body).id if isinstance(d, Push) else -1}
             for i, d in enumerate(s.disturbance)
         ],
@@ -239,7 +242,7 @@ def _settings(s: Resolved) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
+def _arrays(s: Resolved, model: mujoco.MjModel, buffer: state.Buffer) -> dict[str, Any]:
     """Return the arrays of a record in which the callback keeps measurements, commands and states."""
     n, width = s.plant.n, s.plant.n if s.law.joint else 1
     late = not s.clock.regular  # a late command may take effect after the next sample began
@@ -251,6 +254,9 @@ def _arrays(s: Resolved, buffer: state.Buffer) -> dict[str, Any]:
         motors = {"motors": buffer.put(itertools.chain(*each)), "motor_stride": 8 * len(each[0])}
     if s.drive_step is not None:
         states["first"], states["second"] = s.drive_step.start(np.array(s.v0))
+    if has_rotors(model):
+        speeds = speeds_at_start(model, field_values(model, s, 0)["actuator_user"])
+        states["first"][: len(speeds)] = states["second"][: len(speeds)] = speeds
     return motors | {
         "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")}, "a": buffer.reserve(n),
         "told": buffer.reserve(n) if s.model == "true" else 0, "width": width, "commands": buffer.reserve(2 * width),

@@ -34,13 +34,24 @@ from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
 from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, joint_names, moves_alone
+from smc_mujoco.mechanisms.hardware.rotors import flies
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.coerce import MIN_TIME
 from smc_mujoco.simulation.philox import PROCESS
-from smc_mujoco.simulation.signals import Clock, Impulse, Jump, Noise, OrnsteinUhlenbeck, PerChannel, Push, Signal
+from smc_mujoco.simulation.signals import (
+    Clock,
+    Dryden,
+    Impulse,
+    Jump,
+    Noise,
+    OrnsteinUhlenbeck,
+    PerChannel,
+    Push,
+    Signal,
+)
 
 MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
@@ -553,14 +564,20 @@ def check_signals(s: Resolved) -> None:
     """Check that the signals can be disturbances and a reference, and that none is shorter than a step."""
     for d in s.disturbance:
         shortest = s.plant.n * s.duration / max(MAX_STEPS, s.work)  # s between knots, of all channels
-        if isinstance(d, OrnsteinUhlenbeck) and d.dt < shortest:
+        if isinstance(d, OrnsteinUhlenbeck | Dryden) and d.dt < shortest:
             raise ScenarioError(
-                f"OrnsteinUhlenbeck's dt {d.dt:g} s makes too many knots: give {shortest:.3g} s or more"
+                f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s or more"
             )
         if isinstance(d, Impulse) and d.width < s.physics_step:
             raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
     if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.feedforward)):
         raise ScenarioError("only a reference may have a signal for each channel: give one signal for all")
+    winds = [d for d in s.disturbance if d.air]
+    if winds and not flies(s.plant):
+        raise ScenarioError(
+            f"disturbance {shown(winds[0])} is a wind, and {s.plant.name} has no drag: give a force, or plant "
+            "'quadrotor'"
+        )
     for push in [d for d in s.disturbance if isinstance(d, Push)]:
         find(f"body of {s.plant.name} in a Push", push.body, dict.fromkeys(bodies(s.plant)))
     forces = [d for d in s.disturbance if d.cartesian and not isinstance(d, Push)]
@@ -572,7 +589,12 @@ def check_signals(s: Resolved) -> None:
     functions_of_time = [("reference", signal, "a smooth signal") for signal in dict.fromkeys(s.references)]
     functions_of_time += [("feedforward", s.feedforward, "a known signal of u")] if s.feedforward else []
     for name, signal, cure in functions_of_time:
-        kinds = {"a force": signal.cartesian, "noise": signal.random, "one that sees the loop": signal.sees}
+        kinds = {
+            "a force": signal.cartesian,
+            "a wind": signal.air,
+            "noise": signal.random,
+            "one that sees the loop": signal.sees,
+        }
         for kind in (kind for kind, applies in kinds.items() if applies):
             raise ScenarioError(f"{name} is {type(signal).__name__}, which is {kind}: give {cure}")
 

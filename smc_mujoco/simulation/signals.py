@@ -25,6 +25,7 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation import philox
 
+FOOT = 0.3048  # m
 EARLY = 1.0 - 1e-15  # factor on a switching time, because sums of decimal times differ from it by an ulp or two
 MAX_MISSED = 0.99  # probability; chosen: of a hundred samples one runs
 SINUSOIDS = 32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
@@ -44,6 +45,7 @@ class Signal:
     sees: ClassVar[bool] = False  # whether `value` takes e, de and s; then it is called once per control sample
     rows: ClassVar[int] = 2  # of `data`
     cartesian: ClassVar[bool] = False
+    air: ClassVar[bool] = False  # whether it is a wind, m/s
     data: ClassVar[np.ndarray]  # of a series, (rows, N) float64, C-contiguous
     value: ClassVar[Callable[..., tuple[float, float, float]]]  # static: value, first and second derivative
 
@@ -55,6 +57,11 @@ class Signal:
     def parameters(self) -> dict[str, float]:
         """Return parameter name -> value."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
+
+    @property
+    def along(self) -> tuple[float, float, float]:
+        """What the value of a signal in space is multiplied by along each axis of the world."""
+        return getattr(self, "x", 0.0), getattr(self, "y", 0.0), getattr(self, "z", 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -234,6 +241,108 @@ class Push(Signal):
 
 
 @dataclasses.dataclass(frozen=True)
+class Wind(Signal):
+    """Air that moves past a body with drag, such as the `quadrotor`; a trace's d has the force that it exerts.
+
+    (x, y, z) from `time` on, or with a width the gust (x, y, z) (1 - cos(2 pi (t - time) / width)) / 2 while it lasts.
+
+    Attributes:
+      x, y, z: speed in the axes of the world, m/s.
+      time: s.
+      width: s; 0: the wind stays.
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    time: float = 0.0
+    width: Natural = 0.0
+
+    air = True
+
+    @staticmethod
+    def value(t, p):
+        if t < p.time * EARLY:
+            return 0.0, 0.0, 0.0
+        if p.width == 0.0:
+            return 1.0, 0.0, 0.0
+        part = (t - p.time) / p.width
+        return (0.5 - 0.5 * math.cos(2.0 * math.pi * part) if part < 1.0 else 0.0), 0.0, 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Dryden(Signal):
+    """Turbulence of MIL-F-8785C at low altitude: wind past a body with drag, of its own spectrum along x, y and z.
+
+    x is along the mean wind. With h the height in feet, b = 0.177 + 0.000823 h, lengths L_z = h and L_x = L_y = h/b^1.2
+    feet, standard deviations s_z = 0.1 w20 and s_x = s_y = s_z/b^0.4, and T = L/speed:
+
+        s sqrt(2 T)/(1 + T p) along x,    s sqrt(T) (1 + sqrt(3) T p)/(1 + T p)^2 along y and z
+
+    of white noise, with p of Laplace's transform. Both are discretised exactly on knots dt apart and are linear
+    between, so that the rms is s whatever the step. `Wind` gives the mean. Source: MIL-F-8785C (1980), 3.7.
+
+    Attributes:
+      w20: wind at 20 feet, m/s: 7.7 light, 15 moderate, 23 severe.
+      height: m, from 3.05 to 305.
+      speed: of the air past the body, m/s. At hover in no wind the spectrum is singular: give 1 or more.
+      dt: s.
+    """
+
+    w20: Natural
+    height: Annotated[float, Number(low=3.04, high=305.0)] = 3.05
+    speed: Annotated[float, Number(low=0.1, high=1e3)] = 1.0
+    dt: Positive = 1e-3
+
+    x: ClassVar[float] = 1.0  # the value is the wind itself
+    y: ClassVar[float] = 1.0
+    z: ClassVar[float] = 1.0
+    memory = 5  # next knot, the two states, value at the last knot, value at the next
+    random = True
+    air = True
+
+    @staticmethod
+    def value(t, p, memory, seed, channel, stream):
+        feet = p.height / FOOT
+        b = 0.177 + 0.000823 * feet
+        size, length = 0.1 * p.w20, p.height
+        if channel < 2.0:
+            size, length = size / b**0.4, length / b**1.2
+        return _dryden(t, size, length / p.speed, p.dt, memory, seed, channel, stream), 0.0, 0.0
+
+
+@njit(error_model="numpy")
+def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
+    """Return the wind along one axis: of first order along the mean wind (channel 0), else of second."""
+    root = math.sqrt(3.0)
+    knot, x = t / dt, dt / T
+    left = math.exp(-x)
+    if memory[0] == 0.0:  # the stationary state
+        z = philox.normals(seed, channel, stream, 0)
+        memory[1] = sigma * (z[0] if channel == 0.0 else math.sqrt(0.5) * z[0])
+        memory[2] = sigma * (math.sqrt(0.125) * z[0] + math.sqrt(0.125) * z[1])
+        memory[4] = memory[1] if channel == 0.0 else root * memory[1] + (1.0 - root) * memory[2]
+    while memory[0] <= knot:
+        memory[3] = memory[4]
+        memory[0] += 1.0
+        z = philox.normals(seed, channel, stream, memory[0])
+        if channel == 0.0:
+            memory[1] = left * memory[1] + sigma * math.sqrt(-math.expm1(-2.0 * x)) * z[0]
+            memory[4] = memory[1]
+            continue
+        first = -0.5 * math.expm1(-2.0 * x)  # covariances of both states' noise in a step
+        both = 0.25 - left * left * (0.5 * x + 0.25)
+        second = 0.25 - left * left * (0.5 * x * x + 0.5 * x + 0.25)
+        a = math.sqrt(first)
+        c = both / a
+        p, q = left * memory[1], left * (x * memory[1] + memory[2])
+        memory[1] = p + sigma * a * z[0]
+        memory[2] = q + sigma * (c * z[0] + math.sqrt(max(0.0, second - c * c)) * z[1])
+        memory[4] = root * memory[1] + (1.0 - root) * memory[2]
+    return memory[4] + (memory[0] - knot) * (memory[3] - memory[4])
+
+
+@dataclasses.dataclass(frozen=True)
 class Relay(Signal):
     """A disturbance that sees the loop: it goes to `amplitude` if s sigma + rate e' + error e > 0, else to -amplitude.
 
@@ -374,7 +483,7 @@ class Noise:
         constrain(self)
         for error in self.errors:
             is_signal = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
-            if not is_signal or (error and (error.random or error.cartesian or error.sees)):
+            if not is_signal or (error and (error.random or error.cartesian or error.sees or error.air)):
                 cure = "give a known signal, such as smc.signals.Held(times, values)"
                 raise ScenarioError(f"Noise's error is {shown(error)}: {cure}")
 

@@ -78,10 +78,11 @@ LOG = floats((*LOGGED, "held"))  # and the time for which `exact_friction` held 
 FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
 # A disturbance: its stream of random numbers (0: none, and then it is the same in every channel), whether it is a
 # horizontal force on the body instead of a force on the joint, and whether it sees the loop. Of a `Push` also the index
-# of its body in xfrc_applied, and its peak; body is -1 for others.
+# of its body in xfrc_applied, and its peak; body is -1 for others. `air` tells whether it is a wind, m/s, with its peak
+# along each axis.
 DISTURBANCE = np.dtype(
     [
-        ("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("sees", "i8"), ("body", "i8"),
+        ("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("sees", "i8"), ("body", "i8"), ("air", "i8"),
         ("peak", "f8", (3,)),
     ],
     align=True,
@@ -101,6 +102,8 @@ SIMULATION = np.dtype(
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
         # a free body: its actuators, the address of their MIXERs, 0 for other plants, and whether to keep the torques
         ("actuators", "i8"), ("mixer", "i8"), ("keeps_torques", "i8"),
+        # whether these are rotors, see hardware/rotors.py; `first` and `second` are then their speeds and those told
+        ("rotors", "i8"),
         # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
         ("jitter", "i8"), ("missed", "f8"),
         # pauses: physics steps of one, samples from one to the next, and by how many the first comes earlier

@@ -17,7 +17,7 @@ from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
 PLANTS = {name: one if one.n == one.sizes[0] else plant(name, n=12) for name, one in catalogue().items()}
-NOT_READ = {"friction", "n", "contacts", "mechanisms"}
+NOT_READ = {"reach", "friction", "n", "contacts", "mechanisms"}
 PHYSICS = {  # what blows and springs are made of
     "body": ("pos", "quat", "mass", "inertia"), "geom": ("pos", "quat", "size", "type", "contype"),
     "pair": ("friction", "solref", "solimp", "dim"), "tendon": ("stiffness", "damping", "lengthspring"),

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 from helpers.commands import python
 from helpers.pages import ROOT
-from helpers.runs import ARRAYS, assert_loops_agree, assert_same
+from helpers.runs import ARRAYS, JOINTED, assert_loops_agree, assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import reference
 
-PLANTS = pytest.mark.parametrize("plant", smc.plants())
+PLANTS = pytest.mark.parametrize("plant", JOINTED)
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]
 runner = importlib.import_module("smc_mujoco.simulation.run")  # smc.run is the function
 
@@ -110,7 +110,7 @@ def within(plant):
 def scattered(number):
     """A random valid scenario."""
     rng = np.random.default_rng(number)
-    plant = smc.plant(str(rng.choice(smc.plants())))
+    plant = smc.plant(str(rng.choice(JOINTED)))
     period, step = [(1e-3, 1e-3), (2e-3, 1e-3), (5e-3, 1e-3), (20e-3, 1e-3), (4e-3, 5e-4)][rng.integers(5)]
     key = str(rng.choice([*plant.parameters, "mass"]))
     signals = [
@@ -366,7 +366,7 @@ def test_a_failure_leaves_its_neighbours_alone(together):
     assert digest(traces[1::2]) == digest(together)
 
 
-@pytest.mark.parametrize(("plant", "how"), list(zip(smc.plants(), itertools.cycle(range(4)))))
+@pytest.mark.parametrize(("plant", "how"), list(zip(JOINTED, itertools.cycle(range(4)))))
 def test_a_failure_is_timed_and_what_came_before_is_kept(plant, how):
     unbounded = dataclasses.replace(smc.plant(plant), limits=())
     scenario = smc.Scenario(plant=unbounded, law=doomed(how=how), u_max=math.inf, duration=0.1, control_period=2e-3)

@@ -39,7 +39,7 @@ def test_a_length_of_userdata_that_mujoco_cannot_hold_is_one_sentence(number):
 
 @pytest.fixture
 def live():
-    model = smc.plant("duffing").load(nuserdata=17)
+    model = smc.plant("quadrotor").load(nuserdata=17)  # none of the arrays is empty
     return model, mujoco.MjData(model)
 
 

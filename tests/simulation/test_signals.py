@@ -22,6 +22,7 @@ from smc_mujoco.simulation.signals import (
     SINUSOIDS,
     BandLimited,
     Constant,
+    Dryden,
     Gust,
     Impulse,
     MinimumJerk,
@@ -34,6 +35,7 @@ from smc_mujoco.simulation.signals import (
     Signal,
     Sine,
     Step,
+    Wind,
     bounds_of,
 )
 from smc_mujoco.simulation.time_series import Held, TimeSeries, Waypoints
@@ -50,6 +52,7 @@ EVERY = [
     Relay(0.5, s=0.3, rate=1.0, error=-0.2, slope=0.1),
 ]  # fmt: skip
 BLOW = Push("cart", x=2.0, z=-1.0, time=0.3, width=0.2)  # on a body, which not every plant has
+IN_SPACE = [BLOW, Wind(1.0, -2.0, time=0.3, width=0.4), Dryden(7.0, dt=5e-3)]
 SEEN = 0.3, -0.2, 0.1  # e, e' and s
 LED = [signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)]  # what a reference may be
 
@@ -85,10 +88,10 @@ def path(signal, times, **key):
 
 def test_every_kind_of_the_library_is_tested_here():
     kinds = {kind for kind in subclasses(Signal) if kind.__module__.startswith("smc_mujoco.simulation.")}
-    assert kinds - {PerChannel} == {type(signal) for signal in [*EVERY, BLOW]}
+    assert kinds - {PerChannel} == {type(signal) for signal in [*EVERY, *IN_SPACE]}
 
 
-@pytest.mark.parametrize("signal", [*EVERY, BLOW], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("signal", [*EVERY, *IN_SPACE], ids=lambda s: type(s).__name__)
 def test_the_compiled_function_gives_the_bits_of_the_written_one(signal):
     edges = np.array([0.1, 0.2, 0.25, 0.3, 0.305, 0.5, 0.7, 1.0, 1.3])
     times = np.sort(np.concatenate([np.arange(0.0, 1.6, 1e-3), edges, np.nextafter(edges, 2), np.nextafter(edges, 0)]))

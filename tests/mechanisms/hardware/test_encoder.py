@@ -11,6 +11,7 @@ import pickle
 
 import numpy as np
 import pytest
+from helpers.runs import JOINTED
 
 import smc_mujoco as smc
 from smc_mujoco.simulation import reference
@@ -345,7 +346,7 @@ def scattered(number):
     rng = np.random.default_rng(number)
     integrator = str(rng.choice(["RK4", "implicitfast", "Euler"]))
     step = 1e-3 if integrator == "RK4" else 2.5e-4
-    name = str(rng.choice(smc.plants()))
+    name = str(rng.choice(JOINTED))
     least, most = smc.plant(name).sizes
     plant = smc.plant(name, n=3) if least <= 3 <= most else smc.plant(name)
     return smc.Scenario(
