@@ -150,11 +150,11 @@ def worst_first(traces: Sequence[Trace]) -> list[Panel]:
 
 
 def by_channel(panel: Panel) -> list[Panel]:
-    """Return a panel for each channel of a panel's group."""
+    """Return a panel for each channel of a panel's group whose error counts."""
     if panel.quantity in SINGLE:
         return [panel]
-    panels = []
-    for k, i in enumerate(panel.group.channels):
+    panels, judged = [], panel.traces[0].scenario.plant.judged
+    for k, i in enumerate(i for i in panel.group.channels if i in judged):
         place, channel = (dataclasses.replace(panel.group, channels=(j,)) for j in (k, i))
         panels.append(Panel(panel.quantity, channel, [group_trace(trace, place) for trace in panel.traces], i))
     return panels

@@ -70,6 +70,8 @@ class Act:
 def pushes(trace: Trace, edges: np.ndarray, sizes: Sequence[arrows.Scale], colour: str) -> list[Push]:
     """Return the arrows of a machine in each frame between `edges`, s, for what acts on its channels."""
     acting = arrows.loads(trace, edges)
+    if trace.scenario.plant.pose and sizes:
+        return [Push(float(time), arrows.flying(acting, k, sizes[0], colour)) for k, time in enumerate(edges[1:])]
     return [
         Push(float(time), [(i, a) for i, size in enumerate(sizes) for a in arrows.arrows(acting, k, i, size, colour)])
         for k, time in enumerate(edges[1:])

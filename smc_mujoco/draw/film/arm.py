@@ -78,6 +78,55 @@ class Trail:
         image.paste(self.colour, tuple(self.corner.tolist()), self.mask)
 
 
+class Paths:
+    """Paths that machines take, and the wanted ones, drawn over pictures of `size` px; of free bodies their places.
+
+    `paths` has an actual path and a wanted one of each machine, (K + 1, 3) m, from its place in `places`, (3,) m each.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[tuple[np.ndarray, np.ndarray]],
+        times: Sequence[np.ndarray],
+        colours: Sequence[str],
+        places: np.ndarray,
+        project: Project,
+        size: tuple[int, int],
+        scale: float,
+    ):
+        self.trails, self.wanted = [], []
+        for lines, t, colour, place in zip(paths, times, colours, places, strict=True):
+            above = [np.maximum(points + place, (-np.inf, -np.inf, 0.0)) for points in lines]
+            path, wanted = (project(points).clip(-OUTSIDE, np.add(size, OUTSIDE)) for points in above)
+            self.trails.append(Trail(path, t, colour, PATH_WIDTH * scale))
+            self.wanted.append(Trail(wanted, t, style.INK, WANTED_PATH_WIDTH * scale, WANTED_OPACITY))
+
+    def draw(self, image: Image.Image, time: float) -> None:
+        """Draw the wanted paths, and the actual ones until a time, s."""
+        for trail, wanted in zip(self.trails, self.wanted, strict=True):
+            wanted.draw(image, np.inf)
+            trail.draw(image, time)
+
+    def over(self, picture: np.ndarray, time: float) -> np.ndarray:
+        """Return a picture with the paths until a time, s."""
+        image = Image.fromarray(picture)
+        self.draw(image, time)
+        return np.asarray(image)
+
+
+def flights(
+    traces: Sequence[Trace],
+    colours: Sequence[str],
+    places: np.ndarray,
+    project: Project,
+    size: tuple[int, int],
+    scale: float,
+) -> Paths:
+    """Return the paths of free bodies; arguments as those of `Paths`."""
+    paths = [(trace.x[:, :3], trace.r[:, :3]) for trace in traces]
+    return Paths(paths, [trace.t for trace in traces], colours, places, project, size, scale)
+
+
 class Overlay:
     """What is drawn over pictures of `size` px of arms at `places`, (machines, 3) m, between `edges`, (frames + 1,) s.
 
@@ -96,12 +145,8 @@ class Overlay:
         scale: float,
     ):
         self.traces, self.project, self.room, self.scale, self.colours = traces, project, room, scale, colours
-        self.trails, self.wanted = [], []
-        for trace, colour, place in zip(traces, colours, places, strict=True):
-            above = [np.maximum(points + place, (-np.inf, -np.inf, 0.0)) for points in tip.tip_paths(trace)]
-            path, wanted = (project(points).clip(-OUTSIDE, np.add(size, OUTSIDE)) for points in above)
-            self.trails.append(Trail(path, trace.t, colour, PATH_WIDTH * scale))
-            self.wanted.append(Trail(wanted, trace.t, style.INK, WANTED_PATH_WIDTH * scale, WANTED_OPACITY))
+        paths, times = [tip.tip_paths(trace) for trace in traces], [trace.t for trace in traces]
+        self.paths = Paths(paths, times, colours, places, project, size, scale)
         self.edges = edges
         self.shares = [self.share(trace) for trace in traces] if all(map(has_bars, traces)) else None
         self.errors = [windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces]
@@ -122,9 +167,7 @@ class Overlay:
         """Return the picture of a frame with all this; `bodies` returns where a machine's body or tip is, (3,) m."""
         time = float(self.edges[frame + 1])
         image = Image.fromarray(picture)
-        for trail, wanted in zip(self.trails, self.wanted, strict=True):
-            wanted.draw(image, np.inf)
-            trail.draw(image, time)
+        self.paths.draw(image, time)
         draw = ImageDraw.Draw(image)
         for k, force in enumerate(self.forces):
             if force is not None and (size := float(np.linalg.norm(force[frame]))) > 0.5:

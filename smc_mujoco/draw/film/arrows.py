@@ -3,8 +3,9 @@
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
 swings that switches faster than the film. With a drive, arrow and bar show its force, and a pale arrow the command.
 Arrows lie along a pendulum's arc, beyond the bob; or along the rail, above the cart, or before it if it carries
-something. At a hinge of a user's model, whose links may have any shape, they bend around its axis. They are drawn over
-the picture, so that no link hides them.
+something. At a hinge of a user's model, whose links may have any shape, they bend around its axis. On a free body the
+control's are those of its actuators, at their places, and the disturbance's is one force from its middle. All are
+drawn over the picture, so that no link hides them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,7 @@ from PIL import Image, ImageDraw, ImageFilter
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
+from smc_mujoco.mechanisms.hardware.part import drive_ids
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
 from smc_mujoco.metrics.conventions import Group, groups
 from smc_mujoco.simulation import model as models
@@ -43,6 +45,9 @@ NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the s
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
+FLIGHT_LENGTH, FLIGHT_THICKNESS = 2.2, 0.07  # of the longest arrow on a free body, in distances of its actuators
+FLIGHT_DISTANCE = 0.6  # of the disturbance's arrow from the middle of a free body, in longest arrows
+FLYING = "applied", "d"  # what acts on a free body, fields of a trace
 COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -56,6 +61,7 @@ class Arrow(NamedTuple):
     layer: int = 0  # distance from the body, in arrows
     size: float = 1.0
     head: bool = True
+    way: np.ndarray | None = None  # direction of a force on a free body, (3,), in the axes of the world
 
 
 class Mount(NamedTuple):
@@ -67,6 +73,9 @@ class Mount(NamedTuple):
     front: np.ndarray | None  # direction to the camera, (3,), of arrows before a slide that carries something
     beyond: bool = False  # whether on the other side of a hinge than the body: a network's pendulums pass each other
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
+    # Of an actuator of a free body: its place, m, and the direction of its force, in the axes of the body
+    place: np.ndarray | None = None
+    way: np.ndarray | None = None
 
 
 def mounts(
@@ -74,6 +83,8 @@ def mounts(
 ) -> list[Mount]:
     """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
     plant, is_users = scenario.plant, not scenario.plant.on_stage
+    if plant.pose:
+        return flying_mounts(scenario, joints)
     extent = float(models.compile_model(scenario).stat.extent) if is_users else 0.0
     length, thick = SLIDE_LENGTH * rail, min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
     if is_users:
@@ -87,6 +98,20 @@ def mounts(
         Mount(j, length if slide else turning, thick, before, beyond, 0.0 if slide else radius)
         for j, slide in zip(joints, slides, strict=True)
     ]
+
+
+def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
+    """Return a Mount for each channel of a free body; the first ones are those of its actuators."""
+    model = models.with_values(models.compile_model(scenario), scenario)
+    sites = model.actuator_trnid[drive_ids(model), 0]
+    places, ways = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
+    for i, site in enumerate(sites):
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.site_quat[site])
+        places[i], ways[i] = model.site_pos[site], turn.reshape(3, 3) @ model.actuator_gear[drive_ids(model)[i], :3]
+    arm = float(np.linalg.norm(places, axis=1).max()) or USER_LENGTH * float(model.stat.extent)
+    sized = {"unit": FLIGHT_LENGTH * arm, "thick": FLIGHT_THICKNESS * arm, "front": None}
+    return [Mount(j, **sized, place=place, way=way) for j, place, way in zip(joints, places, ways, strict=True)]
 
 
 def loads(trace: Trace, edges: np.ndarray) -> dict[str, Envelope]:
@@ -118,8 +143,8 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
         control, force, push, reaction = (_sizes(parts, name) for name in ("applied", "force", "d", "reaction"))
-        if traces[0].scenario.plant.pose:  # each actuator of a free body acts along several channels
-            control = 0.0, 0.0
+        if traces[0].scenario.plant.pose:  # its actuators are not its channels: see `flying`
+            control, push = ((_largest(traces, name),) * 2 if group.unit == "m" else (0.0, 0.0) for name in FLYING)
         longest = min(reaction[0], control[1]) if control[1] and same else reaction[0]
         if drive:
             control = max(control[0], force[0]), max(control[1], force[1])
@@ -127,6 +152,29 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         exceeded = tuple(name for name, (peak, lasting) in sizes.items() if peak > 1.01 * lasting)
         by_group[group] = Scale(control[1], push[1], longest, exceeded, drive)
     return by_group
+
+
+def _largest(traces: Sequence[Trace], name: str) -> float:
+    """Return the largest force of an actuator ("applied") or of the disturbance ("d") on free bodies, N."""
+    values = [getattr(trace, name)[np.isfinite(trace.x).all(axis=1)] for trace in traces]
+    sizes = [
+        np.abs(part).max(initial=0.0) if name == "applied" else np.linalg.norm(part[:, :3], axis=1).max(initial=0.0)
+        for part in values
+    ]
+    return float(max(sizes))
+
+
+def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str) -> list[tuple[int, Arrow]]:
+    """Return the arrows of a free body in one frame, each with its channel: of actuators and of the disturbance."""
+    law, grey = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE))
+    forces, push = loads["control"].mean[frame], loads["disturbance"].mean[frame, :3]
+    size = float(np.linalg.norm(push))
+    drawn = [
+        (i, Arrow(0.0, float(force) / scale.control, (*law, 1.0))) for i, force in enumerate(forces) if scale.control
+    ]
+    if size and scale.disturbance:
+        drawn.append((0, Arrow(0.0, size / scale.disturbance, (*grey, 1.0), way=push / size)))
+    return [(i, arrow) for i, arrow in drawn if abs(arrow.high) > MIN_LENGTH]
 
 
 def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
@@ -171,6 +219,12 @@ def path(model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow)
     axis, anchor = data.xaxis[mount.joint], data.xanchor[mount.joint]
     low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
+    if mount.place is not None and mount.way is not None:
+        body, way = model.jnt_bodyid[mount.joint], arrow.way
+        turn, start = data.xmat[body].reshape(3, 3), mount.unit * FLIGHT_DISTANCE * (way if way is not None else 0.0)
+        if way is None:
+            way, start = turn @ mount.way, turn @ mount.place
+        return data.xpos[body] + start + mount.unit * along * way, mount.thick
     if mount.radius:
         right = np.cross(axis, mount.front + np.array([0.0, 0.0, BENT_RAISE]))
         if not np.linalg.norm(right):

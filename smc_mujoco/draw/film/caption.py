@@ -277,8 +277,10 @@ def key(traces: Sequence[Trace], scales: Mapping[Group, Scale]) -> list[str]:
     words = []
     if sizes := longest("control"):
         drive = any(scale.drive for scale in scales.values())
-        what = "force of the drive" if drive else "mean control"
-        words += [f"arrow: {what}, longest {sizes}", "bar: its range"]
+        flies = bool(traces[0].scenario.plant.pose)
+        what = "force of the drive" if drive else "force of an actuator" if flies else "mean control"
+        words += [f"arrow: {what}, longest {sizes}"]
+        words += ["line: path; dark: the wanted path"] if flies else ["bar: its range"]
         words += ["pale arrow: command"] * drive
     if sizes := longest("disturbance"):
         words.append(f"dark arrow: disturbance, longest {sizes}")

@@ -272,6 +272,8 @@ def pictures(
         caption.place(stage.boxes)
         overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
         over = arm.Overlay(*overlaid) if arms else None
+        flown = (traces, colours, stage.where, stage.project, above, scale)
+        flights = arm.flights(*flown) if traces[0].scenario.plant.pose else None
         for frame, time in enumerate(times.tolist()):
             failed = tuple(act.failed(time) for act in acts)
             drawn = []
@@ -285,6 +287,8 @@ def pictures(
             picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame, stage.find)
+            if flights:
+                picture = flights.over(picture, time)
             moods = tuple(act.states[frame] for act in acts)
             picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame]))
             yield np.concatenate([picture, charts.at(time)])

@@ -241,8 +241,8 @@ def first_channels(scenario: Scenario) -> Scenario:
 
 
 def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
-    """Return the length of the rail along x, m, from what does not move; inf for pendulums and users' models."""
-    if scenario.plant.unit == "rad" or not scenario.plant.on_stage:
+    """Return the length of the rail along x, m, from what does not move; inf for machines without one."""
+    if scenario.plant.unit == "rad" or scenario.plant.pose or not scenario.plant.on_stage:
         return np.inf
     return float(2 * np.abs(fixed_boxes(model)[..., 0]).max())
 

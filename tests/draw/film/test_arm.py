@@ -73,7 +73,7 @@ def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
     monkeypatch.setattr(tip, "tip_paths", lambda trace: (low, low))
     shown = overlay(dataclasses.replace(trace, t=np.array([0.0, 0.1, 0.2])))
     floor = project(np.zeros((1, 3)))[0, 1]
-    for trail in (shown.trails[0], shown.wanted[0]):
+    for trail in (shown.paths.trails[0], shown.paths.wanted[0]):
         rows = np.flatnonzero((drawn(trail, 1.0) != 255).any(axis=(1, 2)))
         assert floor - 55 <= rows.min() <= floor - 45
         assert rows.max() <= floor + 2
@@ -82,7 +82,7 @@ def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
 def test_the_trail_of_an_arm_is_its_tips_path(trace):
     shown = overlay(trace)
     path = project(tip.tip_paths(trace)[0])
-    early, late = drawn(shown.trails[0], 0.1), drawn(shown.trails[0], 0.5)
+    early, late = drawn(shown.paths.trails[0], 0.1), drawn(shown.paths.trails[0], 0.5)
     before = path[trace.t <= 0.1]
     apart = np.hypot(*(path[:, None] - before).T).min(axis=0)  # px from the early path
     assert apart.max() > 3.0

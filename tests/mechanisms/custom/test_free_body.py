@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -247,10 +248,31 @@ def test_other_uses_of_a_free_joint_are_refused(drone):
         Controller(smc.Scenario(plant=drone, law="geometric"))
 
 
-def test_a_film_has_no_arrow_for_actuators_that_act_along_several_channels(drone):
-    trace = smc.run(smc.Scenario(plant=drone, law="geometric", model="nominal", duration=0.1))
-    assert np.abs(trace.applied).max() > 0.07  # of a rotor that carries its part of the weight
-    assert [scale.control for scale in arrows.scales([trace]).values()] == [0.0, 0.0]
+def test_a_film_has_an_arrow_for_each_actuator_and_one_for_the_disturbance(drone):
+    """At the rotors, along their thrust as the body leans; the disturbance's along the force."""
+    push = smc.signals.Gust(0.02, time=0.0, width=0.4)
+    trace = smc.run(smc.Scenario(plant=drone, law="geometric", duration=0.2, disturbance=push))
+    scale = next(iter(arrows.scales([trace]).values()))
+    assert scale.control == pytest.approx(np.abs(trace.applied).max())
+    assert scale.disturbance == pytest.approx(trace.d[:, 0].max())
+    drawn = arrows.flying(arrows.loads(trace, np.array([0.19, 0.2])), 0, scale, "#000000")
+    assert [i for i, _ in drawn] == [0, 1, 2, 3, 0]
+    lengths = [arrow.high for _, arrow in drawn[:4]]
+    np.testing.assert_allclose(lengths, trace.applied[190:201, :4].mean(axis=0) / scale.control, rtol=0.01)
+    model = trace.scenario.plant.load()
+    data = mujoco.MjData(model)
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.5])
+    data.qpos[:] = [1.0, 2.0, 3.0, *turn.as_quat(scalar_first=True)]
+    mujoco.mj_kinematics(model, data)
+    mounts = arrows.mounts(trace.scenario, [0] * 6, [False] * 6, math.inf, np.zeros(3))
+    for (i, arrow), site in zip(drawn[:4], range(4), strict=True):
+        line, _ = arrows.path(model, data, mounts[i], arrow) or pytest.fail("no arrow")
+        np.testing.assert_allclose(line[0], data.site(str(site + 1)).xpos, atol=1e-12)
+        along = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+        np.testing.assert_allclose(along, turn.apply([0.0, 0.0, 1.0]), atol=1e-12)
+    line, _ = arrows.path(model, data, mounts[0], drawn[4][1]) or pytest.fail("no arrow")
+    np.testing.assert_allclose(np.cross(line[-1] - line[0], [1.0, 0.0, 0.0]), 0.0, atol=1e-12)
+    assert line[-1, 0] > line[0, 0] > 1.0
 
 
 def test_disturbances_are_forces_on_the_centre_of_mass_and_turn_nothing():
