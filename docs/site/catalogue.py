@@ -7,6 +7,7 @@ page of a plant its equation, picture, figure, parameters, obstacles, builds and
 import contextlib
 import dataclasses
 import inspect
+import itertools
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -435,8 +436,9 @@ def units(plant: Plant) -> list[str]:
     sources = (inspect.getsource(sys.modules[one.build.__module__]).splitlines() for one in (named, *alike))
     has = re.compile(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{").search
     lines, at = next((lines, i) for lines in sources for i, line in enumerate(lines) if has(line))
-    comment = lines[at].partition("#")[2] or lines[at - 1].partition("#")[2]
-    return [unit.strip() for unit in comment.split(",")]
+    above = list(itertools.takewhile(lambda line: line.strip().startswith("#"), reversed(lines[:at])))
+    comment = lines[at].partition("#")[2] or " ".join(line.partition("#")[2] for line in reversed(above))
+    return [unit.strip() for unit in comment.split(",") if unit.strip()]
 
 
 def _parameters(plant: Plant) -> str:
