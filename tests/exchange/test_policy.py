@@ -141,18 +141,6 @@ def test_a_policy_may_look_ahead_in_environments_of_its_own():
     assert np.all(trace.u[:-1] == -6.0)
 
 
-def test_a_policy_may_look_ahead_in_runs_of_its_own():
-    ahead = smc.Scenario(plant="inverted_pendulum", law="classical", contact="stops", duration=0.01)
-    ends = []
-
-    def act(observation):
-        ends.append(smc.run(ahead).x[-1, 0])
-        return [0.0]
-
-    assert briefly(smc.policy(act)).failure is None
-    assert ends == 3 * [smc.run(ahead).x[-1, 0]]
-
-
 # files and modules, with stand-ins for their libraries
 
 

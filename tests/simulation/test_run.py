@@ -224,16 +224,6 @@ def test_a_law_that_its_author_compiled_cannot_write_beyond_its_memory_either():
     failed(trace, 0.005, "law 'writes_beyond_its_memory'", "IndexError")
 
 
-def test_a_law_s_memory_starts_at_zero_in_every_channel_and_every_run():
-    def counts(y, gains, memory):
-        memory[0] += 1.0
-        return 0.0, memory[0]
-
-    one = scenario(made(counts), plant=smc.plant("pendulum_network", n=3))
-    for trace in [*smc.run([one, one]), smc.run(one)]:
-        np.testing.assert_array_equal(trace.s, np.arange(1.0, 22.0)[:, None].repeat(3, axis=1))
-
-
 RETURNS = {
     "nothing": lambda y, gains, memory: None, "text": lambda y, gains, memory: ("a", "b"),
     "complex": lambda y, gains, memory: (1j, 0.0), "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
