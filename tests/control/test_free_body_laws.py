@@ -219,6 +219,55 @@ def measured(x, v, dt, r=None, J=(16.8e-6, 16.8e-6, 29.8e-6), m=0.0319, limit=1.
     return JointMeasurement(0.0, dt, 1.0, 0, x, v, x - r, v - dr, r, dr, ddr, ddr, limits, M, h, g)
 
 
+def test_the_adaptive_law_has_a_slope_of_its_own_for_the_yaw():
+    law = smc.law("adaptive_quaternion_sliding")
+    seen = measured(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), np.zeros(6), 2e-3)
+    u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
+    assert s[3:] == pytest.approx([0.0, 0.0, 3.0 * math.sin(0.2)])
+    assert u[5] == pytest.approx(-29.8e-6 * 400.0 * math.tanh(0.2 * s[5]))
+
+
+def test_indi_adds_no_torque_that_it_measures_already():
+    """At its first sample, of a body whose inertia is not that of a ball, where wd is 0: J v alone."""
+    law, x, w = smc.law("indi_attitude", **NOWHERE["indi_attitude"]), np.zeros(6), [3.0, -5.0, 4.0]
+    x[3:5] = 0.3, -0.2
+    J = (12e-6, 20e-6, 29.8e-6)
+    seen = measured(x, np.array([0, 0, 0, *w]), 2e-3, J=J)
+    u, _ = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
+    q = Rotation.from_rotvec(x[3:]).as_quat(scalar_first=True)
+    np.testing.assert_allclose(u[3:], np.array(J) * (-240.0 * q[1:] - 24.0 * np.array(w)), rtol=1e-6)
+
+
+def test_the_cascade_bounds_speed_tilt_and_the_least_thrust():
+    """Level and at rest, 3 m too high and 3 m too far ahead; the period is so short that nothing integrates."""
+    law, weight = smc.law("cascaded_pid"), 0.0319 * G
+    seen = measured(np.array([3.0, 0.0, 3.0, 0.0, 0.0, 0.0]), np.zeros(6), 1e-9)
+    u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
+    assert s[:3] == pytest.approx([1.0, 0.0, 1.0])  # v - v*
+    assert u[:3] == pytest.approx([0.0, 0.0, weight * 20_000 / 42_700])
+    tilt = math.radians(20.0)
+    assert s[3:] == pytest.approx([0.0, 6.0 * 2.0 * math.sin(tilt / 2.0), 0.0], abs=1e-6)
+    assert u[3:] == pytest.approx([0.0, -16.8e-6 * 103.0 * s[4], 0.0], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("torque", "gains"),
+    [
+        (True, {"Ia": 0.0, "Iv": 0.0}),
+        (True, {"Ir": 0.0, "Iv": 0.0}),
+        (False, {"Iz": 0.0}),
+        (False, {"Iz": 2.0, "Ivz": 0.0, "Iv": 0.0}),
+    ],
+    ids=["rate", "attitude", "climb", "height"],
+)
+def test_each_integral_of_the_cascade_leaves_no_error_alone(drone, torque, gains):
+    law, common = smc.law("cascaded_pid", **gains), {"duration": 12.0, "control_period": 2e-3}
+    heavy = {} if torque else {"mismatch": {"m": 1.19}}
+    trace = smc.run(smc.Scenario(plant=drone, law=pushed(law) if torque else law, **common, **heavy))
+    assert np.abs(trace.e[-1, :3]).max() < 2e-3
+    assert np.abs(trace.e[:, :3]).max() > 0.01
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_commands_are_those_of_the_law_in_python(drone, law):
     """Along a path that turns its heading, from a tumbling start, which brings q and -q."""
@@ -322,7 +371,7 @@ def test_indi_takes_the_torque_of_rotors_that_speed_up_into_account():
 
     def yawed(spin, told):
         memory, angle, w, rotors, path = np.zeros((6, law.memory)), 0.05, 0.0, 0.0, []
-        gains = SimpleNamespace(**law.gains | {"spin": told})
+        gains = SimpleNamespace(**{**law.gains, "spin": told})
         for _ in range(600):
             y = measured(np.array([0, 0, 0, 0, 0, angle]), np.array([0, 0, 0, 0, 0, w]), dt)
             u, _ = function(y, gains, memory)
@@ -423,18 +472,29 @@ def geometric_torque(error, turning):
     return -421.7 * np.array([antisymmetric[2, 1], antisymmetric[0, 2], antisymmetric[1, 0]]) - 69.27 * turning
 
 
-def sliding_torque(error, turning):
+def sliding_torque(error, turning, lam=8.0, rho=0.25):
     q = error.as_quat(scalar_first=True, canonical=True)
     rate = 0.5 * (q[0] * turning + np.cross(q[1:], turning))
-    return -8.0 * rate - 400.0 * np.tanh(0.25 * (turning + 8.0 * q[1:]))
+    return -lam * rate - 400.0 * np.tanh(rho * (turning + lam * q[1:]))
+
+
+def adaptive_torque(error, turning):
+    return sliding_torque(error, turning, np.array([8.0, 8.0, 3.0]), 0.2)
+
+
+def adaptive_force(e, de):
+    c, K = np.array([3.0, 3.0, 2.0]), np.array([4.0, 4.0, 3.0])
+    return -c * de - K * np.tanh(0.9 * (de + c * e))
 
 
 @pytest.mark.parametrize(
     ("law", "force", "torque"),
     [
-        ("geometric", lambda e, de: -7.0 * e - 4.0 * de, geometric_torque),
-        ("quaternion_sliding", lambda e, de: -1.25 * de - 5.0 * np.tanh(de + 1.25 * e), sliding_torque),
+        (smc.law("geometric"), lambda e, de: -7.0 * e - 4.0 * de, geometric_torque),
+        (smc.law("quaternion_sliding"), lambda e, de: -1.25 * de - 5.0 * np.tanh(de + 1.25 * e), sliding_torque),
+        (smc.law("adaptive_quaternion_sliding", G=0.0, Gx=0.0, mu=0.0, mux=0.0), adaptive_force, adaptive_torque),
     ],
+    ids=lambda value: getattr(value, "name", ""),
 )
 def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law, force, torque):
     """By rotation matrices, on a path that turns its heading. The inertia is not that of a ball, so w x J w counts."""
