@@ -5,6 +5,7 @@ and held for one control period; it saturates outside [-1, 1]. The limit is u_ma
 An environment has no law, no noise, delay or encoder, and no disturbances, contacts or jumps.
 """
 
+import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -13,7 +14,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError, find, shown, unknown
-from smc_mujoco.envs.tasks import TASKS, Pair, rest, reward, starts, tasks
+from smc_mujoco.control.law import FREE_BODY, law_function
+from smc_mujoco.envs.tasks import FLIGHT_TASKS, TASKS, Pair, rest, reward, starts, tasks
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant, check_ranges
 from smc_mujoco.simulation import coerce
@@ -30,6 +32,12 @@ FIELDS = (  # of a Scenario, that an environment accepts
 )  # fmt: skip
 
 
+@law_function(joint=True, plants=(FREE_BODY,), memory=1)
+def commanded(y, gains, memory):
+    """The command that an agent has put into the memory, and s = 0."""
+    return memory[:, 0].copy(), np.zeros(len(memory))
+
+
 class Setting:
     """A plant with a task, compiled. Every environment has one."""
 
@@ -39,21 +47,26 @@ class Setting:
         task: str = "regulate",
         changes: Mapping[str, Any] | None = None,
         edit: Callable[[mujoco.MjSpec], None] = lambda spec: None,
+        flies: bool = False,
     ):
         """Compile a plant for one of its tasks. `changes`: Scenario field -> value, of FIELDS.
 
-        `edit` changes the mechanism before it is compiled, and must not change the motion.
+        `edit` changes the mechanism before it is compiled, and must not change the motion. A plant that `flies` is a
+        free body; its runs are those of `flown`.
         """
         plant = as_plant(plant)
-        self.task, known = find("task", task, TASKS), tasks(plant)
-        if not known:
-            raise ScenarioError(f"{plant.name} is a free body, which environments lack: give another plant")
+        self.task, known = find("task", task, TASKS), FLIGHT_TASKS if flies else tasks(plant)
+        if plant.pose and not flies:
+            raise ScenarioError(f"{plant.name} is a free body: make its environment alone, by gymnasium.make")
+        if flies and not plant.pose:
+            raise ScenarioError(f"{plant.name} is no free body: make its environment by gymnasium.make")
         if task not in known:
             raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
         changes = _checked({} if changes is None else changes, task)
         # the run that equals an episode
         scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
         self.scenario = stepped_by_mujoco(scenario).resolved
+        self.flown = dataclasses.replace(scenario, law=commanded()) if flies else scenario
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if self.scenario.stepper is not None:

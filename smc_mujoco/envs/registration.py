@@ -57,7 +57,7 @@ def register() -> None:
             if name not in theirs.registry:
                 theirs.register(
                     id=name,
-                    entry_point="smc_mujoco.envs.gymnasium_env:PlantEnv",
+                    entry_point="smc_mujoco.envs.flight_env:environment",
                     vector_entry_point="smc_mujoco.envs.vector_env:BatchEnv",
                     kwargs={"plant": plant},
                 )

@@ -91,7 +91,8 @@ class Track(Task):
             return {"reference": TRACK_REFERENCE}
         low, high = _ranges(plant)
         room = AMPLITUDE_SHARE * np.minimum(high - plant.rest, plant.rest - low)
-        amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)[: plant.driven].tolist()
+        amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)
+        amplitudes = (amplitudes * np.isin(np.arange(plant.n), plant.judged))[: plant.driven].tolist()
         return {
             "reference": [
                 OffsetSine(middle, amplitude, TRACK_REFERENCE.omega)
@@ -162,6 +163,9 @@ class Synchronise(Task):
 
 
 TASKS = {"regulate": Task(), "track": Track(), "swing_up": SwingUp(), "synchronise": Synchronise()}
+
+
+FLIGHT_TASKS = ["regulate", "track"]  # of free bodies
 
 
 def reward(e: np.ndarray, w: np.ndarray) -> Any:

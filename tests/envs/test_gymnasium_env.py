@@ -388,7 +388,7 @@ def test_an_environment_says_what_it_takes_and_gives(plant, task, size):
 
 def test_the_registered_environment_is_this_package_s_and_deterministic():
     spec = gymnasium.spec("smc/Duffing-v0")
-    assert spec.entry_point == "smc_mujoco.envs.gymnasium_env:PlantEnv"
+    assert spec.entry_point == "smc_mujoco.envs.flight_env:environment"
     assert spec.vector_entry_point == "smc_mujoco.envs.vector_env:BatchEnv"
     assert (spec.kwargs, spec.order_enforce, spec.nondeterministic) == ({"plant": "duffing"}, True, False)
 
