@@ -209,7 +209,7 @@ def test_a_jump_changes_the_machine_and_is_told():
 
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "duffing"])
 def test_long_words_stay_in_the_picture(plant):
-    bad = [failed(trace, 150) for trace in runs(plant)]
+    bad = [failed(trace, 150, "it blew up") for trace in runs(plant)]
     names, size = ["a label of more than forty letters, number " + str(i) for i in range(4)], (1280, 460)
     scales, row = {driven(bad): Scale(6.0, 0.2)}, plant != "duffing"
     caption = Caption(bad, names, ["#0072B2"] * 4, "A long title " * 20, size, 1.0, scales, row=row)
