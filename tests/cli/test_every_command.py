@@ -29,8 +29,8 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
-    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --unchecked --out there --searches 2 "
-    "--figure f --latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": ["studies.compare.compare"],
+    "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --unchecked --out there --searches 2 --figure f "
+    "--latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": ["studies.compare.compare"],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
     "compare --rig simple_pendulum_ak80 --seeds 1": ["studies.study.study", "studies.leaderboard.leaderboard"],
