@@ -70,7 +70,7 @@ def test_the_laws_of_a_rotary_pendulum_slide_on_its_own_surface_of_least_cost(na
     """With the weights of `rotary_swing_up`, by a Riccati equation of the linear machine, in its unit of u."""
     from scipy.linalg import solve_continuous_are
 
-    rig = smc.rig(name)
+    rig = smc.rig(name) if drag else smc.rig(name, pendulum_inertia=1.0215e-4)  # of the firmware's model
     p, q = rig.scenario("none").plant.values({}), rig.values
     Jp, lever, weight = p.Jc + p.m * p.l**2, p.m * p.L * p.l, p.m * p.grav * p.l
     A, b = np.zeros((4, 4)), np.zeros((4, 1))

@@ -84,6 +84,17 @@ def test_the_page_has_the_package_s_rows():
         assert published.strip() == ("" if math.isnan(one.published) else f"{100.0 * one.published:.1f} %")
 
 
+@pytest.mark.parametrize("condition", ["hold", "nudges"])
+def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
+    """Of the stepper's twin, which was found from the linear law's figures; not of the plain one."""
+    whole, plain = (
+        next(one for one in twin_figures.orders("stepper_furuta") if (one.variant, one.condition) == (variant, under))
+        for variant, under in (("", condition), ("without all of these, noise and vibration", "hold"))
+    )
+    assert whole.ordered >= 0.75 * whole.sets
+    assert plain.ordered == 0
+
+
 def test_a_twin_that_falls_is_told_and_drawn(tmp_path):
     fell = row("qube_servo", "11", "theta rms", "without the commutator")
     assert math.isinf(fell.twin)

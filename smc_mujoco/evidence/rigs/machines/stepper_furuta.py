@@ -83,17 +83,17 @@ def steps_of(*targets):
 
 NAMES = (
     "holding_torque", "arm_damping", "arm_friction", "pivot_friction", "pivot_damping", "upright_error", "sensor_noise",
-    "vibration",
+    "vibration", "pendulum_inertia",
 )  # fmt: skip
 SETS = (  # of the quantities above, as benchmarks/stepper_furuta.py prints them, the nearest first
-    (0.1405, 0.004566, 0.009819, 9.459e-05, 4.93e-06, -0.005412, 0.0001316, 0.0007717),
-    (0.1274, 0.007911, 0.009272, 0.0001285, 1.066e-06, -0.00244, 5.123e-05, 0.004233),
-    (0.134, 0.03519, 0.005893, 0.0001444, 1.567e-05, -0.001781, 0.0001253, 0.006163),
-    (0.1451, 0.01945, 0.006689, 6.623e-05, 2.656e-06, 0.001639, 0.0001304, 0.003981),
-    (0.1486, 0.007762, 0.001248, 0.0001265, 2.9e-06, 0.001007, 0.0001395, 0.001686),
-    (0.2925, 0.007233, 0.002726, 9.75e-05, 2.997e-06, -0.0005534, 7.229e-05, 0.006044),
-    (0.285, 0.004193, 0.0035, 7.813e-05, 5.452e-06, 0.005727, 0.0003811, 0.007916),
-    (0.2217, 0.02605, 0.000813, 5.728e-05, 3.018e-06, 0.004556, 0.0003906, 0.005497),
+    (0.1404, 0.006761, 0.00792, 0.0001499, 8.631e-05, 0.005923, 9.895e-05, 0.007587, 0.0001036),
+    (0.1494, 0.006834, 0.007885, 0.0001388, 6.145e-05, 0.003578, 0.0004589, 0.00637, 0.0001034),
+    (0.1232, 0.007031, 0.006645, 0.0001371, 0.0001492, 0.00541, 5.597e-05, 0.005791, 0.0001049),
+    (0.1418, 0.01024, 0.00276, 0.0001466, 5.802e-06, -0.002811, 0.0005402, 0.007531, 0.0001118),
+    (0.1285, 0.006165, 0.006705, 0.0001447, 0.0001019, 0.004563, 5.867e-05, 0.006334, 0.0001047),
+    (0.1602, 0.004914, 0.005771, 0.0001482, 8.537e-05, 0.003283, 6.596e-05, 0.004848, 0.0001021),
+    (0.1501, 0.005695, 0.006846, 0.0001268, 0.0001249, 0.004533, 0.0001002, 0.005337, 9.907e-05),
+    (0.1334, 0.01225, 0.003725, 0.0001439, 2.463e-05, -0.001552, 0.0005427, 0.003792, 0.0001071),
 )
 BEST = dict(zip(NAMES, SETS[0], strict=True))
 QUANTITIES = {
@@ -101,7 +101,9 @@ QUANTITIES = {
     "arm_length": Quantity(0.19, "m", MACHINE, 0.01, 1.0),
     "pendulum_mass": Quantity(11.962e-3, "kg", MACHINE, 1e-3, 0.1),
     "pendulum_centre": Quantity(0.08768, "m", FORMULA, 0.01, 1.0),
-    "pendulum_inertia": Quantity(1.0215e-4, "kg m^2", f"{FORMULA}; about the pivot", 1e-5, 1e-2),
+    "pendulum_inertia": Quantity(
+        BEST["pendulum_inertia"], "kg m^2", f"{FOUND}; about the pivot, 1.0215e-4 by formula", 1e-5, 1e-2
+    ),
     "holding_torque": Quantity(BEST["holding_torque"], "N m", FOUND, 1e-3, 100.0),
     "arm_damping": Quantity(BEST["arm_damping"], "N m s/rad", FOUND, 0.0, 1.0),
     "arm_friction": Quantity(BEST["arm_friction"], "N m", FOUND, 0.0, 0.1),
@@ -137,11 +139,14 @@ PREDICTION = Prediction(
         "hold": {
             "alpha_rms": 0.439, "alpha_max": 3.82, "theta_std": 2.28, "theta_max": 10.8, "alpha_rate_rms": 16.3,
             "theta_rate_rms": 9.3, "acceleration_rms": 1066.0, "speed_rms": 33.0, "running": 0.064, "resting": 0.80,
+            "resting_50": 0.21, "resting_90": 0.47, "second_25": 0.018, "second_50": 0.064, "second_75": 0.40,
+            "second_90": 0.78,
             "centroid": 4.73, "ratio": 1.85, "phase": -174.5, "gain": 1.15, "lag": -81.0,
         },
         "nudges": {
             "alpha_rms": 0.844, "alpha_max": 3.65, "theta_std": 12.57, "theta_max": 29.6, "alpha_rate_rms": 31.1,
             "theta_rate_rms": 18.0, "acceleration_rms": 2005.0, "speed_rms": 57.3, "running": 0.260, "centroid": 4.69,
+            "second_25": 0.47, "second_50": 0.75, "second_75": 1.03, "second_90": 1.27,
             "ratio": 1.82, "phase": -173.4, "gain": 1.21, "lag": -81.0,
         },
     },
