@@ -232,6 +232,22 @@ def test_the_adaptive_law_has_a_slope_of_its_own_for_the_yaw():
     assert u[5] == pytest.approx(-29.8e-6 * 400.0 * math.tanh(0.2 * s[5]))
 
 
+def test_adrc_turns_its_states_round_on_the_other_side_of_half_a_turn():
+    """From y = 2 with y' = -3 to the same on the other side: z1 = -2 and z2 = 3, of which s is z2 + wc z1 / 2."""
+    law = smc.law("adrc_attitude", **NOWHERE["adrc_attitude"])
+    memory, x = np.zeros((6, law.memory)), np.array([0.0, 0.0, 0.0, math.radians(-179.9), 0.0, 0.0])
+    memory[3, 2:5] = 1.0, 2.0, -3.0
+    _, s = plain(law)(measured(x, np.zeros(6), 1e-3), SimpleNamespace(**law.gains), memory)
+    assert s[3] == pytest.approx(3.0 - 4.0, abs=0.05)
+
+
+def test_the_cascade_adds_no_gyroscopic_torque():
+    law, J, w = smc.law("cascaded_pid"), np.array([12e-6, 20e-6, 29.8e-6]), [3.0, -5.0, 4.0]
+    seen = measured(np.zeros(6), np.array([0.0, 0.0, 0.0, *w]), 1e-9, J=J)
+    u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
+    np.testing.assert_allclose(u[3:], -J * [103.0, 103.0, 12.65] * s[3:], rtol=1e-6)
+
+
 def test_indi_adds_no_torque_that_it_measures_already():
     """At its first sample, of a body whose inertia is not that of a ball, where wd is 0: J v alone."""
     law, x, w = smc.law("indi_attitude", **NOWHERE["indi_attitude"]), np.zeros(6), [3.0, -5.0, 4.0]
