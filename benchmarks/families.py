@@ -2,13 +2,13 @@
 
     python benchmarks/families.py PLANT [PLANT ...] [--lot SEED] [--out families.json]
 
-A plant is a name, FILE.xml:joint, or a FILE.py that defines a Plant. Each law has the gains of twelve searches, run i
-those of search i, from start i: shipped ones, or searches of the same rule and budget, which are kept beside --out. A
-level is told without units: the load's frequency and the delay by the bandwidth wc of the tuned ADRC, noise by the
-start, dry friction by u_max. Only the force of a load is in N or N m; where u_max is not 6, it is more or less in
-proportion. With `--lot`, levels are drawn within the range of each
-sentence of the page, to check it. The error is rms_error, of the last three quarters of 8 s, at least 1e-4 of the
-start. The cost is what the gains were searched for, ITAE/|x0| plus the weighted variation of u, of this one run.
+A plant is a name, FILE.xml:joint, or FILE.py:plant of a file that defines it. Each law has the gains of twelve
+searches, run i those of search i, from start i: shipped ones, or searches of the same rule and budget, which are kept
+beside --out. A level is told without units: the load's frequency and the delay by the bandwidth wc of the tuned ADRC,
+noise by the start, dry friction by u_max. Only the force of a load is in N or N m; where u_max is not 6, it is more or
+less in proportion. With `--lot`, levels are drawn within the range of each sentence of the page, to check it. The error
+is rms_error, of the last three quarters of 8 s, at least 1e-4 of the start. The cost is what the gains were searched
+for, ITAE/|x0| plus the weighted variation of u, of this one run.
 
 In each family the law is chosen by half of the runs and told by the other half, and the reverse, so the larger family
 has no advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), and it is
@@ -33,9 +33,9 @@ from smc_mujoco.analysis.paired_runs import EPS
 from smc_mujoco.analysis.ranking import LEVEL_SHARE, interval
 from smc_mujoco.analysis.step_halving import halved
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import find
 from smc_mujoco.common.scripts import execute
-from smc_mujoco.control.gain_sets import OBJECTIVES
+from smc_mujoco.control.gain_sets import COMPARED, OBJECTIVES
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
@@ -80,8 +80,8 @@ SURE = {"implicit_first_order": "d", "super_twisting": "d'"}  # laws whose theor
 SCORES, KINDS = ("error", "cost"), ("switching", "smoothed")
 COLOURS, FIGURE_WIDTH, ROW_HEIGHT, LIMIT = (
     ("#0072B2", "#7CC0E8", "#D55E00", "#F0B080"),
-    12.0,
-    3.0,
+    7.0,
+    1.75,
     1e3,
 )  # inches; of the drawn leads
 FAILED = 1e3  # score of a run that fails, times its scale: chosen, beyond all others
@@ -139,10 +139,13 @@ class Subject(NamedTuple):
         }
 
 
-def subject(text: str, folder: Path, condition: str = "nominal", gains: str = "tuned") -> Subject:
+def subject(
+    text: str, folder: Path, condition: str = "nominal", gains: str = "tuned", laws: Sequence[str] = COMPARED
+) -> Subject:
     """Return a plant as its name, FILE.xml:joint or FILE.py says, and its laws; the folder keeps what is tuned."""
-    plant = of_file(Path(text)) if text.endswith(".py") else as_plant(text)
-    templates = [catalogue()[law] for laws in FAMILIES.values() for law in laws]
+    file, _, name = text.partition(".py")
+    plant = of_file(Path(f"{file}.py"), name.removeprefix(":")) if text != file else as_plant(text)
+    templates = [catalogue()[law] for law in dict.fromkeys((*laws, "adrc"))]
     trial = Trial([plant], (), DURATION, None, folder, None, progress=True)
     tuned = trial.gains({plant.name: templates}, defaults=False, gains=gains)[plant.name]
     for its in tuned:
@@ -151,12 +154,10 @@ def subject(text: str, folder: Path, condition: str = "nominal", gains: str = "t
     return Subject(plant, {its.law.name: its for its in tuned}, condition)
 
 
-def of_file(path: Path) -> Plant:
-    """Return the plant that a Python file defines."""
-    found = [value for value in execute(path).values() if isinstance(value, Plant)]
-    if len(found) != 1:
-        raise ScenarioError(f"{path} defines {len(found)} plants: give a file with one")
-    return found[0]
+def of_file(path: Path, name: str = "") -> Plant:
+    """Return the plant that a Python file defines; if several, that of a name."""
+    plants = {value.name: value for value in execute(path).values() if isinstance(value, Plant)}
+    return find(f"plant of {path}", name, plants) if name or len(plants) != 1 else plants.popitem()[1]
 
 
 def by_lot(seed: int) -> dict[str, list[float]]:
@@ -268,9 +269,12 @@ def judged(known: Sequence[dict]) -> Iterator[str]:
 def main() -> None:
     """Print a line a cell, and write them all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("plants", nargs="*", help="names, FILE.xml:joint of your model, or FILE.py with a Plant")
+    parser.add_argument("plants", nargs="*", help="names, FILE.xml:joint of your model, or FILE.py:plant")
     parser.add_argument("--lot", type=int, metavar="SEED", help="levels drawn by lot, to check the page's sentences")
     parser.add_argument("--condition", default="nominal", help="a condition of the suite, which the levels change")
+    parser.add_argument(
+        "--only", nargs="+", default=COMPARED, metavar="LAW", help="some laws, of each kind one or more"
+    )
     parser.add_argument("--without", metavar="LAW", help="leave this law out")
     parser.add_argument("--gains", default="tuned", choices=OBJECTIVES, help="the set of shipped gains")
     parser.add_argument("--read", nargs="+", type=Path, default=[], metavar="FILE", help="cells of earlier calls, too")
@@ -279,9 +283,10 @@ def main() -> None:
     asked = parser.parse_args()
     known = [one for path in asked.read for one in json.loads(path.read_text())]
     read = len(known)
-    compared = {family: [name for name in names if name != asked.without] for family, names in FAMILIES.items()}
+    laws = [law for law in asked.only if law != asked.without]
+    compared = {family: [law for law in names if law in laws] for family, names in FAMILIES.items()}
     for text in asked.plants:
-        it = subject(text, asked.out.with_suffix(""), asked.condition, asked.gains)
+        it = subject(text, asked.out.with_suffix(""), asked.condition, asked.gains, laws)
         for axis, levels in (LEVELS if asked.lot is None else by_lot(asked.lot)).items():
             for level in levels:
                 for one in cells(it, axis, level, compared):

@@ -126,6 +126,7 @@ def test_a_plant_may_be_what_a_python_file_defines(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text("import smc_mujoco as smc\nMINE, N = smc.plant('duffing', beta=2.0), 3\n")
     assert script.of_file(path).parameters["beta"] == 2.0
-    path.write_text("N = 3\n")
-    with pytest.raises(smc.ScenarioError, match=r"mine.py defines 0 plants: give a file with one"):
+    path.write_text("import smc_mujoco as smc\nA, B = map(smc.plant, ('duffing', 'van_der_pol'))\n")
+    assert script.of_file(path, "van_der_pol").name == "van_der_pol"
+    with pytest.raises(smc.ScenarioError, match=r"plant of .*mine.py '': choose from duffing, van_der_pol"):
         script.of_file(path)
