@@ -107,7 +107,7 @@ class Sensitivity(Tables, Explained):
             share = f"{100 * first.total.median:.0f} %"
             return f"{in_words(first.name)} explains {share} of {spread}, 95 % interval {ends}."
         named = joined(in_words(axis.name) for axis in (first, *rivals))
-        return f"The largest share of {spread} is that of {named}: their intervals overlap, so more points must tell."
+        return f"Which axis explains most of {spread} is open: the intervals of {named} overlap, so give more points."
 
     @property
     def _failures(self) -> list[str]:
@@ -187,7 +187,8 @@ def sensitivity(
         random within it. Default: mass, friction, delay, noise, encoder, period and bound, see `default_over`.
       metric: name of any metric; more is worse. A run without a score counts as the worst.
       points: number of points, a power of 2; with k axes there are (k + 2) times as many runs. Default: as many as
-        take up to about 20 s of one core, but at least 8, with which the Panda takes 25 s. Fewer than 32 are told.
+        take up to about 20 s of one core, but at least 8, with which the Panda takes 25 s. A result of fewer than 32
+        says so.
       seed: of the points.
       threads, progress: as in `run`. The result does not depend on threads.
 

@@ -269,7 +269,7 @@ def test_words_name_one_culprit_only_if_the_intervals_part():
     mass, delay = total._replace(low=0.8), total._replace(median=0.0, low=0.0, high=0.9)  # the second reaches the first
     axes = [found.axes[0]._replace(name=name, total=its) for name, its in (("mass", mass), ("delay", delay))]
     same = dataclasses.replace(found, axes=tuple(axes))
-    assert "that of mass and delay" in same.sentences[0]
+    assert "the intervals of mass and delay overlap" in same.sentences[0]
     assert "All of 4 runs have the same" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
     some = np.arange(32) < 5
     assert "5 of 32 runs fail, in no region" in dataclasses.replace(found, failed=some, regions=()).sentences[1]
