@@ -338,8 +338,8 @@ def test_scores_are_of_the_position_the_heading_and_the_actuators(drone):
 
 
 def test_position_and_attitude_have_scales_of_their_own(drone):
-    scales = search_space.scales(drone, 0.48, True, 0.5)
-    assert (scales["X"], scales["F"]) == (0.5, pytest.approx(0.48 / MASS))
+    scales = search_space.scales(drone, 0.48, 0.5)
+    assert (scales["X"], scales["F"], scales["M"]) == pytest.approx((0.5, 0.48, MASS))
     assert scales["T"] == pytest.approx(math.sqrt(0.5 * MASS / 0.48))
     torque, inertia = drone.limits[5], 29.8e-6
     assert scales["T of turns"] == pytest.approx(math.sqrt(inertia / torque))
