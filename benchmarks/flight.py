@@ -1,0 +1,68 @@
+"""Which law of flight is first where, on the quadrotor: a table in docs/flight.md.
+
+    python benchmarks/flight.py [--seeds 20] [--tuned]
+
+Every law has its published gains, or with --tuned those that the same searches find for it, which takes hours. Runs
+start within 0.2 m and 0.2 rad of a hover and last 6 s. No law is told what a row changes. The measure is the ultimate
+bound: the largest distance from the place, or from the path, in the last fifth of a run.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import smc_mujoco as smc
+
+DRONE, MEASURE = smc.plant("quadrotor"), "ultimate_bound"
+W = 6.2832 / 4.0  # rad/s, of a figure of eight in 4 s
+EIGHT = [smc.Sine(1.0, W), smc.Sine(0.5, 2.0 * W), smc.Constant(1.0), *[smc.Constant(0.0)] * 3]
+CONDITIONS = {
+    "noise of 10 mm and 50 mm/s": {"noise": smc.Noise(0.01, 0.05)},
+    "delay of 5 ms": {"input_delay": 5e-3},
+    "steady wind of 3 m/s": {"disturbance": smc.signals.Wind(3.0)},
+    "gust of 6 m/s for 1 s": {"disturbance": smc.signals.Wind(6.0, time=4.5, width=1.0)},
+    "turbulence on 3 m/s": {"disturbance": (smc.signals.Wind(3.0), smc.signals.Dryden(15.0, speed=3.0))},
+    "payload of 19 %": {"mismatch": {"payload": 0.006}},
+    "weak battery": {"mismatch": {"sag": 0.32}},
+    "a rotor loses 20 %": {"mismatch": {"fade": 0.2}},
+    "rotors with a lag of 0.1 s": {"mismatch": {"rise": 0.625, "fall": 0.625}},
+    "figure of eight in 4 s": {"reference": EIGHT, "v0": (W, W, 0.0, 0.0, 0.0, 0.0)},
+}
+
+
+def conditions() -> list[Any]:
+    """Return the conditions, with the names of their rows; the first is the suite's own."""
+    return ["nominal", *(smc.condition(name, **fields) for name, fields in CONDITIONS.items())]
+
+
+def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
+    """Yield the rows of a Markdown table: medians in mm, a star where no law is better, and who is first of all."""
+    heads = [law.replace("_", " ") for law in laws]  # so that they wrap
+    yield f"| {' | '.join(['condition', *heads])} |\n|{'---|' * (len(laws) + 1)}"
+    for block in (block for board in boards if board.metric == MEASURE for block in board.blocks):
+        cells = []
+        for law in laws:
+            mark = "*" * (law in block.best)
+            cells.append("falls" if block.lacking.get(law) else f"{mark}{1e3 * block.medians[law]:.3g}{mark}")
+        yield f"| {' | '.join([block.condition, *cells])} |"
+
+
+def main() -> None:
+    """Run, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=24, help="runs of a law in a condition")
+    parser.add_argument("--tuned", action="store_true", help="gains by the suite's searches, not the published ones")
+    chosen = parser.parse_args()
+    names = [name for name in smc.laws(DRONE) if name != "none"]
+    laws = names if chosen.tuned else [smc.law(name, **smc.law(name).gains) for name in names]
+    with tempfile.TemporaryDirectory() as folder:
+        found = smc.compare(
+            laws, DRONE, conditions(), seeds=chosen.seeds, duration=6.0, metrics=(MEASURE,), out=folder,
+            noise_key=1,
+        )  # fmt: skip
+    print("\n".join(rows(found.leaderboard, names)))
+
+
+if __name__ == "__main__":
+    main()
