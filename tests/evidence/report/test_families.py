@@ -105,6 +105,7 @@ def test_gains_admit_a_load_below_k_and_a_rate_below_k2(tmp_path):
     assert within == {"implicit_first_order": [True] * RUNS, "super_twisting": [False] * RUNS}  # 14 N m / s at least
     assert not any(beyond["implicit_first_order"])
     assert not found.admitted("load, omega / wc", 0.25)
+    assert found.admitted("load, omega / wc", 0.5)
     assert not found.admitted("noise / start", 1e-3)
 
 
