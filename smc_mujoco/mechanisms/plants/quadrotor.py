@@ -22,9 +22,8 @@ are in no law, and a payload is not if a mismatch adds it.
 Sets of published numbers, `smc.plant("quadrotor", set="gym")`; they differ by a factor of 7 in c and of 2.6 in D:
   crazyflie, the default: crazyflow with a lag of 0.0625 s, which the firmware's INDI takes the rotors to have.
   crazyflow: cf2x_L250 of crazyflow and drone-models, identified in flight; lag of a speed-up 0.136 s, of a small
-    slow-down at hover 0.108 s. Behind it the gains of `geometric` and `quaternion_sliding` leave a limit cycle that
-    loses height, and they fly the machine: so its lag is not the default. c is that at hover. Its Jr is marked there
-    as doubtful.
+    slow-down at hover 0.108 s. Behind it the gains of `geometric`, which fly the machine, leave a limit cycle that
+    loses metres of height: so its lag is not the default. c is that at hover. Its Jr is marked there as doubtful.
   gym: cf2x of gym-pybullet-drones; no lag. Drag at the rotors' speed at hover, as in the next two.
   rotorpy: the Crazyflie of RotorPy, whose c is of unknown origin; lag 0.072 s.
   crazys: the Crazyflie of CrazyS; lag 0.0125 s up, 0.025 s down.
