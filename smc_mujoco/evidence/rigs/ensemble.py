@@ -52,19 +52,17 @@ def runs(
         if found:
             nominal = [Condition("nominal", {})]
             base += all_combinations([plant], lambda _: found, nominal, range(seeds), duration, around)
-        bounded = free | {"u_max": _bound(free["u_max"])}
-        for one in base:
-            own = rig.controller is not None and one.law.template is rig.controller.template
-            scenarios.append(dataclasses.replace(one, **(free if own else bounded)).named(name))
+        scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
     return scenarios
 
 
 def objective(rig: Rig, starts: Starts | None = None) -> Objective:
     """Return what `tuned` minimises: the J of tuning, with a run on each parameter set in place of each condition."""
-    machines: dict[str, dict[str, Any]] = {
-        name: fields | {"u_max": _bound(fields["u_max"])} for name, fields in _machines(rig).items()
-    }
-    first = Scenario(**machines["set 1"], law="none", x0=_starts(rig, starts).x0)
+    machines = _machines(rig)
+    u_max = machines["set 1"]["u_max"]
+    bound: Any = None if u_max == math.inf else u_max  # where firmware bounds its own command, that of the drive
+    fields: dict[str, Any] = machines["set 1"] | {"law": "none", "x0": _starts(rig, starts).x0, "u_max": bound}
+    first = Scenario(**fields)
     period = first.control_period
     sets = tuple(Condition(name, fields) for name, fields in machines.items())
     return Objective(
@@ -118,11 +116,6 @@ def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
 
 def _starts(rig: Rig, starts: Starts | None) -> Starts:
     return Starts(x0=rig.x0) if starts is None else starts
-
-
-def _bound(u_max: float | None) -> float | None:
-    """Return the bound on u of a law that is not the machine's own: the drive's where firmware has its own bounds."""
-    return None if u_max == math.inf else u_max
 
 
 def _machines(rig: Rig) -> dict[str, dict[str, Any]]:
