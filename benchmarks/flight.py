@@ -1,6 +1,6 @@
 """Which law of flight is first where, on the quadrotor: a table in docs/flight.md.
 
-    python benchmarks/flight.py [--seeds 20] [--tuned]
+    python benchmarks/flight.py [--seeds 24] [--tuned]
 
 Every law has its published gains, or with --tuned those that the same searches find for it, which takes hours. Runs
 start within 0.2 m and 0.2 rad of a hover and last 6 s. No law is told what a row changes. The measure is the ultimate
@@ -37,7 +37,7 @@ def conditions() -> list[Any]:
 
 
 def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
-    """Yield the rows of a Markdown table: medians in mm, a star where no law is better, and who is first of all."""
+    """Yield the rows of a Markdown table: medians in mm, between stars where no law is better."""
     heads = [law.replace("_", " ") for law in laws]  # so that they wrap
     yield f"| {' | '.join(['condition', *heads])} |\n|{'---|' * (len(laws) + 1)}"
     for block in (block for board in boards if board.metric == MEASURE for block in board.blocks):
