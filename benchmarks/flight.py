@@ -44,7 +44,9 @@ def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
         cells = []
         for law in laws:
             mark = "*" * (law in block.best)
-            cells.append("falls" if block.lacking.get(law) else f"{mark}{1e3 * block.medians[law]:.3g}{mark}")
+            cells.append(
+                "falls" if block.lacking.get(law) else f"{mark}{float(format(1e3 * block.medians[law], '.3g')):g}{mark}"
+            )
         yield f"| {' | '.join([block.condition, *cells])} |"
 
 

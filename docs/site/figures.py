@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".cache" / "site"
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing")
 CONDITIONS = {"nominal": "#2E86C1", "noise + sine": "#D35400"}  # condition -> colour, seen on white and on slate
+FLIGHT_LAWS = "geometric", "quaternion_sliding", "cascaded_pid"
 ARM_LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "passivity_based", "time_delay_sliding")
 PAPER_LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 # Rooms of the package that figures may depend on: those up to draw, as imports point down
@@ -72,11 +73,13 @@ def still(plant: str) -> bytes:
 def plant_laws(plant: str) -> tuple[str, ...]:
     """Return the paper's laws if they can drive every joint of the plant, else the laws for it; without any, `none`.
 
-    For an arm these are laws of many joints.
+    For an arm these are laws of many joints, for a free body laws of flight.
     """
     import smc_mujoco as smc
 
     known = smc.laws(plant)
+    if smc.plant(plant).pose:
+        return FLIGHT_LAWS
     if smc.plant(plant).rest:
         return ARM_LAWS
     return PAPER_LAWS if set(PAPER_LAWS) <= set(known) else tuple(name for name in known if name != "none") or ("none",)

@@ -1,15 +1,15 @@
 """Quadrotor: a free body with four rotors, by default a Crazyflie 2.x.
 
-    [m v', J w'] = u + d - [m grav e3 + R D R' (v - air), w x (J w + h e3) + h' e3],    h = sum of Jr spin_i W_i
-    u = [R e3 F, Mx, My, Mz],    [F, Mx, My, Mz] = [[1, 1, 1, 1], [-a, -a, a, a], [-a, a, a, -a], [-c, c, -c, c]] f
-    f_i = k1 W_i + k2 W_i^2,    W_i' = rise (c_i - W_i) upwards, fall (c_i - W_i) + fall2 (c_i^2 - W_i^2) downwards
+    m v' = u + d - m grav e3 - R D R' (v - air),    u = R e3 (f_1 + f_2 + f_3 + f_4)
+    J w' = M - w x (J w + h e3) - h' e3,    h = Jr (W_1 - W_2 + W_3 - W_4)
+    f_i = (F +- Mx/a +- My/a +- Mz/c)/4,    f_i = k1 W_i + k2 W_i^2,    W_i' = rise (c_i - W_i)
 
 The channels are the position, m, in the axes of the world, and the rotation vector of the attitude R, rad; w is in the
 axes of the body, x forward, y left, z up; air is the wind. Rotors from above: 1 front right, 2 rear right, 3 rear left,
-4 front left; 1 and 3 turn counter-clockwise, spin 1, and their drag turns the body clockwise. A law commands a force
-and a torque, N and N m; of the force the rotors give the part along R e3. They share both by the inverse of the matrix
-above, and c_i is the speed for a share. The excess of the largest over fmax is taken from all, then each is cut at 0,
-as in the Crazyflie's firmware.
+4 front left; 1 and 3 turn counter-clockwise, and their drag turns the body clockwise. A law commands a force, N, of
+which the rotors give the part F along R e3, and the torque M, N m. Their shares have the signs -, -, +, + of Mx, -, +,
++, - of My, and -, +, -, + of Mz. The excess of the largest over fmax is taken from all, then each is cut at 0, as in
+the Crazyflie's firmware. c_i is the speed for a share; a rotor slows down by fall (c_i - W_i) + fall2 (c_i^2 - W_i^2).
 
 m [kg]; Jx, Jy, Jz [kg m^2]; a, the rotors' distance from the axes of roll and pitch [m]; c, torque per thrust [m];
 fmax [N]; k1 [N s/rad], k2 [N s^2/rad^2]; rise, fall [1/s], fall2 [1/rad]; Jr [kg m^2]; Dx, Dy, Dz, the diagonal of D
