@@ -1,7 +1,7 @@
 """ADRC of the attitude: torque = J (v - w x wd) + w x J w, v = -(wc^2 z1 + 2 wc z2 + z3) / |q0|, for a free body.
 
     y = 2 sgn(q0) qv,    A = 1 / (lag p + 1),
-    z1' = z2 + 3 wo (y - z1),    z2' = z3 + |q0| A v + 3 wo^2 (y - z1),    z3' = wo^3 (y - z1)
+    z1' = z2 + 3 wo (y - z1),    z2' = z3 + |q0| A v + 3 wo^2 (y - z1),    z3' = wo^3 (y - z1).
 
 Active disturbance rejection for each axis, with y the error of the attitude, |q0| at least 0.2, and A the lag that the
 law takes the rotors to have. Force, wanted attitude and wd are those of `geometric`. z1 and z2 change sign with y, on

@@ -3,10 +3,9 @@
     v* = clip(P (r - x) + I int(r - x), speed),    F / m = Pv (v* - v) + Iv int(v* - v) + g,    tilt of F below `tilt`
     w* = Pa a + Ia int(a) + Da a'
 
-position, velocity, attitude and rate of the Crazyflie, in SI units, with a = -2 sgn(q0) qv, near the firmware's Euler
-angles where the tilt is small. It follows no r', no r'' and no rate of the wanted attitude. Integrals are clipped. In
-the end no constant force or torque leaves an error, which sideways takes Pv / Iv = 25 s, in height 1.7 s. s is v - v*
-and w - w*: the law slides nowhere.
+with a = -2 sgn(q0) qv, which is near the firmware's roll, pitch and yaw where the tilt is small, all in SI units. It
+follows no r', no r'' and no rate of the wanted attitude. Integrals are clipped. In the end no constant force or torque
+leaves an error, which sideways takes Pv / Iv = 25 s, in height 1.7 s. s is v - v* and w - w*: the law slides nowhere.
 The firmware counts in degrees and in units of its PWM. One of these is 0.12 N / 65535 a motor: 4 of them in thrust, 2 a
 of them = 1.191e-7 N m in roll, with the lever a = 0.03253 m, 4 c of them = 5.383e-8 N m in yaw, c = 0.00735 m:
 

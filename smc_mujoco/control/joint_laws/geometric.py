@@ -1,6 +1,6 @@
-"""Geometric tracking: torque = J (-kR e_R - kW e_W) + ..., thrust = F . R e3, for a free body such as a quadrotor.
+"""Geometric tracking: torque = J (-kR e_R - kW e_W) + ..., thrust = F^T R e3, for a free body such as a quadrotor.
 
-    F = m (r'' - kx e - kv e') + h,    thrust = F . R e3,    Rd e3 = F / |F|,
+    F = m (r'' - kx e - kv e') + h,    thrust = F^T R e3,    Rd e3 = F / |F|,
     torque = J (-kR e_R - kW e_W - w x wd) + w x J w,    e_R = vee(Rd' R - R' Rd) / 2,    e_W = w - wd,
 
 with e the error of the position, R the attitude, Rd the one that turns the thrust to F with the first axis of the

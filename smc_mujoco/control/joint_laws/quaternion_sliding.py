@@ -1,6 +1,6 @@
-"""Quaternion sliding mode: s = we + lam sgn(q0) qv, thrust = F . R e3, for a free body such as a quadrotor.
+"""Quaternion sliding mode: s = we + lam sgn(q0) qv, thrust = F^T R e3, for a free body such as a quadrotor.
 
-    sx = e' + c e,    F = m (r'' - c e' - Kx tanh(rhox sx)) + h,    thrust = F . R e3,    Rd e3 = F / |F|,
+    sx = e' + c e,    F = m (r'' - c e' - Kx tanh(rhox sx)) + h,    thrust = F^T R e3,    Rd e3 = F / |F|,
     s = we + lam sgn(q0) qv,    torque = J (-lam sgn(q0) qv' - K tanh(rho s) - w x wd) + w x J w,
 
 with e the error of the position, (q0, qv) the quaternion from Rd to the attitude R, we = w - wd, and sgn(0) = 1. Rd and
