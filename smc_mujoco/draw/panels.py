@@ -109,6 +109,8 @@ class Panel(NamedTuple):
         if name in WHOLE_LABELS:
             return WHOLE_LABELS[name] + unit
         letter = WORDS.get(name, name) if group.driven else {"x": "q", "v": "q′"}.get(name, WORDS.get(name, name))
+        if plant.pose and name == "u" and group.unit == "m" and len(group.channels) == 1:  # of an actuator
+            return f"actuator {group.channels[0] + 1} {letter}{unit}"
         if len(group.channels) == 1 and (plant.direct or self.channel is not None):
             return f"{joint_names(plant)[group.channels[0]]} {letter}{unit}"
         if name in WORDS or (name == "s" and plant.mixed):  # short: mixed plants have many panels, and low ones

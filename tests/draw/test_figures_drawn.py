@@ -395,3 +395,14 @@ def test_what_cannot_be_drawn_is_refused(call, refused):
     given, changes = REFUSED[call]
     for change in changes:
         refused(lambda arguments=given | change: call(**arguments))
+
+
+def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators():
+    """Its tilt follows from the force, and its actuators are not its channels."""
+    traces = smc.run([smc.Scenario(plant="quadrotor", law=law, duration=0.1) for law in ("geometric", "cascaded_pid")])
+    labels = [panel.label for panel in panels.worst_first(traces)]
+    assert sorted(labels) == ["body_rz e (rad)", "body_x e (m)", "body_y e (m)", "body_z e (m)"]
+    group, parts = next(iter(style.split(traces).items()))
+    assert [panel.label for panel in panels.by_channel(panels.Panel("u", group, parts))] == [
+        f"actuator {i} u (N)" for i in (1, 2, 3)
+    ]
