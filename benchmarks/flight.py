@@ -2,9 +2,10 @@
 
     python benchmarks/flight.py [--seeds 24] [--tuned]
 
-Every law has its published gains, or with --tuned those that the same searches find for it, which takes hours. Runs
-start within 0.2 m and 0.2 rad of a hover and last 6 s. No law is told what a row changes. The measure is the ultimate
-bound: the largest distance from the place, or from the path, in the last fifth of a run.
+Every law has its default gains, or with --tuned those that the same searches find for it, which takes hours. Runs
+start within 0.2 m and 0.2 rad, in each number, of the plant's own start beside a hover, and last 6 s. No law is told
+what a row changes. The measure is the ultimate bound: the largest error along x, y or z, from the place or from the
+path, in the last fifth of a run.
 """
 
 import argparse
@@ -54,7 +55,7 @@ def main() -> None:
     """Run, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=24, help="runs of a law in a condition")
-    parser.add_argument("--tuned", action="store_true", help="gains by the suite's searches, not the published ones")
+    parser.add_argument("--tuned", action="store_true", help="gains by the suite's searches, not the default ones")
     chosen = parser.parse_args()
     names = [name for name in smc.laws(DRONE) if name != "none"]
     laws = names if chosen.tuned else [smc.law(name, **smc.law(name).gains) for name in names]

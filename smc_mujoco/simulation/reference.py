@@ -35,6 +35,7 @@ from smc_mujoco.simulation.state import LOG
 from smc_mujoco.simulation.trace import Trace, from_log
 
 CALLBACK_STEPS = 100  # physics steps after which MuJoCo's callbacks are compared with ours; chosen
+DISTURBANCE_NOT_FINITE = "the disturbance became NaN or inf"
 PLANT_DIVERGED = f"{trace.PLANT_DIVERGED} (|x| or |v| above {MAX_STATE:g}, or NaN)"
 
 
@@ -289,7 +290,7 @@ class Loop:
             turn = axis[channel, j] * arm[channel, k] - axis[channel, k] * arm[channel, j]
             d[self.hinged] += (turn * xfrc[at["horizontal"]])[self.hinged]
         if not np.isfinite(d).all():
-            raise Failure("the disturbance became NaN or inf")
+            raise Failure(DISTURBANCE_NOT_FINITE)
         return d
 
     def feedback_force(self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray) -> float:

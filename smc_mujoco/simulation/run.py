@@ -349,6 +349,8 @@ class ScenarioBatch:
             return self.errors.get(i, reference.PLANT_DIVERGED)
         if code == state.INTERRUPTED:
             return reference.interrupted(self.replaced)
+        if code == state.DISTURBANCE_NOT_FINITE:
+            return reference.DISTURBANCE_NOT_FINITE
         scenario = self.scenarios[i]
         of_law = code in (state.LAW_RAISED, state.NOT_FINITE)
         if of_law and (told := law_failure(scenario, self.records[i], self.packed[i])):

@@ -287,6 +287,14 @@ def test_laws_know_neither_drag_nor_what_has_gone_wrong():
     assert np.abs(other.applied[0] - plain.applied[0]).max() > 1e-3
 
 
+@pytest.mark.parametrize("wind", [smc.signals.Wind(1e300), smc.signals.Wind(y=1e300)])
+def test_a_wind_beyond_all_numbers_ends_its_own_run_alone(wind):
+    runs = [smc.Scenario(plant=QUADROTOR, law="geometric", duration=0.01, disturbance=d) for d in (wind, ())]
+    failed, other = smc.run(runs)
+    assert failed.failure == "the disturbance became NaN or inf, at t = 0 s"
+    assert other.failure is None
+
+
 def refusals():
     yield lambda: smc.plant("quadrotor", set="parrot"), "unknown set of quadrotor 'parrot'"
     yield lambda: smc.plant("panda", set="gym"), "unknown set of panda"
