@@ -3,7 +3,9 @@
 Everything comes from the templates and their docstrings, see `smc_mujoco.control.docstring`.
 """
 
+import inspect
 import itertools
+import re
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
@@ -22,11 +24,14 @@ from smc_mujoco.control.law import Law, Measurement
 from smc_mujoco.control.law import catalogue as laws
 from smc_mujoco.control.properties import PROPERTIES, reads, suitable
 from smc_mujoco.control.surface import catalogue as surfaces
+from smc_mujoco.mechanisms.plant import Plant
+from smc_mujoco.mechanisms.plant import catalogue as plants
 
 CATALOGUES = {"Laws": laws, "Laws of many joints": joint_laws, "Surfaces": surfaces, "Velocity estimators": estimators}
 # Relative degree -> what a law acts on.
 DEGREES = {1: "s, with u in s'", 2: "e, with u in e''", 3: "e, with u in e'''"}
 ARRIVALS = {"s": "s = 0 after a finite time", "e": "e = 0 after a finite time"}  # of `Template.finite_time`
+LINES = re.compile(r"(?<=\S)\n(?=(?!Sources?:)\S)")  # ends of lines within a paragraph
 CALL_TEMPLATES = {  # kind of component -> how a user makes one
     "law": "smc.law({})",
     "surface": "smc.Scenario(surface=smc.surface({}), ...)",
@@ -35,7 +40,9 @@ CALL_TEMPLATES = {  # kind of component -> how a user makes one
 
 
 def print_pages(name: str, console: Console) -> None:
-    """Print a page about one law, surface or estimator of this name, or about each law of a file."""
+    """Print a page about one law, surface, estimator or plant of this name, or about each law of a file."""
+    if name in plants():
+        return print_plant(plants()[name], console)
     known = [templates() for templates in CATALOGUES.values()]
     pages = [(templates[name], templates.package(name)) for templates in known if name in templates]
     if not pages and "." in name:
@@ -44,6 +51,21 @@ def print_pages(name: str, console: Console) -> None:
         raise unknown("law, surface or velocity estimator", name, dict.fromkeys(itertools.chain(*known)))
     for template, package in pages:
         print_page(template, console, package, name)
+    return None
+
+
+def print_plant(plant: Plant, console: Console) -> None:
+    """Print what the file of a plant says, its parameters, and other sets of them."""
+    console.print(Text.assemble((plant.name, "bold cyan"), ("  plant", "dim")))
+    said = LINES.sub(" ", inspect.getdoc(inspect.getmodule(plant.build)) or "")
+    console.print(Padding(Text(said), (1, 0, 1, 2)))
+    table = plain(Column(style="dim", no_wrap=True), "", padding=(0, 2, 1, 0))
+    table.add_row("parameters", Text(", ".join(f"{key}={value:g}" for key, value in plant.parameters.items())))
+    for name, values in plant.sets.items():
+        changed = {key: value for key, value in values.items() if value != plant.parameters[key]}
+        table.add_row(f"set {name}", Text(", ".join(f"{k}={v:g}" for k, v in changed.items()) or "the default"))
+    table.add_row("use", Text(f'smc.plant("{plant.name}")' + ', or smc.plant(..., set="NAME")' * bool(plant.sets)))
+    console.print(table)
 
 
 def lists() -> dict[str, list[tuple[str, str]]]:

@@ -163,6 +163,18 @@ def test_a_name_of_a_law_and_a_surface_shows_both(call):
         assert re.search(rf"^{shared[0]} .*{kind}$", out, re.MULTILINE)
 
 
+def test_a_plant_has_a_page_with_its_parameters_and_its_sets(call):
+    code, printed, _ = call("list", "quadrotor")
+    said = flat(printed)
+    assert code == 0
+    assert "a free body with four rotors, by default a Crazyflie 2.x." in said
+    assert "fmax=0.12" in said
+    assert "set hummingbird m=0.5, Jx=0.00365" in said
+    assert "set crazyflie the default" in said
+    assert max(map(len, printed.splitlines())) <= 80
+    assert "set" not in flat(call("list", "duffing")[1]).partition("parameters")[2]
+
+
 @pytest.mark.parametrize(
     ("typed", "meant"), [("supertwist", "super_twisting"), ("Classical", "classical"), ("kalmann", "kalman")]
 )

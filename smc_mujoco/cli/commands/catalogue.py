@@ -24,7 +24,7 @@ def list_(
         typer.Argument(
             metavar="[NAME|FILE]",
             autocompletion=options.LAWS,
-            help="A law, surface or velocity estimator, or a file with a law; by default all, and plants and scenes.",
+            help="A law, surface, velocity estimator or plant, or a file with a law; by default all, and scenes.",
         ),
     ] = None,
     needs: Annotated[
@@ -107,7 +107,7 @@ def _print_all(terminal: Terminal) -> None:
     for title, rows in lists.items():
         terminal.print(tables.catalogue(title, rows), "")
     page, some = ("smc-mujoco list NAME", "cyan"), ("--needs one-gain,continuous", "cyan")
-    terminal.print(Text.assemble(page, " shows a law in full, ", some, " the laws that have both"))
+    terminal.print(Text.assemble(page, " shows a law or a plant in full, ", some, " the laws that have both"))
 
 
 def _check_c(file: Path, gains: str, memory: int | None, symbol: str, flags: list[str], timeout: float) -> None:
