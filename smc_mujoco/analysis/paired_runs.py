@@ -258,7 +258,7 @@ def unchecked(table: Columns, rows: np.ndarray) -> tuple[str, ...]:
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where it is not known.
 
-    With X0 the largest |x0| of a driven channel and T the duration it is, for
+    With X0 the largest |x0| of a driven channel, of a free body from its rest, and T the duration it is, for
 
     - an error of the last part, and for shares of the start: the larger of half a count of the encoder, the standard
       deviation of the noise and eps X0;
@@ -270,7 +270,9 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
         return 0.0
     entry = CATALOGUE[metric]
     driven, T = [group for group in channel_groups(scenario) if group.driven], scenario.duration
-    start = max((abs(scenario.resolved.x0[i]) for group in driven for i in group.channels), default=0.0)  # X0
+    rest = scenario.plant.rest if scenario.plant.pose else (0.0,) * scenario.plant.n  # a free body may rest anywhere
+    off = [abs(x - r) for x, r in zip(scenario.resolved.x0, rest, strict=True)]
+    start = max((off[i] for group in driven for i in group.channels), default=0.0)  # X0
     least = eps * start
     counts = [scenario.sensor.quantum(group.unit == "rad") / 2 for group in driven] if scenario.sensor else []
     seen = max(scenario.noise.position, *counts, least)

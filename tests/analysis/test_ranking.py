@@ -919,6 +919,8 @@ def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves
     assert cells.floor(noisy, "overshoot") == pytest.approx(100 * 0.02 / 1.5)
     assert cells.floor(noisy, "settling_time") == 1e-3  # s, a control period
     assert cells.floor(noisy, "ultimate_bound", eps=0.0) == 0.02
+    high = smc.Scenario(plant="quadrotor", law="none", x0=(0.3, 0.0, 1.1, 0.0, 0.0, 0.2))
+    assert cells.floor(high, "ultimate_bound") == pytest.approx(3e-5)  # of the way to rest, which is at 1 m
     assert [cells.floor(fine, name) for name in ("max_u", "tv_rate")] == pytest.approx([6e-3, 6e-3])  # |u| <= 6 N
     unbounded = paper.scenario("duffing", "none", changes={"u_max": math.inf})
     assert cells.floor(unbounded, "tv_rate") == 0.0

@@ -299,6 +299,8 @@ def refusals():
     yield lambda: smc.plant("quadrotor", set="parrot"), "unknown set of quadrotor 'parrot'"
     yield lambda: smc.plant("panda", set="gym"), "unknown set of panda"
     yield lambda: smc.plant("quadrotor", Jx=0.0), "Jx"
+    yield lambda: smc.run(smc.Scenario(plant=QUADROTOR, law="none", mismatch={"fade": 1.5})), "fade is 1.5"
+    yield lambda: smc.run(smc.Scenario(plant=smc.plant("quadrotor", Dz=-1.0), law="none")), "Dz is -1: give 0 or more"
     yield lambda: smc.Scenario(plant="duffing", law="pid", disturbance=smc.signals.Wind(1.0)), "has no drag"
     yield lambda: smc.Scenario(plant=QUADROTOR, law="geometric", reference=smc.signals.Wind(1.0)), "is a wind"
     yield lambda: smc.signals.Dryden(w20=5.0, height=1.0), "height"

@@ -10,8 +10,9 @@ and its angular momentum h = sum of inertia spin W, along the body's third axis,
 the other way, which is in the gear of its actuator. The supply sags: c is less by the share `sag` times the sum of all
 thrusts at the start of the physics step. The body's drag is -R diag(drag) R' (v - wind), at its origin.
 
-The callback does this at every stage of a physics step, by the closed solution of W' under a constant c. So a rotor is
-exact for whatever step, and RK4 keeps its order. Other integrators get the thrust at the middle of the step.
+The callback does this at every stage of a physics step, by the closed solution of W' under a constant c. So the speed
+is exact for whatever step, and RK4 keeps its order. Other integrators get the thrust at the middle of the step. The
+torque of h' is that at the stages: a rotor with inertia whose lag is shorter than some steps gets too much of it.
 
 A model has its numbers in `actuator_user` (ROTOR) and `body_user` (drag), where a text `smc:rotors` says so.
 """

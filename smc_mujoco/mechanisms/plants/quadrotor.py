@@ -19,7 +19,7 @@ body's centre. lift is the share of the weight that the rotors carry when a run 
 its rotors at rest. Laws know the masses and inertias of the plant, and where its rotors are; drag, lag, h, sag and fade
 are in no law, and a payload is not if a mismatch adds it.
 
-Sets of published numbers, `smc.plant("quadrotor", set="gym")`; they differ by a factor of 7 in c and of 2.6 in D:
+Published sets, `smc.plant("quadrotor", set="gym")`; those of the Crazyflie differ by 7.6 in c and by 2.6 in D:
   crazyflie, the default: crazyflow with a lag of 0.0625 s, which the firmware's INDI takes the rotors to have.
   crazyflow: cf2x_L250 of crazyflow and drone-models, identified in flight; lag of a speed-up 0.136 s, of a small
     slow-down at hover 0.108 s. Behind it the gains of `geometric`, which fly the machine, leave a limit cycle that
@@ -37,6 +37,7 @@ import math
 
 import mujoco
 
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.hardware.rotors import ROTOR
 from smc_mujoco.mechanisms.plant import Field, Plant, Values, geom_fields, model_path
@@ -86,6 +87,11 @@ def build(n):
 
 
 def fields(model, p):
+    if p.fade > 1.0:
+        raise ScenarioError(f"quadrotor's fade is {p.fade:g}: give the share of its thrust that rotor 1 loses, 0 to 1")
+    for name in ("rise", "fall", "fall2", "Jr", "Dx", "Dy", "Dz", "lift"):
+        if getattr(p, name) < 0.0:
+            raise ScenarioError(f"quadrotor's {name} is {getattr(p, name):g}: give 0 or more")
     body, ball = model.body("machine").id, model.body("payload").id
     rotors = [model.actuator(name).id for name in NAMES]
     radius = math.cbrt(3.0 * p.payload / (4.0 * math.pi * STEEL_DENSITY))
