@@ -42,7 +42,7 @@ class Task(NamedTuple):
     def work(self) -> int:
         """A measure of their time: searches, times gains, times channels."""
         plant = smc.plant(self.plant)
-        box = search_space.box(smc.law(self.law), search_space.scales(plant, U_MAX, with_model=False))
+        box = search_space.box(smc.law(self.law), search_space.scales(plant, U_MAX))
         return self.searches * len(box) * plant.n
 
 

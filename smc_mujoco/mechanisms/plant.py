@@ -299,7 +299,7 @@ def catalogue() -> Catalogue[Plant]:
     return catalogue_of("smc_mujoco.mechanisms.plants", Plant, "smc_mujoco.plants")
 
 
-def plant(name: str, *, set: str | None = None, **parameters: float) -> Plant:  # as users say it
+def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:  # as users say it
     """Return the plant `name`, with some of its parameters (or its size n) changed, else a ScenarioError.
 
     `set` is the name of published numbers, for a plant that has several, such as plant("quadrotor", set="gym").

@@ -489,8 +489,9 @@ def test_a_missed_condition_warns_once_where_it_was_written():
 
 
 def test_the_field_s_usual_words_are_understood(refused):
-    for word, meant in (("STA", "super_twisting"), ("CTA", "continuous_twisting"), ("ISMC", "integral")):
+    for word, meant in (("STA", "super_twisting_attitude"), ("CTA", "continuous_twisting"), ("ISMC", "integral")):
         refused(lambda word=word: smc.Scenario(plant="duffing", law=word), f"'{meant}'?")
+    refused(lambda: smc.Scenario(plant="duffing", law="STA"), "'super_twisting' or")
     refused(lambda: smc.Scenario(plant="duffing", law="pid", reference=0.5))
 
 
