@@ -2,7 +2,7 @@
 
     environment = gymnasium.make("smc_mujoco:smc/Quadrotor-v0")
 
-The callback of `smc.run` moves the body, with its rotors, drag and wind. An action has a number in [-1, 1] for each
+The callback of `smc.run` moves the body, with its rotors and drag. An action has a number in [-1, 1] for each
 actuator, from its least to its largest force, held for a control period: a rotor's thrust, not its speed. An
 observation is the pose, position in m and rotation vector in rad, then the velocity, and the angular velocity in the
 axes of the body; for `track` also r, r' and r''. The task and its reward are those of `tasks`, with the errors that
