@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
 INSTANT_STEP = 1e-9  # s, physics step while rates are linearised
 FLAGS = mujoco.mjtDisableBit
-# What is not linear
-NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value | FLAGS.mjDSBL_FRICTIONLOSS.value
-NONLINEAR_FLAGS |= FLAGS.mjDSBL_CLAMPCTRL.value
+NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value
+NONLINEAR_FLAGS |= FLAGS.mjDSBL_FRICTIONLOSS.value | FLAGS.mjDSBL_CLAMPCTRL.value
 MAX_REST_ACCELERATION = 1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
 
 
@@ -30,9 +29,9 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     """Linearise a plant at rest as a `control.StateSpace`: x' = A x + B u, y = C x.
 
     The states are the positions of its joints, then their velocities, the channels first in their order; u are the
-    commands of the driven channels, and y the positions of all channels; of a free body the states are errors of its
-    pose, and u the forces of its actuators. SI units. Drives are ideal; contacts, limits
-    and dry friction are left out. A and B are central differences of the accelerations that MuJoCo computes.
+    commands of the driven channels, and y the positions of all channels. Those of a free body are errors of its pose,
+    and its u are the forces of its actuators. SI units. Drives are ideal; contacts, limits and dry friction are left
+    out. A and B are central differences of the accelerations that MuJoCo computes.
 
     Args:
       plant: a Plant or its name.

@@ -16,10 +16,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from smc_mujoco.common import gl
-from smc_mujoco.common.errors import ScenarioError, shown
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.envs.episode import Setting, bounded
-from smc_mujoco.envs.gymnasium_env import PlantEnv, TimeLimited, action_space, observation_space
+from smc_mujoco.envs.gymnasium_env import PlantEnv, Single
 from smc_mujoco.envs.tasks import reward
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
@@ -33,10 +32,8 @@ from smc_mujoco.simulation.run import ScenarioBatch
 import gymnasium  # already imported by gymnasium_env
 
 
-class FlightEnv(TimeLimited, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
+class FlightEnv(Single):
     """One free body with a task, `regulate` or `track`."""
-
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
 
     def __init__(
         self,
@@ -46,21 +43,16 @@ class FlightEnv(TimeLimited, gymnasium.Env):  # pyright: ignore[reportIncompatib
         render_mode: str | None = None,
     ):
         """Make a free body with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`."""
-        if render_mode not in (None, "rgb_array"):
-            raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
-        self.setting = Setting(plant, task, changes, flies=True)
-        scenario, model = self.setting.scenario, self.setting.model
-        self.render_mode, self.max_samples = render_mode, scenario.samples
-        self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / scenario.control_period))}
+        setting = Setting(plant, task, changes, flies=True)
+        model, name = setting.model, setting.scenario.plant.name
         drives = drive_ids(model)
         if not model.actuator_ctrllimited[drives].all():
-            raise ScenarioError(f"an actuator of {scenario.plant.name} has no ctrlrange: give each one")
+            raise ScenarioError(f"an actuator of {name} has no ctrlrange: give each one")
         self.wrenches = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
         self.least, self.most = model.actuator_ctrlrange[drives].T
-        self.setting.action_shape, self.setting.limits = (len(drives),), np.ones(len(drives))
-        self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
-        self.renderer: mujoco.Renderer | None = None
-        self.begin(np.array(scenario.x0), np.array(scenario.v0))
+        setting.action_shape, setting.limits = (len(drives),), np.ones(len(drives))
+        self.set_up(setting, render_mode)
+        self.begin(np.array(setting.scenario.x0), np.array(setting.scenario.v0))
 
     def begin(self, x0: np.ndarray, v0: np.ndarray) -> None:
         """Begin an episode from a pose and its velocity, (6,) each."""
@@ -115,23 +107,11 @@ class FlightEnv(TimeLimited, gymnasium.Env):  # pyright: ignore[reportIncompatib
         counted = list(self.setting.scenario.plant.judged)
         return float(reward(e[counted], w[counted])), {"time": self.time, "error": e}
 
-    def render(self) -> np.ndarray | None:
-        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None."""
-        if self.render_mode is None:
-            return None
-        if (renderer := self.renderer) is None:
-            renderer = self.renderer = gl.renderer(self.setting.model)
+    def posed(self) -> mujoco.MjData:
+        """Return the data of the body's model, at its pose."""
         data = mujoco.MjData(self.setting.model)
         data.qpos[:] = self.batch.batch.bind("qpos")[0]
-        mujoco.mj_forward(self.setting.model, data)
-        renderer.update_scene(data, camera=0 if self.setting.model.ncam else -1)
-        return renderer.render()
-
-    def close(self) -> None:
-        """Close the renderer."""
-        if self.renderer is not None:
-            self.renderer.close()
-            self.renderer = None
+        return data
 
 
 def environment(plant: Plant | str, *args: Any, **kwargs: Any) -> gymnasium.Env:

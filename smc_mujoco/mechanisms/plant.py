@@ -128,7 +128,9 @@ class Plant:
     friction: Any = None  # hardware.part.Friction of its joints according to its source, for a scenario; or None
     limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
     reach: Callable[[Values], tuple[float, ...]] | None = None  # `limits` of other parameters, if they depend on them
-    sets: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)  # name -> published parameters
+    sets: Mapping[str, Mapping[str, float]] = dataclasses.field(
+        default_factory=dict
+    )  # name -> parameters, a published set
     above_zero: tuple[str, ...] = ()  # parameters that must be greater than 0, beside masses and lengths
     ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
@@ -299,10 +301,10 @@ def catalogue() -> Catalogue[Plant]:
     return catalogue_of("smc_mujoco.mechanisms.plants", Plant, "smc_mujoco.plants")
 
 
-def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:  # as users say it
+def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
     """Return the plant `name`, with some of its parameters (or its size n) changed, else a ScenarioError.
 
-    `set` is the name of published numbers, for a plant that has several, such as plant("quadrotor", set="gym").
+    `set` is the name of one of the plant's `sets` of numbers, such as plant("quadrotor", set="gym").
     """
     base = find("plant", name, catalogue())
     n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)

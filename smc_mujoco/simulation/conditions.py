@@ -337,22 +337,34 @@ def _disturbed(make: Callable[[float], Signal]) -> Recipe:
 
 
 IDEAL: dict[str, Recipe] = {
-    "nominal": {}, "noise": {"noise": SENSOR_NOISE}, "sine": _disturbed(lambda half: SINE),
-    "constant": _disturbed(lambda half: Constant(0.2)), "step": _disturbed(lambda half: Step(0.2, time=half)),
+    "nominal": {},
+    "noise": {"noise": SENSOR_NOISE},
+    "sine": _disturbed(lambda half: SINE),
+    "constant": _disturbed(lambda half: Constant(0.2)),
+    "step": _disturbed(lambda half: Step(0.2, time=half)),
     "pulse": _disturbed(lambda half: Pulse(2.0, time=half, width=0.1)),
     "process_noise": _disturbed(lambda half: OrnsteinUhlenbeck(sigma=0.2, tau=0.1)),
-    **{f"delay_{ms}ms": {"input_delay": ms * 1e-3} for ms in (1, 5, 10, 20, 50)}, "light": {"mismatch": {"mass": 0.7}},
-    "heavy": {"mismatch": {"mass": 1.3}}, "jump_mild": _jump("mild"), "jump_hard": _jump("hard"),
+    **{f"delay_{ms}ms": {"input_delay": ms * 1e-3} for ms in (1, 5, 10, 20, 50)},
+    "light": {"mismatch": {"mass": 0.7}},
+    "heavy": {"mismatch": {"mass": 1.3}},
+    "jump_mild": _jump("mild"),
+    "jump_hard": _jump("hard"),
     **{f"period_{ms}ms": {"control_period": ms * 1e-3} for ms in (10, 20, 50)},
     "differenced_5ms": {"velocity": DIFFERENCED},
     "differenced_5ms_noise": {"velocity": DIFFERENCED, "noise": Noise(position=0.01)},
-}  # fmt: skip
+}
 REAL: dict[str, Recipe] = {
-    "friction": {"friction": (Coulomb(0.1), Viscous(0.05))}, "coulomb": {"friction": Coulomb(0.1)},
-    "lugre": {"friction": LuGre(coulomb=0.05, static=0.1, stribeck=0.05)}, "lag_20ms": {"actuator": Lag(0.02)},
-    "dc_motor": {"actuator": DCMotor()}, "stepper": _stepper, "backlash": {"actuator": Backlash(0.01)},
-    "encoder": {"sensor": Encoder(counts=4096)}, "jitter": {"clock": Clock(jitter=0.5e-3)},
-    "missed": {"clock": Clock(missed=0.1)}, "contact": _contact,
-}  # fmt: skip
+    "friction": {"friction": (Coulomb(0.1), Viscous(0.05))},
+    "coulomb": {"friction": Coulomb(0.1)},
+    "lugre": {"friction": LuGre(coulomb=0.05, static=0.1, stribeck=0.05)},
+    "lag_20ms": {"actuator": Lag(0.02)},
+    "dc_motor": {"actuator": DCMotor()},
+    "stepper": _stepper,
+    "backlash": {"actuator": Backlash(0.01)},
+    "encoder": {"sensor": Encoder(counts=4096)},
+    "jitter": {"clock": Clock(jitter=0.5e-3)},
+    "missed": {"clock": Clock(missed=0.1)},
+    "contact": _contact,
+}
 
 NAMED: dict[str, Condition] = {name: Condition(name, fields) for name, fields in (IDEAL | REAL).items()}

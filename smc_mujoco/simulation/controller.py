@@ -76,7 +76,8 @@ def control(address, sim, data):
         _actuate(sim, data, step)
     elif sim.drive_step.rise_first != 0.0:
         _give_moment(sim, data, stage)
-    _fly(sim, data, step, stage)
+    if sim.rotors != 0:
+        _fly(sim, data, step, stage)
     if sim.disturbance_count != 0 and failure == record.FINE:
         fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
         sample = k if stage + within == 0 else -1
@@ -89,6 +90,12 @@ def control(address, sim, data):
         return
     if stage == 0 and within == 0:
         _log(sim, data, k)
+    _apply_to_joints(sim, data, stage)
+
+
+@njit(error_model="numpy", inline="always")
+def _apply_to_joints(sim, data, stage):
+    """Give the joints what stepper motors and Coulomb friction exert at a stage."""
     if sim.motors != 0:
         _apply_steppers(sim, data, stage)
     if sim.exact_friction != 0:
@@ -512,8 +519,6 @@ _rippled = njit(error_model="numpy", inline="always")(rippled)
 @njit(error_model="numpy")
 def _fly(sim, data, step, stage):
     """Give a free body its rotors' thrust, their gyroscopic torque and its drag at a stage, see hardware/rotors.py."""
-    if sim.rotors == 0:
-        return
     if stage == 0:
         lifted = 0.0
         for j in range(sim.actuators):
@@ -593,7 +598,7 @@ def _apply_pushes(address, sim, data):
 def _apply_wind(address, sim, data):
     """Apply the force of the air that moves past a free body with drag."""
     x, y, z = 0.0, 0.0, 0.0
-    for j in range(sim.disturbance_count if sim.rotors != 0 else 0):
+    for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         sim.instant.stream = signal.stream
         for i in range(3 if signal.air != 0 else 0):
@@ -602,10 +607,9 @@ def _apply_wind(address, sim, data):
                 return record.RAISED
             part = sim.motion.value * signal.peak[i]
             x, y, z = x + part * (i == 0), y + part * (i == 1), z + part * (i == 2)
-    if sim.rotors != 0:
-        force = _drag(sim, data, x, y, z)
-        for i in range(3):
-            data.xfrc_applied[channel_at(sim.channels, i).xfrc] += force[i]
+    force = _drag(sim, data, x, y, z)
+    for i in range(3):
+        data.xfrc_applied[channel_at(sim.channels, i).xfrc] += force[i]
     return record.FINE
 
 
@@ -638,7 +642,9 @@ def _apply_disturbances(address, sim, data, t, k):
     """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at all others."""
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
-    if _apply_pushes(address, sim, data) != record.FINE or _apply_wind(address, sim, data) != record.FINE:
+    if _apply_pushes(address, sim, data) != record.FINE:
+        return record.RAISED
+    if sim.rotors != 0 and _apply_wind(address, sim, data) != record.FINE:
         return record.RAISED
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)

@@ -243,14 +243,23 @@ def test_a_payload_that_is_dropped_is_weight_until_then():
     np.testing.assert_allclose(heavy.v[k:, 2], late, atol=1e-9)
 
 
+LIFTS = {  # set -> thrust over weight, as its source or what was derived of it says
+    "crazyflie": 1.53, "crazyflow": 1.53, "gym": 2.25, "rotorpy": 1.95, "crazys": 2.41, "hummingbird": 10.2,
+}  # fmt: skip
+HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}  # rpm, likewise
+
+
 @pytest.mark.parametrize("name", list(QUADROTOR.sets))
 def test_every_set_of_numbers_hovers_where_its_rotors_carry_it(name):
     plant = smc.plant("quadrotor", set=name)
-    assert 1.3 < 4 * plant.parameters["fmax"] / (plant.parameters["m"] * G) < 11.0
+    p = plant.parameters
+    assert 4 * p["fmax"] / (p["m"] * G) == pytest.approx(LIFTS[name], rel=0.01)
+    if name in HOVERS:
+        assert speed(p, p["m"] * G / 4) * 30 / math.pi == pytest.approx(HOVERS[name], rel=2e-3)
     trace = smc.run(smc.Scenario(plant=plant, law="geometric", model="nominal", x0=plant.rest, duration=1.0))
     assert trace.failure is None
     assert np.abs(trace.e).max() < 1e-9
-    assert plant.limits[3] == pytest.approx(4 * plant.parameters["fmax"] * plant.parameters["a"])
+    assert plant.limits[3] == pytest.approx(4 * p["fmax"] * p["a"])
 
 
 def test_motion_is_the_same_turned_about_the_vertical_and_in_a_mirror():

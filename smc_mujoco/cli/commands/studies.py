@@ -73,7 +73,8 @@ def compare(
     seeds: Annotated[int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")] = 12,
     tune: Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")] = True,
     searches: Annotated[
-        int | None, typer.Option(min=1, help="Searches of a tuning; default 12. With --rig: tune all its laws anew.")
+        int | None,
+        typer.Option(min=1, help="How many searches tune a law; default 12. With --rig no law is tuned without it."),
     ] = None,
     worst: Annotated[bool, typer.Option("--worst", help="Also search the worst case of each law.")] = False,
     quick: options.Quick = False,

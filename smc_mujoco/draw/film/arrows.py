@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFilter
 
 from smc_mujoco.draw import panels, style
 from smc_mujoco.draw.decimate import Envelope, windows
-from smc_mujoco.mechanisms.hardware.part import drive_ids
+from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
 from smc_mujoco.mechanisms.plant import EFFORT, catalogue
 from smc_mujoco.metrics.conventions import Group, groups
 from smc_mujoco.simulation import model as models
@@ -47,7 +47,6 @@ MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
 FLIGHT_LENGTH, FLIGHT_THICKNESS = 2.2, 0.07  # of the longest arrow on a free body, in distances of its actuators
 FLIGHT_DISTANCE = 0.6  # of the disturbance's arrow from the middle of a free body, in longest arrows
-FLYING = "applied", "d"  # what acts on a free body, fields of a trace
 COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -103,12 +102,13 @@ def mounts(
 def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
     """Return a Mount for each channel of a free body; the first ones are those of its actuators."""
     model = models.with_values(models.compile_model(scenario), scenario)
-    sites = model.actuator_trnid[drive_ids(model), 0]
+    data, joint, drives = mujoco.MjData(model), free_joint(model), drive_ids(model)
+    mujoco.mj_kinematics(model, data)
+    body = model.jnt_bodyid[joint]
     places, ways = np.zeros((len(joints), 3)), np.zeros((len(joints), 3))
-    for i, site in enumerate(sites):
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, model.site_quat[site])
-        places[i], ways[i] = model.site_pos[site], turn.reshape(3, 3) @ model.actuator_gear[drive_ids(model)[i], :3]
+    sites = data.site_xpos[model.actuator_trnid[drives, 0]]
+    places[: len(drives)] = (sites - data.xpos[body]) @ data.xmat[body].reshape(3, 3)
+    ways[: len(drives)] = exerted(model, joint, drives.tolist())[:, :3]
     arm = float(np.linalg.norm(places, axis=1).max()) or USER_LENGTH * float(model.stat.extent)
     sized = {"unit": FLIGHT_LENGTH * arm, "thick": FLIGHT_THICKNESS * arm, "front": None}
     return [Mount(j, **sized, place=place, way=way) for j, place, way in zip(joints, places, ways, strict=True)]
@@ -136,6 +136,8 @@ class Scale(NamedTuple):
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     """Return the scale of the arrows for each group of driven channels."""
+    if traces[0].scenario.plant.pose:
+        return flying_scales(traces)
     by_group = {}
     for group, parts in style.split(traces).items():
         if not group.driven:
@@ -143,8 +145,6 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
         control, force, push, reaction = (_sizes(parts, name) for name in ("applied", "force", "d", "reaction"))
-        if traces[0].scenario.plant.pose:  # its actuators are not its channels: see `flying`
-            control, push = ((_largest(traces, name),) * 2 if group.unit == "m" else (0.0, 0.0) for name in FLYING)
         longest = min(reaction[0], control[1]) if control[1] and same else reaction[0]
         if drive:
             control = max(control[0], force[0]), max(control[1], force[1])
@@ -154,14 +154,13 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
     return by_group
 
 
-def _largest(traces: Sequence[Trace], name: str) -> float:
-    """Return the largest force of an actuator ("applied") or of the disturbance ("d") on free bodies, N."""
-    values = [getattr(trace, name)[np.isfinite(trace.x).all(axis=1)] for trace in traces]
-    sizes = [
-        np.abs(part).max(initial=0.0) if name == "applied" else np.linalg.norm(part[:, :3], axis=1).max(initial=0.0)
-        for part in values
-    ]
-    return float(max(sizes))
+def flying_scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
+    """Return the scale of the arrows of free bodies, all with the position: its actuators are not its channels."""
+    lasting = [np.isfinite(trace.x).all(axis=1) for trace in traces]
+    control = max(float(np.abs(trace.applied[k]).max(initial=0.0)) for trace, k in zip(traces, lasting, strict=True))
+    pushes = (np.linalg.norm(trace.d[k, :3], axis=1) for trace, k in zip(traces, lasting, strict=True))
+    scale = Scale(control, max(float(push.max(initial=0.0)) for push in pushes))
+    return {group: scale if group.unit == "m" else Scale(0.0, 0.0) for group in style.split(traces)}
 
 
 def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str) -> list[tuple[int, Arrow]]:
@@ -169,10 +168,9 @@ def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str)
     law, grey = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE))
     forces, push = loads["control"].mean[frame], loads["disturbance"].mean[frame, :3]
     size = float(np.linalg.norm(push))
-    drawn = [
-        (i, Arrow(0.0, float(force) / scale.control, (*law, 1.0))) for i, force in enumerate(forces) if scale.control
-    ]
-    if size and scale.disturbance:
+    parts = forces / scale.control if scale.control else 0.0 * forces
+    drawn = [(i, Arrow(0.0, float(part), (*law, 1.0))) for i, part in enumerate(parts)]
+    if size:
         drawn.append((0, Arrow(0.0, size / scale.disturbance, (*grey, 1.0), way=push / size)))
     return [(i, arrow) for i, arrow in drawn if abs(arrow.high) > MIN_LENGTH]
 

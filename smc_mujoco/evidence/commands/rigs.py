@@ -73,7 +73,7 @@ def rig(
     first line of a CSV file has the names of the columns.
 
     Without a file: what the twin said of each public record, and what the machine did. A bursty machine never repeats a
-    record. Its figures are predicted anew for each law, with and without parts of the twin, in some minutes.
+    record. This simulates each law again, on the twin and on the twin without some of its parts. It takes minutes.
 
     Example: smc-mujoco rig
 

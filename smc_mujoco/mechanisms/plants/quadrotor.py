@@ -22,7 +22,7 @@ are in no law, and a payload is not if a mismatch adds it.
 Published sets, `smc.plant("quadrotor", set="gym")`; those of the Crazyflie differ by 7.6 in c and by 2.6 in D:
   crazyflie, the default: crazyflow with a lag of 0.0625 s, which the firmware's INDI takes the rotors to have.
   crazyflow: cf2x_L250 of crazyflow and drone-models, identified in flight; lag of a speed-up 0.136 s, of a small
-    slow-down at hover 0.108 s. Behind it the gains of `geometric`, which fly the machine, leave a limit cycle that
+    slow-down at hover 0.108 s. Behind it the gains of `geometric`, the firmware's, leave a limit cycle that
     loses metres of height: so its lag is not the default. c is that at hover. Its Jr is marked there as doubtful.
   gym: cf2x of gym-pybullet-drones; no lag. Drag at the rotors' speed at hover, as in the next two.
   rotorpy: the Crazyflie of RotorPy, whose c is of unknown origin; lag 0.072 s.

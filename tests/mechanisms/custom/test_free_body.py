@@ -248,8 +248,16 @@ def test_other_uses_of_a_free_joint_are_refused(drone):
         Controller(smc.Scenario(plant=drone, law="geometric"))
 
 
-def test_a_film_has_an_arrow_for_each_actuator_and_one_for_the_disturbance(drone):
+POD = """<body name="pod" pos="0 0 0.01" euler="0 0 20">
+  <inertial pos="0 0 0" mass="1e-9" diaginertia="1e-15 1e-15 1e-15"/>
+  <site name="1" pos="0.03253 -0.03253 0"/></body>"""
+PODDED = TEXT.replace('<site name="1" pos="0.03253 -0.03253 0"/>', POD)  # a rotor on a body of its own
+
+
+@pytest.mark.parametrize("text", [TEXT, PODDED], ids=["on the body", "on a part"])
+def test_a_film_has_an_arrow_for_each_actuator_and_one_for_the_disturbance(text):
     """At the rotors, along their thrust as the body leans; the disturbance's along the force."""
+    drone = smc.plant_from(text, channels=["body"], name="drone", keyframe="hover")
     push = smc.signals.Gust(0.02, time=0.0, width=0.4)
     trace = smc.run(smc.Scenario(plant=drone, law="geometric", duration=0.2, disturbance=push))
     scale = next(iter(arrows.scales([trace]).values()))
