@@ -300,12 +300,14 @@ def _draw_sparks(page, cell: SubplotSpec, sparks: Sequence[Sequence[Panel]], run
         for k, panel in enumerate(row):
             ax, (factor, unit) = page.add_subplot(rows[i, k]), panel.scale
             beside = {"fontsize": size, "va": "center", "parse_math": False}
-            drawing.over_time(ax, panel, runs.colours, names=runs.names)
+            drawing.over_time(ax, panel, runs.colours, told=False)
             ax.set(xlim=(0.0, runs.span[0]), yticks=[], frame_on=False)
             ax.set_xticks([0.0, runs.span[0]], ["0", f"{runs.span[0]:.2g} s"] if i == len(sparks) - 1 else ["", ""])
             ax.tick_params(length=0)
             name = style.cropped(panel.label.removesuffix(f" e{unit}"), room, size) if k == 0 else ""
-            ax.set_ylabel(f"{name} {panel.quantity}".strip(), rotation=0, ha="right", **beside)
+            of_actuator = panel.traces[0].scenario.plant.pose and panel.quantity == "u" and panel.group.unit == "m"
+            letter = f"u {panel.group.channels[0] + 1}" if of_actuator else panel.quantity
+            ax.set_ylabel(f"{name} {letter}".strip(), rotation=0, ha="right", **beside)
             largest = factor * max(map(abs, drawing.span(panel.traces, panel.quantity)))
             words = f"{style.short(largest, 3)} {unit.strip(' ()')}"
             ax.text(1.03, 0.5, words, transform=ax.transAxes, **beside)

@@ -272,12 +272,14 @@ def over_time(
     among: Sequence[Trace] = (),
     bands: bool = True,
     names: Sequence[str] = (),
+    told: bool = True,
 ) -> list[Artist]:
     """Draw the panel with the first trace on top, set its vertical range, and return the artists of the traces.
 
     The reference of x is drawn in front, its settling band behind. Traces that agree from the start are drawn once, in
     ink, with words; their colours begin where they part. The traces `among` set the range, by default the panel's own;
-    `bands`: whether to draw ranges behind the lines; `names`: of the traces, for the words.
+    `bands`: whether to draw ranges behind the lines; `names`: of the traces, for the words; `told`: whether to write
+    them.
     """
     artists: list[Artist] = []
     name, means = panel.quantity, [QUANTITIES[panel.quantity](trace).mean(axis=1) for trace in panel.traces]
@@ -319,7 +321,7 @@ def over_time(
         steps = "steps-post" if name == "u" and not smoothed(panel.traces[who[0]]) else "default"
         look = {"color": style.INK, "lw": style.points(LINE), "drawstyle": steps, "gid": AGREED}
         artists += ax.plot(*between(lines[who[0]], start, stop), **look)
-    tell_agreements(ax, shared, lines, names)
+    tell_agreements(ax, shared if told else [], lines, names)
     return artists
 
 

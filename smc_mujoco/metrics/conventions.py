@@ -97,7 +97,7 @@ def group_trace(trace: Trace, group: Group) -> Trace:
         whole["x"] = trace.r + trace.e
     columns = [i for i in group.channels if i in plant.judged]
     arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
-    if plant.pose and group.unit == "m":
+    if plant.pose and group.unit == "m" and trace.x.shape[1] == plant.n:  # forces are of the actuators
         arrays["u"] = trace.applied
     return dataclasses.replace(trace, **arrays)
 
