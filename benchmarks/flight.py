@@ -1,6 +1,6 @@
 """Which law of flight is first where, on the quadrotor: a table in docs/flight.md.
 
-    python benchmarks/flight.py [--seeds 24] [--tuned]
+    python benchmarks/flight.py [--seeds 24] [--tuned] [--out FOLDER]
 
 Every law has its default gains, or with --tuned those that the same searches find for it, which takes hours. Runs
 start within 0.2 m and 0.2 rad, in each number, of the plant's own start beside a hover, and last 6 s. No law is told
@@ -56,12 +56,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=24, help="runs of a law in a condition")
     parser.add_argument("--tuned", action="store_true", help="gains by the suite's searches, not the default ones")
+    parser.add_argument("--out", help="folder that keeps searches and runs, to go on after a kill")
     chosen = parser.parse_args()
     names = [name for name in smc.laws(DRONE) if name != "none"]
     laws = names if chosen.tuned else [smc.law(name, **smc.law(name).gains) for name in names]
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as passing:
         found = smc.compare(
-            laws, DRONE, conditions(), seeds=chosen.seeds, duration=6.0, metrics=(MEASURE,), out=folder,
+            laws, DRONE, conditions(), seeds=chosen.seeds, duration=6.0, metrics=(MEASURE,), out=chosen.out or passing,
             noise_key=1,
         )  # fmt: skip
     print("\n".join(rows(found.leaderboard, names)))
