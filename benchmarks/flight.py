@@ -1,16 +1,18 @@
 """Which law of flight is first where, on the quadrotor: a table in docs/flight.md.
 
-    python benchmarks/flight.py [--seeds 24] [--tuned] [--out FOLDER]
+    python benchmarks/flight.py [--seeds 24] [--tuned | --twins] [--out FOLDER]
 
 Every law has its default gains, or with --tuned those that the same searches find for it, which takes hours. Runs
 start within 0.2 m and 0.2 rad, in each number, of the plant's own start beside a hover, and last 6 s. No law is told
-what a row changes. The measure is the ultimate bound: the largest error along x, y or z, from the place or from the
-path, in the last fifth of a run.
+what a row changes. With --twins two sliding laws stand beside the same law without what is sliding or adaptive in it.
+The measure is the ultimate bound: the largest error along x, y or z, from the place or from the path, in the last
+fifth of a run.
 """
 
 import argparse
 import tempfile
 from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import smc_mujoco as smc
@@ -37,6 +39,19 @@ def conditions() -> list[Any]:
     return ["nominal", *(smc.condition(name, **fields) for name, fields in CONDITIONS.items())]
 
 
+def twins() -> list[smc.Law]:
+    """Return two laws with their default gains, and each without its idea: `quaternion_sliding` with a line of the same
+    slope in place of each tanh, which is `geometric`, and the adaptive one with the gain that it starts with.
+    """
+    sliding, adaptive = (smc.law(name) for name in ("quaternion_sliding", "adaptive_quaternion_sliding"))
+    its = SimpleNamespace(**sliding.gains)
+    line = {"kx": its.Kx * its.rhox * its.c, "kv": its.c + its.Kx * its.rhox}
+    line |= {"kR": its.K * its.rho * its.lam / 2, "kW": its.K * its.rho + its.lam / 2}
+    still = smc.law("adaptive_quaternion_sliding", Gx=0, mux=0, G=0, mu=0)
+    as_they_are = [smc.law(one.name, **one.gains) for one in (sliding, adaptive)]
+    return [as_they_are[0], smc.law("geometric", **line).named("its line"), as_they_are[1], still.named("its K fixed")]
+
+
 def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
     """Yield the rows of a Markdown table: medians in mm, between stars where no law is better."""
     heads = [law.replace("_", " ") for law in laws]  # so that they wrap
@@ -57,9 +72,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=24, help="runs of a law in a condition")
     parser.add_argument("--tuned", action="store_true", help="gains by the suite's searches, not the default ones")
     parser.add_argument("--out", help="folder that keeps searches and runs, to go on after a kill")
+    parser.add_argument("--twins", action="store_true", help="sliding laws, and each without its idea")
     chosen = parser.parse_args()
     names = [name for name in smc.laws(DRONE) if name != "none"]
     laws = names if chosen.tuned else [smc.law(name, **smc.law(name).gains) for name in names]
+    if chosen.twins:
+        laws = twins()
+        names = [law.name for law in laws]
     with tempfile.TemporaryDirectory() as passing:
         found = smc.compare(
             laws, DRONE, conditions(), seeds=chosen.seeds, duration=6.0, metrics=(MEASURE,), out=chosen.out or passing,
