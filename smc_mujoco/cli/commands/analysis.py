@@ -1,4 +1,4 @@
-"""smc-mujoco tune, margins, worst, basin, chatter: one question about laws on a plant, by many runs."""
+"""Commands that ask one question about laws on a plant, and answer it by many runs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
