@@ -15,7 +15,6 @@ from smc_mujoco.analysis.ranking import RELEVANT, Relevant
 from smc_mujoco.analysis.tuning.objective import BUDGET, SEARCHES, Budget, Searches
 from smc_mujoco.common.constraints import FilePath, Positive, Whole, constrained
 from smc_mujoco.common.errors import MAX_ITEMS, ScenarioError, find, items_of, shown
-from smc_mujoco.common.errors import number as checked
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import replacing
 from smc_mujoco.common.tabular import Tables, Tabular
@@ -258,7 +257,7 @@ def _trial(
     progress: bool,
 ) -> Trial:
     """Return the plants and conditions to compare laws on. The extent has the defaults."""
-    length = extent.duration if duration is None else checked("duration", duration, above=0.0)
+    length = extent.duration if duration is None else duration
     machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
     given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
     return Trial(machines, [find_condition(name) for name in given], length, starts, out, threads, progress)

@@ -16,6 +16,7 @@ from typer.models import OptionInfo
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
+from smc_mujoco.common.constraints import of_parameters
 
 CALLS = {  # command line -> the functions that it calls, of which the last does the work; not for audits
     "list pid": ["cli.law_pages.print_pages"],
@@ -220,6 +221,20 @@ def test_the_calls_above_have_every_option_of_their_commands():
         assert [one for one in options if not one & (words | beside)] == [], name
 
 
+def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_takes():
+    compared = 0
+    for line, path in {(line.split()[0], paths[-1]) for line, paths in CALLS.items()}:
+        module, _, name = f"smc_mujoco.{path}".rpartition(".")
+        declared = of_parameters(getattr(importlib.import_module(module), name))
+        for one, info in parameters(COMMANDS[line][1]).values():
+            bound = declared.get(one.name)
+            low = getattr(getattr(bound, "one", bound), "low", None)
+            if isinstance(info, OptionInfo) and info.min is not None and low is not None:
+                assert info.min == low, (line, one.name)
+                compared += 1
+    assert compared > 8
+
+
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_the_examples_of_a_command_have_options_that_it_takes(name):
     command = COMMANDS[name][1]
@@ -245,7 +260,7 @@ def test_every_option_says_what_it_is_in_which_unit_within_which_bounds_and_comp
             unit = r"(, s\b|\bper s\b|\brad\b|\bN\b|, s,|share|a,b|s that|unit)"
             assert re.search(unit, words) or info.metavar, (written, words)
         if "int" in kind.replace("print", "") and written != "--joints":
-            assert info.min in (0, 1, 2), written
+            assert info.min in (0, 1, 2, 8), written
         if written.strip("-") in NAMING and (name, written) != ("export", "--law"):
             whole = NAMING[written.strip("-")]
             assert whole in " ".join(info.autocompletion(whole[:-1])), written

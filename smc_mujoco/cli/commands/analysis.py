@@ -26,6 +26,7 @@ Bound = Annotated[
         "position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
     ),
 ]
+Metric = Annotated[str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")]
 BOUNDS = {  # what sentences about a class say in Python -> on the command line
     r"\bUncertainty's ": "--bound ",
     r"\bUncertainty\b": "--bound",
@@ -143,7 +144,7 @@ def worst(
     law: options.Laws = None,
     disturbance: options.Disturbance = None,
     bound: Bound = None,
-    metric: Annotated[str, typer.Option(help="The metric to make large, any of `smc.score`.")] = "rms_error",
+    metric: Metric = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
     duration: Annotated[
@@ -193,12 +194,12 @@ def sensitivity(
     law: options.OneLaw = "observer_free",
     disturbance: options.Disturbance = None,
     bound: Bound = None,
-    metric: Annotated[str, typer.Option(help="The score to explain, any of `smc.score`.")] = "rms_error",
+    metric: Metric = "rms_error",
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
     duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 5.0,
     points: Annotated[
-        int | None, typer.Option(min=2, help="A power of 2; default: about 20 s of processor time.")
+        int | None, typer.Option(min=8, help="Points, a power of 2; default: as many as take about 20 s of a core.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the points.")] = 0,
     out: Annotated[Path | None, options.picture("the indices and the runs")] = None,

@@ -22,7 +22,7 @@ def list_(
     name: Annotated[
         str | None,
         typer.Argument(
-            metavar="[NAME|FILE]",
+            metavar="NAME|FILE",
             autocompletion=options.LAWS,
             help="A law, surface, velocity estimator or plant, or a file with a law; by default all, and scenes.",
         ),

@@ -21,7 +21,7 @@ def report(
     ] = None,
     records: Annotated[
         Path | None,
-        typer.Option(help="Folder with records of rigs, CSV or npz, which are shown beside their twins; see identify."),
+        typer.Option(help="Folder with records of rigs, CSV or npz, shown beside their twins; see `smc-mujoco rig`."),
     ] = None,
     law: Annotated[
         list[str] | None,
