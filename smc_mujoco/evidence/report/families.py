@@ -57,9 +57,14 @@ def told(values: np.ndarray) -> tuple[np.ndarray, list[int]]:
     return scores, best
 
 
-def lead(scores: Mapping[str, np.ndarray], sets: Mapping[str, np.ndarray], floor: float) -> Lead | None:
+def lead(
+    scores: Mapping[str, np.ndarray],
+    sets: Mapping[str, np.ndarray],
+    floor: float,
+    families: Mapping[str, Sequence[str]] = FAMILIES,
+) -> Lead | None:
     """Return the lead in a cell; None with fewer than two families, or two runs. Scores: law -> (runs,)."""
-    members = {family: [law for law in laws if law in scores] for family, laws in FAMILIES.items()}
+    members = {family: [law for law in laws if law in scores] for family, laws in families.items()}
     members = {family: laws for family, laws in members.items() if laws}
     if len(members) < 2 or len(next(iter(scores.values()))) < 2:
         return None
@@ -75,9 +80,9 @@ def lead(scores: Mapping[str, np.ndarray], sets: Mapping[str, np.ndarray], floor
     return Lead("", "", first, second, times, low, high, laws)
 
 
-def leads(table: "Table") -> tuple[Lead, ...]:
-    """Return the lead in every cell of a study's table that has one."""
-    found, by_row = [], paired_runs.by_row(table, METRIC)
+def leads(table: "Table", metric: str = METRIC, families: Mapping[str, Sequence[str]] = FAMILIES) -> tuple[Lead, ...]:
+    """Return the lead in every cell of a study's table that has one; families: name -> names of laws."""
+    found, by_row = [], paired_runs.by_row(table, metric)
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
         (ran,) = paired_runs.scenarios(table, group)
@@ -85,7 +90,7 @@ def leads(table: "Table") -> tuple[Lead, ...]:
             continue
         there = ~np.isnan(np.array([row[0] for row in its.values.values()])).any(axis=0)
         values, sets = ({law: row[0][there] for law, row in of.items()} for of in (its.values, its.sets))
-        if one := lead(values, sets, paired_runs.floor(ran, METRIC)):
+        if one := lead(values, sets, paired_runs.floor(ran, metric), families):
             found.append(one._replace(plant=plant, condition=condition))
     return tuple(found)
 
