@@ -669,7 +669,7 @@ def check_free_body(s: Resolved) -> None:
     """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three numbers."""
     if not s.plant.pose:
         return
-    if not s.law.joint and s.law.name != "none":
+    if not s.law.joint and s.law.name != "none" and s.law.function is not None:  # else of a trace, without code
         raise ScenarioError(
             f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose channels turn together: "
             "give a law of many joints, such as 'geometric'"

@@ -162,6 +162,14 @@ def test_a_law_of_one_s_own_keeps_its_name_and_gains_but_not_its_code(traces, tm
     assert smc.run(dataclasses.replace(again, law=my_law(**again.law.gains))).diverged_at is None
 
 
+def test_a_free_body_comes_back_under_a_law_of_one_s_own(tmp_path, refused):
+    law = smc.law_function(joint=True, plants=("a free body",))(lambda y, gains, memory: (y.h, y.e))()
+    trace = smc.run(smc.Scenario(plant="quadrotor", law=law, duration=0.01))
+    again = smc.load(trace.save(tmp_path / "a.npz"))
+    np.testing.assert_array_equal(again.x, trace.x)
+    refused(lambda: smc.run(again.scenario), law.name)
+
+
 def test_a_law_of_one_s_own_is_never_taken_for_the_library_s(tmp_path, refused):
     again = smc.load(smc.run(scenario(law=classical())).save(tmp_path / "a.npz")).scenario
     assert again.law != smc.law("classical")

@@ -170,7 +170,7 @@ def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str)
     size = float(np.linalg.norm(push))
     parts = forces / scale.control if scale.control else 0.0 * forces
     drawn = [(i, Arrow(0.0, float(part), (*law, 1.0))) for i, part in enumerate(parts)]
-    if size:
+    if size and scale.disturbance:
         drawn.append((0, Arrow(0.0, size / scale.disturbance, (*grey, 1.0), way=push / size)))
     return [(i, arrow) for i, arrow in drawn if abs(arrow.high) > MIN_LENGTH]
 

@@ -283,6 +283,14 @@ def test_a_film_has_an_arrow_for_each_actuator_and_one_for_the_disturbance(text)
     assert line[-1, 0] > line[0, 0] > 1.0
 
 
+def test_a_free_body_that_fails_at_once_has_no_arrows():
+    law = smc.law_function(joint=True, plants=("a free body",))(lambda y, gains, memory: (math.nan * y.h, y.e))()
+    trace = smc.run(smc.Scenario(plant="quadrotor", law=law, duration=0.2))
+    assert trace.failure is not None
+    scale = next(iter(arrows.scales([trace]).values()))
+    assert not arrows.flying(arrows.loads(trace, np.array([0.1, 0.2])), 0, scale, "#000000")
+
+
 def test_disturbances_are_forces_on_the_centre_of_mass_and_turn_nothing():
     text = TEXT.replace('act="0.0782 0.0782 0.0782 0.0782"', "")
     body = smc.plant_from(text, channels=["body"], name="body", keyframe="hover")
