@@ -13,6 +13,17 @@ for, ITAE/|x0| plus the weighted variation of u, of this one run.
 In each family the law is chosen by half of the runs and told by the other half, and the reverse, so the larger family
 has no advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), and it is
 told at half the physics step, too. A plant of one channel takes about 6 minutes of processor time, and 4 for searches.
+
+What the page shows, call by call:
+
+    table         duffing inverted_pendulum --out two.json
+    no cost of u  duffing inverted_pendulum --only pid implicit_first_order boundary_layer --gains tracking
+    picture       van_der_pol --lot 1795620293 --read two.json --figure where.svg
+    check, border van_der_pol inverted_pendulum_network pendulum_network --lot 1795620293 --read two.json
+    the cart      examples/my_smc_package/my_smc_package/plants.py --lot 1795620293
+    slide by lot  benchmarks/drawn_plants.py:drawn_slide --lot 584051958 --condition differenced_5ms
+    pendulum, too benchmarks/drawn_plants.py:drawn_pendulum --lot 584110175 --condition light
+    their sums    --read FILE FILE FILE, with what these three wrote by --out
 """
 
 import argparse

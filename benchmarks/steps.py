@@ -49,16 +49,16 @@ def row(part: str) -> str:
             wandering += apart((value, nudge), least)
             errors.append(relative_range((value, truth), least))
             laws |= {scenario.law.name} if wrong else set()
-    resolved, count = made[0].resolved, len(made) * len(SCORES)
+    resolved = made[0].resolved
     step = f"{resolved.integrator}, {1e3 * resolved.physics_step:g} ms"
     worst = f"{number(100 * max(errors), 2)} %" if max(errors) <= 10.0 else "> 1000 %"
-    counts = f"{off} of {count} | {found} | {marked} | {wandering}"
+    counts = f"{off} | {found} | {marked} | {wandering}"
     return f"| {part} | {step} | {counts} | {worst} | {', '.join(sorted(laws))} |"
 
 
 def main() -> None:
     """Print the table."""
-    print("| part | step | off | of them marked | marked | wander | largest change | laws with scores that are off |")
+    print("| part | step | off, of 60 | of them marked | marked | wander | largest change | laws with scores off |")
     print("|---|---|---|---|---|---|---|---|")
     for part in sys.argv[1:] or PARTS:
         print(row(part), flush=True)
