@@ -136,11 +136,6 @@ SAID = {
     tip.tip_scores: [f"over the last {percent(1.0 - tip.FORCE_START)} of the run"],
     tasks: [f"T(rms(w) / {tasks.RATE_MARGIN:g})", f"within {tasks.SWING_UP_SPREAD:g} rad of hanging"],
     plugin.smc_golden._fixture_function: [f"within {percent(golden.RELATIVE)} of their recorded value"],
-    ROOT / "docs" / "mathematics.md": [
-        f"A search has {search.BUDGET} evaluations for each gain",
-        f"lower $J$ by less than {percent(search.PATIENCE)}",
-        f"differ by more than {percent(search.AGREEMENT)}",
-    ],
     ROOT / "docs" / "design.md": [f"fails at |x| or |v| beyond {short(controller.MAX_STATE)}"],
 }  # fmt: skip
 
