@@ -39,6 +39,20 @@ def test_indices_of_ishigami_s_function_are_its_closed_forms():
     assert axes[3].total[:3] == (0.0, 0.0, 0.0)
 
 
+def test_an_interval_is_a_point_at_the_level_0_and_grows_to_both_sides_with_the_level(monkeypatch):
+    n, designs, ends = 64, module.designs(64, 2, 0), []
+    scores = designs @ np.array([1.0, 2.0]) - 4.0
+    monkeypatch.setattr(module, "RESAMPLES", 99)
+    for level in (0.0, 0.9):
+        monkeypatch.setattr(module, "LEVEL", level)
+        axes = module.indices(space("a", "b"), scores, n, designs[: 2 * n], scores[: 2 * n], 0)
+        ends.append(np.array([(kind.low, kind.high) for axis in axes for kind in (axis.first, axis.total)]).T)
+    lows, highs = np.swapaxes(ends, 0, 1)
+    assert lows[0] == pytest.approx(highs[0])
+    assert np.all(np.diff(lows, axis=0) < 0.0)
+    assert np.all(np.diff(highs, axis=0) > 0.0)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_no_axis_explains_more_alone_than_with_others(seed):
     """Few points, and an axis that tells all but 1 %: the estimates of the others' first indices are up to 0.1."""
