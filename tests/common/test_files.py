@@ -286,6 +286,15 @@ def test_cells_of_a_csv_file_are_between_commas_or_semicolons(tmp_path):
         files.csv_rows(file)
 
 
+def test_a_file_of_more_than_2_gb_is_refused(tmp_path):
+    with (tmp_path / "a").open("wb") as sparse:
+        sparse.truncate(2 * 10**9)
+        files._bounded(tmp_path / "a")
+        sparse.truncate(2 * 10**9 + 1)
+        with pytest.raises(smc.ScenarioError, match=r"^it has 2,000 MB, more than 2,000 MB$"):
+            files._bounded(tmp_path / "a")
+
+
 def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
     for name, bound in (("MAX_SIZE", 4_000_000), ("MAX_UNPACKED", 3_000_000), ("MAX_RATIO", 20), ("MAX_MEMBERS", 2)):
         assert isinstance(getattr(files, name), int)
