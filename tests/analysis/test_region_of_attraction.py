@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -286,6 +287,16 @@ def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path, refused):
     entries = legend.get_texts() if legend else []
     assert sum(float(one.get_text().split(": ")[1].rstrip(" %")) for one in entries) == pytest.approx(100, abs=1)
     refused(lambda: region.draw([weak], tmp_path / "map.gif"))
+
+
+def test_however_many_horizons_maps_have_what_rests_has_a_shade_of_the_law_and_the_latest_share_one():
+    for after, last in (([1.0], 1.0), ([1.0, 2.0, 4.0], 4.0), ([1.0, 2.0, 4.0, 8.0, 16.0], 16.0)):
+        drawn: Any = SimpleNamespace(decided_at=np.array(after), outcome=np.full(len(after), CONVERGES))
+        shades = region.colour_indices(drawn, after)
+        words = region.meanings(after, "by {:g} s", "never")
+        assert shades.tolist() == [0, 1, 2, 2, 2][: len(after)]
+        assert [words[shade] for shade in (shades[0], shades[-1])] == ["by 1 s", f"by {last:g} s"]
+        assert [*words][-2:] == [3, 4]
 
 
 def test_a_grid_of_nothing_is_refused(refused):
