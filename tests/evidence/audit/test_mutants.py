@@ -44,6 +44,10 @@ def swaps(runs):
     (one,) = runs.traces(runs.grid().values())
     rest = float(abs(one.u[:-1]).max())
     return {"size": 1.0 - rest, "other": rest}
+def weak(runs):
+    (one,) = runs.traces(runs.grid().values())
+    size = one.scenario.law.gains["k"] + 0.1 * float(abs(one.x[-1, 0]))
+    return {"size": size, "other": size}
 def picky(runs):
     (one,) = runs.traces(runs.grid().values())
     if not np.abs(one.u).any():
@@ -102,6 +106,15 @@ def test_a_mutant_that_loses_one_sentence_and_gains_another_loses_the_claim(pape
     two = 'size = { asked = "> 0", sentence = "it rests" }, other = { asked = "> 1", sentence = "it acts" }'
     file.write_text(file.read_text().replace('size = "ASKED"', two))
     assert survivors(file.parent) == {}
+
+
+@pytest.mark.parametrize(("asked", "other", "kept"), [("< 2", "< 2", KEPT), ("< 4", "> 9", KEPT), ("< 1", "> 9", None)])
+def test_what_holds_under_one_set_of_gains_or_in_one_sentence_is_lost_by_it_not_by_a_number(paper, asked, other, kept):
+    file = paper("weak", "ASKED") / "paper.toml"
+    two = f'size = {{ asked = "{asked}", sentence = "weak" }}, other = {{ asked = "{other}", sentence = "it acts" }}'
+    gains = "[gains.strong]\nclassical = { k = 3.0, c = 1.0 }\n[gains.weak]\nclassical = { k = 1.0, c = 1.0 }\n"
+    file.write_text(file.read_text().replace('size = "ASKED"', two) + gains)
+    assert survivors(file.parent, quick=False) == ({"1": kept} if kept else {})
 
 
 def test_a_claim_that_says_why_is_not_asked(paper):
