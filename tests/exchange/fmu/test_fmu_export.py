@@ -16,7 +16,7 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', 
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
-from helpers.pages import ROOT, titled  # noqa: E402
+from helpers.pages import ROOT  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
 from smc_mujoco.control import estimator, surface  # noqa: E402
@@ -380,13 +380,13 @@ def test_a_token_of_another_fmu_is_refused(twisting):
     assert said == [b"the instantiation token is that of another FMU"]
 
 
-# the page
+# the example
 
 
-def test_the_page_s_file_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
+def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
     law = smc.law("super_twisting", k1=5.0, k2=8.0)
     (folder / "super_twisting.c").write_text(smc.exchange.law_to_c(law))
-    (folder / "controller.c").write_text(titled(ROOT / "docs" / "simulink.md")["controller.c"])
+    (folder / "controller.c").write_text((ROOT / "examples" / "controller.c").read_text())
     library = folder / "controller.so"
     flags = [*build.LIBRARY_FLAGS, "-Wall", "-Wextra", "-Werror"]
     subprocess.run([*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"], check=True)
