@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from smc_mujoco.evidence.rigs import controllers
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
 from smc_mujoco.mechanisms.hardware.drives import DCMotor
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
@@ -98,6 +99,8 @@ QUBE_3_SETS = (  # identified; with a third and with three times the weight of t
     (7.829, 8.655e-5, 2.832e-4, 2.079e-3, 1.625e-3, 2.465e-3),
     (7.391, 9.578e-5, 2.492e-4, 2.508e-3, 1.225e-3, 4.398e-3),
 )
+# V/rad and V s/rad: the surface of least quadratic cost of the first set, with the weights of `rotary_swing_up`
+QUBE_3_SURFACE = {"c1": -4.48198, "c2": -44.6088, "c3": -1.99339, "c4": -3.83042}
 QUBE_SERVO_3 = Rig(
     name="qube_servo_3",
     label="QUBE-Servo 3 with rotary pendulum, identified from public records",
@@ -122,6 +125,8 @@ QUBE_SERVO_3 = Rig(
         },
     },
     ensemble=tuple(dict(zip(FOUND, values, strict=True)) for values in QUBE_3_SETS[1:]),
+    laws=controllers.rotary(0.0422 / QUBE_3_SETS[0][0], QUBE_3_SURFACE),
+    x0=(0.0, 0.1),
     about="Standard errors, from a jackknife over eight blocks: resistance 0.36, arm_inertia 1.3e-5, arm_damping "
     "5.3e-5, cable 5.5e-4, cable_friction 9.1e-4, cable_stiffness 1.9e-3. The step of 1 V is met to 0.020 rad rms, the "
     "falls' 2.432 Hz to 1.0 %, their damping ratio 0.0261 to 4 %. The cable has hysteresis: it takes energy from a "
