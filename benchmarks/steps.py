@@ -5,7 +5,7 @@
 Three plants x the four laws of the paper's study x five scores make 60 scores a part, of runs of 4 s. A score is off if
 it is apart from that at an eighth of the step, by the rule of `smc_mujoco/analysis/apart.py`; it is marked if it is
 apart from that at half the step or from a nudged start, as in scenes; it wanders if the nudge alone does that. The
-script prints the table of docs/design.md. It takes 40 s of processor time.
+script prints the table that docs/design.md sums up. It takes 40 s of processor time.
 """
 
 import dataclasses
