@@ -18,9 +18,10 @@ from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
-from smc_mujoco.control.law import catalogue, known_laws
+from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
 from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
+from smc_mujoco.mechanisms.hardware.part import PLACES
 from smc_mujoco.simulation import coerce
 
 NUMBER_BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
@@ -80,6 +81,12 @@ def number_of_joints(law: Component, joints: int | None) -> int:
         if joints is not None:
             raise ScenarioError(f"law {law.name!r} is of one channel: leave joints={shown(joints)} out")
         return 0
+    if law.plants == (FREE_BODY,):
+        if joints not in (None, len(PLACES)):
+            raise ScenarioError(
+                f"law {law.name!r} is of a free body, of {len(PLACES)} joints: leave joints={shown(joints)} out"
+            )
+        joints = len(PLACES)
     if joints is None and not several:
         raise ScenarioError(f"law {law.name!r} is of many joints: give their number, such as joints=7")
     count = whole("joints", next(iter(several.values())) if joints is None else joints, 2, MAX_JOINTS)

@@ -46,6 +46,8 @@ def to_js(component: Component) -> str:
         raise ScenarioError(f"{what} cannot be written in JavaScript: {error}") from None
     if re.search(r"\bfloat\b", code):
         raise ScenarioError(f"{what} computes in numbers of 32 bits: give one of 64 bits")
+    if re.search(r"^ +(?:smc_real|int32_t) (?:\w+\[.*;|\*\w+ = )", code, re.MULTILINE):
+        raise ScenarioError(f"{what} keeps arrays or tuples, which are not written in JavaScript: use numbers by name")
     places = [f"const GAIN_{plain(name)} = {i};" for i, name in enumerate(component.gains)]
     helpers = [text for name, text in WRITTEN_OUT.items() if re.search(rf"\b{name}\(", code)]
     body = "\n".join(["'use strict';", *places, *helpers, _rewritten(code), f"return smc_{component.kind};"])

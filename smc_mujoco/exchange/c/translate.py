@@ -4,10 +4,12 @@ numba turns some powers with a constant exponent into products or roots. The C d
 double precision equal those of the compiled function bit for bit.
 
 An array has a kind such as "real[SMC_JOINTS]" or "real[3][SMC_JOINTS]". An expression of arrays becomes a loop over its
-elements, with the operations of numba in the same order. A function that returns an array writes it to a pointer.
+elements, with the operations of numba in the same order. A function that returns an array writes it to a pointer. A
+tuple of numbers is an array whose kind ends in the names of its fields, such as "real[4]()" or "real[2](e,de)".
 
-Python's names of arrays may share numbers, as `w = memory[:, 0]` does with the memory. The C copies. So an array that
-the function changes must not share its numbers with another name; such code is refused.
+Python's names of arrays may share numbers. A name that is bound once to a part of an array, as in `w = memory[:, 0]`,
+is a pointer into it. All others are copies. So an array that the function changes must not share its numbers with
+another name; such code is refused.
 """
 
 import ast
@@ -117,7 +119,8 @@ class Value(NamedTuple):
     text: str
     kind: str
     level: int = ATOM
-    pointer: str = ""  # of an array: to its numbers in C, if they lie in a row
+    pointer: str = ""  # of an array: to its numbers in C
+    stride: str = ""  # of a vector with a pointer: from one number to the next, if they do not lie in a row
 
     def within(self, level: int) -> str:
         """Return the text as an operand of an operator of precedence `level`."""
@@ -150,6 +153,7 @@ class Program:
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
         self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, result kinds; None in progress
+        self.changing: dict[Any, set[int]] = {}  # Python function -> `changes`
         self.used_names = {self.symbol, *ARGUMENTS, *RESERVED}
         self.slots = 0  # of memory
 
@@ -163,6 +167,26 @@ class Program:
         unique = next(candidate for candidate in candidates if candidate not in self.used_names)
         self.used_names.add(unique)
         return unique
+
+    def changes(self, function: Any) -> set[int]:
+        """Return the positions of the arguments whose elements a function changes, itself or by another one."""
+        written = in_python(function)
+        if written is None or written in REQUESTED_ARRAYS:
+            return set()
+        if written in self.changing:
+            return self.changing[written]
+        self.changing[written] = set()
+        tree, known = parsed(written)[1], around(written)
+        names, inside = [a.arg for a in tree.args.args], in_body(tree)
+        given = [(target.id, root(value)) for target, value in pairs(inside) if isinstance(target, ast.Name)]
+        origins, before = {name: name for name in names}, 0
+        while before != (before := len(origins)):
+            origins |= {name: origins[source] for name, source in given if source in origins and name not in names}
+        changed = [n for n in inside if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store)]
+        for call in (n for n in inside if isinstance(n, ast.Call)):
+            changed += [call.args[i] for i in self.changes(resolved(call.func, known)) if i < len(call.args)]
+        self.changing[written] = {names.index(origins[root(n)]) for n in changed if root(n) in origins}
+        return self.changing[written]
 
     def claim(self, node: ast.AST, slot: int) -> None:
         """Note that a slot of the memory is used. Refuse one that the component does not have."""
@@ -221,9 +245,11 @@ class Program:
         if key not in self.translated:
             self.translated[key] = None
             translated = Function(self, function, kinds, constants)
-            name = self.unique_name(plain(tree.name))
+            name = next((n for n, text in self.functions.items() if translated.text(n) == text), "")
+            if not name:
+                name = self.unique_name(plain(tree.name))
+                self.functions[name] = translated.text(name)
             self.translated[key] = name, translated.results
-            self.functions[name] = translated.text(name)
         if (known := self.translated[key]) is None:
             raise refuse(None, f"{tree.name}, which calls itself,")
         name, results = known
@@ -250,16 +276,21 @@ class Function:
         arguments = [a.arg for a in self.tree.args.args]
         if len(arguments) != len(kinds) or self.tree.args.vararg or self.tree.args.kwonlyargs or self.tree.args.kwarg:
             raise refuse(None, f"{self.tree.name} with its arguments")
-        if not returns(self.tree.body):
+        inside = in_body(self.tree)
+        if (entry or any(isinstance(n, ast.Return) for n in inside)) and not returns(self.tree.body):
             raise refuse(None, f"{self.tree.name}, which does not end in a return,")
-        self.parameters = {n: kind for n, kind in zip(arguments, kinds, strict=True) if n not in constants}
-        inside = [node for statement in self.tree.body for node in ast.walk(statement)]
+        given = {n: kind.partition("@") for n, kind in zip(arguments, kinds, strict=True) if n not in constants}
+        self.parameters = {n: kind for n, (kind, _, _) in given.items()}
+        self.changed = {arguments[i] for i in program.changes(function)}  # arguments whose elements it changes
+        self.origins = dict[str, str]()  # names that are parts of arrays -> the arrays' names
+        # places of arrays that are not where their names say: of these parts, and of arguments with a stride
+        self.places = {n: array_at(plain(n), kind, stride=stride) for n, (kind, _, stride) in given.items() if stride}
         self.read = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
         self.kinds, self.results = dict(self.parameters), list[str]()
         before = None
         while before != (self.kinds, self.results):  # repeat until no variable's kind widens
             before = dict(self.kinds), list(self.results)
-            self.names = {name: Value(self.c_name(name), kind) for name, kind in self.kinds.items()}
+            self.names = {name: self.named(name, kind) for name, kind in self.kinds.items()}
             self.assigned = set(self.parameters)
             self.lines = list(self.block(self.tree.body))
         self.check_sharing()
@@ -273,26 +304,25 @@ class Function:
         words = set(re.findall(r"\w+", " ".join(line.partition(" = ")[2] or line for line in self.lines)))
         self.read -= {n for n, kind in self.kinds.items() if kind in WHOLE_KINDS and self.c_name(n) not in words}
         numbers = {n: TYPES[kind] for n, kind in self.kinds.items() if kind in TYPES and n not in self.parameters}
-        types = {self.c_name(n): of for n, of in numbers.items()}
+        types = {self.c_name(n): f"{of} " for n, of in numbers.items()}
+        types |= {self.c_name(n): self.pointer_to(array) for n, array in self.origins.items()}
         unread = [self.c_name(n) for n in self.kinds if n not in self.read]
-        top = [*self.arrays(), *(f"{types.pop(n)} {n} = 0;" for n in unread if n in types)]
+        top = [*self.arrays(), *(f"{types.pop(n)}{n} = 0;" for n in unread if n in types)]
         top += [f"(void){n};" for n in unread]  # compilers warn of unused variables
         lines, depth = list[str](), 1
         for line in self.lines:
             depth -= line.startswith("}")
             target, words = line.partition(" = ")[0], re.findall(r"\w+", line)
-            indent, declaration = "    " * depth, f"{types.pop(target)} " if depth == 1 and target in types else ""
-            top += [f"{types.pop(n)} {n} = 0;" for n in list(types) if n in words]
-            text, continued = indent + declaration + line, indent + " " * 8
-            lines += textwrap.wrap(
-                text, 110, subsequent_indent=continued, break_long_words=False, break_on_hyphens=False
-            )
+            indent, declaration = "    " * depth, types.pop(target) if depth == 1 and target in types else ""
+            top += [f"{types.pop(n)}{n} = 0;" for n in list(types) if n in words]
+            lines += wrapped(indent, declaration + line)
             depth += line.endswith("{")
-        return "\n".join([self.head(name), "{", *(f"    {line}" for line in top), *lines, "}"])
+        return "\n".join([*wrapped("", self.head(name)), "{", *(f"    {line}" for line in top), *lines, "}"])
 
     def arrays(self) -> Iterable[str]:
         """Return the declarations of the function's arrays."""
-        kinds = {self.c_name(n): kind for n, kind in self.kinds.items() if n not in self.parameters}
+        own = self.kinds.keys() - self.parameters.keys() - self.origins.keys()
+        kinds = {self.c_name(n): kind for n, kind in self.kinds.items() if n in own}
         shaped = [(name, base(kind), shape(kind)) for name, kind in (kinds | self.temporaries).items() if shape(kind)]
         return [f"{TYPES[of]} {name}[{' * '.join(dimensions)}];" for name, of, dimensions in shaped]
 
@@ -302,7 +332,7 @@ class Function:
         arguments = []
         for parameter in self.parameters:
             kind = self.kinds[parameter]
-            of = pointers.get(kind) or (f"const {TYPES[base(kind)]} *" if shape(kind) else f"{TYPES[kind]} ")
+            of = pointers.get(kind) or (self.pointer_to(parameter) if shape(kind) else f"{TYPES[kind]} ")
             arguments.append(f"{of}{self.c_name(parameter)}")
         if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
@@ -310,6 +340,28 @@ class Function:
             return f"static {TYPES[self.results[0]]} {name}({', '.join(arguments) or 'void'})"
         arguments += [f"{TYPES[base(kind)]} *out_{i}" for i, kind in enumerate(self.results)]
         return f"static void {name}({', '.join(arguments)})"
+
+    def pointer_to(self, name: str) -> str:
+        """Return the type of a pointer to the numbers of an array."""
+        kept = name in self.parameters and name not in self.changed and self.kinds[name] != "memory"
+        return f"{'const ' * kept}{TYPES.get(base(self.kinds[name]), 'smc_real')} *"
+
+    def named(self, name: str, kind: str) -> Value:
+        """Return the value of a name."""
+        if name in self.places:
+            return self.places[name]
+        return array_at(self.c_name(name), kind) if shape(kind) else Value(self.c_name(name), kind)
+
+    def origin(self, node: ast.expr | str) -> str:
+        """Return the name of the array whose numbers are those of an expression, or of a name; else an empty text."""
+        name = node if isinstance(node, str) else root(node)
+        return self.origins.get(name, name)
+
+    def sharing(self, text: str) -> set[str]:
+        """Return all names in C of the array that some C begins with."""
+        first, names = re.findall(r"\w+", text)[0], {self.c_name(n): n for n in self.kinds}
+        of = self.origin(names.get(first, ""))
+        return {first} | {c for c, n in names.items() if of and self.origin(n) == of}
 
     def c_name(self, name: str) -> str:
         """Return a variable's name in C. A component's arguments have the names of smc_law.h."""
@@ -336,7 +388,9 @@ class Function:
             case ast.Expr(value=ast.Constant(value=str())) | ast.Pass():
                 pass
             case ast.Expr(value=ast.Call() as call):
-                yield f"{self.numeric(call).text};"
+                if shape((value := self.value(call)).kind):
+                    raise refuse(call, "an array or a tuple that has no name")
+                yield f"{value.text};"
             case ast.Assign(targets=[target]):
                 yield from self.assign(target, node.value)
             case ast.AnnAssign(target=target, value=ast.expr() as value):
@@ -360,31 +414,69 @@ class Function:
 
     def assign(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         """Assign numbers or arrays to one target, or to a tuple of them."""
+        several = isinstance(target, ast.Tuple | ast.List)
+        if isinstance(value, ast.IfExp) and (several or self.needs_lines(value)):
+            yield from self.either(value, lambda one: self.assign(target, one))
+            return
         if not isinstance(target, ast.Tuple | ast.List):
             number = self.numeric(value)
-            if shape(number.kind) or self.is_array(target):
+            if isinstance(target, ast.Name) and number.pointer and self.is_part(target.id, value):
+                yield self.bind(target.id, number, value)
+            elif shape(number.kind) or self.is_array(target):
                 yield from self.store(target, number)
             else:
                 yield f"{self.destination(target, number.kind)} = {number.text};"
             return
         targets, values = target.elts, self.parts(value, len(target.elts))
-        if values and any(names_in(targets[:i]) & names_in([value]) for i, value in enumerate(values)):
+        if values and any(self.set_by(targets[:i]) & self.arrays_in([v]) for i, v in enumerate(values)):
             yield "{"
             yield from self.at_once(targets, values)
             yield "}"
         elif values is not None:
             for part, of_part in zip(targets, values, strict=True):
                 yield from self.assign(part, of_part)
-        elif isinstance(value, ast.IfExp):
-            yield f"if ({self.truth(value.test)}) {{"
-            yield from self.assign(target, value.body)
-            yield "} else {"
-            yield from self.assign(target, value.orelse)
-            yield "}"
         elif isinstance(value, ast.Call):
             yield from self.unpack(targets, value)
         else:
             raise refuse(value, "a tuple from anything but a call")
+
+    def needs_lines(self, value: ast.IfExp) -> bool:
+        """Return whether one of two values is a tuple, or the result of a Python function, which may be one."""
+        values = value.body, value.orelse
+        calls = [self.resolve(one.func) for one in values if isinstance(one, ast.Call)]
+        return any(isinstance(one, ast.Tuple) for one in values) or any(map(in_python, calls))
+
+    def either(self, value: ast.IfExp, translated: Callable[[ast.expr], Iterable[str]]) -> Iterator[str]:
+        """Yield the lines for one value or for the other one, by a condition."""
+        yield f"if ({self.truth(value.test)}) {{"
+        yield from translated(value.body)
+        yield "} else {"
+        yield from translated(value.orelse)
+        yield "}"
+
+    def arrays_in(self, nodes: Iterable[ast.AST]) -> set[str]:
+        """Return the names in some code, and of parts of arrays those of the arrays."""
+        return {one for name in names_in(nodes) for one in (name, self.origin(name))}
+
+    def set_by(self, targets: Iterable[ast.expr]) -> set[str]:
+        """Return the names that targets bind, and the arrays whose elements they set."""
+        return bound(targets) | {self.origin(n) for t in targets for n in ast.walk(t) if isinstance(n, ast.Subscript)}
+
+    def is_part(self, name: str, value: ast.expr) -> bool:
+        """Return whether a name is always the part of an array that a value is, so that it can be a pointer into it."""
+        nodes, array = [*ast.walk(self.tree)], self.origin(value)
+        in_loops = {n for loop in nodes if isinstance(loop, ast.For | ast.While) for n in ast.walk(loop)}
+        given, of_array = ([n for n in nodes if one in assigned(n)] for one in (name, array))
+        lasts = array in self.parameters or (len(of_array) == 1 and of_array[0] not in in_loops)
+        kind = self.kinds.get(array, "")
+        is_place = isinstance(value, ast.Subscript) and (kind == "memory" or (shape(kind) and not is_tuple(kind)))
+        return bool(is_place and lasts and len(given) == 1 and name not in self.parameters)
+
+    def bind(self, name: str, part: Value, node: ast.expr) -> str:
+        """Make a name a pointer to a part of an array, and return the line that sets it."""
+        self.kinds[name], self.origins[name] = part.kind, self.origin(node)
+        self.names[name] = self.places[name] = array_at(self.c_name(name), part.kind, stride=part.stride)
+        return f"{self.c_name(name)} = {part.pointer};"
 
     def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
         """Compute all values before the first assignment, because one reads an earlier target. Arrays are refused."""
@@ -396,30 +488,48 @@ class Function:
             yield f"{self.destination(target, value.kind)} = new_{i};"
 
     def parts(self, value: ast.expr, count: int) -> Sequence[ast.expr] | None:
-        """Return the expressions of a tuple or the elements of memory; None for another expression."""
+        """Return the expressions of a tuple, or the elements of one or of memory; None for another expression."""
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == count:
             return value.elts
-        if isinstance(value, ast.Name) and self.kinds.get(value.id) == "memory":
+        if isinstance(value, ast.Name) and ((kind := self.kinds.get(value.id, "")) == "memory" or is_tuple(kind)):
+            if is_tuple(kind) and int(shape(kind)[0]) != count:
+                raise refuse(value, f"{count} names for {shape(kind)[0]} numbers")
             return [ast.Subscript(value, ast.Constant(i), ast.Load()) for i in range(count)]
         return None
 
     def unpack(self, targets: Sequence[ast.expr], call: ast.Call) -> Iterator[str]:
         """Assign the results of a function that has several."""
-        values = [self.argument(a) for a in call.args]
-        kinds, beginning = self.program.function(self.callee(call), values, call.args)
+        function = self.callee(call)
+        kinds, beginning = self.program.function(function, self.arguments(function, call), call.args)
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
-        pointers, stores = [], []
+        pointers, stores, read = [], [], self.arrays_in(call.args)
         for target, kind in zip(targets, kinds, strict=True):
-            if shape(kind):
-                array = self.temporary(kind)
-                pointers.append(array.pointer)
-                stores.append((target, array))
-            else:
-                pointers.append(f"&{self.destination(target, kind)}")
+            pointer = self.receiver(target, kind, read)
+            if not pointer:
+                array = self.temporary(kind if shape(kind) else f"{kind}[1]")
+                pointer = array.pointer
+                stores.append((target, array if shape(kind) else Value(f"{pointer}[0]", kind)))
+            pointers.append(pointer)
         yield call_to(beginning, ", ".join(pointers))
-        for target, array in stores:
-            yield from self.store(target, array)
+        for target, value in stores:
+            if shape(value.kind):
+                yield from self.store(target, value)
+            else:
+                yield f"{self.destination(target, value.kind)} = {value.text};"
+
+    def receiver(self, target: ast.expr, kind: str, read: set[str]) -> str:
+        """Return a pointer by which a call that reads some arrays can set a target; "" if it cannot."""
+        if isinstance(target, ast.Name):
+            if self.kinds.get(target.id, kind) != kind or (shape(kind) and target.id in {*self.parameters, *read}):
+                return ""
+            place = self.destination(target, kind)
+            return place if shape(kind) else f"&{place}"
+        place = self.changeable(target)
+        fits = base(place.kind) == base(kind) and self.same_shape(place.kind, kind) and not place.stride
+        if not fits or self.origin(target) in read:
+            return ""
+        return place.pointer if shape(kind) else f"&{place.text}"
 
     def destination(self, target: ast.expr, kind: str) -> str:
         """Return a target in C, to which a value of a kind is assigned."""
@@ -432,22 +542,27 @@ class Function:
         if not name or self.kinds.get(name) in ARGUMENTS or name in self.constants:
             raise refuse(target, "an assignment to this")
         self.kinds[name] = kind = wider(self.kinds.get(name, kind), kind)
-        self.names[name] = Value(self.c_name(name), kind)
+        self.names[name] = self.named(name, kind)
         self.assigned.add(name)
         return self.c_name(name)
 
     def augment(self, node: ast.AugAssign) -> Iterator[str]:
         """Translate target op= value, element by element if the target is an array."""
         whole = ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value)  # target op value
-        result = self.numeric(whole)
         if self.is_array(node.target):
-            yield from self.store(node.target, result)
+            yield from self.store(node.target, self.numeric(whole))
             return
+        if type(node.op) not in OPERATORS:
+            result = self.numeric(whole)
+            yield f"{self.destination(node.target, result.kind)} = {result.text};"
+            return
+        value = self.numeric(node.value)
+        result = self.combined(node.op, self.numeric(whole.left), value, node)
         target = self.destination(node.target, result.kind)
-        if type(node.op) in OPERATORS and result.kind not in WHOLE_KINDS:
-            yield f"{target} {OPERATORS[type(node.op)][0]}= {self.numeric(node.value).text};"
-        else:
+        if result.kind in WHOLE_KINDS:
             yield f"{target} = {result.text};"
+        else:
+            yield f"{target} {OPERATORS[type(node.op)][0]}= {value.text};"
 
     def branch(self, node: ast.If, word: str = "if") -> Iterator[str]:
         """Translate if, elif and else."""
@@ -498,7 +613,12 @@ class Function:
 
     def returned(self, value: ast.expr) -> Iterator[str]:
         """Translate return."""
+        if isinstance(value, ast.IfExp) and self.needs_lines(value):
+            yield from self.either(value, self.returned)
+            return
         values = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
+        if len(values) == 1 and is_tuple((one := values[0]).kind):
+            values = [Value(f"{one.pointer}[{i}]", base(one.kind)) for i in range(int(shape(one.kind)[0]))]
         if self.entry and self.program.component.kind == "estimator" and len(values) == 1:
             values.append(Value("NAN", "real", UNARY))
         self.results = self.results or [v.kind for v in values]
@@ -539,7 +659,7 @@ class Function:
             raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
         same = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
         others = re.sub("|".join(same), "", value.text)
-        if re.search(rf"\b{place.text.partition('[')[0]}\b", others):  # reads elements that the loop has changed
+        if self.sharing(place.text) & set(re.findall(r"\w+", others)):  # reads elements that the loop has changed
             kept = self.temporary(value.kind)
             yield from self.fill(kept, value)
             value = kept
@@ -548,8 +668,8 @@ class Function:
     def fill(self, place: Value, value: Value) -> Iterator[str]:
         """Yield the loops that copy an array, or one number, to a place."""
         dimensions = shape(place.kind)
-        if call := self.last_call(place, value):
-            yield f"{call}, {place.pointer});"
+        if moved := self.retargeted(place, value):
+            yield from moved
             return
         indices = [self.index(i) for i in range(len(dimensions))]
         loops = [f"for (int32_t {i} = 0; {i} < {n}; {i}++)" for i, n in zip(indices, dimensions, strict=True)]
@@ -558,23 +678,23 @@ class Function:
             line = line.replace(token, i)
         yield " ".join([*loops, line])
 
-    def last_call(self, place: Value, value: Value) -> str:
-        """Take back and return the call that has just computed a value, if it can write to a place itself; else ""."""
-        end = f", {value.pointer});"
-        if not (place.pointer and self.before and value.pointer in self.temporaries and self.before[-1].endswith(end)):
-            return ""
-        call = self.before[-1].removesuffix(end)
-        if re.search(rf"\b{place.pointer.partition(' ')[0]}\b", call.partition("(")[2]):  # it reads from there
-            return ""
-        self.before.pop()
-        del self.temporaries[value.pointer]
-        return call
+    def retargeted(self, place: Value, value: Value) -> list[str]:
+        """Take back and return the lines that have just computed a value, if they can write to a place itself."""
+        name, given = value.pointer, place.pointer
+        lines = [line for line in self.before if name and re.search(rf"\b{name}\b", line)]
+        if name not in self.temporaries or not lines or self.before[-len(lines) :] != lines or place.stride:
+            return []
+        calls = len(lines) == 1 and re.match(r"\w+\(", lines[0]) is not None  # for and if have a space
+        fits = given and base(place.kind) == base(value.kind) and (calls or given.isidentifier())
+        if not fits or self.sharing(given) & set(re.findall(r"\w+", " ".join(lines))):  # it reads from there
+            return []
+        del self.before[-len(lines) :], self.temporaries[name]
+        return [re.sub(rf"\b{name}\b", given, line) for line in lines]
 
     def changeable(self, target: ast.expr) -> Value:
-        """Return elements that the function may change: of its memory, or of an array that it makes."""
-        name = root(target)
-        kind = self.kinds.get(name, "")
-        if kind != "memory" and (not shape(kind) or name in self.parameters):
+        """Return elements that the function may change: of its memory, of an array that it makes, or of an argument."""
+        kind = self.kinds.get(self.origin(target), "")
+        if kind != "memory" and (not shape(kind) or is_tuple(kind)):
             raise refuse(target, "an assignment to this, which is no array of the function's own,")
         return self.value(target)
 
@@ -615,8 +735,8 @@ class Function:
     def numeric(self, node: ast.expr) -> Value:
         """Translate an expression that is a number or an array; an array in an elementwise one to its element."""
         value = self.value(node)
-        if value.kind in ARGUMENTS:
-            raise refuse(node, f"{value.text} as a number")
+        if value.kind in ARGUMENTS or not value.kind or (self.frames and is_tuple(value.kind)):
+            raise refuse(node, f"{'a tuple' if is_tuple(value.kind) else value.text} as a number")
         if not self.frames:
             return value
         shapes, calls = self.frames[-1]
@@ -687,15 +807,42 @@ class Function:
     def argument(self, node: ast.expr) -> Value:
         """Translate an argument of a function: a number, an array as a pointer, or y or gains."""
         value = self.outside(self.value, node)
-        if value.kind == "memory" and self.program.joints:
-            raise refuse(node, "a function that gets the memory")
         if not shape(value.kind):
             return value
-        if not value.pointer:  # its numbers do not lie in a row: copy them
+        if not value.pointer or value.stride:  # its numbers do not lie in a row: copy them
             value, of_elements = self.temporary(value.kind), value
             for line in list(self.fill(value, of_elements)):
                 self.move(line, node)
         return value._replace(text=value.pointer)
+
+    def arguments(self, function: Any, call: ast.Call) -> list[Value]:
+        """Translate the arguments of a call. An array that the function changes is a pointer, with its stride."""
+        changed, values = self.program.changes(function), list[Value]()
+        shared = [self.shared(a) for a in call.args]
+        for i, node in enumerate(call.args):
+            if i not in changed or not isinstance(node, ast.Name | ast.Subscript | ast.Attribute):
+                values.append(self.argument(node))
+                continue
+            value = self.outside(self.changeable, node)
+            if any(shared[i] & others for j, others in enumerate(shared) if j != i):
+                raise refuse(call, "a call that gets an array twice and changes it")
+            if shape(value.kind):
+                if not value.pointer:
+                    raise refuse(node, "a part of a matrix, which a function changes,")
+                value = value._replace(text=value.pointer, kind=value.kind + f"@{value.stride}" * bool(value.stride))
+            values.append(value)
+        return values
+
+    def check_order(self, call: ast.Call) -> None:
+        """Refuse a call that changes an array which the rest of its line reads: C does not say which comes first."""
+        changed = {self.origin(call.args[i]) for i in self.program.changes(self.callee(call)) if i < len(call.args)}
+        for line in (n for n in in_body(self.tree) if isinstance(n, ast.stmt)):
+            targets = line.targets if isinstance(line, ast.Assign) else []
+            parts = [n for n in ast.iter_child_nodes(line) if not isinstance(n, ast.stmt) and n not in targets]
+            inside = [n for part in parts for n in ast.walk(part)]
+            names = [n for n in inside if isinstance(n, ast.Name) and n not in ast.walk(call)]
+            if call in inside and changed & self.arrays_in(names):
+                raise refuse(call, "a call that changes an array which the rest of the line reads")
 
     def truth(self, node: ast.expr) -> str:
         """Translate an expression as a condition."""
@@ -729,8 +876,7 @@ class Function:
 
     def _name(self, node: ast.Name) -> Value:
         if node.id in self.names:
-            value = self.names[node.id]
-            return array_at(value.text, value.kind) if shape(value.kind) else value
+            return self.names[node.id]
         if node.id not in self.globals:
             raise refuse(node, "a name without a value")
         return self.outer(node, self.globals[node.id])
@@ -752,14 +898,17 @@ class Function:
             if joints and name not in self.program.component.shared:
                 return array_at(owner.text, f"real[{JOINTS}]", f"{place} + ")
             return Value(f"{owner.text}[{place}]", "real")
+        if fields := fields_of(owner.kind):
+            known(name, "field", fields)
+            return Value(f"{owner.pointer}[{fields.index(name)}]", base(owner.kind))
         raise refuse(node, "an attribute")
 
     def outer(self, node: ast.expr, value: Any) -> Value:
         """Return a constant from outside of the function: a number or an array."""
-        if not isinstance(value, np.ndarray):
+        if not isinstance(value, np.ndarray | tuple):
             return literal(value, self.program.single, node)
         made = self.program.array(ast.unparse(node).replace(".", "_"), value)
-        array = array_at(made.text, f"{made.kind}[{len(value)}]")
+        array = array_at(made.text, f"{made.kind}[{len(value)}]" + "()" * isinstance(value, tuple))
         return array if made.kind == "real" else array._replace(pointer="")  # of 16 bits, so that functions get a copy
 
     def _subscript(self, node: ast.Subscript) -> Value:
@@ -778,22 +927,49 @@ class Function:
 
     def elements(self, node: ast.Subscript, owner: Value, places: Sequence[ast.expr]) -> Value:
         """Return some elements of an array, by an index or a colon for each dimension."""
-        text, left, pointer = owner.text, list[str](), owner.pointer
-        for token, place, dimension in zip((ROW, COLUMN), places, shape(owner.kind), strict=False):
+        dimensions, text, pointer = shape(owner.kind), owner.text, owner.pointer
+        strides = [dimensions[1], ""] if len(dimensions) == 2 else [owner.stride]
+        left, steps = list[str](), list[str]()
+        for token, place, dimension, stride in zip((ROW, COLUMN), places, dimensions, strides, strict=False):
             if isinstance(place, ast.Slice):
-                if place.lower or place.upper or place.step or dimension == SLOTS:
-                    raise refuse(node, "a part of an array")
-                text = text.replace(token, (ROW, COLUMN)[len(left)])
-                left.append(dimension)
-                continue
-            index = self.outside(self.numeric, place)
-            self.check_index(node, place, index, dimension)
-            if dimension != SLOTS and not self.natural(place):  # Python counts a negative index from the end
-                index = Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int")
-            text = text.replace(f"[{token}]", f"[{index.text}]").replace(token, index.within(PRODUCT))
-            row = pointer and token == ROW and len(places) == 2
-            pointer = f"{pointer} + {index.within(PRODUCT)} * {shape(owner.kind)[1]}" if row else ""
-        return Value(text, base(owner.kind) + "".join(f"[{n}]" for n in left), owner.level, pointer)
+                first, count = self.part(node, place, dimension)
+                kept = (ROW, COLUMN)[len(left)]
+                index = Value(f"{kept} + {first}", "int", SUM) if first else Value(kept, "int")
+                left.append(count)
+                steps.append(stride)
+                moved = Value(str(first), "int")
+            else:
+                index = self.outside(self.numeric, place)
+                self.check_index(node, place, index, dimension)
+                if dimension != SLOTS and not self.natural(place):  # Python counts a negative index from the end
+                    index = Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int")
+                moved = index
+            text = re.sub(rf"\[{token}\]|{token}", functools.partial(put, index), text)
+            if moved.text != "0":
+                pointer += f" + {moved.within(PRODUCT)} * {stride}" if stride else f" + {moved.within(SUM)}"
+        kind = base(owner.kind) + "".join(f"[{n}]" for n in left) + "()" * (is_tuple(owner.kind) and bool(left))
+        in_rows = len(left) < 2 or left[1] == dimensions[1]
+        located = bool(left and owner.pointer and in_rows)
+        return Value(text, kind, owner.level, pointer * located, steps[-1] if located else "")
+
+    def part(self, node: ast.Subscript, place: ast.Slice, dimension: str) -> tuple[int, str]:
+        """Return where a slice of a dimension begins, and its length."""
+        if place.step:
+            raise refuse(node, "a part of an array with a step")
+        size = self.program.component.memory if dimension == SLOTS else self.program.size(dimension)
+        found = range(size)[slice(self.bound(place.lower), self.bound(place.upper))]
+        if not found:
+            raise refuse(node, "an empty part of an array")
+        if dimension == SLOTS:
+            self.program.claim(node, found[-1])
+        return found[0], dimension if len(found) == size and dimension != SLOTS else str(len(found))
+
+    def bound(self, node: ast.expr | None) -> int | None:
+        """Return the bound of a slice, which is known before the law runs."""
+        if node is None:
+            return None
+        constant = self.constant(node)
+        return constant if isinstance(constant, int) else self.program.size(self.dimensions(node)[0])
 
     def check_index(self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str) -> None:
         """Refuse an index that is no integer, or out of range as far as it is known."""
@@ -846,17 +1022,20 @@ class Function:
             return self._power(node)
         if isinstance(node.op, ast.MatMult):
             raise refuse(node, "the operator @")
-        left, right = self.numeric(node.left), self.numeric(node.right)
+        return self.combined(node.op, self.numeric(node.left), self.numeric(node.right), node)
+
+    def combined(self, operator: ast.operator, left: Value, right: Value, node: ast.AST) -> Value:
+        """Return the result of an operator but that of powers."""
         whole = left.kind in WHOLE_KINDS and right.kind in WHOLE_KINDS
-        if type(node.op) in BIT_OPERATORS:
+        if type(operator) in BIT_OPERATORS:
             if not whole:
                 raise refuse(node, "a bit operation on real numbers")
-            return Value(f"{left.within(ATOM)} {BIT_OPERATORS[type(node.op)]} {right.within(ATOM)}", "int", LOOSE)
-        if isinstance(node.op, ast.Mod) and whole:
+            return Value(f"{left.within(ATOM)} {BIT_OPERATORS[type(operator)]} {right.within(ATOM)}", "int", LOOSE)
+        if isinstance(operator, ast.Mod) and whole:
             return Value(f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})", "int")
-        if type(node.op) not in OPERATORS:
-            raise refuse(node, f"the operator {type(node.op).__name__}")
-        sign, level = OPERATORS[type(node.op)]
+        if type(operator) not in OPERATORS:
+            raise refuse(node, f"the operator {type(operator).__name__}")
+        sign, level = OPERATORS[type(operator)]
         first, kind = left.within(level), wider(left.kind, right.kind)
         if whole:
             kind = "int"
@@ -903,17 +1082,20 @@ class Function:
         """Return one of two values, by a condition."""
         return Value(f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
 
+    def _tuple(self, node: ast.Tuple) -> Value:
+        return self.gathered(node, node.elts, "()")
+
     def _call(self, node: ast.Call) -> Value:
         if node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
             raise refuse(node, "a call with names or stars")
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not node.args:
-            return self.outside(self.value, node.func.value)._replace(pointer="")
+            return self.outside(self.value, node.func.value)._replace(pointer="", stride="")
         function = self.callee(node)
         if function in ELEMENTWISE or function in HELPER_NAMES or function is np.where:
             return self.elementwise(lambda call: self.of_elements(function, call), node)
         if function is len or function in FILL_VALUES:
             method = self.sized
-        elif function is np.array:
+        elif function is np.array or hasattr(function, "_fields"):
             method = self.listed
         else:
             method = self.requested if function in REQUESTED_ARRAYS else self.called
@@ -921,19 +1103,21 @@ class Function:
 
     def called(self, function: Any, node: ast.Call) -> Value:
         """Translate a call of a function of Python, math, or one that is translated itself."""
-        values = [self.argument(a) for a in node.args]
+        values = self.arguments(function, node)
         if not any(shape(v.kind) for v in values):
             if (built_in := self.built_in(function, values, node)) is not None:
                 return built_in
         elif function in (min, max) or inspect.isbuiltin(function) or isinstance(function, type | np.ufunc):
             raise refuse(node, f"{getattr(function, '__name__', function)} of an array")
         kinds, beginning = self.program.function(function, values, node.args)
-        if len(kinds) != 1:
-            raise refuse(node, "several results within an expression")
-        if not shape(kinds[0]):
-            return Value(f"{beginning})", kinds[0])
-        array = self.temporary(kinds[0])
-        self.move(call_to(beginning, array.pointer), node)
+        self.check_order(node)
+        if not kinds or (len(kinds) == 1 and not shape(kinds[0])):
+            return Value(f"{beginning})", "".join(kinds))
+        if len({*kinds}) > 1 or (len(kinds) > 1 and shape(kinds[0])):
+            raise refuse(node, "several results, not all numbers of a kind, within an expression")
+        array = self.temporary(kinds[0] if len(kinds) == 1 else f"{kinds[0]}[{len(kinds)}]()")
+        pointers = [f"{array.pointer} + {i}" if i else array.pointer for i in range(len(kinds))]
+        self.move(call_to(beginning, ", ".join(pointers)), node)
         return array
 
     def built_in(self, function: Any, values: list[Value], node: ast.Call) -> Value | None:
@@ -989,14 +1173,22 @@ class Function:
         return array
 
     def listed(self, function: Any, node: ast.Call) -> Value:
-        """Translate np.array of a list of numbers."""
-        if len(node.args) != 1 or not isinstance(node.args[0], ast.List | ast.Tuple) or not node.args[0].elts:
+        """Translate np.array of a list of numbers, or a NamedTuple of numbers."""
+        if function is not np.array:
+            if len(node.args) != len(function._fields):
+                raise refuse(node, "a NamedTuple without all its fields")
+            return self.gathered(node, node.args, f"({','.join(function._fields)})")
+        if len(node.args) != 1 or not isinstance(node.args[0], ast.List | ast.Tuple):
             raise refuse(node, "an array of anything but a list of numbers")
-        items = [self.numeric(item) for item in node.args[0].elts]
-        if any(shape(item.kind) for item in items):
-            raise refuse(node, "an array of arrays")
+        return self.gathered(node, node.args[0].elts)
+
+    def gathered(self, node: ast.expr, elements: Sequence[ast.expr], fields: str = "") -> Value:
+        """Return an array of numbers, or a tuple with fields."""
+        items = [self.outside(self.numeric, item) for item in elements]
+        if not items or any(shape(item.kind) for item in items):
+            raise refuse(node, "a tuple or an array of arrays, or of nothing,")
         kind = functools.reduce(wider, (item.kind for item in items))
-        array = self.temporary(f"{kind}[{len(items)}]")
+        array = self.temporary(f"{kind}[{len(items)}]{fields}")
         for i, item in enumerate(items):
             self.move(f"{array.pointer}[{i}] = {item.text};", node)
         return array
@@ -1032,20 +1224,20 @@ class Function:
 
     def check_sharing(self) -> None:
         """Refuse arrays that the function changes and that share their numbers with another name."""
-        changed, pairs = {n for n, kind in self.kinds.items() if kind == "memory" and self.program.joints}, []
-        for node in ast.walk(self.tree):
-            if isinstance(node, ast.Assign):
-                (target,) = node.targets
-                paired = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
-                pairs += zip(target.elts, node.value.elts, strict=True) if paired else [(target, node.value)]  # pyright: ignore[reportAttributeAccessIssue]
-            if isinstance(node, ast.Assign | ast.AugAssign):
-                targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-                whole = [t for t in targets if isinstance(t, ast.Subscript) or isinstance(node, ast.AugAssign)]
-                changed |= {name for t in whole if shape(self.kinds.get(name := root(t), ""))}
-        for target, value in pairs:
-            names, shares = names_in([target]), self.shared(value)
-            whole = isinstance(target, ast.Name | ast.Tuple) and any(shape(self.kinds.get(name, "")) for name in names)
-            if whole and (shares & changed or (shares and names & changed)):
+        nodes = in_body(self.tree)
+        changed = {n for n, kind in self.kinds.items() if kind == "memory"}
+        for node in nodes:
+            if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+                changed.add(self.origin(node))
+            elif isinstance(node, ast.AugAssign):
+                changed.add(self.origin(node.target))
+            elif isinstance(node, ast.Call):
+                numbers = self.program.changes(self.resolve(node.func))
+                changed |= {self.origin(node.args[i]) for i in numbers if i < len(node.args)}
+        for target, value in pairs(nodes):
+            copies, shares = bound([target]) - self.origins.keys(), self.shared(value)
+            of_array = any(shape(self.kinds.get(name, "")) for name in copies)
+            if of_array and (shares & changed or (shares and copies & changed)):
                 raise refuse(value, f"an array, {SHARED_WORDS},")
 
     def shared(self, node: ast.expr) -> set[str]:
@@ -1053,7 +1245,7 @@ class Function:
         names, parts = set[str](), list[ast.expr]()
         match node:
             case ast.Name() | ast.Subscript() if self.is_array(node):
-                names = {root(node)}
+                names = set() if is_tuple(self.kinds.get(self.origin(node), "")) else {self.origin(node)}
             case ast.Attribute() | ast.Subscript(value=ast.Attribute()):  # of y or gains
                 names = {ast.unparse(node)}
             case ast.IfExp():
@@ -1089,10 +1281,21 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     return written, tree
 
 
+def in_body(tree: ast.FunctionDef) -> list[ast.AST]:
+    """Return the nodes of a function's statements, without its decorators."""
+    return [node for statement in tree.body for node in ast.walk(statement)]
+
+
 def around(written: FunctionType) -> dict[str, Any]:
     """Return the names outside of a function that it can read, with their values."""
     cells = zip(written.__code__.co_freevars, written.__closure__ or (), strict=True)
     return written.__globals__ | {name: cell.cell_contents for name, cell in cells}
+
+
+def in_python(function: Any) -> FunctionType | None:
+    """Return the Python of a function, compiled or not; None for numpy's, for C's and for what is no function."""
+    written = getattr(function, "py_func", function)
+    return written if isinstance(written, FunctionType) and not of_numpy(written) else None
 
 
 def of_numpy(function: Any) -> bool:
@@ -1103,6 +1306,17 @@ def of_numpy(function: Any) -> bool:
 def names_in(nodes: Iterable[ast.AST]) -> set[str]:
     """Return the names in some code."""
     return {n.id for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name)}
+
+
+def pairs(nodes: Iterable[ast.AST]) -> list[tuple[ast.expr, ast.expr]]:
+    """Return the targets and values of the assignments among some nodes; of tuples, those of their elements."""
+    found = list[tuple[ast.expr, ast.expr]]()
+    for node in nodes:
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                paired = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
+                found += zip(target.elts, node.value.elts, strict=False) if paired else [(target, node.value)]  # pyright: ignore[reportAttributeAccessIssue]
+    return found
 
 
 def changed(nodes: Iterable[ast.AST]) -> set[str]:
@@ -1145,27 +1359,41 @@ def resolved(node: ast.expr, known: Mapping[str, Any]) -> Any:
 
 def may_return_argument(function: Any) -> bool:
     """Return whether a function may return one of its arguments, or a part of it, and not only what it computes."""
-    written = getattr(function, "py_func", function)
-    if not isinstance(written, FunctionType) or of_numpy(written):
+    written = in_python(function)
+    if written is None:
         return False
-    if written.__module__ == joint_law.__name__:
-        return function is joint_law.torque
+    tree = parsed(written)[1]
+    nodes, arguments, known = [*ast.walk(tree)], {a.arg for a in tree.args.args}, around(written)
+    given = [(name, value) for target, value in pairs(nodes) for name in bound([target])]
 
-    def may_share(value: Any) -> bool:
+    def may_share(value: ast.expr, seen: frozenset[str] = frozenset()) -> bool:
         match value:
-            case ast.Tuple():
-                return any(map(may_share, value.elts))
-            case ast.Call():
-                return may_return_argument(resolved(value.func, around(written)))
-        return not isinstance(value, ast.BinOp | ast.UnaryOp | ast.Compare | ast.Constant)
+            case ast.Tuple(elts=parts):
+                return any(may_share(part, seen) for part in parts)
+            case ast.IfExp(body=yes, orelse=no):
+                return may_share(yes, seen) or may_share(no, seen)
+            case ast.Call(func=called):
+                return may_return_argument(resolved(called, known))
+            case ast.Subscript(value=array):
+                return may_share(array, seen)
+            case ast.Name(id=name):
+                values = [] if name in seen else [v for n, v in given if n == name]
+                return name in arguments or any(may_share(v, seen | {name}) for v in values)
+        return isinstance(value, ast.Attribute)
 
-    return any(may_share(node.value) for node in ast.walk(parsed(function)[1]) if isinstance(node, ast.Return))
+    return any(may_share(node.value) for node in nodes if isinstance(node, ast.Return) and node.value)
 
 
 def assigned(node: ast.AST) -> set[str]:
     """Return the names in the targets of an assignment or of a loop; none of other code."""
     targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
-    return names_in(t for t in targets if t is not None and not isinstance(t, ast.Subscript))
+    return bound(target for target in targets if target is not None)
+
+
+def bound(targets: Iterable[ast.AST]) -> set[str]:
+    """Return the names that some targets bind, and not only change the elements of."""
+    inside = [n for target in targets for n in ast.walk(target)]
+    return {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
 
 
 def root(node: ast.expr) -> str:
@@ -1223,6 +1451,13 @@ def rows(items: Sequence[str]) -> str:
     return textwrap.fill(text, 100, initial_indent="    ", subsequent_indent="    ")
 
 
+def wrapped(indent: str, line: str) -> list[str]:
+    """Return a line of code in lines of at most 110 characters."""
+    return textwrap.wrap(
+        indent + line, 110, subsequent_indent=f"{indent}        ", break_long_words=False, break_on_hyphens=False
+    )
+
+
 def shape(kind: str) -> list[str]:
     """Return the dimensions of a kind."""
     return re.findall(r"\[(\w+)\]", kind)
@@ -1233,8 +1468,24 @@ def base(kind: str) -> str:
     return kind.partition("[")[0]
 
 
-def array_at(pointer: str, kind: str, offset: str = "") -> Value:
-    """Return the array at a pointer, from an offset on."""
+def is_tuple(kind: str) -> bool:
+    """Return whether a kind is that of a tuple."""
+    return kind.endswith(")")
+
+
+def fields_of(kind: str) -> list[str]:
+    """Return the names of a tuple's fields, if it has some."""
+    return kind.partition("(")[2].removesuffix(")").split(",") if is_tuple(kind) and not kind.endswith("()") else []
+
+
+def put(index: Value, token: re.Match[str]) -> str:
+    """Return an index in the place of a token, which may be in brackets."""
+    return f"[{index.text}]" if token[0].startswith("[") else index.within(PRODUCT)
+
+
+def array_at(pointer: str, kind: str, offset: str = "", stride: str = "") -> Value:
+    """Return the array at a pointer, from an offset on. `stride`: from one number to the next, if it is not 1."""
     place = ROW if len(shape(kind)) == 1 else f"{ROW} * {shape(kind)[-1]} + {COLUMN}"
+    place += f" * {stride}" * bool(stride)
     moved = f"{pointer} + {offset.removesuffix(' + ')}" if offset else pointer
-    return Value(f"{pointer}[{offset}{place}]", kind, ATOM, moved)
+    return Value(f"{pointer}[{offset}{place}]", kind, ATOM, moved, stride)

@@ -280,7 +280,7 @@ def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
 
 
 REFUSED = {
-    "u = sum((y.e, y.de))": "Tuple", "u = [y.e, y.de][0]": "List", "u = y.e // 2.0": "the operator FloorDiv",
+    "u = sum((y.e, y.de))": "sum of an array", "u = [y.e, y.de][0]": "List", "u = y.e // 2.0": "the operator FloorDiv",
     "u = 'a'": "the value 'a'", "u = y.e if y.de else np.sinc(y.e)": "sinc",
     "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
     "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",

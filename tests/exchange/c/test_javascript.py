@@ -116,6 +116,27 @@ def test_a_law_without_javascript_says_why(law, sentence):
         to_js(law())
 
 
+def test_a_law_that_keeps_arrays_is_refused():
+    """It has a translation into C, of which JavaScript would not read the arrays."""
+
+    @smc.law_function(memory=3)
+    def keeps(y, gains, memory):
+        last = memory[1:]
+        last[0] = y.e
+        return -y.de, last[0]
+
+    @smc.law_function
+    def pairs(y, gains, memory):
+        both = y.e, y.de
+        return -both[0], both[1]
+
+    for law in (keeps(), pairs()):
+        with pytest.raises(
+            smc.ScenarioError, match=f"law '{law.name}' keeps arrays or tuples, which are not written in J"
+        ):
+            to_js(law)
+
+
 def test_a_law_that_calls_a_library_is_quoted():
     @smc.law_function(gains={"k": 2.0})
     def reads(y, gains, memory):

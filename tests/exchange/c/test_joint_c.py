@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -94,6 +95,75 @@ def turns(y, gains, memory):
     return 0.01 * u, s
 
 
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+
+@njit
+def turned(q, k):
+    w, a, b = q
+    return a * k, b, w
+
+
+@njit
+def next_of(q):
+    return turned(q, 2.0) if q[0] > 0.0 else (q[1], 0.25, q[-1])
+
+
+@njit
+def filtered(x, i, states):
+    before = states[i]
+    states[i] = 0.5 * (before + x)
+    return before
+
+
+@njit
+def shift(states, pair):
+    rest = states[1:]
+    rest[0] += pair.first - 0.5 * states[0]
+    states[0] = pair.second
+
+
+@njit
+def split(a):
+    return a[1:], (a[0], a[2]), a[0] * a[:2]
+
+
+@njit
+def swapped(a, b):
+    return b[0], a[1]
+
+
+@smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0}, memory=5)
+def parts(y, gains, memory):
+    """Every turn of Python with parts of arrays and tuples that there is."""
+    n = len(y.x)
+    s, u, kept, table = y.de + gains.c * y.e, np.zeros(n), memory[:, 0], np.zeros((3, n))
+    q = s[0], 0.5, -s[2]
+    q = q[1], q[2], q[0] + len(q)
+    q = next_of(q) if y.t > 0.05 else next_of((s[1], q[0], q[2]))
+    tail, pair, two = split(s)
+    u[:2], u[2] = two, pair[1] + q[n - 2]
+    u[0], u[2] = swapped(u, two)  # the second result is of the u before
+    u[1:] += tail
+    u[1:] = u[:2]  # reads what it changes
+    for i in range(n):
+        row = memory[i, 2:]
+        shift(row, Pair(s[i], u[i]))
+        u[i] += filtered(s[i], i, memory[:, 1])
+        u[i] += 1e-2 * (row[0] - row[-1]) * pair[i % 2]
+    kept[:] = 0.5 * kept + u
+    memory[1:, 0] = memory[:2, 0] + kept[1:]
+    bottom = table[1:]
+    bottom[0] = s
+    bottom[1, 1:] = table[1, :-1]
+    shift(table[2], Pair(kept[1], q[0]))
+    for one in q:
+        u[-1] += 1e-2 * one
+    return u + 0.1 * table[1] - gains.k * table[2], kept
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("joint_laws")
@@ -105,6 +175,7 @@ def compiled(folder):
     laws = {name: template() for name, template in LAWS.items()} | {
         "with gains by joint": smc.law("passivity_based", K=[1.0, 2.0, 0.5], k=[0.3, 0.0, 0.1]),
         "turns": turns(k=[10.0, 20.0, 30.0]),
+        "parts": parts(),
     }
 
     def make(name: str):
@@ -153,7 +224,7 @@ def traces(compiled):
     return {name: [(next(found), next(found)) for _ in each] for name, each in pairs.items()}
 
 
-@pytest.mark.parametrize("name", [*LAWS, "with gains by joint", "turns"])
+@pytest.mark.parametrize("name", [*LAWS, "with gains by joint", "turns", "parts"])
 def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(traces, name):
     assert traces[name]
     for ours, theirs in traces[name]:
@@ -296,7 +367,7 @@ def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
 
 
 REFUSED = {
-    "u = memory[:, 0]\n    memory[:, 0] = s": "an array, which shares its numbers with another name: write .copy()",
+    "u = memory[:, 0]\n    u = memory[:, 1]\n    memory[:, 0] = s": "with another name: write .copy() behind it",
     "u = torque(y, s)\n    s[0] = 0.0": "an array, which shares its numbers with another name",
     "u = s\n    u += 1.0": "an array, which shares its numbers with another name",
     "u = y.M[0]; u[1] = 0.0": "an array, which shares its numbers",
@@ -306,8 +377,21 @@ REFUSED = {
     "u = np.full(3, 0.5)": "numpy's full has no translation into C",
     "u = s * math.gamma(s[0])": "gamma, which is not a Python function,",
     "u = y.M * s": "arrays of different shapes in one expression",
-    "u = s[1:]": "a part of an array",
-    "u = memory[0] * s": "a part of an array",
+    "u = s[1:]": "a result other than two vectors, u and s,",
+    "u = memory[0] * s": "arrays of different shapes in one expression",
+    "u = s[::2]": "a part of an array with a step",
+    "u = s[3:]": "an empty part of an array",
+    "u = s[: int(y.t)]": "a length that is not known before the law runs",
+    "u = s + (1.0, 2.0, 3.0)": "a tuple as a number",
+    "u = s + kept(s) * s[0]": "a call that changes an array which the rest of the line reads",
+    "u = s + both(s, s)": "a call that gets an array twice and changes it",
+    "w = np.zeros((3, 3))\n    u = y.x * kept(w[:, 1:])": "a part of a matrix, which a function changes,",
+    "u = s\n    u[0] = kept(y.x)": "an assignment to this, which is no array of the function's own,",
+    "u = s.copy()\n    w = u[:2]\n    u = u + 1.0\n    w[0] = 1.0": "an array, which shares its numbers",
+    "q = (1.0, y.x)\n    u = q[1]": "a tuple or an array of arrays, or of nothing,",
+    "q = s[0], s[1], s[2]\n    a, b = q\n    u = a * s": "2 names for 3 numbers",
+    "part(s)\n    u = s": "an array or a tuple that has no name",
+    "u = y.x * nothing(s)": "nothing(s) as a number",
     "u = s * s[3]": "an index outside -3 to 2",
     "u = s * memory[:, 8]": "it uses memory[:, 8], and its memory has 8 numbers: give memory=9",
     "u = np.zeros(int(y.t))": "a length that is not known before the law runs",
@@ -335,6 +419,9 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
         "from smc_mujoco.control import joint_law\n"
         "from smc_mujoco.control.joint_law import norm, torque\n"
         "def part(a):\n    b = a if a[0] > 0.0 else -a\n    return b\n"
+        "def kept(a):\n    a[0] = 1.0\n    return 2.0\n"
+        "def both(a, b):\n    return kept(a) + b[0]\n"
+        "def nothing(a):\n    a[0] = 1.0\n"
         "def position(y):\n    return y.x\n"
         "def moved(a):\n    a = a + 1.0\n    return a\n"
         "def around():\n    def inner(a):\n        return a\n"
