@@ -140,9 +140,16 @@ class Session:
         return self.batches[run].logs[0][: self.sample]
 
     def screen(self) -> mujoco.MjModel:
-        """Return the mechanism with the true parameters at the start, for the screen."""
+        """Return the mechanism with the true parameters at the start, for the screen.
+
+        Multisampling and ambient occlusion, which Studio reads from the model, are off: each would take a third of a
+        frame where a processor draws.
+        """
         scenario = self.scenarios[0].resolved
-        seen = compiled_for_runs(models.spec(scenario), 0)
+        spec = models.spec(scenario)
+        spec.visual.quality.offsamples = 0
+        spec.add_numeric(name="filament.ao.enabled", data=[0.0])
+        seen = compiled_for_runs(spec, 0)
         models.put_values(seen, seen, scenario, 0)
         mujoco.mj_setConst(seen, mujoco.MjData(seen))
         return seen

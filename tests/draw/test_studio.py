@@ -33,6 +33,7 @@ def test_a_browser_shows_the_machine(port, words):
                 page = play.chromium.launch(executable_path=BROWSER, args=SWITCHES).new_page()
                 page.goto(f"http://127.0.0.1:{port}/")
                 page.wait_for_timeout(8000)
+                fewer = page.evaluate("document.getElementById('canvas').width / innerWidth")
                 picture = np.asarray(Image.open(io.BytesIO(page.screenshot()))).astype(int)
         finally:
             view.send_signal(signal.SIGINT)
@@ -40,3 +41,4 @@ def test_a_browser_shows_the_machine(port, words):
     assert view.returncode == 0, said
     assert "Traceback" not in said
     assert picture.std() > 20  # not one colour
+    assert fewer == 0.6  # a processor draws
