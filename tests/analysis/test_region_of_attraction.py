@@ -4,7 +4,6 @@ import dataclasses
 import importlib
 import math
 import re
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -335,10 +334,3 @@ def test_the_command_prints_the_share_and_writes_what_it_is_asked_for(tmp_path, 
     made = maps.load(tmp_path / "a.json")
     assert (made.plant, share) == ("duffing", f"{100.0 * np.mean(made.outcome == CONVERGES):.3g}")
     assert (tmp_path / "a.png").exists()
-
-
-def test_the_command_refuses_a_file_it_cannot_write_before_it_runs(monkeypatch):
-    monkeypatch.setattr(maps, "basin", lambda *a, **k: pytest.fail("it ran"))
-    for option in ({"out": Path("map.gif")}, {"json": Path("map.txt")}):
-        with pytest.raises(smc.ScenarioError, match="end the name in"):
-            command("duffing", **option)

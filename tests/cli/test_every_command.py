@@ -103,6 +103,7 @@ FLAGS = {"--no-film", "--no-repeat", "--no-browser", "--no-tune", "--worst", "--
 FLAGS |= {"--no-binary"}
 SWITCHES = {"--rig", "--needs", "--plant"}  # which function does the work; --needs and --plant of `list`
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
+FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {  # option -> arguments that it may change, besides the one of its name
     "--law": "laws scenario scenarios", "--condition": "conditions scenario", "--x0": "starts scenarios",
     "--seed": "scene scenario", "--seeds": "scenarios", "--duration": "scenario scenarios", "--gains": "law scenario",
@@ -198,6 +199,23 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
         for piece in re.split(r"[,=:()]|--flag", " ".join(words[start + 1 : stop])):
             plain = piece.removesuffix(".json").replace("_", "-")
             assert plain in value or mine[0] in UNTOLD or plain == "all", (option, piece, value)
+
+
+FILES = {
+    line: [word for word in line.split() if word in AFTER and not (word == "--out" and line.split()[0] in FOLDERS)]
+    for line in CALLS
+}
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(("line", "option"), [(line, option) for line, its in FILES.items() for option in its])
+def test_a_file_of_another_kind_is_refused_before_the_work(line, option, capsys):
+    words = line.split()
+    words[words.index(option) + 1] = "a.gif"
+    with pytest.raises(SystemExit) as end:
+        reached(words, CALLS[line])
+    assert end.value.code == 2
+    assert "'a.gif': end the name in" in capsys.readouterr().err
 
 
 def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:

@@ -519,13 +519,6 @@ def test_its_table_fits_into_80_columns_with_three_needs(advice, folder):
     assert f"{number(interval.low)}–{number(interval.high)}" in capture.getvalue()
 
 
-def test_the_command_says_in_one_sentence_what_is_wrong(capsys):
-    with pytest.raises(SystemExit) as end:
-        main.main(["which", "duffing", "--needs", "quick"])
-    assert end.value.code == 2
-    assert len(capsys.readouterr().err.splitlines()) == 1
-
-
 def test_every_answer_begins_with_a_law_or_with_why_there_is_none_and_its_table_has_a_place_for_each(advice):
     """With made-up scores of the same runs."""
     traded = with_cells(advice, observer_free=[1, 1, 9.9, 9.9], slow=[2, 2, 3, 8], classical=[4, 4, 9, 9])

@@ -106,6 +106,7 @@ def compare(
     Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex arm.tex
     """
     with delay_ctrl_c():
+        from smc_mujoco.common.files import with_ending
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
 
@@ -119,6 +120,7 @@ def compare(
             terminal,
         )  # fmt: skip
         return
+    latex = latex and with_ending(latex, ".tex")
     options.check_files(None, latex, *files(figure))
     machines = options.names(plants)
     comparison = run(
