@@ -3,6 +3,7 @@
 as_plant("duffing")
 as_plant("arm.xml:shoulder,elbow")
 as_plant("cart.urdf:slider(motor,partner=pole,u_max=20,x0=0.5)")
+as_plant("drone.xml:body@hover")
 """
 
 import dataclasses
@@ -13,7 +14,9 @@ from typing import Any
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.mechanisms.plant import Plant, plant
 
-MODEL = re.compile(r"(?P<path>.*\.(xml|mjcf|urdf))(?::(?P<joints>.*))?", re.DOTALL | re.IGNORECASE)
+MODEL = re.compile(
+    r"(?P<path>.*\.(xml|mjcf|urdf))(?::(?P<joints>.*?)(?:@(?P<keyframe>[^@()]*))?)?", re.DOTALL | re.IGNORECASE
+)
 BETWEEN_JOINTS = re.compile(r"[+,](?![^(]*\))")
 JOINT = re.compile(r"\s*(?P<joint>[^(]*?)\s*(?:\((?P<fields>.*)\))?\s*", re.DOTALL)
 
@@ -35,7 +38,7 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
 
     A comma or a plus sign is between the joints: plants are separated by commas on the command line. Fields of a
     `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2). The law of a channel and its reference are those
-    of the scenario.
+    of the scenario. The keyframe of the start is last, after @.
     """
     if not (model := MODEL.fullmatch(text)):
         if set(text) & set(":./\\"):
@@ -50,6 +53,8 @@ def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     channels = dict(map(_channel, joints))
     if len(channels) < len(joints):
         raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
+    if model["keyframe"] is not None:
+        values = {"keyframe": model["keyframe"].strip()} | values
     return plant_from(folder / path, channels, **values)
 
 

@@ -20,7 +20,11 @@ SWITCHES = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enab
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium: apt-get install chromium")
 @pytest.mark.parametrize(
     ("port", "words"),
-    [(8123, "duffing --law super_twisting,pid"), (8124, "pendulum_network"), (8125, "examples/quadrotor.xml:body")],
+    [
+        (8123, "duffing --law super_twisting,pid"),
+        (8124, "pendulum_network"),
+        (8125, "examples/quadrotor.xml:body@hover"),
+    ],
 )
 def test_a_browser_shows_the_machine(port, words):
     command = [sys.executable, "-m", "smc_mujoco", "view", *words.split(), "--port", str(port), "--no-browser"]

@@ -117,8 +117,8 @@ PlantName = Annotated[
     typer.Argument(
         metavar="PLANT",
         autocompletion=PLANTS,
-        help="A plant from `smc-mujoco list`, or yours, a .xml or .urdf: FILE.xml:joint+joint, where a joint may be "
-        '"joint(motor,partner=pole,u_max=9,x0=0.2)".',
+        help="A plant from `smc-mujoco list`, or yours, a .xml or .urdf: FILE.xml:joint+joint@keyframe, where a joint "
+        'may be "joint(motor,partner=pole,u_max=9,x0=0.2)".',
     ),
 ]
 Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]

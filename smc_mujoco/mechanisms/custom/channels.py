@@ -5,6 +5,7 @@ A motor of gear 1 replaces the actuator that drives a channel's joint.
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -12,7 +13,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.constraints import Bound, Flag, Number, constrain
-from smc_mujoco.common.errors import ScenarioError, find, items_of, shown
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, items_of, shown, users_stacklevel
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import Range
@@ -26,6 +27,7 @@ SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaul
 ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # transmissions to one joint
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
+FLIES = 4  # independent forces and torques that hold a heading: a thrust, and a torque about each axis
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
 
@@ -195,10 +197,14 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
     return (reached[0],) * 3 + tuple(reached[1:])
 
 
-def held_pose(model: mujoco.MjModel, joint: str) -> Literal["all", "heading"]:
-    """Return what of its pose a free body can hold, as in `Plant.pose`."""
+def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "heading"]:
+    """Return what of its pose a free body can hold, as in `Plant.pose`; warn if that is less than its heading."""
     forces = exerted(model, model.joint(joint).id, thrusters(model, joint))
-    return "all" if np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max()) == len(PLACES) else "heading"
+    rank = np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max())
+    if rank < FLIES:
+        text = f"the actuators of {label} give {rank} independent forces and torques, and {FLIES} are to hold a heading"
+        warnings.warn(f"{text}: give them other places, or gears of other signs", ScenarioWarning, users_stacklevel())
+    return "all" if rank == len(PLACES) else "heading"
 
 
 def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> tuple[float, ...]:

@@ -60,18 +60,23 @@ class Source:
         return f"{(roots and roots[0].get('model')) or 'model'}.xml"
 
     def read(self) -> mujoco.MjSpec:
-        """Return the model as an editable MjSpec."""
+        """Return the model as an editable MjSpec. A free joint without a name has that of its body."""
         try:
             if not self.path:
                 included = {name: content for name, content in self.assets if name.lower().endswith(XML)}
-                return mujoco.MjSpec.from_string(self.text, include=included or None, assets=dict(self.assets))
-            spec = (
-                _of_urdf(Path(self.path)) if self.path.lower().endswith(".urdf") else mujoco.MjSpec.from_file(self.path)
-            )
+                spec = mujoco.MjSpec.from_string(self.text, include=included or None, assets=dict(self.assets))
+            elif self.path.lower().endswith(".urdf"):
+                spec = _of_urdf(Path(self.path))
+            else:
+                spec = mujoco.MjSpec.from_file(self.path)
         except ValueError as error:
             raise broken(self.path or self.label, str(error)) from None
-        if digest(Path(self.path)) != self.sha256:
+        if self.path and digest(Path(self.path)) != self.sha256:
             raise ScenarioError(f"{self.path}, or a file that it names, has changed: call smc.plant_from again")
+        taken = {joint.name for joint in spec.joints}
+        for joint in spec.joints:
+            if joint.type == mujoco.mjtJoint.mjJNT_FREE and not joint.name and joint.parent.name not in taken:
+                joint.name = joint.parent.name
         return spec
 
     def compiled(self, spec: mujoco.MjSpec) -> mujoco.MjModel:

@@ -76,9 +76,10 @@ class UserModel:
 
     @property
     def argument(self) -> str:
-        """The model as written on the command line, such as arm.xml:shoulder+elbow."""
+        """The model as written on the command line, such as arm.xml:shoulder+elbow@home."""
         path = os.path.relpath(self.source.path) if self.source.path else "FILE.xml"
-        return f"{path}:{'+'.join(own.as_text(joint, channel) for joint, channel in self.channels)}"
+        joints = "+".join(own.as_text(joint, channel) for joint, channel in self.channels)
+        return f"{path}:{joints}{'' if self.keyframe is None else '@' + self.keyframe}"
 
     def about(self) -> dict:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
@@ -122,7 +123,7 @@ def plant_from(
     Args:
       path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
       channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of joints' names. The
-        plant's channels have the same order.
+        plant's channels have the same order. A free joint without a name has that of its body.
       name: name of the plant, and title of its pictures; default: the file's, with the model's own name as the title.
       keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
         unless the scenario has a v0.
@@ -190,7 +191,7 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
         rest=x0 if pose else (),
         n=len(x0),
         sizes=(len(x0), len(x0)),
-        pose=own.held_pose(model, joints[0]) if pose else "",
+        pose=own.held_pose(label, model, joints[0]) if pose else "",
         build=build,
         fields=fields,
         nominal=without_model if why_not else NominalModel(build, fields),

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import mujoco
 import numpy as np
@@ -13,11 +14,12 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.evaluator import Ended, Evaluator
 from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.common.errors import ScenarioError
+from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.common.files import shipped
 from smc_mujoco.control.attitude import of_thrust
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.mechanisms import rotation
+from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.simulation.conditions import applicable, find_condition
 from smc_mujoco.simulation.python_controller import Controller
 
@@ -204,6 +206,28 @@ def test_a_model_with_thrust_and_moments_of_either_sign_holds_a_pose():
     assert trace.failure is None
     assert np.abs(trace.e[-1]).max() < 1e-3
     assert trace.applied[:, 4:].max() == 0.0
+
+
+@pytest.mark.parametrize("text", [TEXT, TEXT.replace('<freejoint name="body"/>', "<freejoint/>")])
+def test_a_text_names_a_keyframe_and_a_free_joint_without_a_name_has_its_bodys(text, tmp_path):
+    text = text.replace('qpos="0 0 1 1 0 0 0"', 'qpos="0 0 2 1 0 0 0"')
+    (tmp_path / "mine.xml").write_text(text)
+    joint = "body" if 'name="body"' in text else "drone"
+    written = f"{tmp_path}/mine.xml:{joint}@hover"
+    plant = as_plant(written)
+    assert plant.x0 == (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+    assert as_plant(plant.argument).x0 == plant.x0
+    assert as_plant(written.removesuffix("@hover")).x0[2] == 1.0
+    with pytest.raises(ScenarioError, match=r"keyframe of mine.xml 'hver'"):
+        as_plant(written.replace("hover", "hver"))
+
+
+def test_rotors_that_turn_a_body_about_two_axes_only_together_are_told():
+    """The signs of MuJoCo Menagerie's Skydio X2: rotors on one side turn alike."""
+    swapped = re.sub(r'(gear="0 0 1 0 0 )-?([.0-9]+)"', r'\1\2"', TEXT)
+    assert swapped != TEXT
+    with pytest.warns(ScenarioWarning, match="3 independent .* gears of other signs"):
+        smc.plant_from(swapped, channels=["body"], name="alike")
 
 
 THRUSTERS = """<mujoco><option gravity="0 0 0"/><worldbody><body name="b"><freejoint name="floats"/>
