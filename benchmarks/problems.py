@@ -11,8 +11,8 @@
     python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's plants, `measure
-controls` the controls on all problems; ten minutes of processor time each. They and `enter` go on where they were
-stopped. `smc-mujoco site` shows the results of `enter`.
+controls` the controls on all problems; ten minutes of processor time each. With `--version 2` they and `freeze` are of the rules
+of flight, where levels come from no law. They and `enter` go on where they were stopped. `smc-mujoco site` shows the results of `enter`.
 """
 
 import argparse
@@ -47,16 +47,16 @@ BOARDS = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "cal
 Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURES)
 
 
-def cells(version: int = 1) -> list[str]:
-    """List the problems of a version."""
-    return [f"{cell}@{version}" for cell in problems.cells(version)]
+def cells(*versions: int) -> list[str]:
+    """List the problems of some versions; without any, of all."""
+    return [f"{cell}@{v}" for v in versions or map(int, problems.versions()) for cell in problems.cells(v)]
 
 
 def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
     """Return the laws to run on a problem, by name."""
     if kind == "controls":
         oracles = {f"oracle {w:g} {share:g}": controls.oracle_of(one.plant, w, share) for w, share in one.oracles}
-        return {"zero": controls.zero()} | oracles
+        return {"zero": controls.zero(one.plant)} | oracles
     plant = find_plant(one.plant)
     return {law: gain_sets.law(plant, law) for law in gain_sets.general() if gain_sets.in_set(plant, law, "tuned")}
 
@@ -65,6 +65,7 @@ def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[s
     """Run laws or controls on some problems, and write their measures."""
     done: dict = json.loads(out.read_text()) if out.exists() else {"number": number, "runs": {}}
     number, runs = done["number"], done["runs"]
+    out.write_text(json.dumps(done))
     for name in (name for name in names if name not in runs):
         plant, condition, version = str(name).replace("@", "/").split("/")
         text = (problems.RULES / f"{version}.toml").read_text(encoding="utf-8")  # as problem(), also where left out
@@ -132,9 +133,10 @@ def targets(
     return found | {"oracle": setting}
 
 
-def repeat(folder: Path, names: Sequence[str]) -> bool:
-    """Run all that the targets of problems were frozen from, and tell whether they are those of the rules."""
-    rules = problems.rules(1)
+def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
+    """Run all that the targets of a version's problems were frozen from. Return whether they are those of its rules."""
+    rules = problems.rules(version)
+    folder.mkdir(parents=True, exist_ok=True)
     measure("laws", folder / "laws.json", "", INSTANCES, names)
     measure("controls", folder / "controls.json", rules["frozen"]["number"], CONTROLLED, names)
     measure("controls", folder / "seen.json", "", rules["visible"], names)
@@ -194,27 +196,27 @@ def hold(number: str, instances: int | None) -> bool:
     return not failing
 
 
-def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str) -> None:
+def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str, version: int) -> None:
     """Write targets and what is left out below the mark in the rules."""
-    path = problems.RULES / "1.toml"
+    path = problems.RULES / f"{version}.toml"
     lines, left_out = ["[targets]"], []
-    for name in cells():
+    for name in cells(version):
         if (found := targets(name, visible.get(name, {}), of_controls[name], seen[name])) is None:
             left_out.append(name.partition("@")[0])
             continue
         texts = [f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]" for m in problems.MEASURES]
         lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]} }}')
-    write_suites(left_out)
+    write_suites(left_out, version)
     text = path.read_text().partition(MARK)[0] + MARK
     head = f'[frozen]\nnumber = "{number}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
     path.write_text(text + head + "\n".join(lines) + "\n")
     print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
 
 
-def write_suites(left_out: Sequence[str]) -> None:
-    """Write the lists of the suites, without the problems that are left out."""
-    every = [name for name in cells() if name.partition("@")[0] not in left_out]
-    lists = {
+def write_suites(left_out: Sequence[str], version: int) -> None:
+    """Write the lists of a version's suites, without the problems that are left out."""
+    every = [name for name in cells(version) if name.partition("@")[0] not in left_out]
+    lists = {"smc-flight@2": ("A quadrotor.", every)} if version == 2 else {
         "smc-30@1": ("Those that the pattern of version 1 chooses, 3 of 5, see suite.py.", suite.pattern(1, 3)),
         "smc-50@1": ("All problems of the pattern's plants and conditions.", suite.pattern(1, 5)),
         "smc-arm@1": ("The arm of two links.", [name for name in every if name.startswith("double_pendulum")]),
@@ -264,10 +266,12 @@ def parser() -> argparse.ArgumentParser:
     measured.add_argument("out", type=Path)
     measured.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
     measured.add_argument("--instances", type=int, default=INSTANCES)
+    measured.add_argument("--version", type=int, default=1, help="of the rules; default 1")
     for name, files in (("freeze", ("visible", "controls", "seen")), ("agree", ("visible", "hidden"))):
         command = commands.add_parser(name)
         for file in files:
             command.add_argument(file, type=Path)
+        command.add_argument("--version", type=int, default=1, help="of the rules; default 1")
     held = commands.add_parser("hold")
     held.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
     held.add_argument("--instances", type=int, help="of each problem; default: all visible ones")
@@ -284,15 +288,19 @@ if __name__ == "__main__":
         number = secrets.token_hex(32)
         print(f"number {number}", file=sys.stderr)
     if given.command == "measure":
-        measure(given.kind, given.out, number, given.instances, cells())
+        measure(given.kind, given.out, number, given.instances, cells(given.version))
     elif given.command == "hold":
         sys.exit(not hold(number, given.instances))
     elif given.command == "repeat":
-        given.folder.mkdir(parents=True, exist_ok=True)
-        sys.exit(not repeat(given.folder, given.problems or cells()))
+        named, same = given.problems or cells(), []
+        for version in map(int, problems.versions()):
+            if its := [name for name in named if name in cells(version)]:
+                same.append(repeat(given.folder / str(version), its, version))
+        sys.exit(not all(same))
     elif given.command == "freeze":
         controlled, seen = read(given.controls), read(given.seen)
-        freeze(read(given.visible), controlled, seen, json.loads(given.controls.read_text())["number"])
+        number = json.loads(given.controls.read_text())["number"]
+        freeze(read(given.visible), controlled, seen, number, given.version)
     elif given.command == "enter":
         enter_all(given.results)
     else:

@@ -1,6 +1,6 @@
 """Controls of the problems: laws that are no entries.
 
-- zero: u = 0. It must reach no target of any problem.
+- zero: u = 0, or of a quadrotor its weight, so that it stays in the air. It must reach no target of any problem.
 - oracle: it is handed the state, and f and g of x'' = f + g u with the true parameters and with all other forces in f
   (a scenario's model "true"). It must reach every target. With a = g limit - |f - r''| the acceleration that is left,
   it goes to its goal on the parabola de^2 = 2 share a |e|, and near it as a critically damped pole of frequency w:
@@ -13,13 +13,19 @@
 
   Where a joint without an actuator moves with it, near upright q'' = b (x'' - fall q) with b = gq / g, and x'' is the
   state feedback that puts all four poles at -w (F. J. Ackermann, Regelungstechnik 20:297, 1972).
+
+  That of flight is in oracle_flight.py.
 """
 
+import dataclasses
 import math
-from typing import Any
 
+import numpy as np
+
+from smc_mujoco.benchmark.oracle_flight import knowing, oracle_flight
 from smc_mujoco.control.from_text import law
-from smc_mujoco.control.law import Law, law_function
+from smc_mujoco.control.law import FREE_BODY, Law, law_function
+from smc_mujoco.simulation.scenario import Scenario
 
 FALL = {
     "cart_pole": 9.81,
@@ -50,21 +56,38 @@ def oracle_pair(y, gains, memory):
     return (y.ddr - y.f + s) / y.g, s
 
 
+@law_function(joint=True, requires_model=True, plants=(FREE_BODY,))
+def hover(y, gains, memory):
+    """Return the weight, and the error."""
+    u = np.zeros(6)
+    u[:3] = y.h[:3]
+    return u, y.e
+
+
+ORACLES = oracle.function, oracle_pair.function, oracle_flight.function
+
+
 def oracle_of(plant: str, w: float, share: float) -> Law:
-    """Return the oracle for a plant; that of a pair of joints has no share."""
+    """Return the oracle for a plant; that of a pair of joints has no share, and that of flight a time in its place."""
+    if plant == "quadrotor":
+        return oracle_flight(w=w, move=share)
     return oracle_pair(w=w, fall=FALL[plant]) if plant in FALL else oracle(w=w, share=share)
 
 
-def zero() -> Law:
-    """Return u = 0."""
-    return law("none").named("zero")
+def zero(plant: str) -> Law:
+    """Return the law for a plant that does nothing."""
+    return (hover() if plant == "quadrotor" else law("none")).named("zero")
 
 
 def is_oracle(one: Law) -> bool:
     """Return whether a law is an oracle, under any name, which no entry may be."""
-    return any(part.function in (oracle.function, oracle_pair.function) for part in one.parts)
+    return any(part.function in ORACLES for part in one.parts)
 
 
-def truth() -> dict[str, Any]:
-    """Return the fields of a scenario that hand the oracle the truth."""
-    return {"model": "true", "noise": None, "sensor": None, "velocity": None}
+def told(scenario: Scenario) -> Scenario:
+    """Return a scenario that hands the truth to an oracle; the same scenario under any other law."""
+    if not is_oracle(scenario.law):
+        return scenario
+    if scenario.plant.pose:
+        return knowing(scenario)
+    return dataclasses.replace(scenario, model="true", noise=None, sensor=None, velocity=None)

@@ -29,7 +29,8 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law, known_laws
 from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.metrics import conventions
-from smc_mujoco.simulation.grid import case
+from smc_mujoco.simulation.grid import Starts, case
+from smc_mujoco.simulation.model import mixer
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
@@ -41,6 +42,7 @@ STEP = 4096  # of the generator's counter from one instance to the next
 MAX_INSTANCE = 10**9  # chosen
 MEASURES = "accuracy", "settling", "calm"  # that have targets
 FACTORS = "mass", "disturbance"
+SIZES = "sigma", "amplitude", "x", "y", "z", "w20"  # fields of a disturbance that scale it
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -74,13 +76,13 @@ class Problem:
     def _values(self) -> Mapping[str, Any]:
         """The rules' values for the plant and the condition."""
         of = rules(self.version)
-        of_plant = of["more"].get(self.plant, {}) | of["special"].get(self.plant, {})
+        of_plant = of["more"].get(self.plant, {}) | of.get("special", {}).get(self.plant, {})
         return of | of_plant | (of["worst"] if self._attacked else {})
 
     @property
     def _attacked(self) -> bool:
         """Whether an adversary chooses the runs of each law."""
-        return self.condition in rules(self.version)["worst"]["conditions"]
+        return self.condition in _attacks(self.version)
 
     @functools.cached_property
     def _frozen(self) -> Mapping[str, Any]:
@@ -88,9 +90,9 @@ class Problem:
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
 
     @property
-    def u_max(self) -> float:
-        """Bound on |u|, N or N m."""
-        return self._values["u_max"]
+    def u_max(self) -> float | None:
+        """Bound on |u|, N or N m; None: what the plant's actuators give."""
+        return self._values.get("u_max")
 
     @property
     def duration(self) -> float:
@@ -99,7 +101,7 @@ class Problem:
 
     @property
     def oracles(self) -> tuple[tuple[float, float], ...]:
-        """The bandwidths, rad/s, and shares from which the oracle's are chosen."""
+        """The bandwidths, rad/s, and shares, or times of its move, from which the oracle's are chosen."""
         return tuple(itertools.product(self._values["bandwidths"], self._values["shares"]))
 
     @property
@@ -113,7 +115,7 @@ class Problem:
     @property
     def controls(self) -> dict[str, Law]:
         """The laws of the controls: "zero", which reaches no target, and "oracle", which reaches all."""
-        return {"zero": controls.zero(), "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"])}
+        return {"zero": controls.zero(self.plant), "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"])}
 
     def instance(self, index: int, number: str = "") -> Instance:
         """Return what an instance has drawn; `number` as in `scenarios`."""
@@ -153,21 +155,24 @@ class Problem:
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
             law = gain_sets.law(self.plant, law) if shipped else gain_sets.law(self.plant, law, "default")
         changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
-        base = case(self.plant, law, "nominal" if self._attacked else self.condition, self.duration, changes=changes)
-        return dataclasses.replace(base, **controls.truth()) if controls.is_oracle(base.law) else base
+        text = self._values.get("texts", {}).get(self.condition, "")
+        condition = "nominal" if self._attacked else f"{self.condition}: {text}" if text else self.condition
+        return case(self.plant, law, condition, self.duration, starts=Starts(spread=0.0), changes=changes)
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
         """Return the scenario of an instance."""
         plant, resolved, force = base.plant, base.resolved, drawn.disturbance * self._values.get("scale", 1.0)
-        mismatch = dict(base.mismatch)
+        mismatch = {name: value * (force if name in plant.added else 1.0) for name, value in base.mismatch.items()}
         mismatch["mass"] = drawn.mass * mismatch.pop("mass", mismatch.pop(plant.mass, 1.0))
+        rest = plant.rest or (-0.0,) * plant.n  # to which a number is added without a change of a bit
         scenario = dataclasses.replace(
             base,
-            x0=[drawn.side * drawn.start * x for x in resolved.x0],
+            x0=[r + drawn.side * drawn.start * (x - r) for x, r in zip(resolved.x0, rest, strict=True)],
             mismatch=mismatch,
             disturbance=[_scaled(signal, force) for signal in base.disturbance],
             seed=drawn.seed,
         )
+        scenario = controls.told(scenario)
         return (self._worst(scenario) if self._attacked else scenario).named(self.condition)
 
     def _worst(self, scenario: Scenario) -> Scenario:
@@ -176,8 +181,9 @@ class Problem:
         from smc_mujoco.studies.worst_case import worst_case
 
         within = Uncertainty(**self._values["conditions"][self.condition])
-        found = worst_case(scenario, within=within, budget=self._values["budget"], seed=scenario.seed).scenario
-        return dataclasses.replace(found, **controls.truth()) if controls.is_oracle(scenario.law) else found
+        return controls.told(
+            worst_case(scenario, within=within, budget=self._values["budget"], seed=scenario.seed).scenario
+        )
 
     def measures(self, trace: Trace) -> dict[str, float]:
         """Return the measures of a run, and the time from which each target is reached and kept, s (NaN for never).
@@ -194,8 +200,10 @@ class Problem:
         relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
-        driven = trace.scenario.plant.driven
-        variation = np.abs(np.diff(trace.u[:, :driven], axis=0)).sum(axis=0) / np.array(trace.scenario.limits[:driven])
+        plant = trace.scenario.plant
+        bounds = mixer(plant)[:, -1] if plant.pose else np.array(trace.scenario.limits[: plant.driven])
+        commands = (trace.applied if plant.pose else trace.u)[:, : len(bounds)]  # of a free body, of its actuators
+        variation = np.abs(np.diff(commands, axis=0)).sum(axis=0) / bounds
         values = {
             "failed": 0.0,
             "accuracy": max(float(worst[conventions.last_part(trace)].max()), self._values["floor"]),
@@ -244,10 +252,16 @@ def problem(name: str) -> Problem:
 def cells(version: int) -> list[str]:
     """List every plant/condition of the rules, also those that are left out."""
     of = rules(version)
-    each: dict[str, list[str]] = {plant: of["conditions"] for plant in of["plants"]}  # noqa: C420
+    plants = of.get("plants", [])
+    each: dict[str, list[str]] = {plant: of["conditions"] for plant in plants}
     each |= {plant: fields["conditions"] for plant, fields in of["more"].items()}
     of_each = [f"{plant}/{condition}" for plant, conditions in each.items() for condition in conditions]
-    return of_each + [f"{plant}/{condition}" for plant in of["plants"] for condition in of["worst"]["conditions"]]
+    return of_each + [f"{plant}/{condition}" for plant in plants for condition in _attacks(version)]
+
+
+def _attacks(version: int) -> Mapping[str, Any]:
+    """Return the conditions in which an adversary chooses the runs of each law."""
+    return rules(version).get("worst", {}).get("conditions", {})
 
 
 def versions() -> tuple[str, ...]:
@@ -275,8 +289,8 @@ def _number(number: object) -> str:
 
 def _scaled(signal: Any, factor: float) -> Any:
     """Return a disturbance times a factor."""
-    name = "sigma" if hasattr(signal, "sigma") else "amplitude"
-    return dataclasses.replace(signal, **{name: factor * getattr(signal, name)})
+    sizes = [field.name for field in dataclasses.fields(signal) if field.name in SIZES]
+    return dataclasses.replace(signal, **{name: factor * getattr(signal, name) for name in sizes})
 
 
 def _kept(trace: Trace, error: np.ndarray, level: float) -> float:

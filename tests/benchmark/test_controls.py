@@ -52,8 +52,33 @@ def test_no_law_of_an_entry_is_told_anything():
     assert not controls.is_oracle(told())
 
 
-def test_an_entry_is_not_the_oracle(tmp_path):
-    code = "from smc_mujoco.benchmark import controls\n\nmine = controls.oracle(w=9.0)\n"
+@pytest.mark.parametrize(("name", "told"), [("geometric", False), ("oracle", True)])
+def test_the_oracle_of_flight_alone_knows_a_payload(name, told):
+    one = smc.problem("quadrotor/payload@2")
+    (scenario,) = one.scenarios(controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else name, [0])
+    payload = 0.006 * one.instance(0).disturbance
+    assert (scenario.plant.parameters["payload"], scenario.mismatch.get("payload")) == (
+        (payload, None) if told else (0.0, payload)
+    )
+
+
+def test_the_oracle_of_flight_leaves_no_error_behind_a_rotor_that_fades():
+    """A fading rotor's torque is what its feedback alone, without an integral, would not take."""
+    one = smc.problem("quadrotor/fading_rotor@2")
+    for trace in smc.run(one.scenarios(controls.oracle_of("quadrotor", 8.0, 1.5), [0, 3])):
+        assert one.measures(trace)["accuracy"] == 1e-6
+
+
+def test_who_does_nothing_holds_a_quadrotor_in_the_air():
+    """So that it fails for want of feedback, not because it falls."""
+    (scenario,) = smc.problem("quadrotor/slow_rotors@2").scenarios(controls.zero("quadrotor"), [0])
+    trace = smc.run(scenario)
+    np.testing.assert_allclose(trace.e, trace.e[0] * np.ones((len(trace.t), 1)), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", ["oracle(w=9.0)", "oracle_of('quadrotor', 9.0, 1.5)"])
+def test_an_entry_is_not_the_oracle(law, tmp_path):
+    code = f"from smc_mujoco.benchmark import controls\n\nmine = controls.{law}\n"
     (tmp_path / "law.py").write_text(code)
     about = {"name": "mine", "source": "here", "licence": "MIT", "division": "one set"}
     lines = [f'{key} = "{value}"' for key, value in about.items()]

@@ -58,6 +58,29 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
     assert heavy.mismatch == {"mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)}
 
 
+@pytest.mark.parametrize(("condition", "fields"), [
+    ("wind", lambda k: {"disturbance": (smc.signals.Wind(3.0 * k),)}),
+    ("turbulence", lambda k: {"disturbance": (smc.signals.Wind(3.0 * k), smc.signals.Dryden(7.7 * k, speed=3.0))}),
+    ("payload", lambda k: {"mismatch": {"payload": 0.006 * k, "mass": 1.0}}),
+    ("slow_rotors", lambda k: {"mismatch": {"rise": 0.625, "fall": 0.625, "mass": 1.0}}),
+])  # fmt: skip
+def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_from_the_place_of_rest(condition, fields):
+    one = smc.problem(f"quadrotor/{condition}@2")
+    drawn, (scenario,) = one.instance(3), one.scenarios("geometric", [3])
+    far = 0.2 * drawn.side * drawn.start
+    assert scenario.x0 == pytest.approx((far, -far, 1.0 - far, 0.0, 0.0, 2.0 * far), abs=1e-15)
+    assert {name: getattr(scenario, name) for name in fields(1.0)} == fields(drawn.disturbance)
+    assert (scenario.limits, scenario.samples) == (smc.plant("quadrotor").limits, 6000)
+
+
+def test_calm_of_flight_is_of_the_rotors_commands():
+    one = smc.problem("quadrotor/wind@2")
+    whole = smc.run(one.scenarios("geometric", [0])[0])
+    applied = np.zeros_like(whole.applied)
+    applied[::2, 2], applied[::2, 5] = 0.06, 1.0  # half of a rotor's bound; of the last channel there is no rotor
+    assert one.measures(dataclasses.replace(whole, applied=applied))["calm"] == pytest.approx(6000 * 0.5 / 6.0)
+
+
 def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains():
     one = smc.problem("duffing/noise@1")
     visible = one.scenarios("pid")
