@@ -253,9 +253,8 @@ def cells(version: int) -> list[str]:
     """List every plant/condition of the rules, also those that are left out."""
     of = rules(version)
     plants = of.get("plants", [])
-    each: dict[str, list[str]] = {plant: of["conditions"] for plant in plants}
-    each |= {plant: fields["conditions"] for plant, fields in of["more"].items()}
-    of_each = [f"{plant}/{condition}" for plant, conditions in each.items() for condition in conditions]
+    each = [*((plant, of) for plant in plants), *of["more"].items()]
+    of_each = [f"{plant}/{condition}" for plant, fields in each for condition in fields["conditions"]]
     return of_each + [f"{plant}/{condition}" for plant in plants for condition in _attacks(version)]
 
 
