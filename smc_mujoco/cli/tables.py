@@ -17,7 +17,7 @@ from smc_mujoco.common.catalogue import Catalogue
 from smc_mujoco.common.text import number
 from smc_mujoco.control.source import in_words
 from smc_mujoco.draw import style
-from smc_mujoco.mechanisms.hardware.part import joints
+from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.metrics.catalogue import scores as metric_scores
 from smc_mujoco.metrics.conventions import CATALOGUE, Group, Metric, groups
@@ -160,7 +160,7 @@ def headings(scenario: Scenario) -> dict[Group, str]:
     of_plant = groups(scenario)
     if len(of_plant) == 1:
         return {of_plant[0]: ""}
-    names = [joint.name for joint in joints(scenario.plant.spec())]
+    names = joint_names(scenario.plant)
     titles = {}
     for group in of_plant:
         n = len(group.channels)

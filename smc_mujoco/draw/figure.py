@@ -141,7 +141,7 @@ def _composed_page(
     shown = (quantity for name, quantity in TIME_PANELS.items() if name in chosen)
     overview = _by_joint([panel for quantity in shown for panel in drawing.over_groups(early, quantity)])
     errors = drawing.worst_first(early) if "channels" in chosen else []
-    worst, *others = [*map(_spark_row, errors)] or [[]]
+    worst, *others = _spark_rows(errors, early) or [[]]
     overview, sparks = [*worst, *overview], others[:MAX_SPARKS]
     sparks.sort(key=lambda row: row[0].channel or 0)
     groups = [Panel("x", *each) for each in style.split(traces).items()]
@@ -287,9 +287,14 @@ def _equal_ranges(frame: Axes, rows: Sequence[tuple[Axes, Panel, Sequence[str]]]
     frame.tick_params(labelcolor="none", length=0)  # invisible numbers, which keep its label beside those of the rows
 
 
-def _spark_row(error: Panel) -> list[Panel]:
-    """Return the panels of a channel: its error, and its u if it is driven."""
-    return [error, *[error._replace(quantity="u")] * error.group.driven]
+def _spark_rows(errors: Sequence[Panel], traces: Sequence[Trace]) -> list[list[Panel]]:
+    """Return the panels of each channel: its error, and its u if it is driven; on a free body that of an actuator."""
+    plant = traces[0].scenario.plant
+    if not plant.pose:
+        return [[error, *[error._replace(quantity="u")] * error.group.driven] for error in errors]
+    places = (plant.judged.index(error.channel or 0) for error in errors)
+    of_actuators = drawing.actuators(traces) if errors else []
+    return [[error, *of_actuators[k : k + 1]] for error, k in zip(errors, places, strict=True)]
 
 
 def _draw_sparks(page, cell: SubplotSpec, sparks: Sequence[Sequence[Panel]], runs: Runs, channels: int) -> None:

@@ -162,6 +162,17 @@ def by_channel(panel: Panel) -> list[Panel]:
     return panels
 
 
+def actuators(traces: Sequence[Trace]) -> list[Panel]:
+    """Return a panel of the force of each actuator of a free body, in their order, of those that push at all."""
+    group, parts = next(iter(style.split(traces).items()))
+    panels = []
+    for j in np.flatnonzero(np.any([np.nan_to_num(part.u).any(axis=0) for part in parts], axis=0)).tolist():
+        one, first = (dataclasses.replace(group, channels=(i,)) for i in (j, 0))
+        of = [dataclasses.replace(group_trace(part, first), u=part.u[:, j : j + 1]) for part in parts]
+        panels.append(Panel("u", one, of, j))
+    return panels
+
+
 def strip(traces: Sequence[Trace]) -> list[Panel]:
     """Return the panels below a film, from left to right: x of each group of channels, the error, u of driven ones.
 

@@ -402,8 +402,7 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
     traces = smc.run([smc.Scenario(plant="quadrotor", law=law, duration=0.1) for law in ("geometric", "cascaded_pid")])
     labels = [panel.label for panel in panels.worst_first(traces)]
     assert sorted(labels) == ["body_rz e (rad)", "body_x e (m)", "body_y e (m)", "body_z e (m)"]
-    group, parts = next(iter(style.split(traces).items()))
-    shown = panels.by_channel(panels.Panel("u", group, parts))
-    assert [panel.label for panel in shown] == [f"actuator {i} u (N)" for i in (1, 2, 3)]
+    shown = panels.actuators(traces)
+    assert [panel.label for panel in shown] == [f"actuator {i} u (N)" for i in (1, 2, 3, 4)]
     for i, panel in enumerate(shown):
         np.testing.assert_array_equal(panel.traces[0].u, traces[0].applied[:, i : i + 1])
