@@ -406,3 +406,5 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
     assert [panel.label for panel in shown] == [f"actuator {i} u (N)" for i in (1, 2, 3, 4)]
     for i, panel in enumerate(shown):
         np.testing.assert_array_equal(panel.traces[0].u, traces[0].applied[:, i : i + 1])
+    drawn = " ".join(ax.get_ylabel() for ax in figure(traces).axes)
+    assert sorted(map("".join, re.findall(r"actuator (\d)|\bu (\d)", drawn))) == ["1", "2", "3", "4"]
