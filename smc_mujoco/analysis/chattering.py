@@ -30,6 +30,7 @@ from smc_mujoco.common.files import with_ending, write_json
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.mechanisms.hardware.backlash import Backlash
 from smc_mujoco.mechanisms.hardware.drives import RateLimit
+from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
@@ -118,6 +119,7 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
     """Return what `chattering` returns for a scenario; without the ranges of a predicted cycle it is faster."""
+    jointed(scenario.plant, "chattering")
     if channel not in range(scenario.plant.driven):
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
     loop = Loop(scenario, channel)

@@ -38,6 +38,7 @@ from smc_mujoco.common.progress import Report, summed
 from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.control.source import NONE
+from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.metrics.conventions import SETTLING_BAND, error, last_part
 from smc_mujoco.simulation.conditions import DURATION, Condition, find_condition
@@ -114,7 +115,14 @@ def basin(
     Raises:
       ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or an empty grid.
     """
-    base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
+    base = case(
+        jointed(plant, "a region of attraction"),
+        law,
+        condition,
+        duration,
+        gains,
+        changes={"integrator": "implicitfast"},
+    )
     if start := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
         raise ScenarioError(f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave it out")
     reach = POSITION_REACH[base.plant.unit](base.plant)

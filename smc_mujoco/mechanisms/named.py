@@ -33,6 +33,14 @@ def as_plant(value: object) -> Plant:
     return made
 
 
+def jointed(value: object, analysis: str) -> Plant:
+    """Return a plant as `as_plant` does. Refuse a free body, whose channels are no joints, to an analysis of joints."""
+    made = as_plant(value)
+    if made.pose:
+        raise ScenarioError(f"{made.name} is a free body, and {analysis} is for joints: give another plant")
+    return made
+
+
 def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
     """Return a plant by its name and parameters, or from FILE.xml:joint,joint in a folder and `plant_from`'s arguments.
 

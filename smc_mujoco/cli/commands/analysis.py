@@ -368,7 +368,7 @@ def chatter(
         from smc_mujoco.common.progress import bar
         from smc_mujoco.control import gain_sets
         from smc_mujoco.draw.page import files
-        from smc_mujoco.mechanisms.named import as_plant
+        from smc_mujoco.mechanisms.named import jointed
         from smc_mujoco.metrics.limit_cycle import channel_cycle
         from smc_mujoco.simulation.grid import case
         from smc_mujoco.simulation.run import run
@@ -376,7 +376,7 @@ def chatter(
     terminal, pictures, chosen = Terminal(), files(out), options.laws(law, gain_sets.LAWS)
     options.check_files(json, *pictures)
     fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
-    machine = as_plant(plant)
+    machine = jointed(plant, "chattering")
     cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
     with bar("chattering") as progress:
         cycles = []

@@ -97,11 +97,11 @@ def _certified(
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.control import gain_sets
     from smc_mujoco.evidence.certificates.maker import certify as make
-    from smc_mujoco.mechanisms.named import as_plant
+    from smc_mujoco.mechanisms.named import jointed
     from smc_mujoco.simulation.grid import case
     from smc_mujoco.studies.worst_case import worst_case
 
-    machine, chosen = as_plant(plant), options.law(law)
+    machine, chosen = jointed(plant, "a theorem"), options.law(law)
     if isinstance(chosen, str) and gain_sets.in_set(machine, chosen, gains):
         chosen = gain_sets.law(machine, chosen, gains)  # the best of the searches, where run i has those of search i
     scenario = case(machine, chosen, condition, gains=gains)

@@ -272,6 +272,13 @@ def test_other_uses_of_a_free_joint_are_refused(drone):
         Controller(smc.Scenario(plant=drone, law="geometric"))
 
 
+@pytest.mark.parametrize("law", ["geometric", "pid"])
+def test_analyses_of_joints_refuse_a_free_body_whatever_the_law(drone, law):
+    for ask in (lambda: smc.basin(drone, law), lambda: smc.chattering(smc.Scenario(plant=drone, law="geometric"))):
+        with pytest.raises(ScenarioError, match=r"drone is a free body, .* is for joints: give another plant"):
+            ask()
+
+
 POD = """<body name="pod" pos="0 0 0.01" euler="0 0 20">
   <inertial pos="0 0 0" mass="1e-9" diaginertia="1e-15 1e-15 1e-15"/>
   <site name="1" pos="0.03253 -0.03253 0"/></body>"""
