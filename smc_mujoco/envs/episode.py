@@ -57,7 +57,8 @@ class Setting:
         plant = as_plant(plant)
         self.task, known = find("task", task, TASKS), FLIGHT_TASKS if flies else tasks(plant)
         if plant.pose and not flies:
-            raise ScenarioError(f"{plant.name} is a free body: make its environment alone, by gymnasium.make")
+            cure = "make its environment by gymnasium.make, and copies by make_vec(..., vectorization_mode='sync')"
+            raise ScenarioError(f"{plant.name} is a free body: {cure}")
         if flies and not plant.pose:
             raise ScenarioError(f"{plant.name} is no free body: make its environment by gymnasium.make")
         if task not in known:
