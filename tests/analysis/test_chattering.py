@@ -302,6 +302,15 @@ def test_a_relay_behind_a_motor_may_have_any_period_in_its_range():
     assert cycle.amplitude_range[0] < score["chattering_amplitude"] < cycle.amplitude_range[1]
 
 
+def test_a_cycle_that_the_samples_alone_hold_is_within_its_ranges_and_called_so():
+    scenario = smc.Scenario(plant="duffing", law="power_rate", x0=0.02, duration=2.0)
+    cycle, (amplitude, frequency) = chattering(scenario), channel_cycle(smc.run(scenario), 0)
+    assert math.isnan(cycle.amplitude)
+    assert cycle.amplitude_range[0] < amplitude < cycle.amplitude_range[1]
+    assert cycle.frequency_range[0] < frequency < cycle.frequency_range[1] * (1.0 + 1e-9)
+    assert cycle.assumptions[-1].endswith("a cycle locked to the samples is possible")
+
+
 @COARSELY
 def test_a_prediction_with_small_uncertainty_is_good():
     for law in ("super_twisting", "quasi_continuous"):

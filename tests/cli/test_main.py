@@ -475,12 +475,14 @@ def test_a_name_with_a_newline_or_with_markup_is_one_line(call, folder):
     assert [line for line in out.splitlines() if line.startswith("wrote")] == [rf"wrote {folder}/a\n\x1b[31m[b].csv"]
 
 
-def test_show_of_a_failed_run_says_why(call, folder):
+def test_show_of_a_failed_run_says_why(call, folder, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
     unstable = smc.plant("duffing", alpha=-1e6, beta=0.0)
     smc.run(smc.Scenario(plant=unstable, law="none", duration=0.1)).save("wild.npz")
     code, out, _ = call("show", "wild.npz")
     assert code == 0
     assert "the plant diverged" in " ".join(out.split())
+    assert max(map(len, out.splitlines())) <= 40
 
 
 # mistakes

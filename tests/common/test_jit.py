@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,7 +10,7 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.common import numba_internals
-from smc_mujoco.common.jit import jit, reason
+from smc_mujoco.common.jit import Numbers, _complete, jit, reason
 
 pytestmark = pytest.mark.quick
 
@@ -41,6 +42,19 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
         exec("def mine(y, gains, memory):\n    return helper(y.e), y.e", space)
         laws.append(names(jit(space["mine"]))["helper"])
     assert laws[0] is not laws[1]
+
+
+def test_code_is_kept_if_no_other_process_can_number_a_function_of_it_alike_and_the_linker_adds_no_address():
+    own, numbas = f"f_B1v{Numbers.FIRST}", "f_B1v7"
+    for names_of, declared, filled, kept in (
+        ([own, own], [], "x", True), ([own, numbas], [], "x", False), ([numbas, own], [], "x", False),
+        ([own], [numbas], "x", True), ([own], [], numba_internals.RuntimeLinker.PREFIX, False),
+    ):  # fmt: skip
+        functions = [SimpleNamespace(name=name, is_declaration=False) for name in names_of]
+        functions += [SimpleNamespace(name=name, is_declaration=True) for name in declared]
+        module = SimpleNamespace(global_variables=[SimpleNamespace(name=filled)], functions=functions)
+        library: Any = SimpleNamespace(_final_module=module)
+        assert _complete(library) == kept
 
 
 @pytest.mark.parametrize(
