@@ -17,7 +17,7 @@ from smc_mujoco.draw.session import Session, laws_of
 
 GHOST = 0.35  # opacity of the second run's machine
 GEOMS = 2000  # of the second run's machine, at most
-SAMPLES = 500  # of a curve
+SAMPLES = 200  # of a curve: each goes to the browser in each frame
 SAVED_AS = Path("view.py")
 
 
@@ -52,9 +52,8 @@ class Panel(plugin.ViewerPlugin):
             imgui.SameLine()
             self.button(f"save as scene {SAVED_AS}", functools.partial(session.save, SAVED_AS))
             for key in range(self.viewer.model.nkey):
-                self.button(
-                    f"keyframe {self.viewer.model.key(key).name or key}", functools.partial(session.keyframe, key)
-                )
+                name = self.viewer.model.key(key).name.removeprefix("smc:") or key  # "smc:start" is that of a user
+                self.button(f"keyframe {name}", functools.partial(session.keyframe, key))
             for run in range(len(session.scenarios)):
                 self.run(run)
             if len(session.scenarios) == 1:
@@ -82,12 +81,12 @@ class Panel(plugin.ViewerPlugin):
                 self.asked.put(functools.partial(self.session.move, run, slider, value))
 
     def curves(self) -> None:
-        """Show u, s and e of each run's first channel up to now."""
+        """Show u, s and e of each run's first channel up to now; of a free body, those along the vertical."""
         for name in ("u", "s", "e"):
             implot.SetNextAxesToFit()
             if implot.BeginPlot(name, imgui.Vec2(-1.0, 130.0)):
                 for run, scenario in enumerate(self.session.scenarios):
-                    log = self.session.log(run)[:, 0]
+                    log = self.session.log(run)[:, 2 if scenario.plant.pose else 0]
                     log = log[:: max(1, len(log) // SAMPLES)]
                     values = log["x"] - log["r"] if name == "e" else log[name]
                     implot.PlotLine(
