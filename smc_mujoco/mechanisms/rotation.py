@@ -80,6 +80,27 @@ def put_attitude_error(x, v, r, dr, e, de):
     de[3], de[4], de[5] = v[3] - wx, v[4] - wy, v[5] - wz
 
 
+@njit(error_model="numpy")
+def mix(x, u, rows, actuators, keeps_torques, controls):
+    """Write the controls of a free body's actuators for the force u[:3], in the axes of the world, and torque u[3:].
+
+    The force is turned into the axes of the body by its pose x. An actuator has 8 numbers in `rows`: what it gets of
+    the force and of the torque, and its bounds. Where all actuators push one way and alike, as rotors do, the excess of
+    the largest over its bound is taken from all: that keeps the torques, and gives up thrust, as the Crazyflie's
+    firmware does.
+    """
+    fx, fy, fz = turned_back(quaternion(x[3], x[4], x[5]), u[0], u[1], u[2])
+    excess = 0.0
+    for j in range(actuators):
+        i = 8 * j
+        of_force = rows[i] * fx + rows[i + 1] * fy + rows[i + 2] * fz
+        controls[j] = of_force + rows[i + 3] * u[3] + rows[i + 4] * u[4] + rows[i + 5] * u[5]
+        excess = max(excess, controls[j] - rows[i + 7])
+    for j in range(actuators):
+        kept = controls[j] - (excess if keeps_torques != 0 else 0.0)
+        controls[j] = min(max(kept, rows[8 * j + 6]), rows[8 * j + 7])
+
+
 def pose_errors(x: np.ndarray, r: np.ndarray) -> np.ndarray:
     """Return the errors of poses x from references r, (K, 6) each: of an attitude the rotation vector between both."""
     e = x - r

@@ -37,7 +37,7 @@ from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.signals import after_pauses
-from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, mixer_at, motor_at, state_at
+from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, motor_at, state_at
 
 MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
 LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
@@ -272,7 +272,7 @@ def update_law(address, sim, k, t):
             if sim.told != 0:
                 last_u[i] += pointer(sim.told)[i]
     if sim.mixer != 0:
-        _mix(sim, pointer(sim.seen.x), last_u, buffer)
+        _mix(sim, last_u, buffer)
     for i in range(sim.driven, n):  # only measured
         sample = log_at(sim.log, k * n + i)
         buffer[i], sample.u, sample.s, sample.r = 0.0, 0.0, 0.0, 0.0
@@ -282,24 +282,11 @@ def update_law(address, sim, k, t):
 
 
 @njit(error_model="numpy")
-def _mix(sim, x, u, controls):
-    """Write the controls of a free body's actuators for the force u[:3], in the axes of the world, and torque u[3:].
-
-    The force is turned into the axes of the body by the measured attitude. Where all actuators push one way and alike,
-    as rotors do, the excess of the largest over its bound is taken from all: that keeps the torques, and gives up
-    thrust, as the Crazyflie's firmware does.
-    """
-    fx, fy, fz = rotation.turned_back(rotation.quaternion(x[3], x[4], x[5]), u[0], u[1], u[2])
-    excess = 0.0
+def _mix(sim, u, controls):
+    """Write the controls of a free body's actuators for its force and torque u, (6,), by the measured attitude."""
     for j in range(sim.n):
         controls[j] = 0.0
-    for j in range(sim.actuators):
-        row = mixer_at(sim.mixer, j)
-        controls[j] = row.fx * fx + row.fy * fy + row.fz * fz + row.mx * u[3] + row.my * u[4] + row.mz * u[5]
-        excess = max(excess, controls[j] - row.high)
-    for j in range(sim.actuators):
-        row = mixer_at(sim.mixer, j)
-        controls[j] = min(max(controls[j] - (excess if sim.keeps_torques != 0 else 0.0), row.low), row.high)
+    rotation.mix(pointer(sim.seen.x), u, pointer(sim.mixer), sim.actuators, sim.keeps_torques, controls)
 
 
 @njit(error_model="numpy", inline="always")

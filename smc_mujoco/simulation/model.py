@@ -180,6 +180,11 @@ def mixer(plant: Plant) -> np.ndarray:
     return np.hstack([np.linalg.pinv(forces.T, rcond=1e-9), bounds])
 
 
+def keeps_torques(rows: np.ndarray) -> bool:
+    """Return whether the actuators in a `mixer` all push one way and alike, as rotors do."""
+    return len(rows) > 0 and np.ptp(rows[:, 7]) == 0.0 and bool(np.all(rows[:, 6] >= 0.0))
+
+
 def spec(scenario: Scenario) -> mujoco.MjSpec:
     """Return a scenario's mechanism as an editable MjSpec."""
     spec = scenario.plant.spec()

@@ -30,7 +30,15 @@ from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
 from smc_mujoco.mechanisms.plant import Native, Plant
 from smc_mujoco.simulation import cfunctions, philox, state
-from smc_mujoco.simulation.model import Mechanism, check_start, field_values, mechanism, mixer, with_values
+from smc_mujoco.simulation.model import (
+    Mechanism,
+    check_start,
+    field_values,
+    keeps_torques,
+    mechanism,
+    mixer,
+    with_values,
+)
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
@@ -140,7 +148,7 @@ class Packed:
     laws: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
-    mixer: np.ndarray  # (actuators,) MIXER of a free body; (0, 8) for other plants
+    mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
 
 
@@ -166,9 +174,8 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
     values |= {"n": s.plant.n, "driven": s.plant.driven, "nq": mechanism.model.nq, "nv": mechanism.model.nv}
     rows = mixer(s.plant) if s.plant.pose else np.zeros((0, 8))
-    low, high = rows[:, 6], rows[:, 7]
-    alike = len(rows) > 0 and np.ptp(high) == 0.0 and np.all(low >= 0.0)
-    values |= {"actuators": len(rows), "mixer": state.address(rows) if len(rows) else 0, "keeps_torques": alike}
+    values |= {"actuators": len(rows), "mixer": state.address(rows) if len(rows) else 0}
+    values["keeps_torques"] = keeps_torques(rows)
     values |= {"rotors": has_rotors(mechanism.model)}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}

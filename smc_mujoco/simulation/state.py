@@ -63,8 +63,6 @@ CHANNEL = np.dtype(
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
 RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
-# What one actuator of a free body gets of a force and a torque in the axes of the body, and the bounds of its control.
-MIXER = floats(("fx", "fy", "fz", "mx", "my", "mz", "low", "high"))
 DRIVE_STEP, PULSING, MOTOR = floats(DriveStep._fields), floats(Pulsing._fields), floats(GENERATOR)
 # Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
@@ -100,7 +98,7 @@ SIMULATION = np.dtype(
         ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("disturbances", "i8"),
         # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (driven,), ctrl per u
         ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
-        # a free body: its actuators, the address of their MIXERs, 0 for other plants, and whether to keep the torques
+        # a free body: its actuators, the address of their rows for rotation.mix, 0 for others, and its keeps_torques
         ("actuators", "i8"), ("mixer", "i8"), ("keeps_torques", "i8"),
         # whether these are rotors, see hardware/rotors.py; `first` and `second` are then their speeds and those told
         ("rotors", "i8"),
@@ -146,8 +144,8 @@ SIMULATION = np.dtype(
 )  # fmt: skip
 
 # How compiled code reads record i of an array at an address.
-simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at, mixer_at = map(
-    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION, MOTOR, MIXER)
+simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at = map(
+    record_at, (SIMULATION, CHANNEL, CHANNEL_STATE, LOG, DISTURBANCE, FUNCTION, MOTOR)
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.

@@ -18,11 +18,14 @@ from smc_mujoco.common.jit import AtAddress
 from smc_mujoco.common.process import TimedOut, timed
 from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
-from smc_mujoco.control.law import FREE_BODY, catalogue, known_laws
-from smc_mujoco.exchange.c import build
+from smc_mujoco.control.law import FREE_BODY, Law, catalogue, known_laws
+from smc_mujoco.exchange.c import body, build
 from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
 from smc_mujoco.mechanisms.hardware.part import PLACES
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
+from smc_mujoco.simulation.model import mixer
+from smc_mujoco.simulation.scenario import Scenario
 
 NUMBER_BYTES = {"double": 8, "float": 4, "q15": 8}  # of a number of memory, by type of numbers
 Q15_LAW = "observer_free_q15"
@@ -30,11 +33,12 @@ MAX_JOINTS = 100
 SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of the code is measured
 
 
-def law_to_c(law: Component | Template | str, numbers: str = "double", joints: int | None = None) -> str:
+def law_to_c(law: Component | Template | str | Scenario, numbers: str = "double", joints: int | None = None) -> str:
     """Return a law as one C99 file, with its gains as defaults. `smc.exchange.law_from_c` can load it.
 
     Args:
-      law: a Law, its Template, or its text, see `law`.
+      law: a Law, its Template, or its text, see `law`; or a Scenario, which then gives the number of joints, what the
+        law knows of its plant, and of a free body the function that gives its actuators their commands.
       numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16 bits.
       joints: the number of joints for which a law of many joints is written. Default: the number of a gain's values.
 
@@ -44,13 +48,19 @@ def law_to_c(law: Component | Template | str, numbers: str = "double", joints: i
     """
     if numbers not in NUMBER_BYTES:
         raise unknown("type of numbers", numbers, NUMBER_BYTES)
+    plant = None
+    if isinstance(law, Scenario):
+        if joints is not None:
+            raise ScenarioError("a scenario has its own joints: leave joints out, or give its law instead")
+        plant, law = law.resolved.plant, law.resolved.law
+        joints = plant.n if law.joint else None
     law = writable(law)
     joints = number_of_joints(law, joints)
     if numbers == "q15":
         law = _in_q15(law)
         slots, code = 0, _fixed_point(law)
     else:
-        slots, code = translated(law, numbers == "float", joints)
+        slots, code = translated(law, numbers == "float", joints, plant)
     return with_head(law, numbers, slots, code, joints, measured=True)
 
 
@@ -99,12 +109,22 @@ def number_of_joints(law: Component, joints: int | None) -> int:
     return count
 
 
-def translated(component: Component, single: bool = False, joints: int = 0) -> tuple[int, str]:
-    """Return the memory slots and the C of a component, of a law of many joints for a number of these."""
+def translated(
+    component: Component, single: bool = False, joints: int = 0, plant: Plant | None = None
+) -> tuple[int, str]:
+    """Return the memory slots and the C of a component, of a law of many joints for a number of these.
+
+    Of a law of a free body, or for a plant that is one, it has `body.functions`, too.
+    """
+    plant = plant if plant is not None and plant.pose else None
+    of_body = plant is not None or (joints and isinstance(component, Law) and component.plants == (FREE_BODY,))
     try:
-        return translate(component, single, joints)
+        slots, code = translate(component, single, joints, body.functions(plant) if of_body else None)
     except Untranslatable as error:
         raise ScenarioError(f"{component.kind} {component.name!r} cannot be written in C: {error}") from None
+    if plant is not None:
+        code = f"enum {{ SMC_ACTUATORS = {len(mixer(plant))} }}; /* whose controls smc_actuators sets */\n\n{code}"
+    return slots, code
 
 
 def includes(code: str) -> list[str]:

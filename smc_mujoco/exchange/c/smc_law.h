@@ -76,6 +76,14 @@ typedef struct {
  * number i of the m numbers that joint j has. */
 int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out);
 
+#ifdef SMC_JOINTS
+/* Of a free body, in files that smc_mujoco writes. Its x is the position, and the axis of its attitude times the angle, 0
+ * to pi; v is the velocity, and the angular velocity in the body's axes; u a force in the world's axes, and a torque. */
+void smc_pose(const smc_real *q, smc_real *x); /* sets x by the position and the unit quaternion w, x, y, z */
+void smc_errors(const smc_real *x, const smc_real *v, const smc_real *r, const smc_real *dr, smc_real *e, smc_real *de);
+void smc_actuators(const smc_measurement *y, const smc_real *u, smc_real *controls); /* of the plant: u within its limit */
+#endif
+
 /* Optional definitions: */
 extern const char smc_law_gains[]; /* names and defaults of its gains: "lam=6,k1=3", or "k1=3 5" of two joints */
 extern const smc_real smc_law_defaults[]; /* those defaults, ready to be passed as gains[] */

@@ -127,14 +127,19 @@ class Value(NamedTuple):
         return self.text if self.level >= level else f"({self.text})"
 
 
-def translate(component: Component, single: bool, joints: int = 0) -> tuple[int, str]:
+def translate(
+    component: Component, single: bool, joints: int = 0, others: Mapping[str, tuple[Any, Sequence[str]]] | None = None
+) -> tuple[int, str]:
     """Return the number of memory slots of a component, and the C of its function and of all functions it calls.
 
     The function's name is smc_law, smc_surface or smc_estimator. If `single`, smc_real is float. `joints` is 0 for a
-    component of one channel.
+    component of one channel. `others`: name in C -> another function for the file, and the kinds of its arguments.
     """
     program = Program(component, single, joints)
     functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
+    for name, (function, kinds) in (others or {}).items():
+        program.used_names.add(name)
+        functions.append(Function(program, function, kinds, {}).text(name).removeprefix("static "))
     for name, text in reversed(program.functions.items()):
         if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
@@ -211,7 +216,7 @@ class Program:
         if data.ndim != 1 or data.dtype.kind not in "if":
             raise refuse(None, f"the constant {name}, which is not a one-dimensional array of numbers,")
         kind, of = "real", "smc_real"
-        items = [f"{float(v)!r}{'f' * self.single}" for v in data]
+        items = [literal(float(v), self.single, ast.Constant(0)).text for v in data]
         if data.dtype.kind == "i":
             kind, largest = "int", int(np.abs(data).max(initial=0))
             if largest >= 2**31:

@@ -28,7 +28,9 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.control.units import FORCE, POSITION, SPEED, TIME, Unit
 from smc_mujoco.exchange.c import export
 from smc_mujoco.exchange.c.translate import JOINTS, plain
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.controller import MAX_CONTROL
+from smc_mujoco.simulation.model import mixer
 
 MAX_DOUBLE = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
@@ -60,7 +62,7 @@ REQUIRED_INPUTS = ("x", "r", "dr")  # inputs of every FMU
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
     "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
-    "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared",
+    "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared", "smc_pose", "smc_errors", "smc_actuators",
 )  # fmt: skip
 # In C, a function's return for a run without the model, and all that follows it.
 UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL)
@@ -89,6 +91,7 @@ class ExportedLaw:
     u_max: tuple[float, ...]  # bound on |u| of each joint; may be infinite
     modelled: bool  # whether the law reads the nominal model
     joints: int = 0  # of a law of many joints; 0 for a law of one channel
+    plant: Plant | None = None  # a free body, whose actuators it commands
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -104,8 +107,13 @@ class ExportedLaw:
     @functools.cached_property
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
-        joints = {"law": self.joints}
-        return {kind: export.translated(part, joints=joints.get(kind, 0)) for kind, part in self.parts.items()}
+        of_law = {"joints": self.joints, "plant": self.plant}
+        return {kind: export.translated(p, **of_law if kind == "law" else {}) for kind, p in self.parts.items()}
+
+    @property
+    def of_body(self) -> bool:
+        """Whether the law is of a free body, whose errors are those of a pose."""
+        return "smc_errors(" in self.code["law"][1]
 
 
 def variables(exported: ExportedLaw) -> list[Variable]:
@@ -123,6 +131,8 @@ def variables(exported: ExportedLaw) -> list[Variable]:
         computed.append(("v_estimated", "estimated velocity", SPEED))
     for name, words, unit in computed:
         listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
+    for i in range(len(mixer(exported.plant)) if exported.plant else 0):
+        listed.append(Variable(f"control[{i + 1}]", "SMC_COMPUTED", "command of an actuator, for u"))
     words = "bound on the magnitude of u"
     for place, bound in zip(places, exported.u_max, strict=True):
         start = bound if math.isfinite(bound) else MAX_DOUBLE
@@ -303,6 +313,8 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     if needs := [name for name in ("coriolis", "jacobian") if name in reads(exported.code["law"][1])]:
         yield f"y.plant = value, {', '.join(f'y.{name} = {name}' for name in needs)};"
     yield from for_each(_measured(exported, value, j))
+    if exported.of_body:
+        yield "smc_errors(y.x, y.v, y.r, y.dr, y.e, y.de);"
     if many and exported.modelled and "M" in wanted:
         yield f"for (int j = 0; j < SMC_JOINTS * SMC_JOINTS; j++) y.M[j] = value[{place('M[1,1]')} + j];"
     if exported.surface:
@@ -316,6 +328,8 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
             f"if (!(isfinite(out{u}) && isfinite(s) && fabs(u) < {MAX_CONTROL!r})) return SMC_NOT_FINITE;",
         ]
     )
+    if exported.plant:
+        yield f"smc_actuators(&y, out, value + {place('control[1]')});"
     yield "return 0;"
 
 

@@ -81,8 +81,8 @@ def model_description(
 
 
 def is_output(variable: Variable) -> bool:
-    """Return whether a variable is u or s, or an element of these."""
-    return variable.name.partition("[")[0] in OUTPUTS
+    """Return whether a variable is u, s or an actuator's control, or an element of u or s."""
+    return variable.name.partition("[")[0] in (*OUTPUTS, "control")
 
 
 def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:

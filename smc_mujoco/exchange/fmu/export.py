@@ -30,6 +30,7 @@ from smc_mujoco.exchange.c import build
 from smc_mujoco.exchange.c.export import number_of_joints, with_head, writable
 from smc_mujoco.exchange.fmu import contents, description
 from smc_mujoco.exchange.fmu.contents import ExportedLaw
+from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
@@ -88,6 +89,7 @@ def law_to_fmu(
     else:
         joint = "hinge" if joint is None else joint
     exported = _exported(law, **chosen)
+    joint = MIXED_JOINTS if exported.of_body else joint
     plain = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
     identifier = plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")  # of C
     target = with_ending(path if path is not None else f"{identifier}.fmu", ".fmu")
@@ -112,12 +114,20 @@ def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[st
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
     joint = MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
     if s.law.joint:
-        return own | {"u_max": list(scenario.limits), "joints": s.plant.n}, joint
+        plant = s.plant if s.plant.pose else None
+        return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": plant}, joint
     return own | {"u_max": limits.pop(), "joints": None}, joint
 
 
 def _exported(
-    law: Any, surface: Any, velocity: Any, control_period: Any, u_max: Any, model: Any, joints: int | None
+    law: Any,
+    surface: Any,
+    velocity: Any,
+    control_period: Any,
+    u_max: Any,
+    model: Any,
+    joints: int | None,
+    plant: Plant | None = None,
 ) -> ExportedLaw:
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
     sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
@@ -137,6 +147,7 @@ def _exported(
         u_max=_bounds(math.inf if u_max is None else u_max, count),
         modelled=chosen.requires_model or model == "nominal",
         joints=count,
+        plant=plant,
     )
 
 

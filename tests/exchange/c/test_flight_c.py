@@ -1,32 +1,46 @@
-"""Laws of free bodies in C: written out, they give the compiled law's bits."""
+"""Laws of free bodies in C: written out, they give the compiled law's bits, also on their own."""
 
+import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from helpers.compiler import needs_compiler
+from helpers.flights import MEASUREMENT, recorded, scenarios
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
 from smc_mujoco.control.joint_law import catalogue
 from smc_mujoco.control.law import FREE_BODY
-from smc_mujoco.exchange.c import export, sandbox
+from smc_mujoco.exchange.c import build, export, sandbox
+from smc_mujoco.mechanisms.rotation import quaternion, rotation_vector
 
 pytestmark = needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
 LAWS = [name for name, law in catalogue().items() if FREE_BODY in law.plants]
-WIND = (smc.signals.Wind(3.0), smc.signals.Dryden(w20=15.0, speed=3.0))
+# Firmware: reads quaternions and measurements, of which it computes the errors itself.
+FIRMWARE = """#include "law.c"
+#include <stdio.h>
+#include <string.h>
 
-
-def scenarios(law) -> list[smc.Scenario]:
-    """Of the library's quadrotor, along a path in turbulence, and of a drone of one's own, which starts turned."""
-    drone = smc.plant_from("examples/quadrotor.xml", channels=["body"], keyframe="hover")
-    common = {"law": law, "noise": smc.Noise(1e-3, 1e-2), "duration": 0.4}
-    return [
-        smc.Scenario(plant="quadrotor", disturbance=WIND, reference=smc.Sine(0.2, 3.0), **common),
-        smc.Scenario(plant=drone, x0=(0.3, 0.2, 1.0, 0.1, 0.2, 2.5), v0=(0.0, 0.0, 0.0, 3.0, 0.0, 2.0), **common),
-    ]
+int main(void)
+{
+    static double memory[SMC_JOINTS * SMC_LAW_MEMORY];
+    double q[7], x[6], out[2 * SMC_JOINTS], controls[SMC_ACTUATORS];
+    smc_measurement y;
+    while (fread(q, sizeof q, 1, stdin) && fread(&y, sizeof y, 1, stdin)) {
+        memset(y.e, 0, sizeof y.e), memset(y.de, 0, sizeof y.de);
+        smc_pose(q, x);
+        smc_errors(y.x, y.v, y.r, y.dr, y.e, y.de);
+        if (smc_law(&y, smc_law_defaults, memory, out)) return 1;
+        smc_actuators(&y, out, controls);
+        fwrite(x, sizeof x, 1, stdout), fwrite(out, sizeof out, 1, stdout);
+        fwrite(controls, sizeof controls, 1, stdout);
+    }
+    return 0;
+}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +70,25 @@ def test_a_law_of_flight_written_out_gives_its_own_trace_to_the_last_bit(traces,
         assert len(np.unique(ours.u, axis=0)) > 300
 
 
+@pytest.mark.parametrize("of", [0, 1], ids=["quadrotor", "own drone"])
+def test_firmware_gives_what_a_run_gives_from_what_was_measured_there(tmp_path, of):
+    """Force, torque, s and the actuators' controls, in wind and noise, to the last bit."""
+    trace, read = recorded(scenarios("adaptive_quaternion_sliding")[of], tmp_path)
+    (tmp_path / "firmware.c").write_text(FIRMWARE)
+    flags = [*STRICT, "-O2", "-ffp-contract=off"]
+    subprocess.run([*build.compiler(), *flags, "firmware.c", "-o", "firmware", "-lm"], cwd=tmp_path, check=True)
+    given = np.zeros(len(read), [("q", "f8", (7,)), ("y", MEASUREMENT)])
+    given["q"] = [(*x[:3], *np.multiply((1.0, -1.0)[k % 2], quaternion(*x[3:]))) for k, x in enumerate(read["x"])]
+    given["y"] = read
+    done = subprocess.run([tmp_path / "firmware"], input=given.tobytes(), capture_output=True, check=True)
+    x, u, s, controls = np.split(np.frombuffer(done.stdout).reshape(len(trace.t), 22), [6, 12, 18], axis=1)
+    np.testing.assert_array_equal(x, [(*q[:3], *rotation_vector(*q[3:])) for q in given["q"]])
+    np.testing.assert_array_equal(np.clip(u, -read["limit"], read["limit"]), trace.u)
+    np.testing.assert_array_equal(s, trace.s)
+    np.testing.assert_array_equal(controls, trace.applied[:, :4])
+    assert len(np.unique(controls, axis=0)) > 100
+
+
 def test_a_trial_in_a_process_of_its_own_finds_nothing_wrong(tmp_path, capsys):
     (path := tmp_path / "tried.c").write_text(smc.exchange.law_to_c("indi_attitude"))
     with pytest.raises(SystemExit) as end:
@@ -64,6 +97,13 @@ def test_a_trial_in_a_process_of_its_own_finds_nothing_wrong(tmp_path, capsys):
     assert "tried.c: smc_law passes; 6 joints; gains kx = 2, " in capsys.readouterr().out.splitlines()[-1]
 
 
-def test_a_law_of_a_free_body_has_no_other_number_of_joints():
-    with pytest.raises(smc.ScenarioError, match="law 'geometric' is of a free body, of 6 joints: leave joints=7 out"):
-        smc.exchange.law_to_c("geometric", joints=7)
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        ("geometric", "law 'geometric' is of a free body, of 6 joints: leave joints=7 out"),
+        (smc.Scenario(plant="quadrotor", law="geometric"), "a scenario has its own joints: leave joints out"),
+    ],
+)
+def test_another_number_of_joints_is_refused(law, said):
+    with pytest.raises(smc.ScenarioError, match=said):
+        smc.exchange.law_to_c(law, joints=7)

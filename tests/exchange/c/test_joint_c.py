@@ -132,7 +132,12 @@ def split(a):
 
 @njit
 def swapped(a, b):
-    return b[0], a[1]
+    return b[0], a[0]
+
+
+@njit
+def sum_and_difference(a, b):
+    return a + b, a - b
 
 
 @smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0}, memory=5)
@@ -144,6 +149,7 @@ def parts(y, gains, memory):
     q = q[1], q[2], q[0] + len(q)
     q = next_of(q) if y.t > 0.05 else next_of((s[1], q[0], q[2]))
     tail, pair, two = split(s)
+    tail, two = sum_and_difference(tail, two)
     u[:2], u[2] = two, pair[1] + q[n - 2]
     u[0], u[2] = swapped(u, two)  # the second result is of the u before
     u[1:] += tail
@@ -154,6 +160,7 @@ def parts(y, gains, memory):
         u[i] += filtered(s[i], i, memory[:, 1])
         u[i] += 1e-2 * (row[0] - row[-1]) * pair[i % 2]
     kept[:] = 0.5 * kept + u
+    kept[0], u[1] = 0.5 * kept[0], memory[0, 0]  # of before
     memory[1:, 0] = memory[:2, 0] + kept[1:]
     bottom = table[1:]
     bottom[0] = s

@@ -10,6 +10,7 @@ fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', 
 from fmpy.validation import validate_fmu  # noqa: E402
 from helpers import arms  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
+from helpers.flights import recorded, scenarios  # noqa: E402
 from helpers.fmu import Importer  # noqa: E402
 from numba import njit  # noqa: E402
 
@@ -154,6 +155,29 @@ def test_each_joint_has_a_memory_of_its_own(made, folder):
     estimates = fmu.get(*(f"v_estimated[{i}]" for i in JOINTS))
     assert [one[1] for one in slots] == estimates
     assert len(set(estimates)) == 3
+
+
+def test_an_fmu_of_a_free_body_gives_the_actuators_their_controls(tmp_path):
+    """In wind and noise, from what the law measured there; the errors of the pose are its own."""
+    of_run = scenarios("adaptive_quaternion_sliding")[0]
+    trace, read = recorded(of_run, tmp_path)
+    path = smc.exchange.law_to_fmu(of_run, tmp_path / "flight.fmu")
+    assert validate_fmu(str(path)) == []
+    fmu, axes = Importer(path, tmp_path / "flight"), range(1, 7)
+    inputs = {f"{name}[{i}]": (name, i - 1) for name in ("x", "v", "r", "dr", "ddr", "h") for i in axes}
+    inputs |= {f"M[{i},{j}]": ("M", i - 1, j - 1) for i in axes for j in axes}
+    names = [f"{name}[{i}]" for name in "us" for i in axes] + [f"control[{i}]" for i in range(1, 5)]
+    known = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+    assert {name for name, v in known.items() if v.causality == "input"} == inputs.keys()
+    assert [name for name, v in known.items() if v.causality == "output"] == names
+    assert known["x[1]"].unit is None  # some are m, some rad
+    found = []
+    for k, t in enumerate(trace.t):
+        fmu.set(**{name: float(read[field][(k, *place)]) for name, (field, *place) in inputs.items()})
+        fmu.fmu.doStep(t, 1e-3)
+        found.append(fmu.get(*names))
+    np.testing.assert_array_equal(found, np.hstack([trace.u, trace.s, trace.applied[:, :4]]))
+    assert len(np.unique(found, axis=0)) > 300
 
 
 def test_units_are_left_out_where_joints_differ(made, folder):
