@@ -77,7 +77,8 @@ def logged(trace: Trace) -> dict[str, np.ndarray]:
     """Return a run as the firmware would have logged it, without the sensors' noise."""
     s = trace.scenario.resolved
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
-    late = [after_pauses(k, s.steps, pause, samples, pause_phase(s)) if pause else 0 for k in range(s.samples)]
+    phase = pause_phase(s)
+    late = [after_pauses(k, s.steps, pause, samples, phase) if pause else 0 for k in range(s.samples)]
     ran = np.flatnonzero(np.array(late) >= 0)
     t = s.control_period * ran + s.physics_step * np.array(late)[ran]
     sensor, places = s.sensor or IDEAL_SENSOR, []
