@@ -17,11 +17,13 @@ VECTOR = f"real[{len(PLACES)}]"  # of a pose, a velocity or a command
 
 
 def pose(q, x):
+    """Write the pose x, (6,), of a position and a unit quaternion q, (7,)."""
     x[:3] = q[:3]
     x[3], x[4], x[5] = rotation_vector(q[3], q[4], q[5], q[6])
 
 
 def errors(x, v, r, dr, e, de):
+    """Write the errors e and de of a pose x, v from a reference r, dr, (6,) each."""
     e[:], de[:] = x - r, v - dr
     put_attitude_error(x, v, r, dr, e, de)
 
