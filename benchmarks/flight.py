@@ -19,26 +19,13 @@ from typing import Any
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.report.families import leads
+from smc_mujoco.evidence.report.flight import CONDITIONS
 
 FAMILIES = {
     "sliding": ("quaternion_sliding", "adaptive_quaternion_sliding", "super_twisting_attitude"),
     "rivals": ("geometric", "cascaded_pid", "indi_attitude", "adrc_attitude"),
 }
 DRONE, MEASURE = smc.plant("quadrotor"), "ultimate_bound"
-W = 6.2832 / 4.0  # rad/s, of a figure of eight in 4 s
-EIGHT = [smc.Sine(1.0, W), smc.Sine(0.5, 2.0 * W), smc.Constant(1.0), *[smc.Constant(0.0)] * 3]
-CONDITIONS = {
-    "noise of 10 mm and 50 mm/s": {"noise": smc.Noise(0.01, 0.05)},
-    "delay of 5 ms": {"input_delay": 5e-3},
-    "steady wind of 3 m/s": {"disturbance": smc.signals.Wind(3.0)},
-    "gust of 6 m/s for 1 s": {"disturbance": smc.signals.Wind(6.0, time=4.5, width=1.0)},
-    "turbulence on 3 m/s": {"disturbance": (smc.signals.Wind(3.0), smc.signals.Dryden(15.0, speed=3.0))},
-    "payload of 19 %": {"mismatch": {"payload": 0.006}},
-    "weak battery": {"mismatch": {"sag": 0.32}},
-    "a rotor loses 20 %": {"mismatch": {"fade": 0.2}},
-    "rotors with a lag of 0.1 s": {"mismatch": {"rise": 0.625, "fall": 0.625}},
-    "figure of eight in 4 s": {"reference": EIGHT, "v0": (W, W, 0.0, 0.0, 0.0, 0.0)},
-}
 
 
 def conditions() -> list[Any]:

@@ -35,7 +35,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 SECTIONS = {
     "overview": "The answer", "accuracy": "How accurate is it", "claims": "The paper’s claims",
     "tradeoffs": "Error against effort", "margins": "Margins", "chattering": "How much will it chatter",
-    "regions": "Regions of attraction", "rigs": "On the rig", "films": "Films and traces",
+    "regions": "Regions of attraction", "rigs": "On the rig", "flight": "In flight", "films": "Films and traces",
     "method": "How it was computed",
 }  # fmt: skip
 

@@ -48,6 +48,8 @@ class Plan(Extent):
     scene: float = 5.0  # duration of traces and films, s
     rigs: tuple[str, ...] = ("qube_servo", "simple_pendulum_ak80")  # whose laws are compared on all parameter sets
     accurate: tuple[str, ...] = ("duffing",)  # plants on which accuracy is measured without noise
+    flights: tuple[str, ...] | None = None  # conditions in which laws of flight are compared; None for all
+    flight_seeds: int = GRID.seeds
     periods: tuple[float, ...] = PERIODS  # control periods of these measurements, s
     accuracy_starts: int = DEFAULT_SEEDS  # number of initial states of these measurements
 
@@ -65,6 +67,8 @@ QUICK = Plan(
     scenes=tuple((plant, "nominal") for plant in QUICK_GRID.plants),
     filmed=1,
     rigs=("qube_servo",),
+    flights=("nominal", "steady wind of 3 m/s", "payload of 19 %", "a rotor loses 20 %", "figure of eight in 4 s"),
+    flight_seeds=12,
     periods=(4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3),
     accuracy_starts=1,
 )

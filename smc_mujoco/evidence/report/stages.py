@@ -1,4 +1,4 @@
-"""The stages of a report: records, grid, claims, margins, maps, rigs, chattering, scenes, statistics.
+"""The stages of a report: records, grid, claims, margins, maps, rigs, flight, chattering, scenes, statistics.
 
     findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
 
@@ -30,7 +30,7 @@ from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, families, films, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import about, families, films, flight, oscillation, rigs, scores, words
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -100,6 +100,7 @@ class Findings:
     basins: tuple[Basin, ...]
     machines: tuple[rigs.Machine, ...]
     repeated: tuple[rigs.Repeated, ...]
+    flight: flight.Flight
     scenes: tuple[films.Scene, ...]
     about: about.About
 
@@ -130,7 +131,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     claims = judged_claims(work, table)
     worst, margins = worst_cases(work), all_margins(work)
     by_set, basins, scenes = margins_by_set(work, margins), all_basins(work), all_scenes(work)
-    machines = rigs.machines(work)
+    machines, flown = rigs.machines(work), flight.flight(work)
     oscillations, accurate = oscillation.oscillations(work), accuracies(work)
     no_film = video.missing() if plan.filmed else None
     with bars.stage("statistics"):
@@ -151,6 +152,7 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
             basins=basins,
             machines=machines,
             repeated=repeated,
+            flight=flown,
             scenes=scenes,
             about=about.about(plan, table, bars.spent, no_film and no_film.removeprefix("no film: ")),
         )

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from helpers.commands import python
 
+import smc_mujoco as smc
 from smc_mujoco.analysis import chattering
 from smc_mujoco.common import gl
 from smc_mujoco.common.cache import cached
@@ -48,6 +49,8 @@ TINY = dataclasses.replace(
     scene_laws=("observer_free", "classical"),
     scene=0.1,
     rigs=("qube_servo",),
+    flights=("payload of 19 %",),
+    flight_seeds=2,
     periods=(4e-3, 2e-3),
 )
 BROWSERS = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -84,6 +87,13 @@ def text(made):
 def findings(made, folder):
     """What that report tells, read back from its folder."""
     return stages.find(TINY, folder, None, Bars(False))
+
+
+def test_the_worst_run_of_a_law_of_flight_is_its_largest_error(findings):
+    payload = smc.condition("payload of 19 %", mismatch={"payload": 0.006})
+    runs = smc.grid("quadrotor", "geometric", payload, seeds=2, gains="default", duration=6.0)
+    bounds = [smc.score(trace)["ultimate_bound"] for trace in smc.run(runs)]
+    assert findings.flight.worst["payload of 19 %", "geometric"] == max(bounds) > min(bounds)
 
 
 class Reader(html.parser.HTMLParser):
@@ -528,8 +538,8 @@ def test_the_page_has_no_error_and_asks_for_nothing(seen, made):
 
 def test_every_chart_is_drawn(seen, findings):
     counts = seen.page.eval_on_selector_all(".plot > svg", "all => all.map(svg => svg.querySelectorAll('path').length)")
-    # with medians, accuracy, field, fronts and machines
-    assert len(counts) == 5 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
+    # with medians, accuracy, field, fronts, machines and flight
+    assert len(counts) == 6 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
     assert min(counts) > 10
 
 

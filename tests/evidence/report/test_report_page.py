@@ -22,6 +22,7 @@ from smc_mujoco.evidence.report import answer, charts, page, rigs, words
 from smc_mujoco.evidence.report.about import About, Gains
 from smc_mujoco.evidence.report.families import Lead
 from smc_mujoco.evidence.report.films import Scene
+from smc_mujoco.evidence.report.flight import Flight
 from smc_mujoco.evidence.report.oscillation import Oscillation
 from smc_mujoco.evidence.report.plan import Plan
 from smc_mujoco.evidence.report.scores import Score
@@ -295,6 +296,21 @@ def repeated():
     yield rigs.Repeated(rig=smc.rig("emps"), name="b <csv>", why="it is too short")
 
 
+def flown():
+    """Three laws in two conditions: one is unbeaten in both, one has runs that fail."""
+    medians = {"geometric": (0.002, 0.2), "quaternion_sliding": (0.001, 0.1), "cascaded_pid": (0.01, NEVER)}
+    blocks = [
+        SimpleNamespace(
+            condition=name, best=("quaternion_sliding", "geometric")[: 2 - i], runs=6, sample="6 seeds",
+            medians={law: values[i] for law, values in medians.items()}, lacking={"cascaded_pid": 3 * i},
+        )
+        for i, name in enumerate(("nominal", "payload of 19 %"))
+    ]  # fmt: skip
+    worst = {(block.condition, law): 3.0 * value for block in blocks for law, value in block.medians.items()}
+    board = SimpleNamespace(blocks=blocks, entries=[SimpleNamespace(law=law) for law in medians])
+    return Flight(board=board, worst=worst | {("nominal", "geometric"): 0.0021}, medians=b"<svg/>", gains="default")
+
+
 def scenes():
     for plant, film in (("duffing", b"film"), ("pendulum_network", None)):
         yield Scene(plant=plant, condition="nominal", laws=LAWS[:2], curves=b"<svg/>", film=film, seconds=2.0)
@@ -336,6 +352,7 @@ def findings():
     made = scores, leads, boards, claims, fields, fronts, oscillations, basins, machines, repeated, scenes
     return Findings(
         **{one.__name__: tuple(one()) for one in made}, medians=b"<svg></svg>", worst=tuple(worst_cases()),
+        flight=flown(),
         margins=found, by_set={"tuned": found[:6], "study": found[:4]}, accuracies=AccuracyTable(accuracies()),
         about=about(),
     )  # fmt: skip

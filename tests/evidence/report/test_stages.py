@@ -158,8 +158,8 @@ def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch,
     done, bars = [], Bars(False)
     names = (
         "rigs.repeated grid judged_claims worst_cases all_margins margins_by_set all_basins all_scenes rigs.machines "
-        "oscillation.oscillations accuracies leaderboard families.leads films.medians scores.scores fields fronts "
-        "about.about"
+        "flight.flight oscillation.oscillations accuracies leaderboard families.leads films.medians scores.scores "
+        "fields fronts about.about"
     )
 
     def stub(name):
