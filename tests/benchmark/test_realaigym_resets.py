@@ -24,6 +24,7 @@ DRAWN = {  # seed -> first times of resets, and goals
     777: ((4.0065, 6.5967, 10.3490, 15.6826, 18.9549),
           ((-2.18237812, -1.24183005), (2.10646, 2.6829), (-1.45013, 0.90496))),
 }  # fmt: skip
+CHAOS = 0.08  # three standard deviations of a row whose gains differ in their 13th digit, as another processor's may
 STATES = {  # seed -> time, s -> state under u = 0
     333: {
         4.2: (0.069803, 0.853357, 1.722369, 2.993765), 6.0: (0.711255, -0.116228, -1.005636, -3.279171),
@@ -142,7 +143,7 @@ def test_what_cannot_run_is_refused_in_a_sentence_and_a_published_name_is_taken(
 
 @ROBOTS
 def test_rows_of_2025_are_those_of_the_page(robot):
-    """Ours is above mcpilco and below the other published ones; no control experiment comes near but the linear one."""
+    """Ours is below three published ones and above the last; no control experiment comes near but the linear one."""
     rows = {name: boards.global_row(name, run) for name, run in boards.global_experiments(robot).items()}
     page = (ROOT / "docs" / "boards.md").read_text(encoding="utf-8").partition("## The boards of 2025")[2]
     told = {
@@ -152,9 +153,9 @@ def test_rows_of_2025_are_those_of_the_page(robot):
     assert set(told) == {*rows, *published}
     column = boards.ROBOTS.index(robot)
     for name, row in (rows | published).items():
-        assert float(told[name][column]) == pytest.approx(row.score, abs=5.1e-4 if name in published else 0.03), name
+        assert float(told[name][column]) == pytest.approx(row.score, abs=5.1e-4 if name in published else CHAOS), name
     board = [row.name for row in boards.global_board(robot, [*rows.values()])]
-    assert board.index("AcadosMpc") < board.index(boards.GLOBAL_NAME) < board.index("mcpilco")
+    assert board.index("AcadosMpc") < board.index(boards.GLOBAL_NAME) < board.index("prx_analytical")
     near = {boards.GLOBAL_NAME, "the same, linear"}
     assert all(row.score < 0.36 for name, row in rows.items() if name not in near)
     assert all(run.checked for run in boards.global_experiments(robot).values())

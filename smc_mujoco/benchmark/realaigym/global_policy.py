@@ -11,7 +11,7 @@ The published simulator is repeated: RK4 and commands at 2 ms, no noise, no fric
 resets begin; a derivative of the PID for a period of 1 ms, its sums kept from reset to reset; its gravity compensation
 after its limit and before that of the motors. Times and goals are drawn by numpy's legacy generator as today's code
 draws them; the published rows were made by an earlier one, on resets that differ from row to row. So what is told of a
-law is its mean over seeds, and differences below 0.03 mean nothing.
+law is its mean over seeds. The machine is chaotic: differences below 0.08 mean nothing, see docs/boards.md.
 Source: leaderboard/*/simulation_v3, controller/global_policy_testing_controller.py and controller/pid of
 github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
