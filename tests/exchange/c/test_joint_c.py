@@ -151,7 +151,7 @@ def parts(y, gains, memory):
     tail, pair, two = split(s)
     tail, two = sum_and_difference(tail, two)
     u[:2], u[2] = two, pair[1] + q[n - 2]
-    u[0], u[2] = swapped(u, tail)  # the second result is of the u before
+    u[0], u[1] = swapped(u, tail)  # the second result is of the u before
     u[1:] += tail
     u[1:] = u[:2]  # reads what it changes
     for i in range(n):
