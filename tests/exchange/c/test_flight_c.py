@@ -36,7 +36,7 @@ int main(void)
         if (smc_law(&y, smc_law_defaults, memory, out)) return 1;
         smc_actuators(&y, out, controls);
         fwrite(x, sizeof x, 1, stdout), fwrite(out, sizeof out, 1, stdout);
-        fwrite(controls, sizeof controls, 1, stdout);
+        fwrite(controls, sizeof controls, 1, stdout), fwrite(y.e, sizeof y.e + sizeof y.de, 1, stdout);
     }
     return 0;
 }
@@ -81,7 +81,9 @@ def test_firmware_gives_what_a_run_gives_from_what_was_measured_there(tmp_path, 
     given["q"] = [(*x[:3], *np.multiply((1.0, -1.0)[k % 2], quaternion(*x[3:]))) for k, x in enumerate(read["x"])]
     given["y"] = read
     done = subprocess.run([tmp_path / "firmware"], input=given.tobytes(), capture_output=True, check=True)
-    x, u, s, controls = np.split(np.frombuffer(done.stdout).reshape(len(trace.t), 22), [6, 12, 18], axis=1)
+    numbers = np.frombuffer(done.stdout).reshape(len(trace.t), 34)
+    x, u, s, controls, errors = np.split(numbers, [6, 12, 18, 22], axis=1)
+    np.testing.assert_array_equal(errors, np.hstack([read["e"], read["de"]]))
     np.testing.assert_array_equal(x, [(*q[:3], *rotation_vector(*q[3:])) for q in given["q"]])
     np.testing.assert_array_equal(np.clip(u, -read["limit"], read["limit"]), trace.u)
     np.testing.assert_array_equal(s, trace.s)
