@@ -98,7 +98,8 @@ def levels(laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Ma
         chosen = np.quantile(medians, rules["quantiles"], method="higher")
         chosen = np.minimum(chosen, max(filter(math.isfinite, medians)))  # laws of which half of the runs fail
     else:
-        chosen = np.geomspace(worst, max(worst, rules["easiest"][measure] * (worst if measure != "accuracy" else 1)), 5)
+        easiest = rules["easiest"][measure] * (worst if measure != "accuracy" else 1.0)
+        chosen = np.geomspace(worst, max(worst, min(easiest, rules.get("latest", {}).get(measure, math.inf))), 5)
     chosen = np.maximum(chosen, worst)
     return chosen.tolist()
 
