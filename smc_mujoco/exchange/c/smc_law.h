@@ -46,7 +46,12 @@ typedef struct {
 #else
 
 /* Inputs of a law of many joints: all joints at a sample, in SI units. The nominal model is M(x) x'' + h(x, v) = u.
- * Vectors have one number for each joint, matrices are stored by rows. */
+ * Vectors have one number for each joint, matrices are stored by rows.
+ *
+ * A body that flies has six: x, y, z in the axes of the world, and its attitude as a rotation vector. Of the attitude, v
+ * is the angular velocity in the axes of the body, dr and ddr are derivatives of the rotation vector r, e is the rotation
+ * vector from r to x, and de the angular velocity relative to the reference's, in the axes of the body. u is a force in
+ * the axes of the world, and a torque in those of the body. */
 typedef struct {
     smc_real t;                          /* time of the sample */
     smc_real dt;                         /* control period */
@@ -77,8 +82,7 @@ typedef struct {
 int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out);
 
 #ifdef SMC_JOINTS
-/* Of a free body, in files that smc_mujoco writes. Its x is the position, and the axis of its attitude times the angle, 0
- * to pi; v is the velocity, and the angular velocity in the body's axes; u a force in the world's axes, and a torque. */
+/* Of a body that flies, in files that smc_mujoco writes from a scenario. */
 void smc_pose(const smc_real *q, smc_real *x); /* sets x by the position and the unit quaternion w, x, y, z */
 void smc_errors(const smc_real *x, const smc_real *v, const smc_real *r, const smc_real *dr, smc_real *e, smc_real *de);
 void smc_actuators(const smc_measurement *y, const smc_real *u, smc_real *controls); /* of the plant: u within its limit */
