@@ -2,9 +2,10 @@
 
     python benchmarks/flight.py [--seeds 24] [--tuned | --twins] [--out FOLDER]
 
-Every law has its default gains, or with --tuned those that the same searches find for it, which takes hours. Runs
-start within 0.2 m and 0.2 rad, in each number, of the plant's own start beside a hover, and last 6 s. No law is told
-what a row changes. With --twins two sliding laws stand beside the same law without what is sliding or adaptive in it.
+Every law has its default gains, or with --tuned those that the same searches find for it, which takes an hour and a
+half of processor time. Runs start within 0.2 m and 0.2 rad, in each number, of the plant's own start beside a hover,
+and last 6 s. No law is told what a row changes. With --twins two sliding laws stand beside the same law without what is
+sliding or adaptive in it.
 
 The measure is the ultimate bound: the largest error along x, y or z, from the place or from the path, in the last
 fifth of a run. Below the table, sliding mode against its rivals: the ratio of the families' scores, run by run, with
