@@ -32,8 +32,10 @@ import numpy as np
 from smc_mujoco.benchmark import controls
 from smc_mujoco.common.errors import ScenarioError, find, number, shown
 from smc_mujoco.common.files import reading
+from smc_mujoco.control import gain_sets
 from smc_mujoco.control.from_text import law as law_of
 from smc_mujoco.control.law import Law, known_laws
+from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.mechanisms.plant import plants
 
 ABOUT, FILES = "entry.toml", ("law.py", "law.c", "law.fmu")
@@ -143,10 +145,12 @@ def read(folder: str | os.PathLike[str]) -> Entry:
 
 
 def _of_library(name: str) -> Entry:
-    """Return the entry of a law of the library, whose shipped gains were found by its search."""
+    """Return the entry of a law of the library, with shipped gains, which its search found, or else its defaults."""
+    shipped = any(gain_sets.in_set(find_plant(plant), name, "tuned") for plant in plants())
     about = {"authors": ("the authors of smc_mujoco",), "source": f"smc_mujoco, law {name}", "licence": "Apache-2.0"}
     digest = hashlib.sha256(name.encode()).hexdigest()
-    return Entry(name=name, division="search", gains=MappingProxyType({}), file=None, digest=digest, **about)
+    division = "search" if shipped else "one set"
+    return Entry(name=name, division=division, gains=MappingProxyType({}), file=None, digest=digest, **about)
 
 
 def _fields(about: Mapping[str, Any]) -> dict[str, Any]:

@@ -84,7 +84,7 @@ def export(
     """
     outs = [text for text in what if Path(text).suffix in ENDINGS]
     if len(outs) != 1:
-        raise ScenarioError(f"{len(outs)} files to write: give one that ends in {', '.join(ENDINGS)}")
+        raise ScenarioError(f"{len(outs) or 'no'} files to write: give one that ends in {', '.join(ENDINGS)}")
     out, others = Path(outs[0]), [text for text in what if text != outs[0]]
     of_fmu = "surface", "velocity", "period", "u_max", "model", "joint", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")

@@ -37,6 +37,7 @@ def small(monkeypatch):
 def test_an_entry_has_its_gains_on_each_plant(tmp_path):
     one = entry.read(written(tmp_path / "one", gains="[gains.all]\nk = 2.5"))
     assert (one.law("duffing").gains["k"], one.law("furuta").gains["k"]) == (2.5, 2.5)
+    assert [entry.read(name).division for name in ("pid", "geometric")] == ["search", "one set"]  # shipped, defaults
     free = entry.read(written(tmp_path / "free", gains="[gains.duffing]\nk = 2.5", division="free"))
     assert (free.law("duffing").gains["k"], free.law("van_der_pol").gains["k"]) == (2.5, 4.0)
     assert free.law("duffing").name == "own law"
