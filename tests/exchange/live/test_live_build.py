@@ -131,7 +131,7 @@ def test_the_command_takes_a_file_of_laws_gains_and_a_name(vendor, tmp_path, cap
         (["--law", __file__, "live/index.html"], "has no law: write @smc.law_function"),
         (["--law", "computed_torque_sliding", "live/index.html"], "is of several joints"),
         (["page.html"], "it is index.html in a folder, such as live/index.html"),
-        (["duffing"], "0 files to write: give one that ends in .c, .fmu, .html"),
+        (["duffing"], "no files to write: give one that ends in .c, .fmu, .html"),
         (["live/index.html", "--type", "float"], "--type is for OUT.c"),
         (["live/index.html", "--gains", "k=2"], "give --law a law with gains"),
         (["index.html"], "something else is there, choose another folder"),
