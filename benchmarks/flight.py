@@ -35,8 +35,10 @@ def conditions() -> list[Any]:
 
 
 def twins() -> list[smc.Law]:
-    """Return two laws with their default gains, and each without its idea: `quaternion_sliding` with a line of the same
-    slope in place of each tanh, which is `geometric`, and the adaptive one with the gain that it starts with.
+    """Return two laws with their default gains, and each without its idea.
+
+    `quaternion_sliding` has a line of the same slope in place of each tanh, which below 90 degrees is `geometric` to a
+    few per cent. The adaptive law keeps the gain that it starts with.
     """
     sliding, adaptive = (smc.law(name) for name in ("quaternion_sliding", "adaptive_quaternion_sliding"))
     its = SimpleNamespace(**sliding.gains)
@@ -81,10 +83,8 @@ def main() -> None:
         )  # fmt: skip
     print("\n".join(rows(found.leaderboard, names)))
     for one in leads(found.table, MEASURE, FAMILIES):
-        times = f"{one.times:.3g} times ({one.low:.3g} to {one.high:.3g})" if one.sure else "no family is surely first"
-        print(
-            f"{one.condition}: {one.first} {times}, {'/'.join(one.laws)}" if one.sure else f"{one.condition}: {times}"
-        )
+        sure = f"{one.first} by {one.times:.3g} times ({one.low:.3g} to {one.high:.3g}), {'/'.join(one.laws)}"
+        print(f"{one.condition}: {sure if one.sure else 'no family is surely first'}")
 
 
 if __name__ == "__main__":

@@ -11,9 +11,9 @@
     python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's plants, `measure
-controls` the controls on all problems; ten minutes of processor time each. With
-`--version 2` they and `freeze` are of the rules of flight, where levels come from no law. They and `enter` go on where
-they were stopped. `smc-mujoco site` shows the results of `enter`.
+controls` the controls on all problems; ten minutes of processor time each. With `--version 2` they and `freeze` are of
+the rules of flight, where levels come from no law. They and `enter` go on where they were stopped. `smc-mujoco site`
+shows the results of `enter`.
 """
 
 import argparse
@@ -218,21 +218,17 @@ def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str, version: i
 def write_suites(left_out: Sequence[str], version: int) -> None:
     """Write the lists of a version's suites, without the problems that are left out."""
     every = [name for name in cells(version) if name.partition("@")[0] not in left_out]
-    lists = (
-        {"smc-flight@2": ("A quadrotor.", every)}
-        if version == 2
-        else {
-            "smc-30@1": ("Those that the pattern of version 1 chooses, 3 of 5, see suite.py.", suite.pattern(1, 3)),
-            "smc-50@1": ("All problems of the pattern's plants and conditions.", suite.pattern(1, 5)),
-            "smc-arm@1": ("The arm of two links.", [name for name in every if name.startswith("double_pendulum")]),
-            "smc-carts@1": (
-                "A joint without an actuator.",
-                [n for n in every if n.startswith(("cart_pole", "furuta"))],
-            ),
-            "smc-worst@1": ("The paper's plants against an adversary.", [name for name in every if "/worst" in name]),
-        }
-    )
+    lists = {
+        "smc-30@1": ("Those that the pattern of version 1 chooses, 3 of 5, see suite.py.", suite.pattern(1, 3)),
+        "smc-50@1": ("All problems of the pattern's plants and conditions.", suite.pattern(1, 5)),
+        "smc-arm@1": ("The arm of two links.", [name for name in every if name.startswith("double_pendulum")]),
+        "smc-carts@1": ("A joint without an actuator.", [n for n in every if n.startswith(("cart_pole", "furuta"))]),
+        "smc-worst@1": ("The paper's plants against an adversary.", [name for name in every if "/worst" in name]),
+        "smc-flight@2": ("A quadrotor.", every),
+    }
     for name, (words, chosen) in lists.items():
+        if not name.endswith(f"@{version}"):
+            continue
         text = "".join(f"{one}\n" for one in chosen if one in every)
         (suite.SUITES / f"{name}.txt").write_text(f"# {words}\n{text}")
 
@@ -275,11 +271,11 @@ def parser() -> argparse.ArgumentParser:
     measured.add_argument("out", type=Path)
     measured.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
     measured.add_argument("--instances", type=int, default=INSTANCES)
-    measured.add_argument("--version", type=int, default=1, help="of the rules; default 1")
     for name, files in (("freeze", ("visible", "controls", "seen")), ("agree", ("visible", "hidden"))):
         command = commands.add_parser(name)
         for file in files:
             command.add_argument(file, type=Path)
+    for command in (measured, commands.choices["freeze"]):
         command.add_argument("--version", type=int, default=1, help="of the rules; default 1")
     held = commands.add_parser("hold")
     held.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')

@@ -115,14 +115,8 @@ def basin(
     Raises:
       ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or an empty grid.
     """
-    base = case(
-        jointed(plant, "a region of attraction"),
-        law,
-        condition,
-        duration,
-        gains,
-        changes={"integrator": "implicitfast"},
-    )
+    plant = jointed(plant, "a region of attraction")
+    base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
     if start := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
         raise ScenarioError(f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave it out")
     reach = POSITION_REACH[base.plant.unit](base.plant)

@@ -246,7 +246,7 @@ def test_a_payload_that_is_dropped_is_weight_until_then():
 LIFTS = {  # set -> thrust over weight, as its source or what was derived of it says
     "crazyflie": 1.53, "crazyflow": 1.53, "gym": 2.25, "rotorpy": 1.95, "crazys": 2.41, "hummingbird": 10.2,
 }  # fmt: skip
-HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}  # rpm, likewise
+HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}  # rpm at which a set hovers, of the same sources
 
 
 @pytest.mark.parametrize("name", list(QUADROTOR.sets))
