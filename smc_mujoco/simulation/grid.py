@@ -116,12 +116,13 @@ def starts(x0: float | Sequence[float] | None = None, spread: Natural = SPREAD, 
     return Starts(x0=middle, spread=spread, by=by)
 
 
+@constrained
 def grid(
     plants: str | Plant | Sequence[str | Plant],
     laws: str | Law | Template | Sequence[str | Law | Template],
     conditions: str | Condition | Sequence[str | Condition] = "nominal",
     seeds: int | Iterable[int] = 1,
-    gains: str = "tuned",
+    gains: sets.NameOfSet = "tuned",
     duration: float = DURATION,
     starts: Starts | None = None,
 ) -> list[Scenario]:

@@ -241,7 +241,7 @@ def test_a_wrong_key_is_one_sentence(tmp_path, key):
 
 @pytest.mark.filterwarnings("ignore:.*the run takes the reference loop")
 def test_an_unchecked_law_is_marked_and_wins_over_no_checked_one(tmp_path):
-    table = smc.study(smc.grid("duffing", [calm, honest], "noise", 24, 0.05), tmp_path)
+    table = smc.study(smc.grid("duffing", [calm, honest], "noise", 12, duration=1.0), tmp_path)
     (board,) = smc.leaderboard(table, ["tv_rate"], defaults=True)
     assert [(entry.law, entry.checked) for entry in board.entries] == [("calm", False), ("honest", True)]
     assert board.winner is None
