@@ -133,7 +133,7 @@ def run(folder: Path) -> None:
         except MemoryError:
             say(FAULT, f"takes more than {MAX_MEMORY / 2**30:g} GiB of memory: make it smaller")
         except Exception as error:
-            kind = "" if type(error).__name__ == FAULT else f"{type(error).__name__}: "
+            kind = "" if type(error).__name__ in (FAULT, "ScenarioError") else f"{type(error).__name__}: "
             say(FAULT, f"{kind}{' '.join(str(error).split())}")
 
 
