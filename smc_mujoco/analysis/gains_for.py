@@ -49,11 +49,12 @@ class Design:
     speed: float  # w, relative to the given gains
 
 
+@constrained
 def gains_for(
     law: Component | Template | str,
     plant: Plant | str,
-    amplitude: float | None = None,
-    frequency: float | None = None,
+    amplitude: Positive | None = None,
+    frequency: Positive | None = None,
     channel: int = 0,
     **fields: object,
 ) -> Design:
@@ -79,12 +80,7 @@ def gains_for(
       ScenarioError: neither amplitude nor frequency, a gain of unknown unit, no gains in the range of the search
         chatter so little, or those of the wanted amplitude oscillate faster than wanted.
     """
-    return design(Scenario(law=law, plant=plant, **fields), amplitude, frequency, channel)  # type: ignore[arg-type]
-
-
-@constrained
-def design(base: Scenario, amplitude: Positive | None, frequency: Positive | None = None, channel: int = 0) -> Design:
-    """Return the largest gains for the law of a scenario. Arguments and errors are those of `gains_for`."""
+    base = Scenario(law=law, plant=plant, **fields)  # type: ignore[arg-type]
     if amplitude is None and frequency is None:
         raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
     if not base.law.uniform:

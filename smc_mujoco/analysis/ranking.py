@@ -286,7 +286,7 @@ class Comparison:
         whole, half = self.cells[a, block], self.halves[a, block]
         if self.shares or not (again := ~np.isnan(half)).any():
             return None
-        before, after = (float(middle(values[again][None, None])[0, 0]) for values in (whole, half))
+        before, after = (float(middle(values[again])) for values in (whole, half))
         differ = apart((before, after), float(self.floors[block]), bool(self.first_order[block]))
         return (before, after) if differ else None
 
@@ -504,9 +504,7 @@ def p_values(differences: ArrayLike) -> np.ndarray:
     p = np.ones(len(rows))
     for n in np.unique(sizes[sizes > 0]).tolist():
         same = sizes == n
-        of_size = rows[same]
-        sums = np.array([_positive_pairs(row[~np.isnan(row)]) for row in of_size])
-        p[same] = _tail(tuple(range(2, 2 * n + 1, 2)), 2 * sums)
+        p[same] = _tail(n, np.array([_positive_pairs(row[~np.isnan(row)]) for row in rows[same]]))
     return p.reshape(shape)
 
 
@@ -532,7 +530,7 @@ def interval(differences: ArrayLike, error: float) -> tuple[float, float, float]
     with np.errstate(invalid="ignore"):
         means = (known[i] + known[j]) / 2  # NaN of two opposite infinite values
     value = float(np.median(np.where(np.isnan(means), 0.0, means)))
-    tails = _tail(tuple(range(2, 2 * n + 1, 2)), 2 * np.arange(means.size + 1))
+    tails = _tail(n, np.arange(means.size + 1))
     if not (enough := np.flatnonzero(tails <= error)).size:
         return value, -math.inf, math.inf
     low = np.sort(np.where(np.isnan(means), -math.inf, means))[means.size - enough[0]]
@@ -545,22 +543,22 @@ def min_p(n: int) -> float:
     return 2.0**-n
 
 
-def _tail(twice: tuple[int, ...], sums: np.ndarray) -> np.ndarray:
-    """Return the probability that random signs give a sum of doubled ranks as large as these."""
-    if len(twice) <= MAX_EXACT:
-        return _distribution(twice)[sums]
+def _tail(n: int, sums: np.ndarray) -> np.ndarray:
+    """Return the probability that random signs of the ranks 1 to n give a sum as large as these."""
+    if n <= MAX_EXACT:
+        return _distribution(n)[sums]
     from scipy.special import ndtr
 
-    mean, deviation = sum(twice) / 2, math.sqrt(sum(rank * rank for rank in twice)) / 2
-    return ndtr((mean - sums + 1) / deviation)
+    mean, deviation = n * (n + 1) / 4, math.sqrt(n * (n + 1) * (2 * n + 1) / 6) / 2
+    return ndtr((mean - sums + 0.5) / deviation)
 
 
-@functools.lru_cache(maxsize=1024)
-def _distribution(twice: tuple[int, ...]) -> np.ndarray:
-    """Return the probability of a sum of doubled ranks of at least 0, 1, ..., if signs are random."""
-    share = np.zeros(sum(twice) + 1)
+@functools.cache
+def _distribution(n: int) -> np.ndarray:
+    """Return the probability of a sum of the ranks 1 to n of at least 0, 1, ..., if signs are random."""
+    share = np.zeros(n * (n + 1) // 2 + 1)
     share[0] = 1.0
-    for rank in twice:
+    for rank in range(1, n + 1):
         share[rank:] += share[: share.size - rank].copy()
         share /= 2
     return np.cumsum(share[::-1])[::-1]

@@ -7,6 +7,7 @@ trace that diverged or has a NaN (ScenarioError). inf means "never".
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -77,7 +78,9 @@ def trends(trace: Trace) -> dict[str, float]:
       ScenarioError: the run diverged, failed or holds NaN.
     """
     refuse(trace)
-    earlier, whole = conventions.by_group(conventions.first_part(trace)), conventions.by_group(trace)
+    count = last_part(trace).start + 1
+    first = dataclasses.replace(trace, **{name: array[:count] for name, array in trace.arrays().items()})
+    earlier, whole = conventions.by_group(first), conventions.by_group(trace)
     found = {}
     for m in metrics():
         if m.late and not m.refusal(trace.scenario.plant):

@@ -245,12 +245,6 @@ def last_part(trace: Trace) -> slice:
     return slice(int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None)
 
 
-def first_part(trace: Trace) -> Trace:
-    """Return the trace without the last part, but for its first sample."""
-    count = last_part(trace).start + 1
-    return dataclasses.replace(trace, **{name: array[:count] for name, array in trace.arrays().items()})
-
-
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:
     """Return the time since t[0], s, from which magnitude, (K+1,), stays <= band; 0 if always, inf if never."""
     outside = np.flatnonzero(magnitude > band)

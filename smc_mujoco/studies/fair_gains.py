@@ -206,7 +206,7 @@ class Trial(NamedTuple):
             new = [law for law, candidate in zip(laws[plant.name], known, strict=True) if candidate is None]
             files = [self._file(plant, law, searches, budget) for law in new]
             new = [law for law, file in zip(new, files, strict=True) if not any(file.parent.glob(f"{file.stem}-*"))]
-            if new := [law for law in new if not self._why_not(plant, law, starts, conditions=False)]:
+            if new := [law for law in new if not self._why_not(plant, law, starts)]:
                 from smc_mujoco.analysis.tuning import search
 
                 goal = self._goal(plant, starts)
@@ -228,11 +228,11 @@ class Trial(NamedTuple):
         """Return the path of a tuning, without its hashes."""
         return self.folder / "gains" / f"{plant.name}-{law.name}-{searches}-{budget}.json"
 
-    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None, conditions: bool = True) -> str:
+    def _why_not(self, plant: Plant, law: Component | Template, starts: Starts | None) -> str:
         """Return why a law cannot be tuned on a plant, "" if it can, as `search.why_not`."""
         from smc_mujoco.analysis.tuning import search
 
-        return search.why_not(plant, law, self._goal(plant, starts), conditions)
+        return search.why_not(plant, law, self._goal(plant, starts))
 
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""

@@ -139,14 +139,9 @@ class Objective:
             cases.append(case)
         return cases
 
-    def terms(self, traces: list[Trace]) -> tuple[float, float]:
-        """Return tracking and variation, each summed over a candidate's runs; J = tracking + weight variation."""
-        tracking, variation = zip(*map(self.terms_of_run, traces), strict=True)
-        return sum(tracking), sum(variation)
-
     def evaluation(self, case: Scenario, traces: list[Trace], gains: tuple[float, ...] = ()) -> Evaluation:
         """Return the evaluation of a candidate, given its first case and the traces of all."""
-        tracking, variation = self.terms(traces)
+        tracking, variation = map(sum, zip(*map(self.terms_of_run, traces), strict=True))
         cost = tracking + self.weight * variation + self.excess(case)
         return Evaluation(gains, float(cost), float(tracking), float(variation))
 

@@ -271,9 +271,9 @@ class Task(NamedTuple):
         """The largest number of evaluations of a search."""
         return self.budget * len(self.box)
 
-    def cases(self, i: int, law: Component | None = None) -> list[Scenario]:
+    def cases(self, i: int) -> list[Scenario]:
         """Return the runs of search i."""
-        return self.goal.scenarios(self.plant, law or self.law, self.seed, i)
+        return self.goal.scenarios(self.plant, self.law, self.seed, i)
 
     def codes(self) -> Any:
         """Return hashes of the code that every search depends on. It takes 20 ms for a user's law."""
@@ -336,11 +336,6 @@ class Task(NamedTuple):
 def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
     goal.scenarios(plant, law, seed)  # raises for one that cannot be
-    return _planned(plant, law, goal, budget, seed, threads)
-
-
-def _planned(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
-    """Return the same without a check of the conditions."""
     first = goal.commanded(plant, law)
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
@@ -351,13 +346,10 @@ def _planned(plant: Plant | str, law: Component, goal: Objective, budget: int, s
     return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
 
 
-def why_not(plant: Plant, law: Component | Template, goal: Objective, conditions: bool = True) -> str:
-    """Return why a law cannot be tuned on a plant, in a sentence; "" if it can. BrokenLawError: no run of it can be.
-
-    `conditions`: whether those of the objective are checked, too.
-    """
+def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
+    """Return why a law cannot be tuned on a plant, in a sentence; "" if it can. BrokenLawError: no run of it can be."""
     try:
-        (_task if conditions else _planned)(plant, coerce.law(law), goal, BUDGET, 0, None)
+        _task(plant, coerce.law(law), goal, BUDGET, 0, None)
     except BrokenLawError:
         raise
     except ScenarioError as error:
@@ -373,7 +365,7 @@ def expected_seconds(
     Most of an evaluation's time is the mechanism's. So the first of the library's laws stands for all of them; a law of
     the user's, which may not compile, is evaluated itself.
     """
-    tasks = [_planned(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
+    tasks = [_task(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
     seconds, of_library = 0.0, None
     for task in tasks:
         if catalogue().get(task.law.name) is not task.law.template:

@@ -247,17 +247,17 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
         (stepper, 50.0, 1.0),
     ):
         goal = Objective(conditions=(condition,))
-        task = search._planned("inverted_pendulum", smc.law("pid"), goal, 8, 0, 1)
+        task = search._task("inverted_pendulum", smc.law("pid"), goal, 8, 0, 1)
         T = math.sqrt(M * 0.5 / F)
         assert task.scales == {"X": 0.5, "F": F, "M": pytest.approx(M), "T": pytest.approx(T)}
         assert task.goal.u_max == F
         assert math.sqrt(math.prod(task.box["kp"])) == pytest.approx(F / 0.5)
     with pytest.raises(smc.ScenarioError, match=r"commands in N and m/s\^2: tune for each drive alone"):
-        search._planned("duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1)
+        search._task("duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1)
 
 
 def test_the_driven_joint_has_the_scales_of_a_machine_with_a_free_one():
-    task = search._planned("furuta", smc.law("rotary_swing_up"), Objective(), 8, 0, 1)
+    task = search._task("furuta", smc.law("rotary_swing_up"), Objective(), 8, 0, 1)
     p = smc.plant("furuta").values({})
     Jp, lever = p.Jc + p.m * p.l**2, p.m * p.L * p.l
     assert task.scales["M"] == pytest.approx(p.J + p.m * p.L**2 - lever**2 / Jp)
@@ -371,7 +371,7 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
     goal = Objective(conditions=("nominal",), duration=0.2)
     laws = [failing(when=when) for when in (0.0, 0.05, 0.1, 0.15, 1.0)]
     traces = smc.run([goal.scenarios("duffing", law, 0)[0] for law in laws])
-    costs = [goal.terms([trace])[0] for trace in traces]
+    costs = [goal.terms_of_run(trace)[0] for trace in traces]
     assert all(map(math.isfinite, costs))
     assert costs == sorted(costs, reverse=True)
     assert len(set(costs)) == 5
