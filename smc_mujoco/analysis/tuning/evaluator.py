@@ -11,11 +11,10 @@ do not compile. J is that of `Objective.terms`.
 
 import dataclasses
 import functools
-import math
 import warnings
 from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -34,13 +33,8 @@ from smc_mujoco.simulation.state import log_at
 
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "the reference loop"  # engines
 Gains = tuple[float, ...]
-
-
-class Ended(NamedTuple):
-    """What J needs of a run: the time at which it failed, s, or None, and its log, (K + 1, n) LOG."""
-
-    failed_at: float | None
-    log: np.ndarray
+Costs = tuple[float, float]  # tracking and variation of a run
+Terms = Callable[[int, float | None, np.ndarray], Costs]  # number of a case, when it failed, s, (K + 1, n) LOG -> costs
 
 
 class Evaluator:
@@ -96,30 +90,24 @@ class Evaluator:
             return 0.0
         return self.goal.excess(dataclasses.replace(self.cases[0], law=self.law(gains)))
 
-    def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[tuple[float, float]]:
+    def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[Costs]:
         laws = [self.law(gains) for gains in candidates]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlainLoopWarning)  # the runs of the law's own gains have warned
             traces = run([dataclasses.replace(case, law=law) for law in laws for case in self.cases], self.threads)
         return [self.goal.terms_of_run(trace) for trace in traces]
 
-    def _terms(self, index: int, ended: Ended) -> tuple[float, float]:
-        """Return tracking and variation of the run of a case, given by its index."""
+    def _terms(self, index: int, failed_at: float | None, log: np.ndarray) -> Costs:
+        """Return tracking and variation of the run of a case, see `Terms`."""
         case = self.cases[index]
-        if ended.failed_at is None:
-            if case.plant.pose:
-                terms = self.goal.terms_of_pose(case, ended.log["x"], ended.log["r"], ended.log["u"])
-            else:
-                itae, start, tv = sums(ended.log, case.control_period)
-                terms = self.goal.terms_of_sums(case, itae, start, tv) if math.isfinite(itae) else (math.nan, math.nan)
-            if math.isfinite(terms[0]):
-                return terms
-            errors = np.isfinite(ended.log["x"] - ended.log["r"]).all(axis=1)
-            return self.goal.terms_of_failure(int(np.argmin(errors)) * case.control_period)
-        return self.goal.terms_of_failure(ended.failed_at)
-
-
-Terms = Callable[[int, Ended], tuple[float, float]]
+        if failed_at is not None:
+            return self.goal.terms_of_failure(failed_at)
+        finite = np.isfinite(log["x"] - log["r"]).all(axis=1)
+        if not finite.all():
+            return self.goal.terms_of_failure(int(np.argmin(finite)) * case.control_period)
+        if case.plant.pose:
+            return self.goal.terms_of_pose(case, log["x"], log["r"], log["u"])
+        return self.goal.terms_of_sums(case, *sums(log, case.control_period))
 
 
 def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) -> Component:
@@ -136,18 +124,16 @@ def _batched(candidates: Sequence[Gains], size: int) -> list[Sequence[Gains]]:
     return [candidates[first : first + size] for first in range(0, len(candidates), size)]
 
 
-class _Gains:
-    """Where the gains of a run are among its numbers."""
+def _putter(prepared: Prepared, names: Sequence[str], record: Any, packed: Packed) -> Callable[[Gains], None]:
+    """Return the function that puts a candidate's gains among the numbers of a run."""
+    law, at = prepared.scenario.law, int(record["law"]["parameters"])
+    values = state.view(packed.numbers, at, (len(law.gains), prepared.scenario.plant.n if law.joint else 1))
+    rows = [list(law.gains).index(name) for name in names]
 
-    def __init__(self, law: Component, names: Sequence[str], record: Any, packed: Packed, n: int):
-        width, at = n if law.joint else 1, int(record["law"]["parameters"])
-        self.values = state.view(packed.numbers, at, (len(law.gains), width))
-        self.rows = [list(law.gains).index(name) for name in names]
+    def put(gains: Gains) -> None:
+        values[rows] = np.reshape(gains, (-1, 1))
 
-    def put(self, gains: Gains) -> None:
-        """Set the gains that a candidate has."""
-        for row, gain in zip(self.rows, gains, strict=True):
-            self.values[row] = gain
+    return put
 
 
 class _Equations:
@@ -156,28 +142,27 @@ class _Equations:
     def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int):
         self.cases, self.slots = len(prepared), _that_fit(prepared, threads)
         self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
-        law, n = prepared[0].scenario.law, prepared[0].scenario.plant.n
-        self.gains = [_Gains(law, names, one.record[0], one.packed, n) for one in self.runs]
+        self.put = [_putter(one.prepared, names, one.record[0], one.packed) for one in self.runs]
         self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
-    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[tuple[float, float]]:
-        made: list[tuple[float, float]] = []
+    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
+        made: list[Costs] = []
         for some in _batched(candidates, self.slots):
             runs = range(len(some) * self.cases)
             each = functools.partial(self._one, some, terms)
             made += map(each, runs) if self.pool is None else self.pool.map(each, runs)
         return made
 
-    def _one(self, candidates: Sequence[Gains], terms: Terms, i: int) -> tuple[float, float]:
+    def _one(self, candidates: Sequence[Gains], terms: Terms, i: int) -> Costs:
         """Return the terms of run i of some candidates."""
         one = self.runs[i]
         one.restart()
-        self.gains[i].put(candidates[i // self.cases])
+        self.put[i](candidates[i // self.cases])
         one.simulate()
         record = one.record[0]
         failed = record["failure"] != state.FINE
         time = float(record["failed_step"]) * one.scenario.physics_step if failed else None
-        return terms(i % self.cases, Ended(time, one.log))
+        return terms(i % self.cases, time, one.log)
 
 
 class _Batches:
@@ -194,15 +179,15 @@ class _Batches:
                 _Again([prepared[i] for i in its] * self.slots, names, threads, constraints) for its in self.groups
             ]
 
-    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[tuple[float, float]]:
-        made: list[tuple[float, float]] = []
+    def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
+        made: list[Costs] = []
         for some in _batched(candidates, self.slots):
-            rows: list[tuple[float, float]] = [(0.0, 0.0)] * (len(some) * self.cases)
+            rows = [(0.0, 0.0)] * (len(some) * self.cases)
             for its, batch in zip(self.groups, self.batches, strict=True):
-                ended = batch.again([gains for gains in some for _ in its])
-                for k, one in enumerate(ended):
+                batch.again([gains for gains in some for _ in its])
+                for k in range(len(some) * len(its)):
                     index = its[k % len(its)]
-                    rows[k // len(its) * self.cases + index] = terms(index, one)
+                    rows[k // len(its) * self.cases + index] = terms(index, batch.failed_at(k), batch.logs[k])
             made += rows
         return made
 
@@ -215,18 +200,17 @@ class _Again(ScenarioBatch):
         self.first_records = self.records.copy()
         self.first_numbers = [packed.numbers.copy() for packed in self.packed]
         self.start = {name: array.copy() for name, array in self.started.items()}
-        law, n = prepared[0].scenario.law, prepared[0].scenario.plant.n
-        self.gains = [_Gains(law, names, *pair, n) for pair in zip(self.records, self.packed, strict=True)]
+        each = zip(prepared, self.records, self.packed, strict=True)
+        self.put = [_putter(item, names, record, packed) for item, record, packed in each]
 
-    def again(self, gains: Sequence[Gains]) -> list[Ended]:
+    def again(self, gains: Sequence[Gains]) -> None:
         """Run the first simulations, as many as gains are given, from their start."""
-        count = len(gains)
         self.records[:] = self.first_records
-        self.records["failure"][count:] = state.INTERRUPTED  # they are not stepped
+        self.records["failure"][len(gains) :] = state.INTERRUPTED  # they are not stepped
         for one, first in zip(self.packed, self.first_numbers, strict=True):
             one.numbers[:] = first
-        for its, values in zip(self.gains, gains, strict=False):
-            its.put(values)
+        for put, values in zip(self.put, gains, strict=False):
+            put(values)
         self.errors.clear()
         self.calls = 0
         with callback.installed(), memory_for(self.prepared):
@@ -236,13 +220,12 @@ class _Again(ScenarioBatch):
             if self.fields:
                 self.set_parameters(0, range(len(self.scenarios)))
             self.simulate(lambda steps: None)
-            return [self._ended(i) for i in range(count)]
 
-    def _ended(self, i: int) -> Ended:
-        step = int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
+    def failed_at(self, i: int) -> float | None:
+        """Return the time at which a run failed, s, or None."""
         if self.records["failure"][i] == state.FINE:
-            return Ended(0.0 if self.lost_contacts(i) else None, self.logs[i])
-        return Ended(step, self.logs[i])
+            return 0.0 if self.lost_contacts(i) else None
+        return int(self.records["failed_step"][i]) * self.scenarios[i].physics_step
 
 
 def sums(log: np.ndarray, period: float) -> tuple[float, float, float]:

@@ -40,10 +40,7 @@ DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settl
 CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
 DEFAULT_STARTS = Starts()
 SEEDS_PER_SEARCH = 1000  # each condition uses one of them
-SEARCHES, MAX_SEARCHES = (
-    12,
-    1000,
-)  # of a tuning: with twelve, twelve runs of two laws decide between them, see `ranking`
+SEARCHES, MAX_SEARCHES = 12, 1000  # of a tuning: with 12, 12 runs of two laws decide between them, see `ranking`
 BUDGET, MAX_BUDGET = 64, 10_000  # evaluations of a search, for each gain
 Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
 Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]

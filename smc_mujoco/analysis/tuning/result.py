@@ -23,9 +23,7 @@ from smc_mujoco.simulation import serialise
 COMPARED_FIELDS = ("rule", "plant", "definition", "budget", "number_of_searches", "seed", "versions")
 NAMES = {"definition": "objective", "number_of_searches": "number of searches"}  # of fields, in words
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
-SAVED_FIELDS = (
-    "before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions",
-)  # fmt: skip
+SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 NEAR = 0.03  # of the best J: gains within it are as good
 
 Ranges = dict[str, tuple[float, float]]  # gain -> lowest, highest
