@@ -92,6 +92,8 @@ class Setting:
         self.limits, self.scale = np.array(self.scenario.limits), math.prod(p.scale for p in self.scenario.actuator)
         # the channels that the task treats differently, (n,) of bool, and from where positions count in errors, (n,)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
+        # the channels that the reward counts: not the tilt of a body that leans to move
+        self.counted = list(plant.judged) if flies else slice(None)
         self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
         width = self.references.shape[1]
         self.observation_size, self.action_shape = 2 * plant.n + width * self.task.moving, (plant.driven,)
@@ -198,8 +200,13 @@ class Episode:
         time = self.sample * self.setting.scenario.control_period
         if self.diverged:
             return 0.0, {"time": time, "error": np.full(len(self.x), np.nan)}
-        e, w = self.setting.errors(self.x, self.v, self.sample)
-        return float(reward(e, w)), {"time": time, "error": e}
+        e, w = self.errors()
+        counted = self.setting.counted
+        return float(reward(e[counted], w[counted])), {"time": time, "error": e}
+
+    def errors(self) -> Pair:
+        """Return the errors e and w of the task, (n,) each."""
+        return self.setting.errors(self.x, self.v, self.sample)
 
 
 def bounded(observation: np.ndarray) -> np.ndarray:

@@ -17,9 +17,8 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.envs.episode import Setting, bounded
-from smc_mujoco.envs.gymnasium_env import PlantEnv, Single
-from smc_mujoco.envs.tasks import reward
+from smc_mujoco.envs.gymnasium_env import PlantEnv, action_space
+from smc_mujoco.envs.tasks import Pair
 from smc_mujoco.mechanisms import rotation
 from smc_mujoco.mechanisms.hardware.part import drive_ids, exerted, free_joint
 from smc_mujoco.mechanisms.named import as_plant
@@ -32,8 +31,10 @@ from smc_mujoco.simulation.run import ScenarioBatch
 import gymnasium  # already imported by gymnasium_env
 
 
-class FlightEnv(Single):
+class FlightEnv(PlantEnv):
     """One free body with a task, `regulate` or `track`."""
+
+    flies = True
 
     def __init__(
         self,
@@ -43,75 +44,53 @@ class FlightEnv(Single):
         render_mode: str | None = None,
     ):
         """Make a free body with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`."""
-        setting = Setting(plant, task, changes, flies=True)
-        model, name = setting.model, setting.scenario.plant.name
+        super().__init__(plant, task, changes, render_mode)
+        model, scenario = self.setting.model, self.setting.scenario
         drives = drive_ids(model)
         if not model.actuator_ctrllimited[drives].all():
-            raise ScenarioError(f"an actuator of {name} has no ctrlrange: give each one")
+            raise ScenarioError(f"an actuator of {scenario.plant.name} has no ctrlrange: give each one")
         self.wrenches = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
         self.least, self.most = model.actuator_ctrlrange[drives].T
-        setting.action_shape, setting.limits = (len(drives),), np.ones(len(drives))
-        self.set_up(setting, render_mode)
-        self.begin(np.array(setting.scenario.x0), np.array(setting.scenario.v0))
+        self.setting.action_shape, self.setting.limits = (len(drives),), np.ones(len(drives))
+        self.action_space = action_space(self.setting)
+        self.begin(self.data, self.np_random)
 
-    def begin(self, x0: np.ndarray, v0: np.ndarray) -> None:
-        """Begin an episode from a pose and its velocity, (6,) each."""
+    def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
+        """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
+        x0, v0 = self.setting.draw_start(random, options)
         start = dataclasses.replace(self.setting.flown, x0=tuple(x0.tolist()), v0=tuple(v0.tolist()))
         with callback.installed():
             self.batch = ScenarioBatch([prepare(start)], threads=1)
         self.memory = state.view(self.batch.packed[0].numbers, int(self.batch.records["law"]["memory"][0]), (len(x0),))
         self.sample = 0
+        self.read_state(data)
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
-        super().reset(seed=seed)
-        self.begin(*self.setting.draw_start(self.np_random, options))
-        x, v = self.pose()
-        return self.setting.observe(x, v, 0), self.judged(x, v)[1]
-
-    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Take one control period. Return observation, reward, terminated, truncated and the info."""
+    def advance(self, action: Any) -> None:
+        """Take one control period and read the pose."""
         share = 0.5 + 0.5 * self.setting.command(action)
         wrench = (self.least + share * (self.most - self.least)) @ self.wrenches
-        self.memory[:] = *rotation.turned(rotation.quaternion(*self.pose()[0][3:]), *wrench[:3]), *wrench[3:]
+        self.memory[:] = *rotation.turned(rotation.quaternion(*self.x[3:]), *wrench[:3]), *wrench[3:]
         self.sample += 1
         with callback.installed():
             self.batch.advance_to(self.sample * self.setting.scenario.steps)
-        x, v = self.pose()
-        observation, lost = self.setting.observe(x, v, self.sample), bool(self.setting.diverged(x, v))
-        reward, info = (0.0, {"time": self.time, "error": np.full(len(x), np.nan)}) if lost else self.judged(x, v)
-        observation = bounded(observation) if lost else observation
-        return observation, reward, lost, self.sample >= self.max_samples, info
+        self.read_state(self.data)
 
-    @property
-    def time(self) -> float:
-        """Time of the episode, s."""
-        return self.sample * self.setting.scenario.control_period
-
-    def pose(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pose and its velocity, (6,) each."""
-        qpos, qvel = self.batch.batch.bind("qpos")[0], self.batch.batch.bind("qvel")[0]
+    def read_state(self, data: mujoco.MjData) -> None:
+        """Read the pose and its velocity, (6,) each, and write the positions into the data that are drawn."""
+        data.qpos[:], qvel = (self.batch.batch.bind(name)[0] for name in ("qpos", "qvel"))
         first, dof = self.setting.qpos[3], self.setting.qvel[0]
-        turn = rotation.rotation_vector(*qpos[first : first + 4])
-        return np.array([*qpos[first - 3 : first], *turn]), qvel[dof : dof + 6].copy()
+        turn = rotation.rotation_vector(*data.qpos[first : first + 4])
+        self.x, self.v = np.array([*data.qpos[first - 3 : first], *turn]), qvel[dof : dof + 6].copy()
+        self.diverged = bool(self.setting.diverged(self.x, self.v))
 
-    def judged(self, x: np.ndarray, v: np.ndarray) -> tuple[float, dict[str, Any]]:
-        """Return reward and info of a pose and its velocity, (6,) each."""
+    def errors(self) -> Pair:
+        """Return the errors of the pose and of its velocity, (6,) each."""
         r = np.concatenate([self.setting.rest_x, np.zeros(6)])
         if self.setting.task.moving:
             r = self.setting.reference(self.sample)[:12]
-        e, w = x - r[:6], v - r[6:]
-        rotation.put_attitude_error(x, v, r[:6], r[6:], e, w)
-        counted = list(self.setting.scenario.plant.judged)
-        return float(reward(e[counted], w[counted])), {"time": self.time, "error": e}
-
-    def posed(self) -> mujoco.MjData:
-        """Return the data of the body's model, at its pose."""
-        data = mujoco.MjData(self.setting.model)
-        data.qpos[:] = self.batch.batch.bind("qpos")[0]
-        return data
+        e, w = self.x - r[:6], self.v - r[6:]
+        rotation.put_attitude_error(self.x, self.v, r[:6], r[6:], e, w)
+        return e, w
 
 
 def environment(plant: Plant | str, *args: Any, **kwargs: Any) -> gymnasium.Env:

@@ -64,49 +64,11 @@ class TimeLimited:
             self._spec.max_episode_steps = self.max_samples
 
 
-class Single(TimeLimited, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """Base of environments of one plant, with a picture of it."""
+class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIncompatibleVariableOverride]
+    """One plant with a task. It has the attributes of an Episode too."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 1000}  # noqa: RUF012  # as gymnasium has it
-    setting: Setting
-
-    def set_up(self, setting: Setting, render_mode: str | None) -> None:
-        """Take the length of episodes, the rate of pictures, and the spaces from a setting."""
-        if render_mode not in (None, "rgb_array"):
-            raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
-        self.setting, self.render_mode, self.max_samples = setting, render_mode, setting.scenario.samples
-        self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / setting.scenario.control_period))}
-        self.action_space, self.observation_space = action_space(setting), observation_space(setting)
-        self.renderer: mujoco.Renderer | None = None
-
-    def posed(self) -> mujoco.MjData:
-        """Return the data of the plant's model, at the positions of now."""
-        raise NotImplementedError
-
-    def render(self) -> np.ndarray | None:
-        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None."""
-        if self.render_mode is None:
-            return None
-        if (renderer := self.renderer) is None:
-            renderer = self.renderer = gl.renderer(self.setting.model)
-        data = self.posed()
-        mujoco.mj_forward(self.setting.model, data)
-        renderer.update_scene(data, camera=0 if self.setting.model.ncam else -1)
-        return renderer.render()
-
-    def close(self) -> None:
-        """Close the renderer."""
-        if self.renderer is not None:
-            self.renderer.close()
-            self.renderer = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return all but the renderer, for copies and other processes."""
-        return self.__dict__ | {"renderer": None}
-
-
-class PlantEnv(Single, Episode):  # pyright: ignore[reportIncompatibleVariableOverride]
-    """One plant with a task. It has the attributes of an Episode too."""
+    flies = False  # whether it is for free bodies
 
     def __init__(
         self,
@@ -116,13 +78,15 @@ class PlantEnv(Single, Episode):  # pyright: ignore[reportIncompatibleVariableOv
         render_mode: str | None = None,
     ):
         """Make a plant with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`."""
-        Episode.__init__(self, Setting(plant, task, changes))
-        self.set_up(self.setting, render_mode)
+        super().__init__(Setting(plant, task, changes, flies=self.flies))
+        if render_mode not in (None, "rgb_array"):
+            raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
+        scenario = self.setting.scenario
+        self.render_mode, self.max_samples = render_mode, scenario.samples
+        self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / scenario.control_period))}
+        self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
+        self.renderer: mujoco.Renderer | None = None
         self.data = mujoco.MjData(self.setting.model)
-
-    def posed(self) -> mujoco.MjData:
-        """Return the data of the plant's model."""
-        return self.data
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -134,12 +98,36 @@ class PlantEnv(Single, Episode):  # pyright: ignore[reportIncompatibleVariableOv
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Take one control period. Return observation, reward, terminated, truncated and the info."""
-        for steps in self.apply_action(self.data, action):
-            mujoco.mj_step(self.setting.model, self.data, steps)
-        self.sample += 1
-        self.read_state(self.data)
+        self.advance(action)
         observation = self.setting.observe(self.x, self.v, self.sample)
         if self.diverged:
             observation = bounded(observation)
         reward, info = self.reward_and_info()
         return observation, reward, self.diverged, self.sample >= self.max_samples, info
+
+    def advance(self, action: Any) -> None:
+        """Take one control period and read the state."""
+        for steps in self.apply_action(self.data, action):
+            mujoco.mj_step(self.setting.model, self.data, steps)
+        self.sample += 1
+        self.read_state(self.data)
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None."""
+        if self.render_mode is None:
+            return None
+        if (renderer := self.renderer) is None:
+            renderer = self.renderer = gl.renderer(self.setting.model)
+        mujoco.mj_forward(self.setting.model, self.data)
+        renderer.update_scene(self.data, camera=0 if self.setting.model.ncam else -1)
+        return renderer.render()
+
+    def close(self) -> None:
+        """Close the renderer."""
+        if self.renderer is not None:
+            self.renderer.close()
+            self.renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all but the renderer, for copies and other processes."""
+        return self.__dict__ | {"renderer": None}

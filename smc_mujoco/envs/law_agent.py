@@ -77,7 +77,7 @@ class Agent:
 
 def _episode(environment: Any) -> Episode:
     for owner in (getattr(environment, "task", None), getattr(environment, "unwrapped", None)):
-        if isinstance(owner, Episode):
+        if isinstance(owner, Episode) and not owner.setting.scenario.plant.pose:
             return owner
     cure = "give one of smc_mujoco.envs.suite, or a single one of smc_mujoco.envs.gym"
     raise ScenarioError(f"environment is {shown(environment)}: {cure}")

@@ -17,6 +17,7 @@ from smc_mujoco.common.files import plain, read_json, replacing
 from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 
+__tracebackhide__ = True  # pytest hides the frames of a module that has it
 RELATIVE = 0.01  # default tolerance, as a share of the value: chosen, far above rounding errors of other processors
 UPDATE = "run pytest --smc-update"
 MIN_TOLERANCE = 1e-9  # in the metric's unit: above rounding errors of a value that is 0
@@ -48,7 +49,6 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
 
     With `tolerances`, in the metrics' units, only these metrics count; without, all with the tolerances in the file.
     """
-    __tracebackhide__ = True
     tolerances = _checked(response, tolerances)
     known = read(file).get(key, {})
     if missing := [name for name in tolerances if name not in known] or ([] if known else ["metrics"]):
@@ -69,7 +69,6 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
 
 def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, float]:
     """Return tolerances as numbers; raise ScenarioError for others, and for anything but a response that has them."""
-    __tracebackhide__ = True
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.check_names(tolerances)

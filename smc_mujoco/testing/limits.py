@@ -9,6 +9,7 @@ from smc_mujoco.common.errors import ScenarioError, number, shown
 from smc_mujoco.common.tabular import Tabular
 from smc_mujoco.metrics.catalogue import CATALOGUE
 
+__tracebackhide__ = True  # pytest hides the frames of a module that has it
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -41,7 +42,6 @@ def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
     """Raise an AssertionError with a table of all limits if one is violated."""
-    __tracebackhide__ = True
     if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, within in limits if not within]:
         rows = [(*line, "yes" if within else "NO") for *line, within in limits]
         raise AssertionError(
@@ -63,7 +63,6 @@ def without_frames(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:
-        __tracebackhide__ = True
         try:
             return function(*args, **named)
         except ScenarioError as error:

@@ -20,6 +20,7 @@ import pytest
 if TYPE_CHECKING:
     from smc_mujoco.testing.response import StepResponse
 
+__tracebackhide__ = True  # pytest hides the frames of a module that has it
 EXAMPLE = '@pytest.mark.smc(plants=["duffing"], conditions=["nominal", "noise"])'
 GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wrote
 
@@ -135,7 +136,6 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
 
     @without_frames
     def compare(response: StepResponse, **tolerances: float) -> None:
-        __tracebackhide__ = True
         key = test if (n := next(number)) == 1 else f"{test} {n}"
         if update:
             files.record(file, key, response, tolerances)

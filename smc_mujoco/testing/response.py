@@ -20,6 +20,7 @@ from smc_mujoco.simulation.signals import Constant, Step
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.testing.limits import bound, judge, quantity, without_frames
 
+__tracebackhide__ = True  # pytest hides the frames of a module that has it
 MAX_ID = 150  # characters of a test's id in a file's name: most file systems allow 255 bytes
 IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics in the repr of a response
 
@@ -67,7 +68,6 @@ class StepResponse:
 
     @without_frames
     def __getattr__(self, name: str) -> float:
-        __tracebackhide__ = True  # of the AttributeError
         if name.startswith("_") or name == "trace":  # read by copy and inspect
             raise AttributeError(name)
         if name in CATALOGUE and name in self.metrics:
@@ -110,7 +110,6 @@ class StepResponse:
 
     def check_names(self, names: Iterable[str]) -> None:
         """Raise AssertionError if the run failed, and ScenarioError for a name that is not among its `values`."""
-        __tracebackhide__ = True
         if self.failure is not None:
             raise AssertionError(f"{self}: {self.failure}")
         for name in names:
@@ -123,7 +122,6 @@ class StepResponse:
 
         A limit is the highest value, or (lowest, highest), in the metric's unit. The AssertionError has a table of all.
         """
-        __tracebackhide__ = True
         if not limits:
             raise ScenarioError("check has no limits: give metrics with their largest values, as settling_time=0.6")
         self.check_names(limits)

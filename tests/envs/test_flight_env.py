@@ -86,6 +86,8 @@ def test_what_is_no_free_body_or_wants_copies_is_told_where_to_go():
     for other in (PlantEnv, BatchEnv):
         with pytest.raises(smc.ScenarioError, match=r"free body: .*gymnasium\.make"):
             other("quadrotor")
+    with pytest.raises(smc.ScenarioError, match=r"environment is .*: give one of"):
+        smc.envs.agent("geometric", FlightEnv("quadrotor"))
     with pytest.raises(smc.ScenarioError, match="task 'swing_up' is not for quadrotor"):
         FlightEnv("quadrotor", "swing_up")
 
