@@ -18,7 +18,6 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Handle, Size
-from smc_mujoco.draw.pareto import MARKS
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 
@@ -63,7 +62,7 @@ def plot(
     if not plants or not names:
         raise ScenarioError("no runs or no metrics to draw: give a table with rows, and at least one metric")
     colours = dict(zip(laws, style.law_colours(laws), strict=True))
-    marks = dict(zip(laws, itertools.cycle(MARKS), strict=False))
+    marks = dict(zip(laws, itertools.cycle(style.MARKS), strict=False))
     intervals = _intervals(table, names)
     by_plant = {group.name["plant"]: scenarios(table, group) for group in groups(table, GROUPS[:1])}
     units = {plant: unit_of_x(plant, its) for plant, its in by_plant.items()}

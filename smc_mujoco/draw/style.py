@@ -44,6 +44,7 @@ PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}  # of units, by th
 CAMEL = re.compile(
     r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])"
 )  # where a word begins in DCMotor, but not in LuGre
+MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve they begin again
 MAX_DIGITS, MAX_VALUES = 17, 8  # digits that tell two numbers apart; numbers of a label
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen

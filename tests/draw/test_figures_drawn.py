@@ -21,7 +21,6 @@ from smc_mujoco.draw import amplitudes, panels, region, style
 from smc_mujoco.draw.figure import figure, signals
 from smc_mujoco.draw.nyquist import nyquist
 from smc_mujoco.draw.page import DPI
-from smc_mujoco.draw.pareto import pareto
 from smc_mujoco.evidence.accuracy.orders import orders
 from smc_mujoco.evidence.accuracy.scaling import Accuracy, Scaling
 from smc_mujoco.mechanisms.hardware.friction import Coulomb
@@ -377,7 +376,6 @@ REFUSED = {  # call -> arguments, and what replaces them
     ]),
     orders: ({"rows": []}, [{}]),
     region.draw: ({"maps": []}, [{}]),
-    pareto: ({"tunings": []}, [{}]),
     smc.plot: ({"table": ONE}, [{}]),
     smc.show: ({"what": ONE}, [{}]),
     smc.film: ({"traces": ONE, "at": 0.0, "path": "a.png", "size": (320, 180)}, [

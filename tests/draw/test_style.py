@@ -8,11 +8,8 @@ import pytest
 from matplotlib.colors import to_hex
 
 import smc_mujoco as smc
-from smc_mujoco.analysis.tuning.objective import Objective
-from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.control.gain_sets import COMPARED, LAWS
 from smc_mujoco.draw import figure, style
-from smc_mujoco.draw.pareto import MARKS, pareto
 
 pytestmark = pytest.mark.quick
 
@@ -58,8 +55,8 @@ def test_laws_of_one_picture_are_apart_in_four_sights_as_far_as_so_many_can_be(c
 def test_laws_of_a_dot_plot_that_share_a_mark_have_colours_that_nobody_mistakes():
     """Dark purple and dark brown pluses, 14.6 apart, were two of the sixteen that are compared by default."""
     colours = style.law_colours(COMPARED)
-    shared = [[k, k + len(MARKS)] for k in range(len(COMPARED) - len(MARKS))]
-    assert len(set(MARKS)) == len(MARKS) >= len(COMPARED) / 2
+    shared = [[k, k + len(style.MARKS)] for k in range(len(COMPARED) - len(style.MARKS))]
+    assert len(set(style.MARKS)) == len(style.MARKS) >= len(COMPARED) / 2
     assert min(least([colours[k] for k in pair]) for pair in shared) > 2 * style.MIN_DISTANCE
 
 
@@ -111,17 +108,11 @@ def test_law_colours_never_repeat_in_one_picture():
     assert len({*style.law_colours([*smc.laws(), *names])}) == len(smc.laws()) + len(names)
 
 
-@pytest.mark.filterwarnings("ignore:no set of gains tried")
-def test_laws_that_would_share_a_colour_differ_in_signals_and_fronts_too(monkeypatch):
+def test_laws_that_would_share_a_colour_differ_in_signals_too(monkeypatch):
     monkeypatch.setattr(style, "law_colour", lambda law: "#0072B2")
-    laws = ("observer_free", "classical")
-    runs = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.05) for law in laws])
+    runs = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.05) for law in ("observer_free", "classical")])
     rows = figure.figure(runs, None, ["b", "b"], panels=["u"])
-    brief = Objective(conditions=("nominal",), duration=0.1)
-    fronts = pareto([tune("duffing", law, budget=4, objective=brief, searches=1) for law in laws])
     assert len({to_hex(line.get_color()) for ax in rows.axes for line in ax.lines}) == 2
-    (ax,) = fronts.axes
-    assert len({to_hex(line.get_color()) for line in ax.lines if str(line.get_marker()) in MARKS}) == 2
 
 
 def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():

@@ -1,7 +1,6 @@
 """The result of a tuning and everything that it depends on. It is saved as JSON."""
 
 import dataclasses
-import itertools
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +9,6 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
-from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import counted
@@ -19,9 +17,6 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
-# Equal in tunings that are compared.
-COMPARED_FIELDS = ("rule", "plant", "definition", "budget", "number_of_searches", "seed", "versions")
-NAMES = {"definition": "objective", "number_of_searches": "number of searches"}  # of fields, in words
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 NEAR = 0.03  # of the best J: gains within it are as good
@@ -231,15 +226,3 @@ def load(path: str | os.PathLike[str], plant: Plant | None = None) -> Tuned:
 
 def _short(value: float) -> float:
     return float(f"{value:.6g}")
-
-
-def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
-    """Return the tunings, best first. Raise ScenarioError unless all were made in the same way."""
-    if not tuned:
-        raise ScenarioError("cannot compare []: give a list of tunings")
-    for one, field in itertools.product(tuned, COMPARED_FIELDS):
-        if (value := getattr(one, field)) != (other := getattr(tuned[0], field)):
-            name = NAMES.get(field, field)
-            words = f"{name} cannot be compared, {one.law.name} has {value}, {tuned[0].law.name} {other}"
-            raise ScenarioError(f"laws tuned with unequal {words}: tune them in the same way")
-    return sorted(tuned, key=lambda one: one.objective)

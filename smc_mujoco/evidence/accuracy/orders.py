@@ -21,7 +21,6 @@ from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import panels as drawing
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
-from smc_mujoco.draw.pareto import MARKS
 from smc_mujoco.evidence.accuracy.scaling import QUANTITIES, Accuracy, Scaling
 
 ROW_HEIGHT = 5.2  # inches on a full page, height of the panels of a plant in a condition
@@ -46,7 +45,7 @@ def orders(
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     laws = list(dict.fromkeys(row.law for row in rows))
-    looks = dict(zip(laws, zip(style.law_colours(laws), itertools.cycle(MARKS), strict=False), strict=True))
+    looks = dict(zip(laws, zip(style.law_colours(laws), itertools.cycle(style.MARKS), strict=False), strict=True))
     with style.page(width):
         narrow = width < pages.NARROW
         down = len(groups) * (len(QUANTITIES) if narrow else 1)
