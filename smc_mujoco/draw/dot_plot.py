@@ -175,16 +175,16 @@ def _dot(ax: Axes, interval: Interval, line: int, look: dict) -> None:
 
 
 def _labels(metrics: Sequence[str], x: str, room: float) -> list[str]:
-    """Return the labels of a row of panels, positions in x; all in two lines if one is wider than `room`, in points."""
-    labels = [_label(metric, x) for metric in metrics]
+    """Return the labels of a row of panels with the metrics' units where positions are in x.
+
+    All are in two lines if one is wider than `room`, in points.
+    """
+    labels = []
+    for metric in metrics:
+        words, bracket, unit = "share of runs that settle", "", ""
+        if metric != SETTLES:
+            words, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
+        labels.append(words + bracket + unit.replace("^2", "²").replace(" ", "·"))
     if any(style.width(label, style.points(pages.TEXT_SIZE)) > room for label in labels):
         return [label.replace(" (", "\n(").replace(" that", "\nthat") for label in labels]
     return labels
-
-
-def _label(metric: str, x: str) -> str:
-    """Return a metric's label with its unit where positions are in x."""
-    if metric == SETTLES:
-        return "share of runs that settle"
-    label, bracket, unit = CATALOGUE[metric].heading(x).partition(" (")
-    return label + bracket + unit.replace("^2", "²").replace(" ", "·")

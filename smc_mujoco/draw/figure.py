@@ -50,12 +50,6 @@ class Runs(NamedTuple):
     changes: Mapping[float, str]
     span: tuple[float, float]
 
-    @property
-    def time(self) -> str:
-        """The label of a time axis."""
-        shown, whole = self.span
-        return "time (s)" if shown == whole else f"time (s), the first {shown:.2g} s of {whole:g} s"
-
 
 def figure(
     traces: Trace | Sequence[Trace],
@@ -235,8 +229,9 @@ def _draw_over_time(page, cells: Sequence[SubplotSpec], overview: Sequence[tuple
             ax.tick_params(labelbottom=False)
         _equal_ranges(frame, rows)
     if axes:
+        shown, whole = runs.span
         axes[-1].tick_params(labelbottom=True)
-        axes[-1].set_xlabel(runs.time)
+        axes[-1].set_xlabel("time (s)" if shown == whole else f"time (s), the first {shown:.2g} s of {whole:g} s")
     page.align_ylabels(frames)
 
 

@@ -39,7 +39,8 @@ def show(
     from IPython.display import HTML, display
 
     if isinstance(what, Figure | SubFigure):
-        display(HTML(html.embedded(page.png(what), "image/png", page.css_width(what))))
+        content, width = page.embedded(what)
+        display(HTML(html.embedded(content, "image/png", width)))
         return
     frames = what if isinstance(what, Frames) else Frames(what, labels, title, size, fps, speed, camera)
     if why := film.missing():

@@ -50,24 +50,20 @@ class Page(Figure):
     """A figure that a notebook shows, although pyplot does not know of it."""
 
     def _repr_png_(self) -> tuple[bytes, dict[str, float]]:
-        return png(self), {"width": css_width(self)}
+        content, width = embedded(self)
+        return content, {"width": width}
 
 
-def png(page: Figure | SubFigure) -> bytes:
-    """Return the whole figure as a PNG."""
-    content = io.BytesIO()
-    page.get_figure(root=True).savefig(content, format="png", dpi=DPI)
-    return content.getvalue()
+def embedded(page: Figure | SubFigure) -> tuple[bytes, float]:
+    """Return the whole figure as a PNG, and its width in px of a web page, 96 an inch."""
+    whole, content = page.get_figure(root=True), io.BytesIO()
+    whole.savefig(content, format="png", dpi=DPI)
+    return content.getvalue(), 96 * whole.get_figwidth()
 
 
 def resolution(page: Figure | SubFigure) -> float:
     """Return the dots per inch of the PNG of the whole figure."""
     return DPI if page.get_figure(root=True).get_figwidth() >= style.JOURNAL_WIDTH else PRINT_DPI
-
-
-def css_width(page: Figure | SubFigure) -> float:
-    """Return the width of the whole figure in px of a web page, 96 an inch."""
-    return 96 * page.get_figure(root=True).get_figwidth()
 
 
 def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, float | None]:

@@ -17,7 +17,6 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from smc_mujoco.common.text import joined
-from smc_mujoco.control.law import Law
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import columns, end, line, smooth, window
 from smc_mujoco.mechanisms.hardware.part import joint_names
@@ -51,8 +50,8 @@ QUANTITY_OF_UNIT = {  # quantity -> another one of the same unit
     **dict.fromkeys(("reaction", "d"), "force"),
 }
 WORDS = {"force": "delivered", "reaction": "reaction", "spread": "max − min x"}  # quantity -> words instead of a letter
-KINDS = {"v": "velocity", "u": "control", "s": "sliding variable", "e": "error", "d": "disturbance"}
-KINDS["applied"] = "control"
+KINDS = {"v": "velocity", "s": "sliding variable", "e": "error", "d": "disturbance"}
+KINDS |= dict.fromkeys(("u", "applied"), "control")
 WHOLE_LABELS = {  # quantity, one number a sample -> what an axis says
     "tip": "tip off its path (mm)", "contact": "force of contact (N)", "settling": "|x − r|", "largest": "largest |u|",
 }  # fmt: skip
@@ -90,15 +89,16 @@ class Panel(NamedTuple):
         The unit is "" where the words have it; or where it depends on the law, as that of s does: the s of twisting is
         e, and that of PID is a force.
         """
-        plant, laws = self.traces[0].scenario.plant, [trace.scenario.law for trace in self.traces]
-        rates = plant.free == 0 and all(law.relative_degree == 1 and not _is_baseline(law) for law in laws)
+        scenarios = [trace.scenario for trace in self.traces]
+        baseline = any(one.law.template and one.law.template.family == "baseline" for one in scenarios)
+        first_degree = scenarios[0].plant.free == 0 and all(one.law.relative_degree == 1 for one in scenarios)
         if self.quantity in ("tip", "contact"):
             return 1.0, ""
         unit = style.units(self.group)[QUANTITY_OF_UNIT.get(self.quantity, self.quantity)]
         if self.quantity in PEAKS:
             return 1.0, f" ({unit})"
         factor, prefixed = style.prefixed(max(map(abs, limits(self.traces, self.quantity))), unit)
-        if self.quantity != "s" or rates:
+        if self.quantity != "s" or (first_degree and not baseline):
             return factor, f" ({prefixed})"
         return factor, "" if factor == 1.0 else f" / {1.0 / factor:g}"
 
@@ -117,11 +117,6 @@ class Panel(NamedTuple):
             return f"{letter}{' on q' * (not group.driven)}{unit}"
         kind = {"rad": "angle", "m": "position"}[group.unit]
         return f"{KINDS.get(name, kind if group.driven else f'free {kind}')} {letter}{unit}"
-
-
-def _is_baseline(law: Law) -> bool:
-    """Return whether a law is no sliding mode, such as PID or computed torque."""
-    return law.template is not None and law.template.family == "baseline"
 
 
 def over_groups(traces: Sequence[Trace], quantity: str) -> list[Panel]:

@@ -2,10 +2,13 @@
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
 from smc_mujoco.common.errors import ScenarioError
@@ -13,9 +16,6 @@ from smc_mujoco.control.source import Source
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
 from smc_mujoco.draw.page import Size
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
 
 SHADES = ("dark", "middle", "light")  # from early to late
 UNDECIDED, LIGHTEST = "#F4F4F4", 82.0  # a colour; lightness of the latest shade in CIELAB
@@ -26,8 +26,8 @@ def draw(
     maps: Sequence[Basin],
     path: str | os.PathLike[str] | None = None,
     size: Size = None,
-    fig: "Figure | SubFigure | None" = None,
-) -> "Figure | SubFigure":
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
     """Draw maps side by side; `path`, `size` and `fig` are as in `figure`."""
     paths = pages.files(path)
     if not maps:
@@ -52,11 +52,8 @@ def draw(
     return page
 
 
-def draw_map(ax, region: Basin, after: Sequence[float], title: str) -> None:
+def draw_map(ax: Axes, region: Basin, after: Sequence[float], title: str) -> None:
     """Fill a matplotlib axes with a map and its legend; `after` is from `convergence_times` of all maps."""
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
     classes = colour_indices(region, after)
     colours = colours_of(region.law)
     ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(colours), vmin=-0.5, vmax=4.5, rasterized=True)

@@ -383,43 +383,30 @@ def ending(trace: Trace) -> str:
     return f"{'diverged' if trace.plant_diverged else 'failed'} at {trace.diverged_at:.3g} s"
 
 
-def jumps(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
-    """Return the changes of plants, time in s -> "mass × 2", preceded by the labels of the runs if only some change."""
-    return _by_time([_jump(trace) for trace in traces], names)
+def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> dict[float, str]:
+    """Return the changes of plants, and the `blows` on arms, time in s -> "mass × 2", "blow of 400 N for 20 ms".
 
-
-def marks(traces: Sequence[Trace], names: Sequence[str]) -> dict[float, str]:
-    """Return the changes of plants and the blows on arms, time in s -> words such as "blow of 400 N for 20 ms"."""
-    return _by_time([[*_jump(trace), *map(_blow, pushes([trace]))] for trace in traces], names)
+    The labels of the runs precede what only some of them have.
+    """
+    who_at: dict[tuple[float, str], list[str]] = {}
+    for trace, name in zip(traces, names, strict=True):
+        plant, jump = trace.scenario.plant, trace.scenario.jump
+        events = [] if jump is None else [(jump.time, plant.change(jump.factors))]
+        for push in pushes([trace]) if blows else ():
+            size = short(math.hypot(push.x, push.y, push.z))
+            events.append((push.time, f"blow of {size} N for {1e3 * push.width:.3g} ms"))
+        for event in dict.fromkeys(events):
+            who_at.setdefault(event, []).append(name)
+    words: dict[float, list[str]] = {}
+    for (time, what), who in sorted(who_at.items()):
+        words.setdefault(time, []).append(what if len(who) == len(traces) else f"{', '.join(who)}: {what}")
+    return {time: "; ".join(parts) for time, parts in words.items()}
 
 
 def pushes(traces: Sequence[Trace]) -> list[Push]:
     """Return the blows on the bodies of arms."""
     arms = [trace.scenario for trace in traces if trace.scenario.plant.tip]
     return [push for scenario in arms for push in scenario.disturbance if isinstance(push, Push)]
-
-
-def _jump(trace: Trace) -> list[tuple[float, str]]:
-    """Return when a plant changes and how, if it does."""
-    jump = trace.scenario.jump
-    return [] if jump is None else [(jump.time, trace.scenario.plant.change(jump.factors))]
-
-
-def _blow(push: Push) -> tuple[float, str]:
-    """Return when a blow starts, and its size in words."""
-    return push.time, f"blow of {short(math.hypot(push.x, push.y, push.z))} N for {1e3 * push.width:.3g} ms"
-
-
-def _by_time(events: Sequence[Sequence[tuple[float, str]]], names: Sequence[str]) -> dict[float, str]:
-    """Return time in s -> what happens, from the events of each run, with the runs' labels if only some have it."""
-    who_at: dict[tuple[float, str], list[str]] = {}
-    for name, happened in zip(names, events, strict=True):
-        for event in dict.fromkeys(happened):
-            who_at.setdefault(event, []).append(name)
-    words: dict[float, list[str]] = {}
-    for (time, what), who in sorted(who_at.items()):
-        words.setdefault(time, []).append(what if len(who) == len(events) else f"{', '.join(who)}: {what}")
-    return {time: "; ".join(parts) for time, parts in words.items()}
 
 
 @functools.cache

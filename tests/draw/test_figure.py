@@ -128,7 +128,7 @@ def test_a_jump_is_marked_with_what_has_changed(tmp_path):
     jumping = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0, **factors))
     assert "mass × 25.9, delta × 2" in words(draw_figure.figure([jumping]))
     still = dataclasses.replace(jumping, scenario=dataclasses.replace(jumping.scenario, jump=None))
-    assert style.jumps([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
+    assert style.marks([jumping, still], ["A", "B"]) == {0.5: "A: mass × 25.9, delta × 2"}
 
 
 def cart_and_pole(**fields) -> smc.Trace:

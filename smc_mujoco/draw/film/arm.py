@@ -4,7 +4,8 @@ All are drawn over the rendered picture, so they cost little and no link hides t
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -14,6 +15,9 @@ from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
+
+if TYPE_CHECKING:
+    from smc_mujoco.draw.film.stage import Stage
 
 PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
 WANTED_OPACITY = 0.5  # of the wanted path
@@ -28,7 +32,6 @@ BLOW_ARROW = 0.4  # m, length of the arrow of a blow
 SHAFT_WIDTH = 4.0  # px
 BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
 BLOW_TIME = 0.12  # s for which a blow is shown after its end
-Project = Callable[[np.ndarray], np.ndarray]  # points (m, 3) -> (m, 2) px
 
 
 def is_arm(traces: Sequence[Trace]) -> bool:
@@ -79,27 +82,20 @@ class Trail:
 
 
 class Paths:
-    """Paths that machines take, and the wanted ones, drawn over pictures of `size` px; of free bodies their places.
+    """Paths that the machines on a stage take, and the wanted ones, drawn over its pictures.
 
-    `paths` has an actual path and a wanted one of each machine, (K + 1, 3) m, from its place in `places`, (3,) m each.
+    These are the paths of the tips of arms, and of the places of free bodies.
     """
 
-    def __init__(
-        self,
-        paths: Sequence[tuple[np.ndarray, np.ndarray]],
-        times: Sequence[np.ndarray],
-        colours: Sequence[str],
-        places: np.ndarray,
-        project: Project,
-        size: tuple[int, int],
-        scale: float,
-    ):
-        self.trails, self.wanted = [], []
-        for lines, t, colour, place in zip(paths, times, colours, places, strict=True):
+    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], stage: "Stage"):
+        self.trails, self.wanted, s = [], [], stage.scale
+        for trace, colour, place in zip(traces, colours, stage.where, strict=True):
+            free = trace.scenario.plant.pose
+            lines = (trace.x[:, :3], trace.r[:, :3]) if free else tip.tip_paths(trace)
             above = [np.maximum(points + place, (-np.inf, -np.inf, 0.0)) for points in lines]
-            path, wanted = (project(points).clip(-OUTSIDE, np.add(size, OUTSIDE)) for points in above)
-            self.trails.append(Trail(path, t, colour, PATH_WIDTH * scale))
-            self.wanted.append(Trail(wanted, t, style.INK, WANTED_PATH_WIDTH * scale, WANTED_OPACITY))
+            path, wanted = (stage.project(points).clip(-OUTSIDE, np.add(stage.size, OUTSIDE)) for points in above)
+            self.trails.append(Trail(path, trace.t, colour, PATH_WIDTH * s))
+            self.wanted.append(Trail(wanted, trace.t, style.INK, WANTED_PATH_WIDTH * s, WANTED_OPACITY))
 
     def draw(self, image: Image.Image, time: float) -> None:
         """Draw the wanted paths, and the actual ones until a time, s."""
@@ -114,41 +110,22 @@ class Paths:
         return np.asarray(image)
 
 
-def flights(
-    traces: Sequence[Trace],
-    colours: Sequence[str],
-    places: np.ndarray,
-    project: Project,
-    size: tuple[int, int],
-    scale: float,
-) -> Paths:
-    """Return the paths of free bodies; arguments as those of `Paths`."""
-    paths = [(trace.x[:, :3], trace.r[:, :3]) for trace in traces]
-    return Paths(paths, [trace.t for trace in traces], colours, places, project, size, scale)
-
-
 class Overlay:
-    """What is drawn over pictures of `size` px of arms at `places`, (machines, 3) m, between `edges`, (frames + 1,) s.
+    """What is drawn over pictures of the arms on a stage, between `edges`, (frames + 1,) s.
 
-    `project` leads from the scene to the picture; `room` has what is shown below each label, (machines, 4) px.
+    `room` has what is shown below each label, (machines, 4) px.
     """
 
     def __init__(
-        self,
-        traces: Sequence[Trace],
-        colours: Sequence[str],
-        places: np.ndarray,
-        project: Project,
-        size: tuple[int, int],
-        edges: np.ndarray,
-        room: np.ndarray,
-        scale: float,
+        self, traces: Sequence[Trace], colours: Sequence[str], stage: "Stage", edges: np.ndarray, room: np.ndarray
     ):
-        self.traces, self.project, self.room, self.scale, self.colours = traces, project, room, scale, colours
-        paths, times = [tip.tip_paths(trace) for trace in traces], [trace.t for trace in traces]
-        self.paths = Paths(paths, times, colours, places, project, size, scale)
-        self.edges = edges
-        self.shares = [self.share(trace) for trace in traces] if all(map(has_bars, traces)) else None
+        self.traces, self.colours, self.stage, self.edges, self.room = traces, colours, stage, edges, room
+        self.paths, self.scale = Paths(traces, colours, stage), stage.scale
+        self.shares = None  # torques as shares of their limits, (frames, joints), -1 .. 1: means over a frame
+        if all(map(has_bars, traces)):
+            torques = [windows(trace.t, trace.applied, edges).mean for trace in traces]
+            limits = [np.array(trace.scenario.limits) for trace in traces]
+            self.shares = [np.clip(u / most, -1.0, 1.0) for u, most in zip(torques, limits, strict=True)]
         self.errors = [windows(trace.t, tip.tip_error(trace)[:, None], edges).mean[:, 0] for trace in traces]
         self.forces = [
             windows(trace.t, tip.contacts(trace).push, edges).mean if tip.knows_contacts(trace.scenario) else None
@@ -158,47 +135,39 @@ class Overlay:
         self.newton = FORCE_ARROW / max(sizes, default=1.0) if max(sizes, default=0.0) else 0.0  # m
         self.blows = [(k, push) for k, trace in enumerate(traces) for push in style.pushes([trace])]
 
-    def share(self, trace: Trace) -> np.ndarray:
-        """Return the torques as shares of their limits, (frames, joints), -1 .. 1: means over a frame."""
-        torque = windows(trace.t, trace.applied, self.edges).mean
-        return np.clip(torque / np.array(trace.scenario.limits), -1.0, 1.0)
-
-    def over(self, picture: np.ndarray, frame: int, bodies: Callable[[int, str], np.ndarray]) -> np.ndarray:
-        """Return the picture of a frame with all this; `bodies` returns where a machine's body or tip is, (3,) m."""
+    def over(self, picture: np.ndarray, frame: int) -> np.ndarray:
+        """Return the picture of a frame with all this, as the machines stand on the stage."""
         time = float(self.edges[frame + 1])
         image = Image.fromarray(picture)
         self.paths.draw(image, time)
         draw = ImageDraw.Draw(image)
         for k, force in enumerate(self.forces):
             if force is not None and (size := float(np.linalg.norm(force[frame]))) > 0.5:
-                at = bodies(k, self.traces[k].scenario.plant.tip)
-                ends = self.project(np.array([at, at - self.newton * force[frame]]))
-                self.arrow(image, ends[0], ends[1], style.REACTION, f"{size:.0f} N", after=True)
+                at = self.stage.find(k, self.traces[k].scenario.plant.tip)
+                self.arrow(image, np.array([at, at - self.newton * force[frame]]), size, after=True)
         for k, blow in self.blows:
             if self.edges[frame] <= blow.time + blow.width + BLOW_TIME and time >= blow.time:
                 peak = np.array([blow.x, blow.y, blow.z])
                 way = peak / np.linalg.norm(peak)
-                end = bodies(k, blow.body) - BLOW_DISTANCE * way
-                ends = self.project(np.array([end - BLOW_ARROW * way, end]))
-                self.arrow(image, ends[0], ends[1], style.REACTION, f"{np.linalg.norm(peak):.0f} N", after=False)
+                end = self.stage.find(k, blow.body) - BLOW_DISTANCE * way
+                self.arrow(image, np.array([end - BLOW_ARROW * way, end]), float(np.linalg.norm(peak)), after=False)
         for k in range(len(self.traces)):
             self.gauges(draw, k, frame)
         return np.asarray(image)
 
-    def arrow(
-        self, image: Image.Image, start: np.ndarray, end: np.ndarray, colour: str, words: str, after: bool
-    ) -> None:
-        """Draw an arrow with smooth edges between two points, px, and words beyond its end, or before its start."""
-        s = self.scale
+    def arrow(self, image: Image.Image, ends: np.ndarray, force: float, after: bool) -> None:
+        """Draw an arrow with smooth edges between two points, (2, 3) m, and its force, N, beyond it or before it."""
+        s, (start, end) = self.scale, self.stage.project(ends)
         if np.linalg.norm(end - start) > 1.0:
-            line, rgb = np.linspace(start, end, 40), np.array(style.rgb(colour)) / 255
+            line, rgb = np.linspace(start, end, 40), np.array(style.rgb(style.REACTION)) / 255
             arrows.paint(image, arrows.outline(line, SHAFT_WIDTH * s), (*rgb, 1.0))
         draw, font = ImageDraw.Draw(image), style.font(NUMBER_SIZE * s, bold=True)
         place = end if after else start
         gap = 6 * s * np.sign((end - start)[0] or 1.0) * (1 if after else -1)
         anchor = "lm" if gap > 0 else "rm"
         at = (float(place[0] + gap), float(place[1]))
-        draw.text(at, words, colour, font, anchor=anchor, stroke_width=round(2 * s), stroke_fill=style.PAPER)
+        look = {"anchor": anchor, "stroke_width": round(2 * s), "stroke_fill": style.PAPER}
+        draw.text(at, f"{force:.0f} N", style.REACTION, font, **look)
 
     def gauges(self, draw: ImageDraw.ImageDraw, k: int, frame: int) -> None:
         """Draw the bars of a machine, and how far its tip is off its path."""

@@ -49,7 +49,7 @@ class Caption:
         parts: Sequence[str] | None = None,
     ):
         self.traces, self.names, self.colours, self.size, self.scale = traces, names, colours, size, scale
-        self.jumps = style.jumps(traces, names)
+        self.jumps = style.marks(traces, names, blows=False)
         inside = size[0] - 2 * EDGE * scale
         clock = style.width("00.000 s", TITLE_SIZE * scale, bold=True) + EDGE * scale
         clock += style.width("8× slower", KEY_SIZE * scale, bold=True) + 2 * KEY_SIZE * scale

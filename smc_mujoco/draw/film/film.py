@@ -270,10 +270,8 @@ def pictures(
     charts = Charts(traces, names, colours, (size[0], low), scale)
     with framed(acts, above, caption.room, chosen, caption.apart, scale) as stage:
         caption.place(stage.boxes)
-        overlaid = traces, colours, stage.where, stage.project, above, edges, caption.badges, scale
-        over = arm.Overlay(*overlaid) if arms else None
-        flown = (traces, colours, stage.where, stage.project, above, scale)
-        flights = arm.flights(*flown) if traces[0].scenario.plant.pose else None
+        over = arm.Overlay(traces, colours, stage, edges, caption.badges) if arms else None
+        flights = arm.Paths(traces, colours, stage) if traces[0].scenario.plant.pose else None
         for frame, time in enumerate(times.tolist()):
             failed = tuple(act.failed(time) for act in acts)
             drawn = []
@@ -286,7 +284,7 @@ def pictures(
                 drawn += [] if failed[k] else [(k, *each) for each in act.pushes[frame].arrows]
             picture = stage.render(drawn)
             if over:
-                picture = over.over(picture, frame, stage.find)
+                picture = over.over(picture, frame)
             if flights:
                 picture = flights.over(picture, time)
             moods = tuple(act.states[frame] for act in acts)

@@ -93,17 +93,13 @@ def users_machine(machine: mujoco.MjSpec, film: mujoco.MjSpec) -> mujoco.MjSpec:
     for name in (name for name in dir(machine) if name.startswith("nuser_")):
         setattr(machine, name, getattr(film, name))
     for name in ("global_", "quality", "headlight", "map", "scale", "rgba"):
-        copy_settings(getattr(film.visual, name), getattr(machine.visual, name))
+        settings = getattr(film.visual, name)
+        for field in (field for field in dir(settings) if not field.startswith("_")):
+            setattr(getattr(machine.visual, name), field, getattr(settings, field))
     planes = [geom for geom in machine.geoms if geom.type == PLANE]
     skies = [texture for texture in machine.textures if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX]
     strip(machine, *machine.equalities, *machine.texts, *planes, *skies, *machine.lights)
     return machine
-
-
-def copy_settings(source: object, target: object) -> None:
-    """Copy all fields of a group of settings."""
-    for field in [field for field in dir(source) if not field.startswith("_")]:
-        setattr(target, field, getattr(source, field))
 
 
 def set_floor(

@@ -1,6 +1,7 @@
 """What films show of an arm: its tip's path until now, torques against their limits, forces of contact, and blows."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,10 +35,11 @@ def struck(trace, **fields):
     return dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, **fields))
 
 
-def overlay(trace, edges=EDGES):
-    return arm.Overlay(
-        [trace], [COLOUR], np.zeros((1, 3)), project, SIZE, edges, np.array([[100.0, 150.0, 300.0, 210.0]]), 1.0
-    )
+def overlay(trace, edges=EDGES, body=(9.0, 0.0, 9.0)):
+    """What is drawn over an arm at the origin, of which every body is at one place, m."""
+    find = lambda k, name: np.array(body)  # noqa: E731
+    stage = SimpleNamespace(where=np.zeros((1, 3)), project=project, size=SIZE, scale=1.0, find=find)
+    return arm.Overlay([trace], [COLOUR], stage, edges, np.array([[100.0, 150.0, 300.0, 210.0]]))
 
 
 def paper():
@@ -102,7 +104,7 @@ def test_bars_are_shares_of_each_joints_limit(trace):
     beyond = np.where(trace.t[:, None] < EDGES[1], 1.5, -1.5) * [4.0, 2.0, 9.0]
     np.testing.assert_array_equal(overlay(dataclasses.replace(trace, applied=beyond)).shares, [[[1.0] * 3, [-1.0] * 3]])
     bars.shares[0][0] = (0.5, -1.0, 0.0)
-    image = bars.over(paper() // 2, 0, lambda k, name: np.array([9.0, 0.0, 9.0]))
+    image = bars.over(paper() // 2, 0)
     zero = 150.0 + arm.LABEL_GAP + arm.BAR_HEIGHT / 2
     middles = [round(100.0 + arm.BAR_GAP + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2) for i in range(3)]
     quarter = round(arm.BAR_HEIGHT / 8)
@@ -115,14 +117,15 @@ def test_bars_are_shares_of_each_joints_limit(trace):
 
 def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     hit = struck(trace, disturbance=smc.Push("hand", x=50.0, time=0.021, width=0.01))
-    shown, body = overlay(hit), np.array([2.0, 0.0, 1.0])  # 250, 100 px
-    before, during = (shown.over(paper(), frame, lambda k, name: body) for frame in (0, 1))
+    body = (2.0, 0.0, 1.0)  # 250, 100 px
+    shown = overlay(hit, body=body)
+    before, during = (shown.over(paper(), frame) for frame in (0, 1))
     hue = np.array(style.rgb(style.REACTION))
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
     assert 250 - 100 * arm.BLOW_DISTANCE - 3 <= x.max() <= 250 - 100 * arm.BLOW_DISTANCE + 1
     assert abs(np.median(y) - 100) <= 1
     edges = np.array([0.0, 0.02, 0.03, 0.14, 0.16, 0.18])  # s, of frames; it is seen until 0.12 s after its end
-    frames = [overlay(hit, edges).over(paper(), frame, lambda k, name: body) for frame in range(5)]
+    frames = [overlay(hit, edges, body).over(paper(), frame) for frame in range(5)]
     assert [(each[y, x] == hue).all() for each in frames] == [False, True, True, True, False]
 
 

@@ -128,12 +128,14 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
     def project(points):
         return np.array([150.0, 200.0]) + 100.0 * points[:, [0, 2]] * (1.0, -1.0)
 
-    over = arm.Overlay([trace], COLOURS[:1], np.array([[0.1, 0.0, 0.2]]), project, SIZE, edges, low, 0.8)
+    place, find = np.array([[0.1, 0.0, 0.2]]), lambda k, name: np.array([0.4, 0.0, 0.9])
+    stage = SimpleNamespace(where=place, project=project, size=SIZE, scale=0.8, find=find)
+    over = arm.Overlay([trace], COLOURS[:1], stage, edges, low)
     within = [(trace.t >= a) & (trace.t < b) for a, b in itertools.pairwise(edges)]
     forces = [np.linalg.norm(20.0 * trace.x[frame].mean(axis=0)) for frame in within]
     for frame, force in enumerate(forces):
         pen.clear()
-        over.over(paper(), frame, lambda k, name: np.array([0.4, 0.0, 0.9]))
+        over.over(paper(), frame)
         said = "\n".join(pen)
         assert "'50 N'" in said  # hypot(30, 40), seen for a while after it
         (touch,) = [float(note.split("'")[1][:-2]) for note in pen if " N'" in note and "'50 N'" not in note]
