@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from pprint import pformat
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -48,12 +48,16 @@ if __name__ == "__main__":
 
 
 class Slider(NamedTuple):
-    """A number of a scenario: its present value, its range, and how a scenario gets another."""
+    """A number of a scenario: its present value, its range, and the fields of a scenario that has another."""
 
     value: float
     low: float
     high: float
-    changed: Callable[[Scenario, float], Scenario]
+    fields: Callable[[Scenario, float], dict[str, Any]]
+
+    def changed(self, scenario: Scenario, value: float) -> Scenario:
+        """Return the scenario with another number."""
+        return dataclasses.replace(scenario, **self.fields(scenario, value))
 
 
 class Session:
@@ -220,11 +224,11 @@ def at_keyframe(scenario: Scenario, model: mujoco.MjModel, key: int) -> Scenario
 def gain_sliders(law: Law) -> dict[str, Slider]:
     """Return a slider for each finite gain that all channels share: a tenth to ten times it, 0 to 1 for 0."""
 
-    def changed(name: str) -> Callable[[Scenario, float], Scenario]:
-        return lambda s, gain: dataclasses.replace(s, law=dataclasses.replace(s.law, gains={**s.law.gains, name: gain}))
+    def fields(name: str) -> Callable[[Scenario, float], dict[str, Any]]:
+        return lambda s, gain: {"law": dataclasses.replace(s.law, gains={**s.law.gains, name: gain})}
 
     return {
-        name: Slider(gain, min(gain / 10.0, gain * 10.0), max(gain / 10.0, gain * 10.0) if gain else 1.0, changed(name))
+        name: Slider(gain, min(gain / 10.0, gain * 10.0), max(gain / 10.0, gain * 10.0) if gain else 1.0, fields(name))
         for name, gain in law.gains.items()
         if not isinstance(gain, tuple) and math.isfinite(gain)
     }
@@ -236,28 +240,18 @@ def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
     bound = float(np.min(s.resolved.u_max))
     sliders: dict[str, Slider] = {
         "mass, factor": Slider(
-            s.mismatch.get("mass", 1.0),
-            0.5,
-            2.0,
-            lambda s, v: dataclasses.replace(s, mismatch={**s.mismatch, "mass": v}),
+            s.mismatch.get("mass", 1.0), 0.5, 2.0, lambda s, v: {"mismatch": {**s.mismatch, "mass": v}}
         ),
-        "delay, s": Slider(
-            s.input_delay, 0.0, 0.05, lambda s, v: dataclasses.replace(s, input_delay=round(v / step) * step)
-        ),
+        "delay, s": Slider(s.input_delay, 0.0, 0.05, lambda s, v: {"input_delay": round(v / step) * step}),
         "noise, rad or m": Slider(
-            s.noise.position,
-            0.0,
-            0.02,
-            lambda s, v: dataclasses.replace(s, noise=dataclasses.replace(s.noise, position=v)),
+            s.noise.position, 0.0, 0.02, lambda s, v: {"noise": dataclasses.replace(s.noise, position=v)}
         ),
     }
     coulomb = [part.level for part in s.friction if isinstance(part, Coulomb)]
     if len(coulomb) == len(s.friction) <= 1:
         level = sum(coulomb)
         most = 0.5 * bound if math.isfinite(bound) else 1.0
-        sliders["friction, N or N m"] = Slider(
-            level, 0.0, most, lambda s, v: dataclasses.replace(s, friction=Coulomb(v) if v else None)
-        )
+        sliders["friction, N or N m"] = Slider(level, 0.0, most, lambda s, v: {"friction": Coulomb(v) if v else None})
     return sliders
 
 

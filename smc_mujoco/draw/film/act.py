@@ -13,7 +13,6 @@ from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.metrics.conventions import Group
 from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.run import poses
-from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
 
@@ -79,19 +78,18 @@ def pushes(trace: Trace, edges: np.ndarray, sizes: Sequence[arrows.Scale], colou
 
 
 def motion(trace: Trace, times: np.ndarray) -> Motion | None:
-    """Return how joints without a channel move, at times in s; None if there are none, or if that is not known."""
-    moved = poses(trace, times) if has_other_joints(scene.first_channels(trace.scenario)) else None
-    return None if moved is None else Motion(times, moved)
+    """Return how joints of a user's machine move that are neither channels nor rotors of drives, at times in s.
 
-
-def has_other_joints(scenario: Scenario) -> bool:
-    """Return whether a user's machine has joints that are neither channels nor rotors of drives."""
+    None if there are none, or if that is not known.
+    """
+    scenario = scene.first_channels(trace.scenario)
     if scenario.plant.on_stage:
-        return False
+        return None
     model = models.compile_model(scenario)
     names = [model.joint(i).name for i in joint_ids(model)]
     rotors = [name for name in names if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0]
-    return len(names) + len(rotors) != model.nq
+    moved = poses(trace, times) if len(names) + len(rotors) != model.nq else None
+    return None if moved is None else Motion(times, moved)
 
 
 def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -251,7 +251,8 @@ def path(model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow)
             across = np.cross(mount.front, way)
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
-        start = half_extent(model, data, body, out) + RAIL_DISTANCE * width
+        turned, aabb = out @ data.geom_xmat[body].reshape(3, 3), model.geom_aabb[body]
+        start = aabb[:3] @ turned + aabb[3:] @ np.abs(turned) + RAIL_DISTANCE * width  # beyond the geom's box
     return place + (start + LAYER_DISTANCE * width * arrow.layer) * out + reach * along * way, arrow.size * width
 
 
@@ -279,12 +280,6 @@ def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int 
         image.paste(style.rgb(style.PAPER), tuple(corner.tolist()), wide)
     colour = tuple(round(255 * part) for part in rgba[:3])
     image.paste(colour, tuple(corner.tolist()), mask.resize(size, Image.Resampling.BOX))
-
-
-def half_extent(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> float:
-    """Return how far a geom's box reaches from its middle in a direction, m."""
-    turned = direction @ data.geom_xmat[geom].reshape(3, 3)
-    return float(model.geom_aabb[geom, :3] @ turned + model.geom_aabb[geom, 3:] @ np.abs(turned))
 
 
 def arrow_geom(model: mujoco.MjModel, body: int) -> int:

@@ -48,7 +48,8 @@ class Canvas:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, size: tuple[int, int], arms: bool = False):
         self.model, self.data, self.size = model, data, size
         self.turn, self.place = data.cam("film").xmat.reshape(3, 3).copy(), data.cam("film").xpos.copy()
-        self.sun = sun(model, data)
+        light = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_LIGHT, scene.SUN)
+        self.sun = None if light < 0 else data.light_xdir[light].copy()  # (3,), of what casts shadows on the floor
         self.steady = not any(model.light_castshadow & model.light_active)  # a lamp's shadow may be anywhere
         middle = (model.stat.center - self.place) @ -self.turn[:, 2]
         self.casts = casting(model, middle * camera.pixel(size), MIN_ARM_CAST if arms else 0.0)
@@ -188,12 +189,6 @@ class Canvas:
         mujoco.mjr_render(rect, renderer.scene, context)
         mujoco.mjr_readPixels(out, None, rect, context)
         return out[::-1]
-
-
-def sun(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray | None:
-    """Return the direction, (3,), of the light `scene.SUN`, which casts shadows on the floor; None without it."""
-    light = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_LIGHT, scene.SUN)
-    return None if light < 0 else data.light_xdir[light].copy()
 
 
 def around(points: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ class Frames:
     span: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        checked(self.camera)
+        self.camera = checked(self.camera)
         if self.at is not None:
             end = max(float(trace.t[-1]) for trace in style.same_plant(self.traces))
             self.clock = Clock(np.array([number("at", self.at, low=0.0, high=end + 1e-9)]), np.ones(1))
@@ -86,7 +86,7 @@ class Frames:
         return len(self.clock.times)
 
     def __iter__(self) -> Generator[np.ndarray]:
-        return pictures(self.traces, self.clock, self.labels, self.title, self.size, self.camera)
+        return pictures(self)
 
     def __repr__(self) -> str:
         return f"Frames({len(self)} of {self.size[0]} x {self.size[1]} px, {self.fps:g} a second)"
@@ -238,20 +238,13 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     return int(sides[0]), int(sides[1])
 
 
-def pictures(
-    traces: Trace | Sequence[Trace],
-    shown: Clock,
-    labels: Sequence[str] | None,
-    title: str | None,
-    size: tuple[int, int],
-    chosen: Camera | None = None,
-) -> Generator[np.ndarray]:
-    """Yield the film's pictures at the times of a clock, each (height, width, 3) uint8."""
-    traces, chosen = style.same_plant(traces), checked(chosen)
-    names, colours = style.labels(traces, labels), style.law_colours([trace.scenario.law for trace in traces])
+def pictures(frames: Frames) -> Generator[np.ndarray]:
+    """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
+    traces, shown, chosen = style.same_plant(frames.traces), frames.clock, frames.camera
+    names, colours = style.labels(traces, frames.labels), style.law_colours([trace.scenario.law for trace in traces])
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
-    size = _checked_size(size)
+    size = _checked_size(frames.size)
     if why := gl.missing():
         raise ScenarioError(why)
     scale = (size[0] / FULL_WIDTH) ** 0.6  # letters shrink less than pictures
@@ -266,7 +259,7 @@ def pictures(
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
     below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces)) if arms else (None, None)
     told = [act.told for act in acts]
-    caption = Caption(traces, names, colours, title, above, scale, scales, told, row, below, words)
+    caption = Caption(traces, names, colours, frames.title, above, scale, scales, told, row, below, words)
     charts = Charts(traces, names, colours, (size[0], low), scale)
     with framed(acts, above, caption.room, chosen, caption.apart, scale) as stage:
         caption.place(stage.boxes)

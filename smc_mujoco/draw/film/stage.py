@@ -79,8 +79,9 @@ class Stage:
         self.paint = np.where((material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba)
         names = [[joint.name for joint in joints(models.spec(scenario))] for scenario in scenarios]
         self.joints = [[self.model.joint(f"m{k}/{name}").id for name in its] for k, its in enumerate(names)]
+        visible = (self.model.geom_group < GROUPS) & (self.paint[:, 3] > 0.0)
         moved = [moved_bodies(self.model, its) for its in self.joints]  # by joints: bodies without one may be fused
-        self.links = [np.flatnonzero(np.isin(self.model.geom_bodyid, its) & self.visible()) for its in moved]
+        self.links = [np.flatnonzero(np.isin(self.model.geom_bodyid, its) & visible) for its in moved]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):
             self.set_shape(k, 0.0)
@@ -151,12 +152,6 @@ class Stage:
         else:
             self.model.mat(f"m{k}/accent").rgba[:3] = rgb
         self.colours[k], self.changed = colour, True
-
-    def visible(self) -> np.ndarray:
-        """Return which geoms a picture shows, (geoms,)."""
-        material = self.model.geom_matid
-        alpha = np.where(material >= 0, self.model.mat_rgba[material, 3], self.model.geom_rgba[:, 3])
-        return (self.model.geom_group < GROUPS) & (alpha > 0.0)
 
     def aim(self, k: int, r: np.ndarray | None) -> None:
         """Show where the reference r, (shown,) rad or m, wants machine k, as a ghost; None: show no ghost."""

@@ -9,7 +9,6 @@ from smc_mujoco.common.files import scratch
 from smc_mujoco.draw import dot_plot
 from smc_mujoco.draw.figure import figure
 from smc_mujoco.draw.film import film as video
-from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.encoder import encoder
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report
@@ -36,13 +35,13 @@ class Scene:
 
 def film(traces: Sequence[Trace], title: str, report: Report = lambda done, whole: None) -> bytes:
     """Return a film of the traces as WebM."""
-    shown = pace.clock(traces, FPS)
+    frames = video.Frames(traces, title=title, size=SIZE, fps=FPS)
     with scratch() as folder:
         path = folder / "film.webm"
         with encoder(path, (SIZE[1], SIZE[0]), FPS) as write:
-            for k, picture in enumerate(video.pictures(traces, shown, None, title, SIZE), 1):
+            for k, picture in enumerate(frames, 1):
                 write(picture)
-                report(k, len(shown.times))
+                report(k, len(frames))
         return path.read_bytes()
 
 

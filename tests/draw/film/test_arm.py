@@ -155,7 +155,9 @@ def test_a_blow_on_an_arm_is_shown_in_slow_motion(trace, monkeypatch):
 def test_a_film_of_arms_tells_of_the_tip(trace):
     now = film.Clock(np.array([0.1, 0.4]), np.ones(2))
     labels = ["one with a long label", "another with a long label"]
-    early, late = film.pictures([trace, trace], now, labels, None, (960, 540), (90.0, -70.0))
+    frames = film.Frames([trace, trace], labels, size=(960, 540), camera=(90.0, -70.0))
+    frames.clock = now
+    early, late = frames
     assert early.shape == (540, 960, 3)
     (colour, _) = style.law_colours([trace.scenario.law] * 2)
     inks = [np.abs(picture[:220].astype(int) - style.rgb(colour)).sum(axis=2) < 12 for picture in (early, late)]

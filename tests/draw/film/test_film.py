@@ -45,7 +45,9 @@ def driven(traces):
 def pictures(traces, times, charts=False, **options) -> list[np.ndarray]:
     clock = Clock(np.array(times), np.ones(len(times)))
     with contextlib.nullcontext() if charts else without_charts:
-        return list(film.pictures(traces, clock, options.get("labels"), None, options.get("size", SIZE)))
+        frames = film.Frames(traces, options.get("labels"), size=options.get("size", SIZE), at=0.0)
+        frames.clock = clock
+        return list(frames)
 
 
 def seconds(trace: smc.Trace, fps: float = 30.0) -> np.ndarray:

@@ -268,9 +268,10 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     """Of a film, a clip and a still; the pictures are blank."""
     asked, wrote, told = [], [], []
 
-    def blank(traces, shown, labels, title, size, chosen=None):
-        asked.append((*shown.times[[0, -1]].tolist(), len(shown.times), labels, title, size, chosen))
-        yield from (paper(size) - np.uint8(k) for k in range(len(shown.times)))
+    def blank(frames):
+        times = frames.clock.times
+        asked.append((times[0], times[-1], len(times), frames.labels, frames.title, frames.size, frames.camera))
+        yield from (paper(frames.size) - np.uint8(k) for k in range(len(times)))
 
     @contextlib.contextmanager
     def encoder(part, shape, fps):

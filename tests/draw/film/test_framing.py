@@ -41,7 +41,9 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     with without_charts, monkeypatch.context() as patch:
         patch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
         patch.setattr(film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given)))
-        made_of = film.pictures(traces, Clock(np.array(times), np.ones(len(times))), None, None, SIZE)
+        frames = film.Frames(traces, size=SIZE, at=0.0)
+        frames.clock = Clock(np.array(times), np.ones(len(times)))
+        made_of = iter(frames)
         assert [*itertools.islice(made_of, 2)]
         yield seen["stage"], seen["caption"]
         made_of.close()

@@ -244,12 +244,9 @@ def test_a_film_has_every_frame(tmp_path, monkeypatch):
         path.write_bytes(b"webm")
 
     trace = made(smc.Scenario(plant="duffing", law="pid", duration=1.0))
-    pictures = lambda traces, shown, names, title, size: (  # noqa: E731
-        np.full((4, 4, 3), 4 * k, np.uint8) for k in range(len(shown.times))
-    )
+    pictures = [np.full((4, 4, 3), 4 * k, np.uint8) for k in range(count)]
     monkeypatch.setattr(films, "encoder", encoder)
-    monkeypatch.setattr(films.pace, "clock", lambda traces, fps: SimpleNamespace(times=np.arange(count) / fps))
-    monkeypatch.setattr(films.video, "pictures", pictures)
+    monkeypatch.setattr(films.video, "Frames", lambda traces, title, size, fps: pictures)
     film = films.film([trace], "title", lambda done, whole: reached.append((done, whole)))
     assert written == [("film.webm", (540, 960), 20), *range(0, 4 * count, 4)]
     assert reached == [(k + 1, count) for k in range(count)]
