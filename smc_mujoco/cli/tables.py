@@ -101,17 +101,23 @@ def _several(
 ) -> dict[str, list[T | None]]:
     """Return label -> scores of a run, then of the same run again; None for one that failed. Not if all failed."""
     runs = {label: (trace, *(again or {}).get(label, ())) for label, trace in traces.items()}
-    values = {label: [None if _failed(one) else scored(one) for one in its] for label, its in runs.items()}
+    values = {
+        label: [None if one.diverged_at is not None else scored(one) for one in its] for label, its in runs.items()
+    }
     return {label: its for label, its in values.items() if its != [None] * len(its)}
 
 
-def _failed(trace: Trace) -> bool:
-    return trace.diverged_at is not None
-
-
 def _score(values: Sequence[float | None], metric: str, scenario: Scenario) -> Text:
-    """Return a metric of the same run several times as text, see `_marked`."""
-    return _marked(values, lambda value: _score_text(metric, value), scenario, floor(scenario, metric))
+    """Return a metric of the same run several times as text, see `_marked`.
+
+    Overshoot of a run that goes far away has no digits that matter.
+    """
+
+    def text(value: float) -> str:
+        large = metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
+        return f"> {MAX_PRINTED_OVERSHOOT}" if large else number(value)
+
+    return _marked(values, text, scenario, floor(scenario, metric))
 
 
 def _marked(
@@ -180,12 +186,10 @@ def answers(
         if not all(CATALOGUE[name].refusal(plant) for plant, _ in plants):
             units = dict.fromkeys(CATALOGUE[name].unit_for(plant.unit, effort) for plant, effort in plants)
             shown[f"{name} ({' or '.join(units)})"] = CATALOGUE[name]
-    if len(traces) == 1:
-        ((condition, runs),) = traces.items()
-        others = (again or {}).get(condition, {})
-        return _noted([_answer("", [(head, metric, runs, others) for head, metric in shown.items()])])
     every = [(name, runs, (again or {}).get(name, {})) for name, runs in traces.items()]
     columns = {head: [(name, metric, runs, others) for name, runs, others in every] for head, metric in shown.items()}
+    if len(traces) == 1:
+        columns = {"": [(head, *column[1:]) for head, (column,) in columns.items()]}
     return _noted([_answer(head, of_metric) for head, of_metric in columns.items()])
 
 
@@ -205,14 +209,8 @@ def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> T
     """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
-    values = [None if _failed(one) else metric.of(one) for one in (trace, *again)]
+    values = [None if one.diverged_at is not None else metric.of(one) for one in (trace, *again)]
     return _score(values, metric.name, trace.scenario)
-
-
-def _score_text(metric: str, value: float) -> str:
-    """Return a score as text. Overshoot of a run that goes far away has no digits that matter."""
-    large = metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
-    return f"> {MAX_PRINTED_OVERSHOOT}" if large else number(value)
 
 
 def _by_label(

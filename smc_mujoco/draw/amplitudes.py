@@ -11,7 +11,6 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
@@ -71,7 +70,12 @@ def amplitudes(
             handles.append(Line2D([], [], color=colour, lw=style.points(3.0), label=f"{style.label(label)}{source}"))
         if len(predicted) == 2:
             (lags, one), (_, other) = predicted.values()
-            _mark_equal(ax, crossover(lags, one, other))
+            if not math.isnan(equal := crossover(lags, one, other)):
+                place = {"xytext": (-4, 4), "textcoords": "offset points", "ha": "right", "va": "bottom"}
+                ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
+                ax.annotate(
+                    f"equal at {style.short(equal)} ms", (equal, 0.0), xycoords=("data", "axes fraction"), **place
+                )
         handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
         if hollow:
@@ -84,12 +88,3 @@ def amplitudes(
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         pages.write(page, pages.files(path))
     return page
-
-
-def _mark_equal(ax: Axes, equal: float) -> None:
-    """Mark the lag, ms, at which two amplitudes are equal, if there is one."""
-    if math.isnan(equal):
-        return
-    ax.axvline(equal, color=style.RULE, lw=style.points(1.0), ls=(0, (4, 3)))
-    place = {"xytext": (-4, 4), "textcoords": "offset points", "ha": "right", "va": "bottom"}
-    ax.annotate(f"equal at {style.short(equal)} ms", (equal, 0.0), xycoords=("data", "axes fraction"), **place)

@@ -17,6 +17,7 @@ MEAN_WINDOW = 0.01, 40  # of a mean: share of the run, and smallest number of sa
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
 TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
+COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 MAX_GAP = 0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence; chosen
 LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest value
 
@@ -59,24 +60,20 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
     return Envelope((edges[:-1] + edges[1:]) / 2, low, total / count, high)
 
 
-def columns(t: np.ndarray, y: np.ndarray, max_parts: int) -> Envelope:
-    """Return range and mean of y in at most `max_parts` windows of equally many samples; short gaps are closed.
+def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP between swings.
 
-    That number is even, so that a control which switches at every sample has the correct mean.
+    There are at most COLUMNS windows, of equally many samples each.
     """
-    count = len(t) - 1
-    if count <= max_parts:
-        return Envelope(t, y, y, y)
-    edges = t[:: 2 * -(-count // (2 * max_parts))]
-    return closed(windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1])))
-
-
-def closed(ranges: Envelope) -> Envelope:
-    """Return the ranges with gaps of less than MAX_GAP closed."""
     from scipy.ndimage import grey_closing, grey_opening
 
-    size = 1 + int(MAX_GAP / (ranges.t[1] - ranges.t[0])), 1
-    return ranges._replace(low=grey_opening(ranges.low, size), high=grey_closing(ranges.high, size))
+    count = len(t) - 1
+    if count <= COLUMNS:
+        return t, y.min(axis=1), y.max(axis=1)
+    edges = t[:: 2 * -(-count // (2 * COLUMNS))]
+    e = windows(t, y, edges if edges[-1] == t[-1] else np.append(edges, t[-1]))
+    low, high, size = e.low.min(axis=1), e.high.max(axis=1), 1 + int(MAX_GAP / (e.t[1] - e.t[0]))
+    return e.t, grey_opening(low, size, mode="nearest"), grey_closing(high, size, mode="nearest")
 
 
 def window(trace: Trace) -> int:

@@ -18,13 +18,12 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from smc_mujoco.common.text import joined
 from smc_mujoco.draw import style
-from smc_mujoco.draw.decimate import columns, end, line, smooth, window
+from smc_mujoco.draw.decimate import COLUMNS, band, end, line, smooth, window
 from smc_mujoco.mechanisms.hardware.part import joint_names
 from smc_mujoco.metrics import tip
 from smc_mujoco.metrics.conventions import SETTLING_BAND, Group, group_trace, scale
 from smc_mujoco.simulation.trace import Trace
 
-COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
 MAX_DRAWN_CHANNELS = 40  # channels of a network that are drawn one by one; of more, those between which all lie
@@ -38,7 +37,6 @@ COINCIDENT_SHARE = 0.99  # of agreeing curves' samples, so that controls that sw
 MIN_AGREEMENT = 0.15  # of the time that a panel shows: curves that agree for less have their colours there; chosen
 ALL = {2: "both", 3: "all three", 4: "all four", 5: "all five", 6: "all six"}
 MIN_WIDE_BAND, MAX_BANDS = 0.2, 1  # mean height of a wide band, of a panel's, and how many share a row; chosen
-MAX_GAP = 0.02  # s: a band with shorter gaps looks like a fence
 VISIBLE_CHATTERING = 0.01  # of a panel's height: chattering that is smaller needs no words; chosen
 REST_BAND = 0.02  # of a panel's height: an x that stays within it rests; chosen
 ZOOM, MAX_ZOOMED = 1.3, 0.5  # panels show ZOOM times the time until all rest, if that is less than this part of a run
@@ -337,16 +335,6 @@ def set_numbers(axis: Axis, panel: Panel) -> None:
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.6g}".replace("-", "−")))
 
 
-def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP between swings."""
-    from scipy.ndimage import grey_closing, grey_opening
-
-    e = columns(t, y, COLUMNS)
-    low, high = e.low.min(axis=1), e.high.max(axis=1)
-    size = 1 + int(MAX_GAP / (e.t[1] - e.t[0])) if len(e.t) > 1 and len(t) > COLUMNS else 1
-    return e.t, grey_opening(low, size, mode="nearest"), grey_closing(high, size, mode="nearest")
-
-
 def cross() -> dict[str, Any]:
     """Return the look of the mark at the end of a failed run."""
     return {"ms": style.points(9), "mec": "white", "mew": style.points(1)}
@@ -570,8 +558,8 @@ def crowded(panel: Panel) -> bool:
     low, high = limits(panel.traces, "u")
     wide = 0
     for trace in panel.traces:
-        band = columns(trace.t, trace.u, COLUMNS)
-        wide += float(np.mean(band.high.max(axis=1) - band.low.min(axis=1))) > MIN_WIDE_BAND * (high - low)
+        _, least, most = band(trace.t, trace.u)
+        wide += float(np.mean(most - least)) > MIN_WIDE_BAND * (high - low)
     return wide > MAX_BANDS
 
 

@@ -259,9 +259,9 @@ def test_chattering_is_drawn_as_its_mean_without_teeth():
         mean = decimate.smooth(u, 100)
         assert np.abs(mean).max() < 0.15  # to the ends
         assert np.abs(mean[50:-50]).max() < 0.02
-        band = decimate.columns(t, u[:, None], 360)
-        assert len(band.t) <= 360
-        assert (band.low.min(), band.high.max()) == (-6.0, 6.0)
+        at, low, high = decimate.band(t, u[:, None])
+        assert len(at) <= 360
+        assert (low.min(), high.max()) == (-6.0, 6.0)
     assert np.abs(decimate.smooth(switching, 100) - decimate.smooth(switching + drift, 100)).max() < 0.2
 
 

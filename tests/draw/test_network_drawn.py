@@ -8,7 +8,7 @@ from helpers.sketch import made
 from matplotlib.figure import Figure
 
 import smc_mujoco as smc
-from smc_mujoco.draw import panels
+from smc_mujoco.draw import decimate, panels
 
 
 def network(n):
@@ -37,7 +37,7 @@ def test_no_drawn_range_is_smaller_than_the_data_s(n):
 def test_a_band_has_no_gaps_of_20_ms_between_swings_and_keeps_longer_ones():
     t = np.linspace(0.0, 3.0, 3001)
     pauses = (t % 0.1 < 0.015) | ((t > 1.0) & (t < 1.2))
-    at, low, high = panels.band(t, np.where(pauses, 0.0, (-1.0) ** np.arange(3001))[:, None])
+    at, low, high = decimate.band(t, np.where(pauses, 0.0, (-1.0) ** np.arange(3001))[:, None])
     rest = (at > 1.02) & (at < 1.18)
     assert high[rest].max() == 0.0 == low[rest].min()
     assert (high[(at > 0.05) & (at < 0.95)] == 1.0).all()

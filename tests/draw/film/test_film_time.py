@@ -8,7 +8,6 @@ from helpers.sketch import made
 
 import smc_mujoco as smc
 from smc_mujoco.draw import style
-from smc_mujoco.draw.decimate import MAX_GAP, columns
 from smc_mujoco.draw.film.charts import WINDOW_WIDTH, Charts
 from smc_mujoco.draw.panels import horizon
 
@@ -71,13 +70,3 @@ def test_dots_in_one_place_are_one_in_ink(charts):
 
 def style_of(traces):
     return style.law_colours([trace.scenario.law for trace in traces])
-
-
-def test_short_gaps_of_a_band_are_closed_and_long_ones_are_not():
-    t = np.arange(4001) * 1e-3
-    u = np.where(np.arange(4001) % 2, 1.0, -1.0)
-    for start, width in ((1.0, 0.8 * MAX_GAP), (2.0, 0.2)):
-        u[(t >= start) & (t < start + width)] = 0.0
-    band = columns(t, u[:, None], 360)
-    high = np.interp([1.008, 2.1, 3.0], band.t, (band.high - band.low)[:, 0])
-    assert high == pytest.approx([2.0, 0.0, 2.0])
