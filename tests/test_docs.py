@@ -13,7 +13,6 @@ from helpers.commands import python
 from helpers.pages import ROOT, beside, blocks, titled
 
 import smc_mujoco as smc
-from smc_mujoco.analysis import linear_theory
 from smc_mujoco.cli import law_pages
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.metrics.catalogue import metrics
@@ -97,13 +96,6 @@ def test_numbers_that_the_mathematics_tell_are_what_their_code_prints(tmp_path, 
         assert printed == told
         seen += len(told)
     assert seen >= 5
-
-
-def test_the_smallest_lambda_is_the_formula_that_the_mathematics_tell():
-    p = smc.plant("inverted_pendulum").parameters
-    assert linear_theory.smallest_lam(smc.plant("inverted_pendulum"), 9.7) == pytest.approx(
-        p["m"] * p["grav"] * p["l"] / 9.7
-    )
 
 
 @pytest.mark.slow

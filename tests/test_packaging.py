@@ -177,33 +177,6 @@ def test_pytest_has_the_plugin_of_the_wheel(binaries, tmp_path):
     assert "--smc-film" in run(binaries / "python", "-m", "pytest", "--help", cwd=tmp_path).stdout
 
 
-LAWS = """
-import pytest
-import smc_mujoco as smc
-@pytest.mark.parametrize("phi", [0.3, 2.0])
-def test_my_law_settles(step_response, phi):
-    r = step_response("inverted_pendulum", smc.law("boundary_layer", k=6, c=8, phi=phi), step=0.2, duration=1.0)
-    assert r.settling_time < 0.6 and r.overshoot < 20
-"""
-
-
-@pytest.mark.slow
-def test_a_user_s_test_passes_with_a_good_law_and_fails_readably_with_a_bad_one(binaries, tmp_path):
-    (tmp_path / "test_law.py").write_text(LAWS)
-    plain = {name: "" for name in CLEAN if name.startswith("PYTEST_")}
-    options = ("-p", "no:cacheprovider", "-W", "error", "--smc-out=failed", "--strict-markers")
-    done = run(binaries / "python", "-m", "pytest", *options, cwd=tmp_path, **plain)
-    assert done.returncode == 1, done.stderr
-    assert "1 failed, 1 passed" in done.stdout
-    assert "FAILED test_law.py::test_my_law_settles[2.0] - assert (inf < 0.6" in done.stdout
-    assert "inverted_pendulum under boundary_layer(k=6, c=8, phi=2), step 0.2 rad" in done.stdout
-    assert re.search(r"^metric +value", done.stdout, re.MULTILINE)
-    assert re.search(r"^settling_time +\S+", done.stdout, re.MULTILINE)
-    (figure,) = re.findall(r"^figure: (.*)$", done.stdout, re.MULTILINE)
-    assert Path(figure).parent == tmp_path / "failed"
-    assert Path(figure).stat().st_size > 1000
-
-
 # what only extras bring, as it is imported
 OPTIONAL = ("dm_control", "dm_env", "mediapy", "imageio_ffmpeg", "IPython", "jinja2", "distributed", "gymnasium")
 ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"

@@ -78,15 +78,12 @@ def test_workflows_have_the_pythons_of_the_package():
 
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
-def test_a_workflow_may_read_and_no_more_and_pins_what_it_uses(workflow):
+def test_a_workflow_may_read_and_no_more(workflow):
     data = yaml.safe_load(workflow.read_text(encoding="utf-8"))
     assert data["permissions"] == {"contents": "read"}
     for job in data["jobs"].values():
         more = {"contents"} if job == jobs(HIDDEN)["write"] else set()
         assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations", *more}
-        for used in [step["uses"] for step in job["steps"] if "uses" in step]:
-            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|[0-9a-f]{40})", used)
-            assert used.startswith("actions/") or len(used.partition("@")[2]) == 40  # of others, the very commit
         for step in job["steps"]:
             if step.get("uses", "").startswith("actions/checkout"):
                 assert step["with"] == {"persist-credentials": False}

@@ -11,9 +11,6 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import COARSE, FINE, KINDS, Margin
 from smc_mujoco.cli import tables
-from smc_mujoco.cli.commands.analysis import QUICK_MARGINS
-from smc_mujoco.cli.commands.analysis import margins as command
-from smc_mujoco.control import gain_sets as gains
 from smc_mujoco.evidence.papers.gaber import scenarios
 
 margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins is the function
@@ -310,16 +307,6 @@ def test_an_unknown_name_is_refused_with_the_cure(refused):
         refused(lambda arguments=arguments: margins.margins(*arguments))
 
 
-@pytest.mark.slow
-def test_the_command_prints_a_table_and_writes_a_file(tmp_path, capsys):
-    path = tmp_path / "margins.json"
-    command(["duffing"], "observer_free,classical", "disturbance", "study", quick=True, json=path)
-    shown = capsys.readouterr().out
-    assert "largest disturbance tolerated" in shown
-    assert "1.29" in shown
-    assert [entry["law"] for entry in json.loads(path.read_text())] == ["observer_free", "classical"]
-
-
 def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_tolerated():
     from rich.console import Console
 
@@ -330,9 +317,3 @@ def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_tolerated(
     assert "none" in first
     assert "any" in first
     assert ">= 1.00" in second
-
-
-def test_what_is_quick_is_part_of_the_study():
-    assert set(QUICK_MARGINS["plants"]) <= set(scenarios.PLANTS)
-    assert set(QUICK_MARGINS["kinds"]) <= set(KINDS)
-    assert set(scenarios.LAWS) <= set(gains.LAWS)

@@ -3,7 +3,6 @@
 import dataclasses
 import importlib
 import math
-import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +12,6 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
-from smc_mujoco.cli.commands.analysis import basin as command
 from smc_mujoco.draw import region
 
 maps = importlib.import_module("smc_mujoco.analysis.region_of_attraction")  # smc.basin is the function
@@ -326,11 +324,3 @@ def test_the_study_maps_by_name_and_tells_how_far_it_is():
     assert (found.x.tolist(), found.v.tolist(), found.unit) == ([-3.0, 0.0, 3.0], [-9.0, 9.0], "m")
     assert all(0 < done <= most for done, most in told)
     assert told == sorted(told)
-
-
-def test_the_command_prints_the_share_and_writes_what_it_is_asked_for(tmp_path, capsys):
-    command("duffing", points=2, gains="study", duration=1.0, out=tmp_path / "a.png", json=tmp_path / "a.json")
-    (share,) = re.findall(r"duffing: (\S+) % of the states converge", capsys.readouterr().out)
-    made = maps.load(tmp_path / "a.json")
-    assert (made.plant, share) == ("duffing", f"{100.0 * np.mean(made.outcome == CONVERGES):.3g}")
-    assert (tmp_path / "a.png").exists()
