@@ -1,12 +1,10 @@
 """Intervals of medians and shares: their two ends are treated in the same way, and they cover what they say."""
 
-import math
-
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
+from smc_mujoco.analysis.bootstrap import median_of, share_interval
 
 pytestmark = pytest.mark.quick
 
@@ -18,11 +16,6 @@ def test_an_interval_of_negated_values_is_the_mirror_image():
         _, low, high, _ = median_of(values)
         mirrored = median_of(-values)
         assert (mirrored.low, mirrored.high) == (-high, -low)
-
-
-def test_a_median_of_two_has_an_interval_and_that_of_one_has_none():
-    assert median_of(np.array([[1.0, 3.0]])) == (2.0, 1.0, 3.0, 2)
-    assert repr(median_of(np.array([[3.0]]))) == repr(Interval(3.0, math.nan, math.nan, 1))
 
 
 @pytest.mark.parametrize("n", [6, 40])

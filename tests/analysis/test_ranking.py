@@ -17,7 +17,6 @@ from smc_mujoco.analysis.bootstrap import Interval, median_of, share_interval
 from smc_mujoco.analysis.ranking import (
     RELEVANT,
     Comparison,
-    Effect,
     Limits,
     Rank,
     _holm,
@@ -35,7 +34,7 @@ from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import board as boards_of
 from smc_mujoco.studies import run_key
-from smc_mujoco.studies.board import Board, Boards, size_in_words
+from smc_mujoco.studies.board import Board, Boards
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard
 from smc_mujoco.studies.study import study as run_study
 
@@ -107,19 +106,6 @@ def test_the_ends_are_the_order_statistics_that_the_binomial_distribution_gives(
     below = [stats.binom.sf(math.ceil(n / 2) - 1, n, j / n) for j in range(1, n + 1)]
     assert 1 + np.argmax(np.array(below) >= tail) == low
     assert interval(np.arange(1.0, n + 1))[1:3] == (low, high)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("n", "low", "high"), [(5, 1, 5), (20, 6, 15)])
-def test_the_interval_of_a_skewed_sample_covers_as_often_as_its_order_statistics_do(n, low, high):
-    rng, runs = np.random.default_rng(n), 1000
-    samples = rng.lognormal(sigma=2.0, size=(runs, n))  # median 1
-    samples[rng.random((runs, n)) < 0.1 * (samples > 1)] = INF  # as failures among the worse half: the median stays
-    found = [interval(sample) for sample in samples]
-    covered = sum(one.low <= 1.0 <= one.high for one in found)
-    probability = stats.binom.cdf(high - 1, n, 0.5) - stats.binom.cdf(low - 1, n, 0.5)
-    assert probability >= min(0.93, 1 - 2 ** (1 - n))
-    assert within(covered, runs, probability)
 
 
 def test_from_six_to_forty_seeds_it_covers_93_percent_or_more():
@@ -249,16 +235,6 @@ def test_two_conditions_need_seven_seeds_as_the_least_p_is_two_to_the_one_minus_
     assert ("too few" in board.result) != wins
 
 
-@pytest.mark.slow
-def test_few_seeds_are_too_few_for_many_comparisons_and_the_board_says_so():
-    laws = {f"law{i:02}": blocks(*range(i + 1, i + 6), seeds=6) for i in range(30)}
-    board = leaderboard(stand(laws), ["itae"])[0]
-    assert board.family == 5
-    assert board.result == "no winner: 6 seeds, too few for 5 comparisons: take 8 seeds (--seeds 8)"
-    enough = {law: blocks(*range(i + 1, i + 6), seeds=8) for i, law in enumerate(laws)}
-    assert leaderboard(stand(enough), ["itae"])[0].winner == "law00"
-
-
 def spreading(laws: int, conditions: int, spread: float, rng: np.random.Generator, tails: bool = False):
     """Equal laws of 24 runs, whose own gain sets spread their scores; conditions share the gains, laws the starts."""
     size = (laws, 1, 24)
@@ -386,23 +362,6 @@ def test_laws_that_do_the_same_are_never_separated():
     scores = np.random.default_rng(0).lognormal(size=(4, 30))
     for rank in ranks({"a": scores, "b": scores.copy(), "c": scores.copy()}):
         assert (rank.mean, rank.place, rank.best) == (2, 2, True)
-
-
-@pytest.mark.parametrize(
-    ("value", "low", "high", "words"),
-    [
-        (0.71, 0.6, 0.8, "29 % less (20 to 40 %)"), (1.2, 1.1, 1.3, "20 % more (10 to 30 %)"),
-        (0.9, 0.7, 1.2, "10 % less (-20 to 30 %)"), (1.2, 0.9, 1.5, "20 % more (-10 to 50 %)"),
-        (0.01, 0.005, 0.02, "100 times less (50.0 to 200 times)"),
-        (0.01, 0.0, 0.02, "100 times less (50.0 times or more)"),
-        (1.7e9, 2.8e8, math.inf, "1.7e9 times as much (2.8e8 times or more)"),
-        (0.71, 0.0, math.inf, "29 % less (too few for an interval)"),
-        (0.0, 0.0, 0.1, "the other has no value in most runs"),
-        (math.inf, 2.0, math.inf, "the other alone has a value in most runs"), (1.0, 1.0, 1.0, "no difference"),
-    ],
-)  # fmt: skip
-def test_a_difference_has_its_interval_or_says_that_there_is_none(value, low, high, words):
-    assert size_in_words(Effect(value, low, high, 1, 1, True, 0.1)) == words
 
 
 # the rule of a winner, of each term
@@ -668,12 +627,6 @@ def test_the_order_of_rows_and_the_names_of_laws_change_nothing():
             assert new[name].rank.place == old[law].rank.place
 
 
-def test_groups_may_be_plants_in_conditions():
-    boards = leaderboard(study(), ["itae"], by=["plant", "condition"])
-    assert [block.runs for board in boards for block in board.blocks] == [20] * 4
-    assert [tuple(b.group.values()) for b in boards[:2]] == [("van_der_pol", "nominal"), ("van_der_pol", "noise")]
-
-
 def test_only_runs_that_all_laws_have_are_compared():
     table = study()
     lacking = (table.column("law") == "b") & (table.column("seed") == 3) & (table.column("condition") == "noise")
@@ -708,14 +661,6 @@ def printed(boards: list[Board], width: int = 100) -> str:
     return plain(Boards(boards), width)
 
 
-def test_the_table_says_who_wins_and_where_none_does():
-    text = printed(leaderboard(study()))
-    for words in ("van_der_pol: 20 seeds", "under nominal and noise: a wins", "no winner", "never", "95 % interval"):
-        assert words in " ".join(text.split())
-    assert "too few" in " ".join(printed(leaderboard(study(seeds=3))).split())
-    assert max(map(len, printed(leaderboard(study()), width=80).splitlines())) <= 80
-
-
 def test_a_leaderboard_breaks_no_number_at_80_columns():
     factors = [1.2345e-5 * 2**i * near for i in range(6) for near in (1.0, 1.01)]  # two by two they are tied
     names = ["observer_free_adaptive", *(f"law{i}" for i in range(11))]
@@ -726,18 +671,6 @@ def test_a_leaderboard_breaks_no_number_at_80_columns():
     narrow, wide = (printed(boards, width=width) for width in (80, 300))
     assert max(map(len, narrow.splitlines())) <= 80
     assert sorted(re.findall(r"[0-9.e-]+", narrow)) == sorted(re.findall(r"[0-9.e-]+", wide))
-
-
-def test_a_real_table_has_what_a_leaderboard_needs():
-    pa = pytest.importorskip("pyarrow")
-    table_type = pytest.importorskip("smc_mujoco.studies.table").Table
-    ran = [run_key.row(paper.scenario(plant, "none"))["scenario"] for plant in study().column("plant")]
-    stand_in = study().taken(slice(None))
-    stand_in.columns |= {"scenario": np.array(ran), "hash": np.array([""] * len(ran))}
-    columns = {name: values.tolist() for name, values in stand_in.columns.items()}
-    numbers = {name: pa.array(v, from_pandas=True) for name, v in columns.items() if isinstance(v[0], float)}
-    table = table_type(data=pa.table(columns | numbers))
-    assert leaderboard(table) == leaderboard(stand_in)
 
 
 # what a verdict may say
@@ -807,16 +740,6 @@ def test_no_random_table_has_a_verdict_that_contradicts_it(seed):
         named += checked(leaderboard(table, ["itae", "settles", "settling_time"]))
         named += checked(leaderboard(table, ["itae"], by=("plant", "condition")))
     assert named > 5
-
-
-def test_seeds_that_change_nothing_are_one_sample():
-    once = {"a": [[1.0]], "b": [[2.0]]}
-    same = stand({law: np.repeat(values, 20, axis=1) for law, values in once.items()})
-    (board,) = leaderboard(same, ["itae"])
-    assert board.winner is None
-    assert board.result == "no winner: 20 seeds, 1 distinct run, too few: most seeds change nothing here"
-    assert all(math.isnan(entry.interval.low) for entry in board.entries)
-    assert "20 seeds, 1 distinct run" in " ".join(printed([board]).split())
 
 
 def test_a_seed_is_a_sample_of_two_laws_if_it_changes_one():
@@ -898,14 +821,6 @@ def test_a_block_without_randomness_is_in_every_resample():
     both = median_of(np.stack([one, [5.0, *nothing]]))
     alone = median_of(one[None])
     assert both[:3] == pytest.approx([(5.0 + end) / 2 for end in alone[:3]])
-
-
-@pytest.mark.parametrize(("seeds", "told"), [(5, True), (6, False)])
-def test_the_table_says_that_intervals_of_very_few_samples_cover_less(seeds, told):
-    text = " ".join(
-        printed(leaderboard(stand({"a": blocks(1.0, seeds=seeds), "b": blocks(2.0, seeds=seeds)}), ["itae"])).split()
-    )
-    assert ("of fewer than 6 samples the interval is their range" in text) == told
 
 
 def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves_them():

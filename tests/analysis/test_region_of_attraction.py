@@ -276,16 +276,6 @@ def test_what_is_no_map_is_refused(tmp_path, refused):
         refused(lambda: maps.load(path))
 
 
-def test_a_picture_is_drawn_and_its_shares_are_a_whole(weak, tmp_path, refused):
-    region.draw([weak, weak], tmp_path / "map.png")
-    assert (tmp_path / "map.png").stat().st_size > 10_000
-    assert np.array_equal(region.colour_indices(weak, region.convergence_times([weak])) == 4, weak.outcome == DOES_NOT)
-    legend = region.draw([weak]).axes[0].get_legend()
-    entries = legend.get_texts() if legend else []
-    assert sum(float(one.get_text().split(": ")[1].rstrip(" %")) for one in entries) == pytest.approx(100, abs=1)
-    refused(lambda: region.draw([weak], tmp_path / "map.gif"))
-
-
 def test_however_many_horizons_maps_have_what_rests_has_a_shade_of_the_law_and_the_latest_share_one():
     for after, last in (([1.0], 1.0), ([1.0, 2.0, 4.0], 4.0), ([1.0, 2.0, 4.0, 8.0, 16.0], 16.0)):
         drawn: Any = SimpleNamespace(decided_at=np.array(after), outcome=np.full(len(after), CONVERGES))
