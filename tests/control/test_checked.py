@@ -31,7 +31,7 @@ FROZEN.flags.writeable = False
 BIG = np.zeros(2**18)  # numba reads arrays of this size in place
 BIG.flags.writeable = False
 TABLE: dict[float, float] = {}
-LIST, COUNT = [1.0, 2.0], 0
+COUNT = 0
 ADDRESS = 4096
 C_TIME = ctypes.CDLL(ctypes.util.find_library("c")).clock
 C_TIME.restype, C_TIME.argtypes = ctypes.c_long, []
@@ -107,11 +107,6 @@ def reads_an_array_in_place(y, gains, memory):
 
 
 @cheat
-def reads_a_list(y, gains, memory):
-    return -y.e * LIST[1], y.e
-
-
-@cheat
 def reads_the_key(y, gains, memory):
     with open("noise_key.json") as file:
         return -y.e * len(file.read()), y.e
@@ -122,13 +117,6 @@ def key_in_object_mode(y, gains, memory):
     with objmode(size="float64"):
         size = float(len(open("noise_key.json").read()))  # noqa: SIM115
     return -y.e * size, y.e
-
-
-@cheat
-def time_in_object_mode(y, gains, memory):
-    with objmode(now="float64"):
-        now = time.time()
-    return -y.e * now, y.e
 
 
 @cheat
@@ -169,11 +157,6 @@ def strides_beyond_its_memory(y, gains, memory):
 @cheat
 def carries_beyond_its_memory(y, gains, memory):
     return carray(memory.ctypes, (10_000,))[5_000], y.e
-
-
-@cheat
-def address_as_a_number(y, gains, memory):
-    return float(memory.ctypes.data), y.e
 
 
 @cheat
@@ -236,11 +219,6 @@ def operator_of_an_author(y, gains, memory):
 @cheat
 def shape_of_too_many(y, gains, memory):  # 3 * 6148914691236517208 is 8, the size of the memory, modulo 2^64
     return memory.reshape((3, 6148914691236517208))[0, 5_000], y.e
-
-
-@cheat
-def shape_of_nothing(y, gains, memory):
-    return np.zeros(0).reshape((2**32, 2**32))[0, 5_000], y.e
 
 
 @cheat

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from helpers.plants_ab import measured
 
 import smc_mujoco as smc
 from smc_mujoco.control.component import GainWarning
-from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.laws import observer_free_q15 as q15
-from smc_mujoco.control.surface import surface
 from smc_mujoco.simulation import python_controller
 
 PLANTS = ("van_der_pol", "duffing", "inverted_pendulum_network")
@@ -17,11 +16,6 @@ FORMS = ("observer_free_table", "observer_free_taylor", "observer_free_single", 
 LAM, K1 = 6.0, 2.5
 HALF = np.linspace(0.0, 12.0, 6001)
 GRID = np.concatenate([-HALF[:0:-1], HALF])
-
-
-def measured(e=0.0, de=0.0, **more):
-    """What a law sees with the reference at 0."""
-    return Measurement(t=0.0, dt=1e-3, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, **more)
 
 
 def forces(law, e, de):
@@ -211,26 +205,3 @@ def test_a_form_moves_a_plant_as_the_paper_s_law_does_and_to_where_it_comes_to_r
         assert form.failure is None
         assert 0.0 < np.abs(form.x - exact.x).max() <= APART[name], plant
         assert np.abs(form.x[-2000:] - exact.x[-2000:]).max() <= 2.0 * step, plant
-
-
-@pytest.mark.parametrize("name", FORMS)
-def test_a_form_takes_the_scenario_s_surface(name):
-    """Given its own, de + k1 e, it does the same, up to where s is rounded."""
-    common = {"plant": "duffing", "law": smc.law(name, lam=LAM, k1=K1), "model": "nominal", "duration": 3.0}
-    own, given, other = (
-        smc.run(smc.Scenario(**common, surface=s)) for s in (None, surface("linear", c=K1), surface("linear", c=1.0))
-    )
-    assert np.abs(given.x - own.x).max() <= (1e-3 if name == "observer_free_q15" else 1e-6)
-    assert np.abs(other.x - own.x).max() > 0.1
-
-
-@pytest.mark.parametrize("plant", PLANTS)
-def test_with_the_model_every_form_obeys_its_own_error_equation(plant):
-    """e'' = -k1 de - lam tanh(s), f and g cancelled: on every plant as on a free mass."""
-    common = {"model": "nominal", "x0": 0.4, "duration": 2.0, "u_max": math.inf}
-    free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
-    laws = [smc.law(name, lam=LAM, k1=K1) for name in FORMS]
-    there = smc.run([smc.Scenario(plant=plant, law=law, **common) for law in laws])
-    here = smc.run([smc.Scenario(plant=free, law=law, **common) for law in laws])
-    for one, other in zip(there, here, strict=True):
-        assert np.abs(one.x - other.x).max() < 2e-3  # the held input, 1 ms

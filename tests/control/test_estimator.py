@@ -128,17 +128,6 @@ def test_an_estimate_starts_without_a_kick_is_odd_and_does_not_read_the_velocity
     np.testing.assert_array_equal(both(smc.estimator(name), x, v), -both(smc.estimator(name), -x))
 
 
-@pytest.mark.parametrize("name", LINEAR)
-def test_a_linear_estimate_takes_its_time_from_dt(name):
-    """In units of the period nothing changes: gains in 1 / s by 1 / h, q by h^-5, tau by h."""
-    exponents = {"w": -1, "q": -5, "tau": 1}
-    x = np.cumsum(np.random.default_rng(0).normal(size=300))
-    one = both(smc.estimator(name), x, h=1e-3)
-    scaled = {gain: value * 7.0 ** exponents.get(gain, 0) for gain, value in smc.estimator(name).gains.items()}
-    other = both(smc.estimator(name, **scaled), x, h=7e-3)
-    np.testing.assert_allclose(other * np.array([[7.0], [49.0]]), one, rtol=1e-7, atol=1e-7 * np.abs(one).max())
-
-
 @pytest.mark.parametrize(("name", "h"), list(zip(FROM_POSITION, itertools.cycle([5e-3, 1e-3]))))
 def test_an_estimate_of_a_ramp_is_its_slope_and_no_acceleration(name, h):
     t = np.arange(round(2.0 / h)) * h

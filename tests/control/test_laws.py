@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.plants_ab import called, constant, measured, one, orders, plant_a, ramp, sine, wave
+from helpers.plants_ab import called, constant, measured, one, orders, plant_a, sine, wave
 from scipy.linalg import expm
 
 import smc_mujoco as smc
@@ -30,36 +30,17 @@ def test_classical_fails_below_the_disturbance_and_holds_above_it():
     assert lost.residual() > 0.5
 
 
-def test_classical_chatters_within_one_sample_of_its_force():
-    for h in (1e-2, 1e-3):
-        assert plant_a(smc.law("classical", k=2.0), wave, h=h).residual() <= h * (2.0 + 1.5)
-
-
 def test_classical_residual_is_first_order_in_the_control_period():
     slopes, residuals = orders(smc.law("classical", k=2.0), duration=20.0)
     assert np.all(np.abs(slopes - 1.0) < 0.1), slopes
     np.testing.assert_allclose(residuals[:2], [3.2e-2, 3.4e-3], rtol=0.1)
+    assert np.all(residuals <= [h * (2.0 + 1.5) for h in (1e-2, 1e-3, 1e-4)])
 
 
 def test_super_twisting_residual_is_second_order_in_the_control_period():
     slopes, residuals = orders(smc.law("super_twisting", k1=1.5, k2=1.1), duration=20.0)
     assert np.all(np.abs(slopes - 2.0) < 0.2), slopes
     np.testing.assert_allclose(residuals[:2], [3.8e-4, 5.1e-6], rtol=0.1)
-
-
-def test_super_twisting_follows_a_ramp_of_disturbance_that_outgrows_every_constant_gain():
-    """d = 0.8 t has |d'| = 0.8 < k2: s stays at O(h^2) and u tends to -d, while a gain of 4 is lost at t = 5."""
-    run = plant_a(smc.law("super_twisting", k1=1.5, k2=1.1), ramp(0.8))
-    assert run.residual() < 20 * 1e-3**2
-    late = run.t > 8
-    assert np.abs(run.u + 0.8 * run.t)[late].max() < 20 * 1e-3
-    assert plant_a(smc.law("classical", k=4.0), ramp(0.8)).residual() > 1
-
-
-def test_super_twisting_is_lost_when_the_disturbance_is_faster_than_its_integrator():
-    """k2 = 0.5 cannot follow |d'| = 0.8: the rest grows until the square root carries it."""
-    slow = plant_a(smc.law("super_twisting", k1=1.5, k2=0.5), ramp(0.8))
-    assert slow.residual() > 0.5
 
 
 @pytest.mark.parametrize(("k", "phi", "d"), [(6.0, 0.5, 1.5), (2.0, 1.0, 1.9), (6.0, 0.01, 5.0)])
@@ -153,20 +134,3 @@ def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, li
     tiny = states < 1e-2
     np.testing.assert_allclose(norms[tiny], states[tiny], rtol=0.05, atol=1e-9)
     assert norms[tiny][-1] < 0.5e-6 if stable else norms[tiny][-1] > 3e-6
-
-
-@pytest.mark.parametrize("period", [1e-3, 5e-3, 20e-3])
-def test_dt_is_the_control_period(period):
-    """An immovable cart stands at e = -1, so s = -c: K = gamma c t and w = k2 t whatever the control period."""
-    anvil = smc.plant("duffing", M=1e12, alpha=0.0, beta=0.0, delta=0.0)
-    common = {"plant": anvil, "x0": 0.0, "reference": smc.Constant(1.0), "u_max": math.inf, "duration": 1.0}
-    laws = (
-        smc.law("adaptive", gamma=50.0, c=3.0),
-        smc.law("adaptive_leak", gamma=50.0, c=3.0, leak=0.0),
-        smc.law("super_twisting", k1=2.0, k2=5.0, c=3.0),
-    )
-    scenarios = [smc.Scenario(law=law, control_period=period, **common) for law in laws]
-    adaptive, leaky, twisting = smc.run(scenarios)
-    for trace in (adaptive, leaky):
-        np.testing.assert_allclose(trace.u[:, 0], 150.0 * trace.t, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(twisting.u[:, 0], 2.0 * math.sqrt(3.0) + 5.0 * twisting.t, rtol=1e-6)

@@ -1,6 +1,5 @@
 """First-order laws beside the study's, each held to what its docstring states, on plants A and B sampled exactly."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -10,7 +9,6 @@ from scipy.optimize import brentq
 
 import smc_mujoco as smc
 from smc_mujoco.control.laws.fuzzy_gain import inferred
-from smc_mujoco.evidence.papers.gaber import scenarios as paper
 
 pytestmark = pytest.mark.quick
 
@@ -294,19 +292,6 @@ def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_s
     assert (np.abs(run.s[-2000:]).max() < size) == stable
 
 
-@pytest.mark.slow
-def test_observer_free_integral_leaves_no_error_under_a_constant_load_and_the_plain_law_does():
-    scenarios = [paper.scenario(plant, "observer_free", "constant", duration=12.0) for plant in paper.GAINS]
-    gains = [{**x.law.gains, "ki": 0.6 * x.law.gains["k1"]} for x in scenarios]
-    laws = [smc.law("observer_free_integral", **own) for own in gains]
-    mended = [dataclasses.replace(x, law=law) for x, law in zip(scenarios, laws, strict=True)]
-    errors = np.array([smc.score(trace)["steady_error"] for trace in smc.run(scenarios + mended)])
-    before, after = errors.reshape(2, -1)
-    assert np.all(before > 4e-3), before
-    assert np.all(after < 5e-4), after
-    assert np.all(after < before / 20), (before, after)
-
-
 @smc.law_function(gains={"lam": 2.0, "k1": 1.0, "ki": 1.0}, memory=1)
 def winding(y, gains, memory):
     """observer_free_integral without its condition."""
@@ -330,18 +315,6 @@ def test_observer_free_integral_does_not_wind_up():
     assert np.all(0.3 * np.abs(z[grew]) <= 2.0 + np.abs(s[grew]))
     assert near.residual() < 1e-6
     assert -near.s.min() < 0.1 * -far.s.min()
-
-
-@pytest.mark.slow
-def test_observer_free_adaptive_survives_the_jump_that_throws_the_plain_law():
-    scenarios = [paper.scenario(plant, "observer_free", "jump_hard") for plant in paper.GAINS]
-    mended = [dataclasses.replace(x, law=smc.law("observer_free_adaptive", **x.law.gains)) for x in scenarios]
-    bounds = np.array([smc.score(trace)["ultimate_bound"] for trace in smc.run(scenarios + mended)])
-    before, after = bounds.reshape(2, -1) / [max(map(abs, x.resolved.x0)) for x in scenarios]
-    assert np.all(after < 0.05), after
-    thrown = np.array(list(paper.GAINS)) != "pendulum_network"  # the hanging chain cannot fall
-    assert np.all(before[thrown] > 0.9), before
-    assert np.all(after <= before)
 
 
 @pytest.mark.parametrize("d", [0.05, 2.0, 8.0])
@@ -372,28 +345,17 @@ def test_observer_free_adaptive_does_not_grow_without_end_under_noise():
     assert plant_a(capped, wave, noise=noise, duration=40.0).memory.max() == 10.0
 
 
-# what must fail
-
-
 EXACT = ("exponential_reaching", "implicit_first_order", "fixed_time", "discrete_time", "barrier_adaptive", "dynamic")
 
 
 def test_surface_and_own_sliding_variable_give_the_same_first_order_law():
-    """On the linear surface a law is itself; the model adds what the surface asks for."""
-    for name in (*EXACT, "power_rate", "fuzzy_gain", "prescribed_time", "integral"):
-        law = smc.law(name)
-        own = one(law, e=0.2, de=-0.3, f=0.7, g=2.0, model=1.0)
-        y = on_surface(-0.3 + law.gains["c"] * 0.2, eq=law.gains["c"] * 0.3, f=0.7, g=2.0, model=1.0)
+    """On the linear surface of another slope a law is itself with that slope; the model adds what the surface asks."""
+    forms = [f"observer_free_{form}" for form in ("table", "taylor", "single", "q15")]
+    state = {"f": 0.7, "g": 2.0, "model": 1.0}
+    for name in (*EXACT, "power_rate", "fuzzy_gain", "prescribed_time", "integral", *forms):
+        law, slope = smc.law(name), "k1" if name in forms else "c"
+        own = one(smc.law(name, **{slope: 1.7}), e=0.2, de=-0.3, **state)
+        y = on_surface(-0.3 + 1.7 * 0.2, eq=1.7 * 0.3, **state)
         given = called(law, y._replace(e=0.2, de=-0.3), np.zeros(law.memory))
-        np.testing.assert_allclose(own, given, rtol=1e-12)
-
-
-@pytest.mark.parametrize("h", [1e-3, 5e-3])
-def test_fuzzy_gain_s_rate_is_per_second(h):
-    """|s| that falls by 5 /s is worth the same gain at any period: halfway to the falling rules at rate = 10."""
-    law, memory = smc.law("fuzzy_gain"), np.zeros(2)
-    called(law, measured(de=0.2 + 5.0 * h, dt=h), memory)
-    u, _ = called(law, measured(de=0.2, dt=h), memory)
-    # size 0.4: rows small and medium by 0.2 and 0.8; rate -0.5: columns falling and steady by halves
-    share = 0.2 * (0.5 * 0.0 + 0.5 * 0.0) + 0.8 * (0.5 * 0.0 + 0.5 * 0.5)
-    assert u == pytest.approx(-(3.0 + 3.0 * share), rel=1e-9)
+        rounds = {"observer_free_single": 1e-6, "observer_free_q15": 1e-2}.get(name, 1e-12)
+        np.testing.assert_allclose(own, given, rtol=rounds)

@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 import pytest
+from helpers.plants_ab import called, measured
 
 import smc_mujoco as smc
 from smc_mujoco.control.estimator import Reading, estimator
-from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.surface import surface
 from smc_mujoco.simulation import python_controller
 
@@ -28,21 +28,10 @@ H = 1e-3
 STATES = np.random.default_rng(0).normal(scale=(1.0, 2.0), size=(400, 2))
 
 
-def measured(e=0.0, de=0.0, dt=H, **more):
-    """What a law of this package measures with the reference at 0."""
-    zero = {"r": 0.0, "dr": 0.0, "ddr": 0.0}
-    return Measurement(**({"t": 0.0, "dt": dt, "x": e, "v": de, "e": e, "de": de, "f": 0.0, "g": 1.0} | zero | more))
-
-
-class Ours:
-    """A law, a surface or an estimator of this package with its memory, called like a function."""
-
-    def __init__(self, component, **more):
-        self.function, self.gains, self.more = component.function, python_controller.gains_of(component), more
-        self.memory = np.zeros(component.memory)
-
-    def __call__(self, e=0.0, de=0.0, **more):
-        return self.function(measured(e, de, **(self.more | more)), self.gains, self.memory)
+def own(component, **given):
+    """A law or a surface of this package with its memory, as a function."""
+    memory = np.zeros(component.memory)
+    return lambda e=0.0, de=0.0, **more: called(component, measured(e, de, **(given | more)), memory)
 
 
 def along(ours, theirs, states=STATES, rtol=1e-12):
@@ -80,7 +69,7 @@ def test_their_controller_is_a_law_in_one_line():
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_reaching_laws_agree(law, theirs):
-    ours, other = Ours(law), theirs()
+    ours, other = own(law), theirs()
     along(lambda e, de: ours(0.0, de)[0], lambda e, de: other.compute(de))
 
 
@@ -109,13 +98,13 @@ def test_reaching_laws_agree(law, theirs):
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_controllers_agree(law, theirs):
-    ours, other = Ours(law, model=1.0), controlled(theirs())
+    ours, other = own(law, model=1.0), controlled(theirs())
     along(lambda e, de: ours(e, de)[0], other, rtol=1e-9)
 
 
 def test_the_integral_of_a_pid_agrees_but_for_one_sample():
     """Theirs counts the sample's own error before it acts, ours after."""
-    ours, theirs = Ours(smc.law("pid", kp=5.0, ki=3.0, kd=2.0, tau=0.0)), controlled(controllers.PID(5.0, 2.0, 3.0, H))
+    ours, theirs = own(smc.law("pid", kp=5.0, ki=3.0, kd=2.0, tau=0.0)), controlled(controllers.PID(5.0, 2.0, 3.0, H))
     along(lambda e, de: ours(e, de)[0] - 3.0 * H * e, theirs)
 
 
@@ -123,7 +112,7 @@ def test_the_adaptive_gain_agrees_but_for_one_sample():
     """Theirs grows before it acts, ours after."""
     theirs = controllers.AdaptiveSMC(c=2.0, gamma=5.0, eta0=0.5, eta_max=1e9, lam=0.0, dt=H)
     law = smc.law("adaptive", gamma=5.0, c=2.0, k0=0.5)
-    ours, gain = Ours(law, model=1.0), Ours(law, model=1.0)
+    ours, gain = own(law, model=1.0), own(law, model=1.0)
     gain(*STATES[0])
     for (e, de), after in zip(STATES.tolist(), STATES[1:].tolist(), strict=False):
         u, s = ours(e, de)
@@ -142,7 +131,7 @@ def test_the_adaptive_gain_agrees_but_for_one_sample():
 )
 def test_second_order_laws_agree_when_theirs_are_told_sigma_and_its_rate(law, theirs):
     name, alpha, betas = theirs
-    ours, other = Ours(law), getattr(controllers, name)(order=2, alpha=alpha, betas=betas, g_sign=1.0)
+    ours, other = own(law), getattr(controllers, name)(order=2, alpha=alpha, betas=betas, g_sign=1.0)
     along(
         lambda e, de: ours(e, de)[0],
         lambda e, de: other.compute(0.0, None, None, sigma_derivs=[e, de])[0],
@@ -158,7 +147,7 @@ class Itself(core.SlidingSurface):
 
 
 def test_twisting_agrees_when_theirs_is_handed_a_variable_of_relative_degree_2():
-    ours, theirs = Ours(smc.law("twisting", r1=3.0, r2=2.0)), controllers.TwistingSMC(3.0, 2.0, surface=Itself())
+    ours, theirs = own(smc.law("twisting", r1=3.0, r2=2.0)), controllers.TwistingSMC(3.0, 2.0, surface=Itself())
     along(lambda e, de: ours(e, de)[0], controlled(theirs))
 
 
@@ -175,18 +164,18 @@ def test_twisting_agrees_when_theirs_is_handed_a_variable_of_relative_degree_2()
     ids=lambda v: getattr(v, "name", ""),
 )
 def test_surfaces_agree(ours, theirs):
-    mine, other = Ours(ours), theirs()
+    mine, other = own(ours), theirs()
     along(lambda e, de: mine(e, de)[0], lambda e, de: float(other.compute(e, de)))
 
 
 def test_the_global_surface_agrees():
-    ours, theirs = Ours(surface("global_", c=3.0, q=2.0)), surfaces.GlobalSurface(c=3.0, alpha=2.0)
+    ours, theirs = own(surface("global_", c=3.0, q=2.0)), surfaces.GlobalSurface(c=3.0, alpha=2.0)
     for k, (e, de) in enumerate(STATES.tolist()):
         assert ours(e, de, t=k * H)[0] == pytest.approx(float(theirs.compute(e, de, t=k * H)), abs=1e-12)
 
 
 def test_the_integral_of_a_pid_surface_agrees_but_for_one_sample():
-    ours, theirs = Ours(surface("pid", kp=3.0, ki=2.0)), surfaces.PIDSurface(alpha=1.0, beta=3.0, gamma=2.0, dt=H)
+    ours, theirs = own(surface("pid", kp=3.0, ki=2.0)), surfaces.PIDSurface(alpha=1.0, beta=3.0, gamma=2.0, dt=H)
     along(lambda e, de: ours(e, de)[0] + 2.0 * H * e, theirs.compute)
 
 

@@ -8,12 +8,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from helpers.plants_ab import called, constant, plant_b
+from helpers.plants_ab import called, constant, measured, plant_b
 from scipy.linalg import expm, solve_continuous_are, solve_discrete_are
 
 import smc_mujoco as smc
 from smc_mujoco.control import design
-from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.laws import loop_shaping, lqi, mpc
 from smc_mujoco.simulation import python_controller
 
@@ -32,15 +31,10 @@ def vectors():
     return json.loads(VECTORS.read_text())
 
 
-def measured(**fields):
-    zero = dict.fromkeys(("t", "x", "v", "r", "dr", "ddr", "f"), 0.0)
-    return Measurement(**(zero | {"dt": 1e-3, "g": 1.0} | fields))
-
-
 def call(law, memory, **fields):
     """The law's u, clipped to its limit."""
     y = measured(**fields)
-    u, _ = law.function(y, python_controller.gains_of(law), memory)
+    u, _ = called(law, y, memory)
     return min(max(u, -y.limit), y.limit)
 
 

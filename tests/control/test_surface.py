@@ -166,17 +166,6 @@ def test_on_a_terminal_surface_the_error_ends_at_the_stated_time(name, speed, du
     assert np.abs(trace.x[trace.t > 1.05 * whole + 0.05]).max() < 2e-3
 
 
-@pytest.mark.parametrize("e", [1e-3, 1.0, 1e3, 1e6])
-def test_the_predefined_time_surface_ends_before_t_from_anywhere(e):
-    """e' = -v(e) in the variable w = |e|^p, in which it is w' = -exp(w) / T."""
-    slid = surface("predefined_time", T=2.0)
-    speed = -at(slid, np.zeros(slid.memory), -e, 0.0)[0] if e < 1e5 else math.inf
-    p = slid.gains["p"]
-    if math.isfinite(speed):
-        assert p * e ** (p - 1) * speed == pytest.approx(math.exp(e**p) / 2.0, rel=1e-9)
-    assert 2.0 * (1 - math.exp(-(e**p))) <= 2.0
-
-
 def shares(name, law):
     """Ultimate bounds over the start, of a law on a surface, on three plants."""
     plants = ("duffing", "van_der_pol", "inverted_pendulum")
@@ -237,19 +226,3 @@ def test_memory_of_a_surface_belongs_to_a_channel_and_a_run():
     assert not trace.x[:, 1].any()
     np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])
     np.testing.assert_array_equal(trace.u, again.u)
-
-
-@pytest.mark.parametrize("period", [1e-3, 5e-3, 20e-3])
-def test_dt_of_a_surface_is_the_control_period(period):
-    """An immovable cart stands at e = -1: s of PID is -(kp + ki t), of the integral surface -k1 t."""
-    anvil = smc.plant("duffing", M=1e12, alpha=0.0, beta=0.0, delta=0.0)
-    common = {"plant": anvil, "x0": 0.0, "reference": smc.Constant(1.0), "duration": 1.0, "control_period": period}
-    pid, integral, decaying = smc.run(
-        [
-            smc.Scenario(law="classical", surface=slid, **common)
-            for slid in (surface("pid", kp=3.0, ki=2.0), surface("integral", k1=2.0), surface("global_", c=2.0, q=1.5))
-        ]
-    )
-    np.testing.assert_allclose(pid.s[:, 0], -(3.0 + 2.0 * pid.t), rtol=1e-6)
-    np.testing.assert_allclose(integral.s[:, 0], -2.0 * integral.t, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(decaying.s[:, 0], -2.0 * (1 - np.exp(-1.5 * decaying.t)), rtol=1e-6, atol=1e-9)

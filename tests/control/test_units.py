@@ -63,8 +63,3 @@ def test_estimator_does_the_same_in_every_system_of_units(name):
         units = [X / T, X / T**2][: plain.shape[1]]
         found = called(converted(one, system), seen(X, T)).reshape(len(WAY), -1)
         np.testing.assert_allclose(found, plain * units, rtol=1e-9, atol=1e-9)
-
-
-@pytest.mark.parametrize("template", [*surface.catalogue().values(), *estimator.catalogue().values()])
-def test_every_gain_has_a_unit_or_is_a_number(template):
-    assert all(gain.unit is not None or gain.held for gain in template.gains.values())

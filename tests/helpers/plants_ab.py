@@ -55,11 +55,10 @@ rest = constant(0.0)
 wave = sine(1.0) + constant(0.5)  # |d| <= 1.5, |d'| <= 1
 
 
-def measured(e=0.0, de=0.0, dt=1e-3, f=0.0, g=1.0, t=0.0, a=0.0, limit=math.inf, model=0.0):
-    """What a law sees with the reference at 0 and no surface."""
-    return Measurement(
-        t=t, dt=dt, x=e, v=de, e=e, de=de, r=0.0, dr=0.0, ddr=0.0, f=f, g=g, a=a, limit=limit, model=model
-    )
+def measured(e=0.0, de=0.0, dt=1e-3, **more):
+    """What a law sees with the reference at 0, f = 0, g = 1 and no surface, but for the fields in `more`."""
+    zero = dict.fromkeys(("t", "r", "dr", "ddr", "f"), 0.0)
+    return Measurement(**(zero | {"dt": dt, "x": e, "v": de, "e": e, "de": de, "g": 1.0} | more))
 
 
 def on_surface(s, dt=1e-3, eq=0.0, **y):
