@@ -69,7 +69,9 @@ def perform(
     try:
         if filming:
             with clock("film"):
-                written += film(scene, traces, out, terminal)
+                path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
+                runs, names = [*traces[scene.film].values()], [*map(style.label, traces[scene.film])]
+                written += filmed(runs, path, names, title, terminal, scene.camera)
     finally:  # also if the film fails or is stopped
         terminal.print("wrote", style="dim")
         for file in written:
@@ -161,12 +163,6 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
         figure(list(runs.values()), path, labels=[*map(style.label, runs)], title=_title(scene, condition))
         written += files(path)
     return written
-
-
-def film(scene: Scene, traces: Traces, out: Path, terminal: Terminal) -> list[Path]:
-    """Film the scene's filmed condition and return the file; if nothing can render, print why and return []."""
-    runs, path, title = traces[scene.film], out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
-    return filmed(list(runs.values()), path, [*map(style.label, runs)], title, terminal, scene.camera)
 
 
 def filmed(

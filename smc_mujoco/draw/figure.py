@@ -327,7 +327,15 @@ def _draw_beside(
     portraits = iter(places[1:])
     for cell, name in zip(cells, column, strict=True):
         if name == "end":
-            _draw_end(page, cell, places[0]._replace(quantity="u"), runs)
+            panel = places[0]._replace(quantity="u")
+            frame, rows = _rows(page, cell, panel, runs, above=True)
+            for ax, part, colours in rows:
+                drawing.last_samples(ax, part, colours, panel.traces, runs.names)
+            _equal_ranges(frame, rows)
+            plant = panel.traces[0].scenario.plant
+            letter = f"{joint_names(plant)[0]} u" if plant.driven > 1 or plant.direct else "control u"
+            frame.set_ylabel(letter + panel.scale[1])
+            rows[-1][0].set_xlabel("time before the end (ms)")
             continue
         ax = page.add_subplot(cell)
         if name == "phase":
@@ -338,18 +346,6 @@ def _draw_beside(
             drawing.over_time(ax, panel, runs.colours, names=runs.names)
             words = f"time (s)\nthe largest in {1e3 * drawing.peak_window(panel.traces):.3g} ms"
             ax.set(xlabel=words, ylabel=panel.label, xlim=(0.0, runs.span[1]))
-
-
-def _draw_end(page, cell: SubplotSpec, panel: Panel, runs: Runs) -> None:
-    """Draw the close-up of the last samples of u."""
-    frame, rows = _rows(page, cell, panel, runs, above=True)
-    for ax, part, colours in rows:
-        drawing.last_samples(ax, part, colours, panel.traces, runs.names)
-    _equal_ranges(frame, rows)
-    plant = panel.traces[0].scenario.plant
-    letter = f"{joint_names(plant)[0]} u" if plant.driven > 1 or plant.direct else "control u"
-    frame.set_ylabel(letter + panel.scale[1])
-    rows[-1][0].set_xlabel("time before the end (ms)")
 
 
 def _key(shown: Sequence[Panel]) -> list[Handle]:

@@ -49,10 +49,13 @@ def nyquist(
     with style.page():
         colours = style.law_colours([scenario.law for scenario in scenarios])
         gains, shared = pages.gain_sources([[scenario.law.source] for scenario in scenarios])
-        handles: list[Handle] = [
-            Line2D([], [], color=colour, lw=style.points(3), label=_legend(scenario, cycle) + source)
-            for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True)
-        ]
+        handles: list[Handle] = []
+        for scenario, cycle, colour, source in zip(scenarios, cycles, colours, gains, strict=True):
+            words = "no limit cycle predicted, L and 1/N do not cross"
+            if cycle:
+                words = f"amplitude {style.short(cycle.amplitude)} at {cycle.frequency:.3g} Hz predicted"
+            label = f"{style.law_name(scenario.law)}: {words}{source}"
+            handles.append(Line2D([], [], color=colour, lw=style.points(3), label=label))
         whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)
         page = pages.blank(style.FULL_WIDTH, whole)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
@@ -72,14 +75,6 @@ def nyquist(
         pages.set_head(page, style.FULL_WIDTH, title, handles, shared)
         pages.write(page, pages.files(path))
     return page
-
-
-def _legend(scenario: Scenario, cycle: Chattering) -> str:
-    """Return a law's entry in the legend."""
-    name = style.law_name(scenario.law)
-    if not cycle:
-        return f"{name}: no limit cycle predicted, L and 1/N do not cross"
-    return f"{name}: amplitude {style.short(cycle.amplitude)} at {cycle.frequency:.3g} Hz predicted"
 
 
 def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour: str) -> None:

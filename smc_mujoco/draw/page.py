@@ -217,7 +217,13 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
         return
     whole, about = page.get_figure(root=True), str(page.get_label()) or None
     dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}, whole.get_layout_engine()
-    lay_out(whole, paths[0].suffix[1:])
+    if layout is not None:
+        canvas, dpi = whole.canvas, whole.dpi
+        get_registered_canvas_class(paths[0].suffix[1:])(whole)  # texts are as large as this canvas draws them
+        whole.dpi = resolution(whole)
+        layout.execute(whole)
+        whole.set_canvas(canvas)
+        whole.dpi = dpi
     whole.set_layout_engine(None)  # savefig draws a figure twice while it has a layout
     for path in paths:
         with replacing(path) as part:
@@ -231,17 +237,6 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
                 text = Path(part).read_text(encoding="utf-8")
                 Path(part).write_text(re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8")
     whole.set_layout_engine(layout)
-
-
-def lay_out(whole: Figure, format: str) -> None:
-    """Place the parts of a figure as they fit in a file of this format."""
-    canvas, dpi, layout = whole.canvas, whole.dpi, whole.get_layout_engine()
-    if layout is not None:
-        get_registered_canvas_class(format)(whole)  # texts are as large as this canvas draws them
-        whole.dpi = resolution(whole)
-        layout.execute(whole)
-        whole.set_canvas(canvas)
-        whole.dpi = dpi
 
 
 class Spaced(AutoLocator):

@@ -36,10 +36,11 @@ def draw(
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     colour = style.law_colour(found.scenario.law)
+    pale = style.mixed(colour, style.PAPER, PALE_SHARE)
     name = style.law_name(found.scenario.law)
     handles: list[Handle] = [
         Patch(facecolor=colour, label="alone"),
-        Patch(facecolor=_pale(colour), label="with others, 95 % interval"),
+        Patch(facecolor=pale, label="with others, 95 % interval"),
         Line2D([], [], ls="", marker="o", color=colour, label=f"a run, darker: worse {CATALOGUE[found.metric].label}"),
         *([Line2D([], [], ls="", marker="x", color=style.INK, label="a run that fails")] * bool(found.failed.any())),
     ]
@@ -48,7 +49,7 @@ def draw(
         tall = max(MIN_HEIGHT, 0.9 + ROW_HEIGHT * len(found.axes))
         page = pages.blank(width, height or head + style.points(tall), fig)
         bars, runs = page.subplots(1, 2, width_ratios=[1.0, 1.1])
-        _bars(bars, found, colour)
+        _bars(bars, found, colour, pale)
         _runs(runs, found, colour)
         told = f"What breaks {name}: {style.plant_name(found.scenario.plant)}"
         pages.set_head(page, width, title or told, handles)
@@ -56,17 +57,11 @@ def draw(
     return page
 
 
-def _pale(colour: str) -> str:
-    """Return the colour of a bar's part that is due to several axes."""
-    return style.mixed(colour, style.PAPER, PALE_SHARE)
-
-
-def _bars(ax: Axes, found: Explained, colour: str) -> None:
+def _bars(ax: Axes, found: Explained, colour: str, pale: str) -> None:
     """Draw both indices of each axis, the largest at the top."""
     rows = np.arange(len(found.axes))
-    light = _pale(colour)
     first, total = ([getattr(axis, kind) for axis in found.axes] for kind in ("first", "total"))
-    ax.barh(rows, [100 * max(its.median, 0.0) for its in total], 0.62, color=light)
+    ax.barh(rows, [100 * max(its.median, 0.0) for its in total], 0.62, color=pale)
     ax.barh(rows, [100 * min(max(its.median, 0.0), 1.0) for its in first], 0.3, color=colour)
     ends = np.clip([(its.low, its.high) for its in total], 0.0, 1.0) * 100
     ax.hlines(rows, *ends.T, color=style.INK, lw=style.points(1.2))

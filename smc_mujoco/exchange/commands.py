@@ -96,7 +96,9 @@ def export(
         return
     if len(others) > 1:
         raise ScenarioError(f"{len(others)} laws for {out}: give one")
-    chosen = options.law_with(others[0] if others else out.stem, gains)
+    with delay_ctrl_c():
+        from smc_mujoco.control import from_text
+    chosen = from_text.law(others[0] if others else out.stem, **from_text.parsed_gains(gains, "--gains"))
     with delay_ctrl_c(), options.as_options({r"\bjoints=": "--joints "}):
         if out.suffix == ".c":
             from smc_mujoco.common.files import replacing

@@ -330,7 +330,7 @@ def test_a_film_that_fails_leaves_the_list_of_what_was_written(call, undrawn, sc
     def failing(*_):
         raise ScenarioError("cannot write mp4: no ffmpeg")
 
-    monkeypatch.setattr(show, "film", failing)
+    monkeypatch.setattr(show, "filmed", failing)
     answer = call("run", scene, "--out", "out")
     refused(answer, "cannot write mp4: no ffmpeg")
     assert all(f"{name}\n" in answer[1].partition("wrote")[2] for name in TRACES)

@@ -103,7 +103,6 @@ def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
         pages.extend([paths] * bool(paths))  # a part of a page has no files
         write(whole, paths[:1] if len(pages) == 1 else [])
 
-    monkeypatch.setattr(page, "lay_out", lambda *_: None)
     monkeypatch.setattr(page, "write", render_the_first)
     scene = declared_shortly(FOLDER / f"{name}.py")
     two = {condition: dict([*runs.items()][:2]) for condition, runs in [*scene.conditions.items()][:2]}

@@ -188,11 +188,6 @@ def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
     return values
 
 
-def columns(text: str | None) -> dict[str, str]:
-    """Return the rig's name of a column -> the file's, from the option --columns."""
-    return pairs(text, "columns", "theta=arm_angle,t=time")
-
-
 def laws(
     texts: str | Sequence[str] | None, default: Sequence[str] = (), of_rig: "Sequence[Law]" = ()
 ) -> "list[str | Law]":
@@ -209,13 +204,6 @@ def law(text: str) -> "str | Law":
 
     laws_of_text = from_text.laws(text)
     return laws_of_text[0] if len(laws_of_text) == 1 else from_text.law(text)
-
-
-def law_with(text: str, gains: str) -> "Law":
-    """Return the law in a text with the gains of the option --gains."""
-    from smc_mujoco.control import from_text
-
-    return from_text.law(text, **from_text.parsed_gains(gains, "--gains"))
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:

@@ -5,7 +5,6 @@ All are drawn over the rendered picture, so they cost little and no link hides t
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -13,11 +12,9 @@ from PIL import Image, ImageDraw
 from smc_mujoco.draw import style
 from smc_mujoco.draw.decimate import windows
 from smc_mujoco.draw.film import arrows
+from smc_mujoco.draw.film.stage import Stage
 from smc_mujoco.metrics import tip
 from smc_mujoco.simulation.trace import Trace
-
-if TYPE_CHECKING:
-    from smc_mujoco.draw.film.stage import Stage
 
 PATH_WIDTH, WANTED_PATH_WIDTH = 3.0, 1.6  # px
 WANTED_OPACITY = 0.5  # of the wanted path
@@ -32,11 +29,6 @@ BLOW_ARROW = 0.4  # m, length of the arrow of a blow
 SHAFT_WIDTH = 4.0  # px
 BLOW_DISTANCE = 0.09  # m, from the middle of a body to the arrow of its blow
 BLOW_TIME = 0.12  # s for which a blow is shown after its end
-
-
-def is_arm(traces: Sequence[Trace]) -> bool:
-    """Return whether all machines have a tip, which a film then shows."""
-    return all(bool(trace.scenario.plant.tip) for trace in traces)
 
 
 def has_bars(trace: Trace) -> bool:
@@ -87,7 +79,7 @@ class Paths:
     These are the paths of the tips of arms, and of the places of free bodies.
     """
 
-    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], stage: "Stage"):
+    def __init__(self, traces: Sequence[Trace], colours: Sequence[str], stage: Stage):
         self.trails, self.wanted, s = [], [], stage.scale
         for trace, colour, place in zip(traces, colours, stage.where, strict=True):
             free = trace.scenario.plant.pose
@@ -117,7 +109,7 @@ class Overlay:
     """
 
     def __init__(
-        self, traces: Sequence[Trace], colours: Sequence[str], stage: "Stage", edges: np.ndarray, room: np.ndarray
+        self, traces: Sequence[Trace], colours: Sequence[str], stage: Stage, edges: np.ndarray, room: np.ndarray
     ):
         self.traces, self.colours, self.stage, self.edges, self.room = traces, colours, stage, edges, room
         self.paths, self.scale = Paths(traces, colours, stage), stage.scale

@@ -253,7 +253,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     times = shown.times
     edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
     traces = [finite(trace) for trace in traces]
-    scales, arms = arrows.scales(traces), arm.is_arm(traces)
+    scales, arms = arrows.scales(traces), scene.are_arms([trace.scenario for trace in traces])
     grid = np.linspace(0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1)  # also for a still
     acts = [Act(trace, colour, edges, grid, scales, arms) for trace, colour in zip(traces, colours, strict=True)]
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))

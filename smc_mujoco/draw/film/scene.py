@@ -226,6 +226,11 @@ def fixed_boxes(model: mujoco.MjModel) -> np.ndarray:
     return boxes(model, data)[(model.body_weldid[model.geom_bodyid] == 0) & (model.geom_type != PLANE)]
 
 
+def are_arms(scenarios: Sequence[Scenario]) -> bool:
+    """Return whether all machines have a tip, which a film then shows."""
+    return all(bool(scenario.plant.tip) for scenario in scenarios)
+
+
 def first_channels(scenario: Scenario) -> Scenario:
     """Return the scenario with the channels that a film shows."""
     plant = scenario.plant

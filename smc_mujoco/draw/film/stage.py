@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 
 from smc_mujoco.common.errors import ScenarioWarning, users_stacklevel
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import arm, arrows, camera, scene
+from smc_mujoco.draw.film import arrows, camera, scene
 from smc_mujoco.draw.film.act import Act
 from smc_mujoco.draw.film.canvas import Canvas
 from smc_mujoco.draw.film.puppet import Puppet, moved_bodies
@@ -63,7 +63,7 @@ class Stage:
             puppet.mounts = arrows.mounts(puppet.scenario, puppet.ids, puppet.slides, puppet.rail, turn[:, 2])
         runs = zip(self.puppets, traces, self.motions, pushes, strict=True)
         reaches = [puppet.reach(trace, motion, its, cut) for puppet, trace, motion, its in runs]
-        where, seen, place = placed(traces, self.puppets, reaches, turn, size, room, apart)
+        where, seen, place = placed(self.puppets, reaches, turn, size, room, apart)
         for puppet, there in zip(self.puppets, where, strict=True):
             puppet.place = there
         self.model = scene.compose(scenarios, where, size)
@@ -103,7 +103,7 @@ class Stage:
         scene.forward(self.model, self.data)
         scene.set_floor(self.model, turn, place, size, np.concatenate(seen))
         self.turn, self.place, self.size = turn, place, size
-        self.canvas = Canvas(self.model, self.data, size, arms=arm.is_arm(traces))
+        self.canvas = Canvas(self.model, self.data, size, arms=scene.are_arms(scenarios))
 
     def __enter__(self) -> "Stage":
         return self
@@ -219,7 +219,6 @@ class Stage:
 
 
 def placed(
-    traces: Sequence[Trace],
     puppets: Sequence[Puppet],
     reaches: Sequence[np.ndarray],
     turn: np.ndarray,
@@ -232,7 +231,7 @@ def placed(
     Machines in a row are at least `apart` px apart, and fill ROW_SHARE of the room if that makes them no smaller.
     """
     where = standing_places(puppets, reaches, turn)
-    if arm.is_arm(traces):  # the floor hides what is below it
+    if scene.are_arms([puppet.scenario for puppet in puppets]):  # the floor hides what is below it
         floors = [(-np.inf, -np.inf, -there[2]) for there in where]
         reaches = [np.maximum(points, floor) for points, floor in zip(reaches, floors, strict=True)]
 

@@ -91,7 +91,7 @@ def rig(
             raise ScenarioError("--fit without a rig: give one, or a plant")
         _tell(name or "", seeds, figure)
         return
-    files, named = files or [], options.columns(columns)
+    files, named = files or [], options.pairs(columns, "columns", "theta=arm_angle,t=time")
     if fit:
         values = options.numbers(given, "--set", "M=5,b=8")
         _fit(name, files, named, options.names(quantities), values, starts, seed, figure, json)
