@@ -463,18 +463,6 @@ def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
 
 
-@pytest.mark.slow
-@COARSELY
-def test_a_user_s_law_is_predicted_with_its_memory():
-    @smc.law_function(gains={"k": 2.0}, memory=1)
-    def mine(y, gain, m):
-        s = y.v + 0.01 * y.x
-        return -gain.k * (1.0 if s > 0 else -1.0), s
-
-    ours, theirs = chattering(lagging(mine(), 5e-3)), chattering(lagging(LAWS["classical"], 5e-3))
-    assert (ours.amplitude, ours.frequency) == pytest.approx((theirs.amplitude, theirs.frequency), rel=1e-3)
-
-
 @smc.law_function(gains={"k": 2.0})
 def broken(y, gain, m):
     return math.nan * gain.k, y.v

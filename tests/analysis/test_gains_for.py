@@ -44,15 +44,6 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     assert _force_headroom(base) == pytest.approx(least / 2.0)
 
 
-@pytest.mark.slow
-@COARSELY
-def test_a_law_that_does_not_chatter_gets_the_largest_gains_there_are():
-    design = smc.design.gains_for("boundary_layer", "duffing", amplitude=1e-3, u_max=10.0, **LAG)
-    assert not design.chattering
-    assert design.law.gains["k"] == pytest.approx(10.0)
-    assert design.law.gains["phi"] / smc.law("boundary_layer").gains["phi"] == pytest.approx(design.size)
-
-
 FAST = smc.law("classical", k=1.0, c=20.0)
 
 
@@ -77,18 +68,6 @@ def test_an_amplitude_and_a_frequency_decide_size_and_speed():
     larger = smc.chattering(smc.law("classical", **gains), plant="duffing", **fields)
     assert larger.amplitude_range[1] > 5e-3 or larger.frequency > wanted
     assert both.law.gains["k"] == pytest.approx(both.size * both.speed**2)
-
-
-@pytest.mark.slow
-@COARSELY
-def test_a_frequency_that_no_speed_has_is_refused_with_the_least_there_is(refused):
-    refused(lambda: smc.design.gains_for("classical", "duffing", frequency=5.0, **LAG), "oscillates at 66")
-
-
-@pytest.mark.slow
-def test_speeds_at_which_a_law_has_no_cycle_do_not_count(refused):
-    said = "Hz at least, at whatever speed: give a larger one"
-    refused(lambda: smc.design.gains_for("super_twisting", "duffing", frequency=10.0, **LAG), said)
 
 
 @smc.law_function(gains={"k": 1.0})
@@ -122,22 +101,23 @@ def test_the_speed_is_that_of_the_largest_forces_at_most_as_fast_as_wanted(refus
     def narrow(w):
         return steady(w) if 0.5 <= w <= 2.0 else Chattering()
 
+    def shrinking(w):
+        return predicted(20.0 * w, 0.1 * w**3)
+
     speeds = {k: 10.0 ** (0.1 * k) for k in range(-10, 11)}
-    assert next(iter(_forces(steady, None, 20.1, math.inf))) == speeds[0]
-    assert next(iter(_forces(steady, None, 200.1, math.inf))) == speeds[10]
-    assert next(iter(_forces(steady, None, 200.1, speeds[3] ** 2))) == speeds[3]
-    assert next(iter(_forces(dipping, None, 20.1, math.inf))) == speeds[6]
-    assert next(iter(_forces(narrow, None, 11.0, math.inf))) == speeds[-3]
-    assert (
-        next(iter(_forces(narrow, None, 9.0, math.inf))) == speeds[-4]
-    )  # no cycle, and slower than the first with one
-    assert (
-        next(iter(_forces(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e-3, 200.1, math.inf))) == speeds[-10]
-    )  # force ~ 1 / w
-    assert (
-        next(iter(_forces(lambda w: predicted(20.0 * w, 0.1 * w**3), 1e3, 200.1, 4.0))) == speeds[3]
-    )  # all 4: the fastest
-    refused(lambda: _forces(steady, None, 1.9, math.inf))
+    for cycle, amplitude, frequency, headroom, chosen in (
+        (steady, None, 20.1, math.inf, 0),
+        (steady, None, 200.1, math.inf, 10),
+        (steady, None, 200.1, speeds[3] ** 2, 3),
+        (dipping, None, 20.1, math.inf, 6),
+        (narrow, None, 11.0, math.inf, -3),
+        (narrow, None, 9.0, math.inf, -4),  # no cycle, and slower than the first with one
+        (shrinking, 1e-3, 200.1, math.inf, -10),  # force ~ 1 / w
+        (shrinking, 1e3, 200.1, 4.0, 3),  # all 4: the fastest
+    ):
+        assert next(iter(_forces(cycle, amplitude, frequency, headroom))) == speeds[chosen]
+    refused(lambda: _forces(steady, None, 1.9, math.inf), "oscillates at 2 Hz at least")
+    refused(lambda: _forces(lambda w: steady(w) if w < 2.0 else Chattering(), None, 1.9, math.inf), "2 Hz at least")
     refused(lambda: _forces(steady, None, 9.0, 1e-3))
 
 

@@ -310,18 +310,6 @@ def test_what_lies_outside_a_theorem_is_told_by_condition(change, bounds, told, 
     assert [part for part in untold if part in words] == [], words
 
 
-def test_a_table_orders_by_the_worst_and_says_what_a_theorem_leaves_out():
-    laws = "observer_free", smc.law("classical", k=1.9), smc.law("super_twisting", k2=1.0)
-    found = WorstCases(smc.worst_case(scenario(law=law), within=CLASSES["force"], budget=3) for law in laws)
-    assert [one.value for one in found] == sorted(one.value for one in found)
-    assert sorted(note.partition(":")[0] for note in found.notes[1:]) == [
-        "Kendall's tau between the two orders", "classical", "super_twisting",
-    ]  # fmt: skip
-    text = str(found)
-    assert "its theorem needs |d| < 1.9 N with these gains" in text
-    assert "its theorem needs |d'| < 1 N/s with these gains" in text
-
-
 def test_a_table_says_which_law_has_its_defaults_beside_tuned_ones():
     laws = smc.law("pid"), gain_sets.law("duffing", "classical", "tuned"), smc.law("twisting", r1=5.0)
     short = smc.Scenario(plant="duffing", duration=0.1, law="none")
