@@ -10,7 +10,7 @@ from helpers.commands import python
 import smc_mujoco as smc
 from smc_mujoco.cli import law_pages, main
 from smc_mujoco.control.component import Template
-from smc_mujoco.control.law import catalogue, law_function, laws
+from smc_mujoco.control.law import law_function, laws
 
 pytestmark = pytest.mark.quick
 
@@ -41,25 +41,10 @@ def flat(text):
 # all of them
 
 
-def test_the_table_has_every_law_surface_and_estimator_and_fits(call):
-    code, out, err = call("list")
-    assert (code, err) == (0, "")
-    firsts = [line.split()[0] for line in out.splitlines() if re.match(r" {2}\S", line)]
-    for names in (laws(), laws(kind="surface"), laws(kind="estimator")):
-        assert [name for name in names if name not in firsts] == []
-    assert "…" not in out
-    assert max(map(len, out.splitlines())) <= 80
-    assert "smc-mujoco list NAME" in out
-
-
 def test_the_table_has_the_formula(call):
     out = call("list")[1]
     (line,) = (line for line in out.splitlines() if line.split()[:1] == ["super_twisting"])
     assert "u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s)" in flat(out[out.index(line) :])
-
-
-def test_there_are_at_least_thirty_laws():
-    assert len(laws()) >= 30
 
 
 # those that suit
@@ -258,20 +243,3 @@ for words in (["list"], ["list", "brand_new"]):
     assert out.count("brand_new") >= 3
     for words in ("k > c", "J. Nothing 1(1):1, 2001", "c = 2.5"):
         assert words in flat(out)
-
-
-@pytest.mark.slow
-def test_a_new_law_is_walked_by_the_tests_of_the_catalogue(added):
-    files = [*map(str, (ROOT / "tests" / "control").glob("test_laws*.py"))]
-    files += [str(ROOT / "tests" / "cli" / "test_law_pages.py")]
-    out = with_law(added, "-m", "pytest", "-p", "added_law", "-p", "no:cacheprovider", "--collect-only",
-                 "-k", "brand_new", *files)  # fmt: skip
-    cases = [line for line in out.splitlines() if "::" in line]
-    assert len(cases) >= 3  # and the tests that walk the catalogue in one case
-    found = {case.partition("::")[0].removeprefix("tests/") for case in cases}
-    assert "cli/test_law_pages.py" in found
-    assert any(name.startswith("control/test_laws") for name in found)
-
-
-def test_the_catalogue_of_this_process_is_left_alone():
-    assert "brand_new" not in catalogue()

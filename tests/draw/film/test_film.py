@@ -6,14 +6,11 @@ import itertools
 import os
 import signal
 import subprocess
-import sys
 
-import imageio_ffmpeg
 import numpy as np
 import pytest
 from helpers.films import without_charts
 from helpers.sketch import failed
-from PIL import Image
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
@@ -70,18 +67,6 @@ def share(picture: np.ndarray, colour: str) -> float:
 
 
 @renders
-@without_charts
-def test_film_has_a_frame_every_thirtieth_of_a_second(tmp_path):
-    path = film.film(runs(), tmp_path / "new" / "a.mp4", size=SIZE, speed=1.0)
-    read = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-    done = subprocess.run(read, capture_output=True, check=True)
-    assert len(done.stdout) == 10 * 270 * 480 * 3
-    assert b"480x270" in done.stderr
-    assert b" 30 fps" in done.stderr
-    assert [p.name for p in path.parent.iterdir()] == ["a.mp4"]
-
-
-@renders
 def test_every_machine_moves():
     traces = runs(duration=1.0)
     first, last = pictures(traces, [0.0, 1.0])
@@ -89,24 +74,6 @@ def test_every_machine_moves():
     rows = np.flatnonzero(moved.any(axis=1))
     assert moved.mean() > 0.02
     assert np.ptp(rows) > 0.5 * len(moved)  # from the nearest rail to the farthest
-
-
-@pytest.mark.slow
-@renders
-def test_every_law_has_its_colour():
-    (picture,) = pictures(runs("van_der_pol"), [0.1], size=(640, 360))
-    for law in LAWS:
-        assert share(picture, style.law_colour(law)) > 3e-4, law
-
-
-@pytest.mark.slow
-@renders
-def test_a_large_control_draws_an_arrow():
-    (with_control,) = pictures(runs(laws=LAWS[:1]), [0.2])
-    quiet = dataclasses.replace(runs(laws=LAWS[:1])[0], u=np.zeros((301, 1)), applied=np.zeros((301, 1)))
-    (without,) = pictures([quiet], [0.2])
-    blue = style.law_colour(LAWS[0])
-    assert share(with_control, blue) > share(without, blue) + 1e-3
 
 
 def test_arrows_are_to_scale_and_a_bar_shows_switching():
@@ -151,20 +118,6 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
         scene.pose(0, np.array([0.4]))
         leaning = column(scene.render())
     assert leaning * right > 0.0 > leaning * left
-
-
-@pytest.mark.slow
-@renders
-def test_the_drum_on_a_crane_s_trolley_hides_none_of_its_arrow():
-    trace = smc.run(smc.Scenario(plant="overhead_crane", law="none", duration=0.01))
-    seen = []
-    with Stage([trace], ["#0072B2"], (1280, 720), camera.Room(20, 20, 1260, 700)) as scene:
-        scene.pose(0, trace.x[0])
-        for height in (0.0, -50.0):  # where it is, and away
-            scene.model.geom("m0/drum").pos[2] += height
-            empty, arrow = scene.render().astype(int), Arrow(0.0, -0.3, (1.0, 0.0, 0.0, 1.0))
-            seen.append((np.abs(scene.render([(0, 0, arrow)]) - empty).max(axis=2) > 60).sum())
-    assert seen[0] == pytest.approx(seen[1], rel=0.02)
 
 
 @renders
@@ -245,56 +198,6 @@ def test_a_film_that_is_stopped_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         film.film(runs(), tmp_path / "a.mp4", size=SIZE)
     assert not list(tmp_path.iterdir())
-
-
-@renders
-@pytest.mark.slow
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no process groups to interrupt")
-def test_ctrl_c_ends_a_film_as_itself_and_leaves_nothing(tmp_path):
-    code = """
-import signal, sys
-import smc_mujoco as smc
-from smc_mujoco.common.progress import Bar
-signal.signal(signal.SIGINT, signal.default_int_handler)  # also where tests run in the background
-Bar.advance = lambda bar, work: print(work, flush=True)
-trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=20.0))
-smc.film([trace], sys.argv[1], size=(320, 180))
-"""
-    command = [sys.executable, "-c", code, str(tmp_path / "a.mp4")]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, start_new_session=True, env=environment, **pipes) as process:
-        assert process.stdout is not None
-        for _ in range(5):
-            process.stdout.readline()
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-        _, error = process.communicate(timeout=60)
-    assert error.strip().endswith("KeyboardInterrupt")
-    assert "RuntimeError" not in error
-    assert not list(tmp_path.iterdir())
-
-
-@renders
-@without_charts
-def test_stills_and_clips_are_written_and_networks_are_cut(tmp_path):
-    many = smc.plant("inverted_pendulum_network", n=30)
-    traces = smc.run([smc.Scenario(plant=many, law="none", duration=0.2)])
-    still = film.film(traces, tmp_path / "a.png", at=0.1, size=SIZE)
-    with Image.open(still) as image:
-        assert image.size == SIZE
-    with Image.open(film.film(traces, tmp_path / "a.webp", span=(0.0, 0.2), size=SIZE, speed=1.0)) as clip:
-        assert (clip.n_frames, clip.size) == (5, SIZE)
-
-
-@pytest.mark.slow
-@without_charts
-def test_one_trace_is_filmed_like_a_list_of_one(tmp_path):
-    (trace,) = runs(laws=LAWS[:1], duration=0.1)
-    for name, given in (("a.png", trace), ("b.png", [trace])):
-        film.film(given, tmp_path / name, at=0.05, size=SIZE)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert film.film(trace, tmp_path / "a.mp4", size=SIZE, speed=1.0).stat().st_size
-    assert film.film(trace, tmp_path / "a.webp", size=SIZE, speed=1.0).stat().st_size
 
 
 def test_camera_sees_all_points_as_near_as_it_can():
@@ -524,13 +427,6 @@ def test_a_rotor_lies_on_the_flank_that_pushes_and_a_cart_on_its_bed():
     with Stage([resting], ["#0072B2"], (480, 170), ROOM) as shown:
         shown.pose(0, np.array([0.4]))
         assert shown.data.joint("m0/lift").qpos[0] == 0.0
-
-
-@pytest.mark.slow
-@renders
-def test_a_realistic_machine_that_fails_is_filmed():
-    parts = {"actuator": smc.Backlash(0.2), "friction": Coulomb(0.3), "contact": "stops"}
-    pictures([failed(realistic(duration=0.2, **parts), 0)], [0.0, 0.2], charts=True)
 
 
 @renders

@@ -1,5 +1,6 @@
 """The encoder's thread: order, a bound on memory, errors in one sentence."""
 
+import contextlib
 import threading
 import time
 
@@ -83,6 +84,23 @@ def test_an_error_with_the_last_picture_is_not_lost(tmp_path, monkeypatch):
     monkeypatch.setattr(mediapy.VideoWriter, "add_image", broken)
     with pytest.raises(smc.ScenarioError, match="cannot write mp4: Broken pipe"):
         encode(tmp_path, 1)
+
+
+def test_ctrl_c_ends_a_film_as_itself_though_ffmpeg_complains_of_half_a_picture(tmp_path, monkeypatch):
+    close = mediapy.VideoWriter.close
+
+    def complain(self):
+        with contextlib.suppress(RuntimeError):
+            close(self)
+        raise RuntimeError("Error writing: half a picture")
+
+    def stopped():
+        with encoder.encoder(tmp_path / "a.mp4", (180, 320), 30.0):
+            monkeypatch.setattr(mediapy.VideoWriter, "close", complain)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
 
 
 def test_an_error_where_pictures_are_made_is_that_error_and_the_rest_is_dropped():

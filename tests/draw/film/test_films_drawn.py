@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from helpers import arms
 from helpers.sketch import Pen, failed, made
-from PIL import ImageDraw
+from PIL import Image, ImageDraw
 
 import smc_mujoco as smc
 from smc_mujoco.common import gl, progress
@@ -271,7 +271,7 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     def blank(frames):
         times = frames.clock.times
         asked.append((times[0], times[-1], len(times), frames.labels, frames.title, frames.size, frames.camera))
-        yield from (paper(frames.size) - np.uint8(k) for k in range(len(times)))
+        yield from (paper(frames.size) - np.uint8(40 * k % 256) for k in range(len(times)))
 
     @contextlib.contextmanager
     def encoder(part, shape, fps):
@@ -299,6 +299,8 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     assert asked[2][1] < 5.0  # a clip ends where little happens any more
     assert wrote == [((180, 320), 10.0), ((720, 1280), 30.0)]
     assert set(told) == {1}
+    with Image.open(tmp_path / "b.webp") as clip, Image.open(tmp_path / "b.png") as still:
+        assert (clip.n_frames, clip.size, still.size) == (6, size, size)
     assert {path.name for path in tmp_path.iterdir()} == {"a.mp4", "a.png", "a.webp", "b.png", "b.webp", "first.mp4"}
 
 
