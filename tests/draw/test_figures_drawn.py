@@ -368,7 +368,8 @@ def test_equal_blues_of_maps_side_by_side_are_equal_times():
 ONE, OTHER = (made(smc.Scenario(plant=name, law="classical", duration=0.01)) for name in ("duffing", "van_der_pol"))
 REFUSED = {  # call -> arguments, and what replaces them
     figure: ({"traces": ONE}, [
-        {"traces": []}, {"traces": [ONE, OTHER]}, {"labels": ["a", "b"]}, {"labels": "a"},
+        {"traces": []}, {"traces": [ONE, OTHER]}, {"traces": [ONE, 3]}, {"traces": 5},
+        {"labels": ["a", "b"]}, {"labels": "a"},
         {"path": ""}, {"path": "a\0"}, {"path": "a.gif"}, {"path": "a.png", "format": "svg"}, {"format": "svg"},
         {"path": "a", "format": "gif"}, {"size": (1.9, 5.0)}, {"size": (5.0, 101.0)}, {"size": "ieee"}, {"size": 3.0},
         {"panels": ["y"]}, {"panels": []}, {"size": (5.0,)}, {"size": (5.0, 4.0), "fig": Figure()},

@@ -118,21 +118,6 @@ def probe(film: bytes) -> tuple[int, int, float, int]:
 # mistakes
 
 
-@pytest.mark.parametrize(
-    ("what", "sentence"),
-    [
-        (5, "traces is 5: give a list"),
-        ("film.mp4", "traces has 'f', which is no trace"),
-        ([], "no traces to draw"),
-        ([1, 2], "traces has 1, which is no trace: give those of smc.run or smc.load"),
-    ],
-)
-def test_what_cannot_be_shown_is_one_sentence(cell, what, sentence):
-    with pytest.raises(smc.ScenarioError, match=sentence):
-        smc.show(what)
-    assert cell == []
-
-
 def test_where_nothing_renders_show_says_so_before_it_films(cell, trace, monkeypatch):
     monkeypatch.setattr(film, "missing", lambda: "no film: no OpenGL here")
     monkeypatch.setattr(film, "film", lambda *_: pytest.fail("it filmed"))
