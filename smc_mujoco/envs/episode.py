@@ -108,11 +108,7 @@ class Setting:
         except (TypeError, ValueError, OverflowError):
             a = np.array(np.nan)
         if a.shape != shape or not np.isfinite(a).all():
-            wrong = shown(action)
-            if a.shape == shape and copies:  # name the first copy that is not finite
-                i = int(np.argmin(np.isfinite(a).all(axis=-1)))
-                wrong = f"{shown(a[i].tolist())} for copy {i}"
-            raise ScenarioError(f"action is {wrong}: give finite numbers, of shape {shape}")
+            raise ScenarioError(f"action is {shown(action)}: give finite numbers, of shape {shape}")
         return self.limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
     def drive_start(self, qvel: np.ndarray) -> np.ndarray | float:

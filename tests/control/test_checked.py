@@ -30,7 +30,6 @@ WRITEABLE, FROZEN = np.arange(4.0), np.arange(4.0)
 FROZEN.flags.writeable = False
 BIG = np.zeros(2**18)  # numba reads arrays of this size in place
 BIG.flags.writeable = False
-TABLE: dict[float, float] = {}
 COUNT = 0
 ADDRESS = 4096
 C_TIME = ctypes.CDLL(ctypes.util.find_library("c")).clock
@@ -77,23 +76,10 @@ def cheat(function):
 
 
 @cheat
-def global_dict(y, gains, memory):
-    if y.t not in TABLE:
-        TABLE[y.t] = y.x
-    return TABLE[y.t], y.e
-
-
-@cheat
 def counts_in_a_global(y, gains, memory):
     global COUNT  # noqa: PLW0603
     COUNT += 1
     return -y.e * COUNT, y.e
-
-
-@cheat
-def writes_a_global_array(y, gains, memory):
-    WRITEABLE[0] += 1.0
-    return -y.e * WRITEABLE[0], y.e
 
 
 @cheat
@@ -152,11 +138,6 @@ def beyond_its_memory(y, gains, memory):
 @cheat
 def strides_beyond_its_memory(y, gains, memory):
     return np.lib.stride_tricks.as_strided(memory, (10_000,), (8,))[5_000], y.e
-
-
-@cheat
-def carries_beyond_its_memory(y, gains, memory):
-    return carray(memory.ctypes, (10_000,))[5_000], y.e
 
 
 @cheat
@@ -248,12 +229,7 @@ def default_of_a_helper(y, gains, memory):
 
 
 def made():
-    kept, array = [0.0], np.zeros(3)
-
-    @cheat
-    def counts_in_its_closure(y, gains, memory):
-        kept[0] += 1.0
-        return -y.e * kept[0], y.e
+    array = np.zeros(3)
 
     @cheat
     def reads_its_closure_array(y, gains, memory):

@@ -25,6 +25,8 @@ LAWS = ["geometric", *SLIDING, "super_twisting_attitude", "indi_attitude", "adrc
 SOURCE = {  # the numbers of arXiv 2508.06568, with rotors of 50 ms as in another coding of its laws
     'mass="0.0319"': 'mass="0.032"', '"16.8e-6 16.8e-6 29.8e-6"': '"16.6e-6 16.6e-6 29.3e-6"', '"0.0625"': '"0.05"'
 }  # fmt: skip
+# it turns its heading
+PATH = [smc.Sine(0.5, 2.0), smc.Sine(0.4, 3.0), smc.Sine(0.3, 1.0), *[smc.Constant(0.0)] * 2, smc.Sine(0.8, 4.0)]
 NOWHERE = {  # gains that leave the position alone, so that the wanted attitude is level
     **{law: {"kx": 1e-9, "kv": 1e-9} for law in ("geometric", "indi_attitude", "adrc_attitude")},
     **{law: {"c": 1e-9, "Kx": 1e-9} for law in ("quaternion_sliding", "super_twisting_attitude")},
@@ -46,15 +48,27 @@ def original():
     return smc.plant_from(text, channels=["body"], name="original", keyframe="hover")
 
 
-def pushed(law):
-    """A law of the library with a constant torque about the roll axis added to what it commands."""
+@njit
+def roll(y):
+    """A constant torque about the roll axis, N m."""
+    return np.array([TORQUE, 0.0, 0.0])
+
+
+@njit
+def wave(y):
+    """A torque about each axis, by 10 rad/s^2 of its inertia."""
+    return 10.0 * math.sin(4.0 * y.t) * np.diag(y.M)[3:]
+
+
+def pushed(law, torque=roll):
+    """A law of the library with a torque added to what it commands."""
     base = njit(law.function)
     gains = {name: Gain(value, shared=True) for name, value in law.gains.items()}
 
     @smc.law_function(joint=True, requires_model=True, plants=("a free body",), gains=gains, memory=law.memory)
     def with_torque(y, gains, memory):
         u, s = base(y, gains, memory)
-        u[3] += TORQUE
+        u[3:] += torque(y)
         return u, s
 
     return with_torque
@@ -190,11 +204,8 @@ def test_the_adaptive_gains_grow_by_the_published_rule_and_stay_within_their_bou
     """K grows above eps / rho, falls below it, creeps by mu at K0, and stays at K_up."""
     law = smc.law("adaptive_quaternion_sliding", K_up=430.0, Kx_up=4.4)
     base, memory, gains, dt = plain(law), np.zeros((6, law.memory)), SimpleNamespace(**law.gains), 0.05
-    K, K0, up = (
-        np.array([4.0, 4.0, 3.0, 400.0, 400.0, 400.0]),
-        np.array([4.0, 4.0, 3.0, 400.0, 400.0, 400.0]),
-        [4.4, 430],
-    )
+    K0, up = np.array([4.0, 4.0, 3.0, 400.0, 400.0, 400.0]), [4.4, 430]
+    K = K0.copy()
     seen = {"grows": 0, "falls": 0, "creeps": 0, "stays": 0}
     for k in range(400):
         at = 0.4 if k < 200 else 1e-4
@@ -292,45 +303,26 @@ def test_each_integral_of_the_cascade_leaves_no_error_alone(drone, torque, gains
 
 @pytest.mark.parametrize("law", LAWS)
 def test_commands_are_those_of_the_law_in_python(drone, law):
-    """Along a path that turns its heading, from a tumbling start, which brings q and -q."""
-    path = [smc.Sine(0.5, 2.0), smc.Sine(0.4, 3.0), smc.Sine(0.3, 1.0), *[smc.Constant(0.0)] * 2, smc.Sine(0.8, 4.0)]
+    """From a tumbling start, which brings q and -q."""
     start = {"x0": (0.3, -0.2, 1.0, 2.4, -0.9, 0.8), "v0": (0.5, -0.4, 0.3, 6.0, -9.0, 7.0)}
-    trace = smc.run(smc.Scenario(plant=drone, law=law, reference=path, duration=0.2, control_period=2e-3, **start))
+    trace = smc.run(smc.Scenario(plant=drone, law=law, reference=PATH, duration=0.2, control_period=2e-3, **start))
     own, limits = smc.law(law), np.array(trace.scenario.limits)
     function, gains = plain(own), SimpleNamespace(**own.gains)
     memory = np.zeros((6, own.memory))
     for k, t in enumerate(trace.t[:-1]):
-        r = np.array([[of(one, t) for one in path] for of in (value, rate, acceleration)])
+        r = np.array([[of(one, t) for one in PATH] for of in (value, rate, acceleration)])
         u, s = function(measured(trace.x[k].copy(), trace.v[k].copy(), 2e-3, r, limit=limits), gains, memory)
         np.testing.assert_allclose(trace.u[k], np.clip(u, -limits, limits), rtol=1e-8, atol=1e-12)
         np.testing.assert_allclose(trace.s[k], s, rtol=1e-8, atol=1e-10)
 
 
-@njit
-def wave(t):
-    return 10.0 * math.sin(4.0 * t)  # rad/s^2
-
-
 @pytest.mark.slow
 def test_super_twisting_stays_within_the_square_of_the_period_without_a_lag_and_in_a_cycle_behind_one(drone):
     """|d'| < 40 = L; then harmonic balance of the yaw, with G = (p + lam / 2) / (p (mu p^2 + p + lam / 2))."""
-    text, L = (
-        TEXT.replace('dyntype="filter" dynprm="0.0625" ', "").replace(' act="0.0782 0.0782 0.0782 0.0782"', ""),
-        45.0,
-    )
-    quick = smc.plant_from(text, channels=["body"], name="quick", keyframe="hover")
-    base = njit(smc.law("super_twisting_attitude").function)
-
-    gains = {name: Gain(value, shared=True) for name, value in smc.law("super_twisting_attitude").gains.items()}
-
-    @smc.law_function(joint=True, requires_model=True, plants=("a free body",), gains=gains, memory=3)
-    def disturbed(y, gains, memory):
-        u, s = base(y, gains, memory)
-        for i in range(3):
-            u[3 + i] += y.M[3 + i, 3 + i] * wave(y.t)
-        return u, s
-
-    law = disturbed(k1=1.5 * math.sqrt(L), k2=1.1 * L, **NOWHERE["super_twisting_attitude"])
+    text = TEXT.replace('dyntype="filter" dynprm="0.0625" ', "").replace(' act="0.0782 0.0782 0.0782 0.0782"', "")
+    quick, L = smc.plant_from(text, channels=["body"], name="quick", keyframe="hover"), 45.0
+    law = pushed(smc.law("super_twisting_attitude"), wave)
+    law = law(k1=1.5 * math.sqrt(L), k2=1.1 * L, **NOWHERE["super_twisting_attitude"])
     common = {"plant": quick, "law": law, "duration": 3.0, "x0": (0.0, 0.0, 30.0, 0.1, 0.0, 0.2)}
     ends = [
         np.abs(trace.s[trace.t > 2.0, 3:]).max()
@@ -534,14 +526,13 @@ def adaptive_force(e, de):
 )
 def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law, force, torque):
     """By rotation matrices, on a path that turns its heading. The inertia is not that of a ball, so w x J w counts."""
-    path = [smc.Sine(0.5, 2.0), smc.Sine(0.4, 3.0), smc.Sine(0.3, 1.0), *[smc.Constant(0.0)] * 2, smc.Sine(0.8, 4.0)]
     start = {"x0": (0.3, -0.2, 1.0, 0.4, -0.3, 0.2), "v0": (0.5, -0.4, 0.3, 6.0, -9.0, 7.0)}
     body = smc.plant_from(TEXT.replace('"16.8e-6 16.8e-6', '"12e-6 20e-6'), channels=["body"], keyframe="hover")
-    trace = smc.run(smc.Scenario(plant=body, law=law, reference=path, duration=0.1, control_period=2e-3, **start))
+    trace = smc.run(smc.Scenario(plant=body, law=law, reference=PATH, duration=0.1, control_period=2e-3, **start))
     J, dt, before, limits = np.diag([12e-6, 20e-6, 29.8e-6]), 2e-3, None, np.array(trace.scenario.limits)
     free, h = 0, 1e-5  # torques within their bounds
     for k, t in enumerate(trace.t[:-1]):
-        r, dr, ddr = (np.array([of(one, t) for one in path[:3]]) for of in (value, rate, acceleration))
+        r, dr, ddr = (np.array([of(one, t) for one in PATH[:3]]) for of in (value, rate, acceleration))
         R, w, e, de = (
             Rotation.from_rotvec(trace.x[k, 3:].copy()), trace.v[k, 3:], trace.x[k, :3] - r, trace.v[k, :3] - dr,
         )  # fmt: skip
@@ -551,7 +542,7 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
 
         def wanted(ahead, t=t, e=e, de=de, ddr=ddr, dde=dde, jerk=jerk):
             F = 0.0319 * (ddr + ahead * jerk + force(e + ahead * de, de + ahead * dde) + [0.0, 0.0, G])
-            return F, attitude_of(F, np.array([0.0, 0.0, value(path[5], t) + ahead * rate(path[5], t)]))
+            return F, attitude_of(F, np.array([0.0, 0.0, value(PATH[5], t) + ahead * rate(PATH[5], t)]))
 
         F, goal = wanted(0.0)
         turning = (wanted(-h)[1].inv() * wanted(h)[1]).as_rotvec() / (2.0 * h)

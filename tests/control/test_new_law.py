@@ -1,12 +1,10 @@
 """A new law is one file: it alone makes the law listed, tunable, coloured, labelled, reported and known to theory."""
 
 import json
-from pathlib import Path
 
 import pytest
 from helpers.commands import python
 
-ROOT = Path(__file__).parents[2]
 NEW = '''"""Brand new: u = -k sat(s / phi), s = de + c e. Source: N. Body, "Of no use", J. Nothing 1(1):1, 2001."""
 
 import numpy as np

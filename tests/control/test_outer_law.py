@@ -22,7 +22,10 @@ def test_each_joint_obeys_the_outer_loop_whatever_the_others_do():
     np.testing.assert_allclose(trace.x, np.array([0.3, -0.2]) * (1.0 + wt) * np.exp(-wt), atol=2e-3)
 
 
-@pytest.mark.parametrize(("name", "gains"), [("adrc", {}), ("pd_observer", {}), ("lqi", {"q0": 5e3}), ("mpc", {})])
+SLOWLY = pytest.param("mpc", {}, marks=pytest.mark.slow)  # compiled
+
+
+@pytest.mark.parametrize(("name", "gains"), [("adrc", {}), ("pd_observer", {}), ("lqi", {"q0": 5e3}), SLOWLY])
 def test_an_outer_law_leaves_no_error_under_a_constant_force(name, gains):
     trace = run(smc.law(name, **gains), disturbance=smc.Constant(1.0), duration=8.0, control_period=1e-3)
     assert np.abs(trace.x[-1]).max() < 1e-3

@@ -51,12 +51,14 @@ def test_surface_does_the_same_in_every_system_of_units(name):
         np.testing.assert_allclose(eq, plain[:, 1] * X / T**2, rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", laws(kind="estimator"))
-def test_estimator_does_the_same_in_every_system_of_units(name):
+@pytest.mark.parametrize(
+    ("name", "gains"), [*((name, {}) for name in laws(kind="estimator")), *(("levant", {"order": n}) for n in (1, 3))]
+)
+def test_estimator_does_the_same_in_every_system_of_units(name, gains):
     def seen(X, T):
         return [Reading(dt=0.01 * T, x=X * (math.sin(0.3 * i) + x), v=v * X / T) for i, (x, v, *_) in enumerate(WAY)]
 
-    one = estimator.estimator(name)
+    one = estimator.estimator(name, **gains)
     plain = called(one, seen(1.0, 1.0)).reshape(len(WAY), -1)
     for system in SYSTEMS:
         X, T = system["X"], system["T"]
