@@ -31,7 +31,7 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Law
 from smc_mujoco.mechanisms.plant import EFFORT, Plant
 from smc_mujoco.metrics import catalogue
-from smc_mujoco.metrics.conventions import by_group, refuse, scale
+from smc_mujoco.metrics.conventions import by_group, scale
 from smc_mujoco.simulation.coerce import REST
 from smc_mujoco.simulation.conditions import DURATION, Condition
 from smc_mujoco.simulation.grid import START_CURE, Starts, case, listed, listed_laws
@@ -141,9 +141,7 @@ class Kind:
 
 def tolerates(trace: Trace) -> bool:
     """Return whether a run did not fail and ended within 5 % of its scale, in every group of its channels."""
-    try:
-        refuse(trace)
-    except ScenarioError:  # it failed, or diverged
+    if trace.failure is not None:
         return False
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
     return all(bound(part) <= TOLERATED_ERROR * scale(part) for part in by_group(trace).values())

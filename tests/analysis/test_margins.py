@@ -28,8 +28,8 @@ def found():
     return margins.margins_of(bases, resolution=COARSE, threads=2)
 
 
-def kind_of(put, levels=(1.0, 2.0, 4.0), none=0.0):
-    return margins.Kind(label="push", unit="{u}", levels=levels, put=put, none=none)
+def kind_of(put):
+    return margins.Kind(label="push", unit="{u}", levels=(1.0, 2.0, 4.0), put=put)
 
 
 def pushed(level):
@@ -94,13 +94,24 @@ def test_it_does_not_depend_on_company_or_threads(found):
 
 # the search
 
+SEARCHED = [  # whether a level is tolerated, of 1, 2 and 4 first, and the margin
+    (
+        lambda level: not 1.3 < level < 2.5,
+        pytest.approx(1.3, rel=FINE),
+        "ends at the first level that is not tolerated",
+    ),
+    (lambda level: not 1.3 < level < 1.9, 4.0, "an island between two levels goes unseen"),
+    (lambda level: True, 4.0, "has the searched level where no run fails"),
+    (lambda level: level < 0.3, pytest.approx(0.3, abs=FINE), "is also found below the smallest level"),
+]
 
-def test_it_stops_at_the_first_level_that_is_not_tolerated(monkeypatch):
-    island = kind_of(lambda base, level: pushed(not 1.3 < level < 2.5))
-    monkeypatch.setitem(margins.MARGIN_KINDS, "island", island)
-    (margin,) = margins.margins_of([pushed(True)], ["island"])
-    assert margin.value == pytest.approx(1.3, rel=FINE)
-    assert margin.searched == 4.0
+
+@pytest.mark.parametrize(("tolerated", "value", "words"), SEARCHED, ids=[row[-1] for row in SEARCHED])
+def test_a_margin(tolerated, value, words, monkeypatch):
+    monkeypatch.setitem(margins.MARGIN_KINDS, "push", kind_of(lambda base, level: pushed(tolerated(level))))
+    (margin,) = margins.margins_of([pushed(True)], ["push"])
+    assert (margin.value, margin.searched) == (value, 4.0), words
+    assert (margin.open, margin.resolution == 0.0) == (value == 4.0,) * 2
 
 
 @pytest.mark.slow
@@ -117,28 +128,10 @@ def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     assert margin.value < 4.5
 
 
-def test_an_island_between_two_levels_goes_unseen(monkeypatch):
-    monkeypatch.setitem(margins.MARGIN_KINDS, "island", kind_of(lambda base, level: pushed(not 1.3 < level < 1.9)))
-    (margin,) = margins.margins_of([pushed(True)], ["island"])
-    assert margin.open
-
-
-def test_a_run_that_never_fails_has_the_searched_level_as_its_margin(monkeypatch):
-    monkeypatch.setitem(margins.MARGIN_KINDS, "nothing", kind_of(lambda base, level: pushed(True)))
-    (margin,) = margins.margins_of([pushed(True)], ["nothing"])
-    assert (margin.value, margin.searched, margin.resolution, margin.open) == (4.0, 4.0, 0.0, True)
-
-
 def test_a_law_that_fails_anyway_has_no_margin():
     (margin,) = margins.margins_of([dataclasses.replace(BASE, law=smc.law("none"))], ["mass"])
     assert math.isnan(margin.value)
     assert not margin.open
-
-
-def test_a_margin_below_the_smallest_level_is_found_too(monkeypatch):
-    monkeypatch.setitem(margins.MARGIN_KINDS, "tiny", kind_of(lambda base, level: pushed(level < 0.3)))
-    (margin,) = margins.margins_of([pushed(True)], ["tiny"])
-    assert margin.value == pytest.approx(0.3, abs=FINE)
 
 
 def test_delays_are_whole_control_periods():
