@@ -134,14 +134,6 @@ def test_a_law_that_fails_anyway_has_no_margin():
     assert not margin.open
 
 
-def test_delays_are_whole_control_periods():
-    slow = dataclasses.replace(BASE, control_period=0.03, physics_step=None)
-    (margin,) = margins.margins_of([slow], ["delay"])
-    periods = margin.value / 0.03
-    assert periods == pytest.approx(round(periods))
-    assert margin.resolution == pytest.approx(0.03)
-
-
 def test_it_tells_how_far_it_is():
     told = []
     margins.margins_of([BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole)))

@@ -30,7 +30,6 @@ from smc_mujoco.common.tabular import plain
 from smc_mujoco.evidence.papers.gaber import scenarios as paper
 from smc_mujoco.evidence.report.scores import scores as report_scores
 from smc_mujoco.evidence.report.words import TABLE_METRICS
-from smc_mujoco.metrics.catalogue import metrics as every_metric
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import board as boards_of
 from smc_mujoco.studies import run_key
@@ -383,11 +382,7 @@ WINS = [  # what a law and a rival with twice its values have besides, who wins,
     ({"halves": {"a": 3.0 * SOME * A, "b": SOME * B}}, None, "up"),
     ({"halves": {"a": SOME * A / 3.0, "b": SOME * B}}, None, "and down"),
     # 0.86^5 is 0.47: the rival would be where the law is after as much time again
-    (
-        {"trends": {"a": np.ones((1, 12)), "b": np.full((1, 12), 0.86)}},
-        None,
-        "a falling rival is charged for it",
-    ),
+    ({"trends": {"a": np.ones((1, 12)), "b": np.full((1, 12), 0.86)}}, None, "a falling rival is charged"),
     ({"trends": {"a": np.ones((1, 12)), "b": np.full((1, 12), 0.98)}}, "a", "two percent are no trend"),
     ({"trends": {"a": np.ones((1, 12)), "b": np.full((1, 12), 2.0)}}, "a", "a rising rival gains nothing"),
     ({"trends": {"a": np.full((1, 12), 1.16), "b": np.ones((1, 12))}}, None, "a rising law is charged"),
@@ -532,14 +527,10 @@ def test_over_several_conditions_only_what_holds_in_each_is_told():
     one_set = dataclasses.replace(both.blocks[0], sets=12, given=("b",))
     assert dataclasses.replace(both, blocks=(one_set,)).result.endswith("runs, for these gains of b")
     assert dataclasses.replace(both, blocks=(dataclasses.replace(one_set, given=()),)).result.endswith("20 runs")
-    text = " ".join(printed([board]).split())
-    assert "too few" not in text
-    assert "b wins under c2, loses under c0 and c1;" in text
     level = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4)}), ["itae"])[0]
     assert level.result == "no winner in both conditions: a wins under c1, for these gains"
     first = leaderboard(stand({"a": blocks(1, 2), "b": blocks(1.01, 4), "c": blocks(4, 2.01)}), ["itae"])[0]
     assert first.result == "no winner, undefeated: a"
-    assert "undefeated: a" in " ".join(printed([first]).split())
 
 
 # leaderboards
@@ -596,15 +587,6 @@ def test_a_board_for_each_plant_and_metric_with_medians_shares_and_winners():
     assert by_law(picked(boards, "settling_time", plant="duffing").entries)["c"].interval[:3] == (INF, INF, INF)
     failing = by_law(picked(boards, "settles", plant="van_der_pol").entries)["c"]
     assert failing.interval.median == 39 / 40
-
-
-def test_a_failed_run_is_worst_in_every_metric():
-    board = leaderboard(study(), ["tv_rate"])[0]
-    table = study()
-    rows = (table.column("plant") == "van_der_pol") & (table.column("law") == "c")
-    c = table.column("tv_rate")[rows & (table.column("condition") == "noise")]
-    assert board.blocks[1].medians["c"] == np.median(np.where(np.isnan(c), INF, c))
-    assert board.blocks[1].medians["c"] > np.nanmedian(c)
 
 
 def test_the_order_of_rows_and_the_names_of_laws_change_nothing():
@@ -757,16 +739,6 @@ def test_a_seed_that_changes_a_third_law_is_no_sample_of_two():
     assert board.result == "no winner, undefeated: b; too few samples to tell whether c is beaten"
 
 
-def test_of_equal_laws_none_stands_alone_for_lack_of_samples():
-    draws = np.random.default_rng(2)
-    for _ in range(20):
-        laws = {name: draws.lognormal(sigma=0.15, size=(4, 8)) for name in "abc"}
-        for board in leaderboard(stand(laws), ["itae"], ("plant", "condition")):
-            unbeaten = {law for law in laws if not board.losses(law)}
-            told = board.winner or board.too_few or re.search("level|cannot tell them|none beaten", board.result)
-            assert told or all(re.search(rf"\b{law}\b", board.result) for law in unbeaten)
-
-
 @pytest.mark.parametrize("laws", ["ab", "abc"])
 def test_of_equal_laws_none_is_called_undefeated_because_runs_of_another_fail(laws):
     """A run in ten fails by chance. A law is defeated only where a test says that another is better."""
@@ -863,24 +835,6 @@ def test_a_law_is_not_marked_where_no_lead_would_have_been_seen():
         assert ("sees no lead" in printed([board])) != marked
 
 
-def test_commands_of_laws_that_friction_holds_are_level_though_one_creeps_a_thousand_times_less():
-    held = run_key.row(paper.scenario("duffing", "none", changes={"friction": smc.Coulomb(0.2)}))["scenario"]
-    for size, winner in ((1e-8, None), (1.0, "a")):
-        table = stand({"a": blocks(size), "b": blocks(1e3 * size)}, metric="tv_rate")
-        table.columns["scenario"] = np.array([held] * 40)
-        (board,) = leaderboard(table, ["tv_rate"])
-        assert board.winner == winner
-        assert "0.1 % of the bound on u" in " ".join(printed([board]).split())
-
-
-@pytest.fixture(scope="module")
-def real(tmp_path_factory):
-    """Two plants, three laws, three conditions: real runs."""
-    laws, conditions = ["observer_free", "classical", "adaptive"], ["nominal", "noise", "coulomb"]
-    scenarios = grid(["van_der_pol", "duffing"], laws, conditions, 16, gains="study", duration=0.1)
-    return run_study(scenarios, tmp_path_factory.mktemp("study"))
-
-
 # a metric of each family: a time, an error of the last part, an integral, a command, and a cycle that runs may not have
 @pytest.mark.parametrize("metric", ["settling_time", "ultimate_bound", "itae", "tv_rate", "chattering_amplitude"])
 def test_a_median_that_half_the_step_moves_by_more_than_five_percent_is_marked_on_boards_and_in_the_report(metric):
@@ -909,14 +863,6 @@ def test_boards_say_where_no_run_was_compared_with_half_its_step(tmp_path):
         boards = leaderboard(run_study(runs, tmp_path / condition), ["itae", "chattering_amplitude"])
         said[condition] = [board.by_step for board in boards], "half the physics step" in " ".join(str(boards).split())
     assert said == {"nominal": ([False, False], False), "backlash": ([True, True], True)}
-
-
-@pytest.mark.slow
-def test_no_board_of_real_runs_has_a_verdict_that_contradicts_it(real):
-    names = [metric.name for metric in every_metric()]
-    named = checked(leaderboard(real, [*METRICS, *names]))
-    named += checked(leaderboard(real, by=("plant", "condition")))
-    assert named > 5
 
 
 def test_a_law_that_fails_more_often_does_not_tie():

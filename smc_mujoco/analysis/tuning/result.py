@@ -115,11 +115,6 @@ class Tuned(Tables):
         )
 
     @property
-    def number_of_searches(self) -> int:
-        """The number of searches."""
-        return len(self.searches)
-
-    @property
     def sets(self) -> list[Evaluation]:
         """The best set of each search, in order: run i uses set i, modulo their number."""
         return [found.best for found in self.searches]

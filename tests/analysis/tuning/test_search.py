@@ -205,12 +205,6 @@ def test_the_front_is_what_no_other_evaluation_beats(found):
 # the search space
 
 
-def test_scales_are_those_of_the_plant():
-    scales = search_space.scales(smc.plant("duffing", M=6.0), u_max=4.0)
-    assert scales == {"X": 1.5, "F": 4.0, "M": pytest.approx(6.0), "T": pytest.approx(1.5)}
-    assert search_space.scales(smc.plant("inverted_pendulum"), 6.0)["M"] == pytest.approx(0.5 * 0.5**2)
-
-
 @pytest.mark.quick
 def test_a_law_is_searched_about_the_bound_on_its_command():
     """In N m, V or rad/s^2, with the inertia per unit of it. A motor's winding changes neither."""
