@@ -235,14 +235,6 @@ def measured(x, v, dt, r=None, J=(16.8e-6, 16.8e-6, 29.8e-6), m=0.0319, limit=1.
     return JointMeasurement(0.0, dt, 1.0, 0, x, v, x - r, v - dr, r, dr, ddr, ddr, limits, M, h, g)
 
 
-def test_the_adaptive_law_has_a_slope_of_its_own_for_the_yaw():
-    law = smc.law("adaptive_quaternion_sliding")
-    seen = measured(np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), np.zeros(6), 2e-3)
-    u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
-    assert s[3:] == pytest.approx([0.0, 0.0, 3.0 * math.sin(0.2)])
-    assert u[5] == pytest.approx(-29.8e-6 * 400.0 * math.tanh(0.2 * s[5]))
-
-
 def test_adrc_turns_its_states_round_on_the_other_side_of_half_a_turn():
     """From y = 2 with y' = -3 to the same on the other side: z1 = -2 and z2 = 3, of which s is z2 + wc z1 / 2."""
     law = smc.law("adrc_attitude", **NOWHERE["adrc_attitude"])
@@ -453,13 +445,6 @@ def test_noise_leaves_millimetres_and_a_delay_beyond_the_margin_of_the_attitude_
     assert np.abs(seen.e[len(seen.t) // 2 :, :3]).max() < 0.02
     assert 5e-3 < margin < 10e-3
     assert np.abs(lost.e[-1, :3]).max() > 10.0
-
-
-def test_a_law_of_less_gain_stands_noise_and_ten_milliseconds(drone):
-    law = smc.law("geometric", kx=2.0, kv=2.0, kR=120.0, kW=24.0)  # of the firmware's INDI
-    noisy = {"noise": smc.Noise(0.01, 0.05), "input_delay": 10e-3}
-    trace = smc.run(smc.Scenario(plant=drone, law=law, x0=(0.2, -0.2, 1.2, 0.2, -0.2, 0.2), duration=8.0, **noisy))
-    assert np.abs(trace.e[len(trace.t) // 2 :, :3]).max() < 0.02
 
 
 def rate_by_differences(F, r, dr, h=1e-6):

@@ -176,16 +176,7 @@ def test_lqi_solves_its_riccati_equation(plant, q):
     a1, a2, b = plant
     A, B = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]]), np.array([[0.0], [0.0], [b]])
     ki, k1, k2 = (B.T @ solve_continuous_are(A, B, np.diag(q), np.eye(1)))[0]
-    np.testing.assert_allclose(lqi.feedback(a1, a2, b, *q), (k1, k2, ki), rtol=1e-7)
-
-
-def test_lqi_gives_foreign_gains(vectors):
-    for case in vectors["lq"]:
-        weights = [case[name] / case["r"] for name in ("q0", "q1", "q2")]
-        k1, k2, ki = lqi.feedback(case["a1"], case["a2"], case["b"], *weights)
-        np.testing.assert_allclose((ki, k1, k2), case["lqi"], rtol=1e-9)
-        np.testing.assert_allclose(lqi.feedback(case["a1"], case["a2"], case["b"], 0.0, *weights[1:])[:2], case["lqr"],
-                                   rtol=1e-9)  # fmt: skip
+    np.testing.assert_allclose(lqi.feedback(a1, a2, b, *q), (k1, k2, ki), rtol=1e-9)
 
 
 def test_lqi_tracks_back_from_the_bound_with_its_time_constant():
@@ -244,17 +235,8 @@ def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, 
             assert np.abs(rows[:, 0] + us).max() <= limit * (1.0 + 1e-12)
         else:  # only the first move was asked for, as the same moves were said to be free
             assert mpc.recall(n, e, de, -us, limit, memory.copy()) > -1e-9 * limit
-        missed += wrong > 1e-6 * max(limit, np.abs(v).max())
+        missed += wrong > 1e-8 * max(limit, np.abs(v).max())
     assert missed <= 1
-
-
-def test_mpc_gives_the_control_of_a_foreign_solver(vectors):
-    for case in vectors["mpc"]:
-        law = smc.law("mpc", **{name: case[name] for name in ("a1", "a2", "b", "H", "N", "q1", "q2", "r")})
-        memory = np.zeros(mpc.SLOTS)
-        memory[:4] = 1.0, case["e"], case["de"], case["d"]
-        u = call(law, memory, e=case["e"], de=case["de"], dt=1e-12, limit=case["limit"])
-        assert abs(u - case["u"]) <= 1e-9 * case["limit"]
 
 
 def test_only_the_ratios_of_mpc_s_weights_matter():
@@ -290,20 +272,9 @@ def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
     gamma = 1.1 * math.sqrt(1.0 + np.linalg.eigvals(Z @ X).real.max())
     F = -np.linalg.solve((1.0 - gamma**-2) * np.eye(3) - gamma**-2 * X @ Z, np.eye(3)).T @ B
     got = loop_shaping.design(*plant, k, wi)
-    assert got[6] == pytest.approx(gamma, rel=1e-6)
-    np.testing.assert_allclose(got[:3], (F.T @ X)[0], rtol=1e-5)
-    np.testing.assert_allclose(got[3:6], (-Z @ C.T)[:, 0], rtol=1e-6)
-
-
-def test_loop_shaping_has_the_frequency_response_of_a_foreign_design(vectors):
-    for case in vectors["loop_shaping"]:
-        A, B, C = shaped(*case["plant"], case["k"], case["wi"])
-        *FH, gamma = loop_shaping.design(*case["plant"], case["k"], case["wi"])
-        assert gamma == pytest.approx(case["gamma"], rel=1e-6)
-        F, Hs = np.array([FH[:3]]), np.array([FH[3:]]).T
-        for omega, Ks in zip(case["frequency"], case["Ks"], strict=True):
-            got = (F @ np.linalg.solve(1j * omega * np.eye(3) - A - B @ F - Hs @ C, -Hs)).item()
-            assert got == pytest.approx(complex(*Ks), rel=1e-8)
+    assert got[6] == pytest.approx(gamma, rel=1e-8)
+    np.testing.assert_allclose(got[:3], (F.T @ X)[0], rtol=1e-8)
+    np.testing.assert_allclose(got[3:6], (-Z @ C.T)[:, 0], rtol=1e-8)
 
 
 def test_loop_shaping_s_law_answers_as_its_controller():

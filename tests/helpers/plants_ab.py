@@ -120,7 +120,6 @@ def chain(
     g=1.0,
     model=0.0,
     limit=math.inf,
-    dt=None,
     told=None,
     rates=None,
     memory=(),
@@ -130,7 +129,7 @@ def chain(
     Args:
       d: Force.
       x: initial state.
-      h: control period, s; dt: what the law is told of it, h unless given.
+      h: control period, s.
       sign: -1 turns the control round.
       noise: (K,) or (K, n), added to the state that the law sees.
       f, g: constants of the plant; model: 1 where the law may use them.
@@ -140,7 +139,7 @@ def chain(
     """
     count, n = round(duration / h), len(x)
     function = cfunctions.compile_component(law)  # as the callback calls it
-    y = np.array(measured(dt=h if dt is None else dt, f=f, g=g, limit=limit if told is None else told, model=model))
+    y = np.array(measured(dt=h, f=f, g=g, limit=limit if told is None else told, model=model))
     y[HAS_SURFACE] = float(n == 1)
     gains, out, cells = np.array([*law.gains.values(), 0.0]), np.zeros(2), np.zeros(law.memory + 1)
     cells[: len(memory)] = memory
