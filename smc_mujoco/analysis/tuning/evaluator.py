@@ -6,7 +6,7 @@
 A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator prepares them once, puts
 the gains of each candidate into the buffers that compiled code reads, and takes J from the logs. It has three engines:
 MuJoCo, in a Batch that lasts; the plant's `equation`, which may only find gains; and the reference loop, for laws that
-do not compile. J is that of `Objective.terms`.
+do not compile. J is that of `Objective.terms_of_run`.
 """
 
 import dataclasses
@@ -17,19 +17,16 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from numba import njit, types
 
 from smc_mujoco.analysis.tuning import equation
 from smc_mujoco.analysis.tuning.objective import OBJECTIVES, Evaluation, Objective
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.common.jit import compiled, pointer
 from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
 from smc_mujoco.simulation.run import BATCH_BYTES, PlainLoopWarning, ScenarioBatch, cores, memory_for, run
 from smc_mujoco.simulation.scenario import Scenario
-from smc_mujoco.simulation.state import log_at
 
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "the reference loop"  # engines
 Gains = tuple[float, ...]
@@ -229,46 +226,15 @@ class _Again(ScenarioBatch):
 
 
 def sums(log: np.ndarray, period: float) -> tuple[float, float, float]:
-    """Return ITAE, sum |x0| and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace do."""
-    out = np.empty(3)
-    _sums().ctypes(state.address(log), *log.shape, period, state.address(out))
-    itae, start, tv = out.tolist()
-    return itae, start, tv
+    """Return ITAE, sum |x0| and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace do.
 
-
-@functools.cache
-def _sums() -> Any:
-    """Return the compiled `sums`, void(log, samples, channels, period, results)."""
-    ours = callback.magic()  # so that the code in the cache is that of these sources
-
-    def body(log, samples, n, period, out):
-        if ours != 0.0:
-            _write_sums(log, samples, n, period, pointer(out))
-
-    integer = types.intp
-    return compiled(types.void(integer, integer, integer, types.float64, integer), body, cache=True)
-
-
-@njit(error_model="numpy")
-def _write_sums(log, samples, n, period, out):
-    """Write ITAE, sum |x0| and TV into an array of three numbers."""
-    itae, start, tv, before = 0.0, 0.0, 0.0, 0.0
-    for k in range(samples):
-        error = 0.0
-        for i in range(n):
-            sample = log_at(log, k * n + i)
-            error += abs(sample.x - sample.r)
-            if k == 0:
-                start += abs(sample.x)
-        now = k * period * error
-        itae += 0.5 * (before + now) * period
-        before = now
-    for i in range(n):
-        total = 0.0
-        for k in range(1, samples):
-            total += abs(log_at(log, k * n + i).u - log_at(log, (k - 1) * n + i).u)
-        tv = max(tv, total)
-    out[0], out[1], out[2] = itae, start, tv
+    Terms are added in their order, so that the last bit, which a search may magnify, is the same on every machine.
+    """
+    errors = functools.reduce(np.add, np.abs(log["x"] - log["r"]).T)
+    weighted = np.arange(len(log)) * period * errors
+    itae = np.cumsum(0.5 * (weighted[:-1] + weighted[1:]) * period)[-1]
+    tv = np.cumsum(np.abs(np.diff(log["u"], axis=0)), axis=0)[-1].max()
+    return float(itae), sum(np.abs(log["x"][0]).tolist()), float(tv)
 
 
 def objectives(
