@@ -105,26 +105,9 @@ class Objective:
         """
         return self._instance(plant, law, MAX_SEARCHES * seed + search)
 
-    def undisturbed(self, plant: Plant | str, law: Component) -> Scenario:
-        """Return the run that all conditions change, from the plant's own start."""
-        common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
-        return Scenario(plant=plant, law=law, **common)
-
-    def commanded(self, plant: Plant | str, law: Component) -> Scenario:
-        """Return that run with the drive of the conditions, whose command is a force, a voltage or an acceleration."""
-        first = self.undisturbed(plant, law)
-        fields = [one.on(first.plant, self.duration) for one in self.conditions]
-        driven = [
-            dataclasses.replace(first, **{name: one[name] for name in ("plant", "actuator", "u_max") if name in one})
-            for one in fields
-        ]
-        if len(units := sorted({one.efforts[0] for one in driven})) > 1:
-            both = f"{units[0]} and {units[1]}"
-            raise ScenarioError(f"the conditions of a tuning have commands in {both}: tune for each drive alone")
-        return driven[0]
-
     def _instance(self, plant: Plant | str, law: Component, number: int) -> list[Scenario]:
-        first = self.undisturbed(plant, law)
+        common = {name: getattr(self, name) for name in ("duration", "control_period", "u_max")}
+        first = Scenario(plant=plant, law=law, **common)
         fields = [one.on(first.plant, self.duration) for one in self.conditions]
         cases = []
         for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):

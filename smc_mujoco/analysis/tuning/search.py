@@ -335,8 +335,10 @@ class Task(NamedTuple):
 
 def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
-    goal.scenarios(plant, law, seed)  # raises for one that cannot be
-    first = goal.commanded(plant, law)
+    first, *others = goal.scenarios(plant, law, seed)
+    if len(units := sorted({one.efforts[0] for one in (first, *others)})) > 1:
+        both = f"{units[0]} and {units[1]}"
+        raise ScenarioError(f"the conditions of a tuning have commands in {both}: tune for each drive alone")
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
