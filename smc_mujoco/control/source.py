@@ -50,13 +50,8 @@ class Search:
         """The name of the rule."""
         return re.split("[(,:;]", self.rule)[0].rstrip() + " about the defaults" * self.about_defaults
 
-    @property
-    def ended(self) -> str:
-        """How far the searches agree, in words."""
-        return spread_in_words(self.searches, self.spread)
-
     def __str__(self) -> str:
-        return f"{self.name}, {self.evaluations} evaluations, {self.ended}"
+        return f"{self.name}, {self.evaluations} evaluations, {spread_in_words(self.searches, self.spread)}"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -97,14 +92,14 @@ def kinds(sources: Iterable[Source]) -> str:
     return ", ".join(dict.fromkeys(source.kind for source in sources))
 
 
-def in_words(sources: Mapping[str, Iterable[Source]], short: bool = False) -> str:
+def in_words(sources: Mapping[str, Iterable[Source]]) -> str:
     """Return where the gains of laws come from: "gains: shipped (...)", or "gains: a and b default, c yours".
 
-    `sources` maps a law to the sources of its gains; laws without gains are left out. `short` leaves out the searches.
+    `sources` maps a law to the sources of its gains; laws without gains are left out.
     """
     with_gains = {law: [source for source in all_ if source.kind != NONE] for law, all_ in sources.items()}
     words = {law: kinds(of_law) for law, of_law in with_gains.items()}
-    for kind in () if short else dict.fromkeys(words.values()):
+    for kind in dict.fromkeys(words.values()):
         of_kind = [law for law in words if words[law] == kind]
         searches = {law: [source.search for source in with_gains[law] if source.search] for law in of_kind}
         if any(searches.values()):

@@ -8,7 +8,7 @@ equals the trace of that run.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from smc_mujoco.control.surface import Surface
 from smc_mujoco.envs.episode import Episode
 from smc_mujoco.simulation.callback import installed
 from smc_mujoco.simulation.python_controller import Controller, Failure
-from smc_mujoco.simulation.scenario import Scenario
 
 
 def agent(
@@ -31,7 +30,7 @@ def agent(
     model: str | None = None,
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
-) -> "Agent":
+) -> Callable[[Any], np.ndarray]:
     """Return a law as an agent: a callable observation -> action, whose memory is cleared with each episode.
 
     Args:
@@ -49,30 +48,25 @@ def agent(
         surface=surface,  # pyright: ignore[reportArgumentType]
         velocity=velocity,  # pyright: ignore[reportArgumentType]
     )
-    return Agent(episode, scenario)
+    with installed():
+        controller = Controller(scenario)
+    last_episode = 0  # number of the episode in which it acted last
 
-
-class Agent:
-    """A law that acts in an environment."""
-
-    def __init__(self, episode: Episode, scenario: Scenario):
-        self.episode, self.scenario = episode, scenario
-        with installed():
-            self.controller = Controller(scenario)
-        self.last_episode = 0  # number of the episode in which it acted last
-
-    def __call__(self, observation: Any) -> np.ndarray:
+    def act(observation: Any) -> np.ndarray:
         """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of gymnasium."""
-        k, plant = self.episode.sample, self.scenario.plant
-        if k == 0 or self.last_episode != self.episode.episodes:
-            self.last_episode, self.controller = self.episode.episodes, Controller(self.scenario)
-        t = k * self.scenario.control_period
+        nonlocal controller, last_episode
+        k, plant = episode.sample, scenario.plant
+        if k == 0 or last_episode != episode.episodes:
+            last_episode, controller = episode.episodes, Controller(scenario)
+        t = k * scenario.control_period
         try:
             with np.errstate(all="ignore"):
-                u, _ = self.controller(k, t, *_positions_and_velocities(observation, plant.n))
+                u, _ = controller(k, t, *_positions_and_velocities(observation, plant.n))
         except Failure as failure:
             raise ScenarioError(f"{failure}, at t = {t:.6g} s") from failure
-        return u[: plant.driven] / self.scenario.limits
+        return u[: plant.driven] / scenario.limits
+
+    return act
 
 
 def _episode(environment: Any) -> Episode:

@@ -23,18 +23,14 @@ UPDATE = "run pytest --smc-update"
 MIN_TOLERANCE = 1e-9  # in the metric's unit: above rounding errors of a value that is 0
 
 
-def golden_file(test: Path) -> Path:
-    """Return the golden file of a test file."""
-    return test.with_suffix(".golden.json")
-
-
 def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
     """Write a response's metrics and their tolerances into the file, under `key`. Arguments are those of `compare`."""
     tolerances = _checked(response, tolerances)
     entry = {}
     for name in tolerances or [name for name in response.values if response.applies(name)]:
         value, unit = response.value(name)
-        entry[name] = {"value": value, "tolerance": tolerances.get(name, _tolerance(value)), "unit": unit}
+        share = float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}") if math.isfinite(value) else 0.0
+        entry[name] = {"value": value, "tolerance": tolerances.get(name, share), "unit": unit}
     try:
         with locked(file.parent):
             text = json.dumps(plain(dict(sorted((read(file) | {key: entry}).items()))), indent=2, ensure_ascii=False)
@@ -73,11 +69,6 @@ def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, flo
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.check_names(tolerances)
     return {name: number(f"tolerance of {name}", value, low=0.0) for name, value in tolerances.items()}
-
-
-def _tolerance(value: float) -> float:
-    """Return the default tolerance of a metric in its unit: a share of its value; 0 for inf."""
-    return float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}") if math.isfinite(value) else 0.0
 
 
 def read(file: Path) -> dict[str, dict[str, dict[str, Any]]]:

@@ -131,7 +131,7 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
     from smc_mujoco.testing import golden as files
     from smc_mujoco.testing.limits import without_frames
 
-    file, update = files.golden_file(request.path), request.config.getoption("smc_update")
+    file, update = request.path.with_suffix(".golden.json"), request.config.getoption("smc_update")
     test, number = request.node.nodeid.partition("::")[2], itertools.count(1)
 
     @without_frames

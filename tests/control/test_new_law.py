@@ -74,8 +74,15 @@ def found(tmp_path_factory):
     return json.loads(python("-c", CODE, folder).stdout.splitlines()[-1])
 
 
-def test_new_law_is_listed_and_ranked(found):
-    assert all(one["listed"] and one["ranked"] for one in found.values())
+@pytest.mark.parametrize(
+    ("name", "label", "short", "linear"),
+    [("brand_new", "Brand-new", "NEW", [12.0, 2.5]), ("plain_one", "Plain one", "PO", None)],
+)
+def test_new_law_is_listed_ranked_labelled_and_known_to_linear_theory(found, name, label, short, linear):
+    one = found[name]
+    assert (one["listed"], one["ranked"]) == (True, True)
+    assert one["label"] == one["report"] == label
+    assert (one["short"], one["linear"]) == (short, linear)
 
 
 def test_new_law_is_tuned_in_the_box_of_its_units(found):
@@ -89,21 +96,8 @@ def test_new_law_is_tuned_in_the_box_of_its_units(found):
     assert found["plain_one"]["bounds"]["k"] == pytest.approx([u_max * T / X / 10**1.5, u_max * T / X * 10**1.5])
 
 
-@pytest.mark.parametrize(
-    ("name", "label", "short"), [("brand_new", "Brand-new", "NEW"), ("plain_one", "Plain one", "PO")]
-)
-def test_new_law_has_its_label_in_figures_and_report(found, name, label, short):
-    assert found[name]["label"] == found[name]["report"] == label
-    assert found[name]["short"] == short
-
-
 def test_new_law_has_its_colour_or_one_that_nobody_else_has(found):
     assert found["brand_new"]["colour"] == "#102030"
     assert found["brand_new"]["colours"].count("#102030") == 1
     every = found["plain_one"]["colours"]
     assert len(set(every)) == len(every)
-
-
-def test_linear_theory_knows_the_law_that_says_its_linear_part(found):
-    assert found["brand_new"]["linear"] == [12.0, 2.5]
-    assert found["plain_one"]["linear"] is None

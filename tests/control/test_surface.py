@@ -88,44 +88,26 @@ def test_every_surface_is_odd_and_zero_at_rest(name):
         assert at(slid, rest, 0.0, 0.0, t=k * 1e-3) == (0.0, 0.0)
 
 
-def test_on_the_linear_surface_the_error_decays_at_c():
-    trace = slide("linear", de=-2.0, c=2.0)
-    np.testing.assert_allclose(trace.x[:, 0], np.exp(-2.0 * trace.t), atol=2 * SHAKEN / 2.0)
+def second_order(k2, k1, v, t):
+    """The response of e'' + k2 e' + k1 e = 0 from e = 1 and e' = v, for real poles."""
+    fast, slow = sorted(np.roots([1.0, k2, k1]))
+    return ((v - slow) * np.exp(fast * t) - (v - fast) * np.exp(slow * t)) / (fast - slow)
 
 
-def second_order(k2, k1, t):
-    """The response of e'' + k2 e' + k1 e = 0 from e = 1 at rest, for real poles."""
-    fast, slow = np.roots([1.0, k2, k1])
-    return (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
+RESPONSES = [  # e'(0), and e from e(0) = 1; the integral and the global surface have no reaching phase
+    ("linear", {"c": 2.0}, -2.0, lambda t: np.exp(-2.0 * t)),
+    ("integral", {"k1": 2.0, "k2": 3.0}, 0.0, lambda t: second_order(3.0, 2.0, 0.0, t)),
+    ("integral", {"k1": 2.0, "k2": 3.0}, 1.5, lambda t: second_order(3.0, 2.0, 1.5, t)),
+    ("pid", {"kp": 3.0, "ki": 2.0}, -3.0, lambda t: second_order(3.0, 2.0, -3.0, t)),
+    ("global_", {"c": 2.5, "q": 1.5}, 0.0, lambda t: np.exp(-2.5 * t) + 2.5 * (np.exp(-1.5 * t) - np.exp(-2.5 * t))),
+]
 
 
-def test_the_integral_surface_has_no_reaching_phase_and_leaves_the_nominal_response():
-    trace = slide("integral", k1=2.0, k2=3.0)
-    assert np.abs(trace.s[:, 0]).max() <= SHAKEN
-    np.testing.assert_allclose(trace.x[:, 0], second_order(3.0, 2.0, trace.t), atol=2 * SHAKEN)
-    moving = slide("integral", de=1.5)
-    assert np.abs(moving.s[:, 0]).max() <= SHAKEN
-    assert np.abs(slide("linear").s[:500, 0]).min() > 0.5  # as the linear surface has
-
-
-def test_on_the_pid_surface_the_error_follows_its_polynomial():
-    """From s(0) = 0: de = -kp e, with e'(0) as it is."""
-    kp, ki = 3.0, 2.0
-    trace = slide("pid", de=-kp, kp=kp, ki=ki)
-    fast, slow = sorted(np.roots([1.0, kp, ki]))
-    due = ((-kp - slow) * np.exp(fast * trace.t) - (-kp - fast) * np.exp(slow * trace.t)) / (fast - slow)
-    np.testing.assert_allclose(trace.x[:, 0], due, atol=2 * SHAKEN)
-    assert np.abs(trace.s[:, 0]).max() <= SHAKEN
-
-
-def test_the_global_surface_has_no_reaching_phase_and_becomes_the_linear_one():
-    c, q = 2.5, 1.5
-    trace = slide("global_", c=c, q=q)
-    assert np.abs(trace.s[:, 0]).max() <= SHAKEN
-    t, s0 = trace.t, c
-    due = np.exp(-c * t) + s0 * (np.exp(-q * t) - np.exp(-c * t)) / (c - q)
-    np.testing.assert_allclose(trace.x[:, 0], due, atol=2 * SHAKEN)
-    assert np.abs(trace.v + c * trace.x)[-1, 0] < s0 * math.exp(-q * 6.0) + SHAKEN
+@pytest.mark.parametrize(("name", "gains", "de", "due"), RESPONSES)
+def test_from_its_surface_the_error_follows_the_closed_form(name, gains, de, due):
+    trace = slide(name, de=de, **gains)
+    assert np.abs(trace.s).max() <= SHAKEN
+    np.testing.assert_allclose(trace.x[:, 0], due(trace.t), atol=2 * SHAKEN)
 
 
 TERMINAL = [  # speed on s = 0, and the time it takes from e

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
-from smc_mujoco.control.source import in_words
+from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import style
 from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.arrows import Scale
@@ -59,9 +59,7 @@ class Caption:
         notes = [f"{words} since {time:g} s" for time, words in self.jumps.items()]
         longest = max((style.width(note, KEY_SIZE * scale, bold=True) for note in notes), default=0.0)
         self.note_room = min(longest + EDGE * scale, 0.4 * inside)
-        self.source = in_words(
-            {name: [t.scenario.law.source] for name, t in zip(names, traces, strict=True)}, short=True
-        )
+        self.source = by_words({name: t.scenario.law.source.kind for name, t in zip(names, traces, strict=True)})
         self.key = wrapped(key(traces, scales) if parts is None else parts, inside - self.note_room, KEY_SIZE * scale)
         self.beside, self.in_line = not row, False  # machines behind each other have their labels at the left
         words = [{state.words for state in of_machine if state} for of_machine in states] or [set()] * len(traces)
