@@ -127,20 +127,16 @@ def smooth(y: np.ndarray, width: int) -> np.ndarray:
     """
     line = y.astype(float)
     for part in chattering_parts(y, width):
+        from scipy.signal import detrend
+
         half = min(width // 2, (part.stop - part.start + 1) // 2)
         means = np.pad(triangular_mean(line[part], half), half - 1, "edge")
         for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
-            if is_moving(values[: 2 * half - 1]):
+            start = values[: 2 * half - 1]
+            if detrend(start).var() < (1.0 - TREND_SHARE) * start.var():  # it moves more than it varies
                 mean[: half - 1] = [triangular_mean(values[: 2 * k - 1], k)[0] for k in range(1, half)]
         line[part] = means
     return line
-
-
-def is_moving(y: np.ndarray) -> bool:
-    """Return whether y (K,) follows a straight line more than it varies about it."""
-    from scipy.signal import detrend
-
-    return bool(detrend(y).var() < (1.0 - TREND_SHARE) * y.var())
 
 
 def triangular_mean(y: np.ndarray, half: int) -> np.ndarray:

@@ -276,10 +276,8 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
             _settings, trace, [run for run in alike if run.scenario.condition == trace.scenario.condition]
         )
         settings = {name: words for name, words in settings.items() if name in same or name not in CONDITION_FIELDS}
-    machine = [
-        f"plant's {words}" if name in trace.scenario.law.gains else words
-        for name, words in _differing(_machine, trace, others).items()
-    ]
+    true = _differing(lambda run: vars(run.scenario.plant.values(run.scenario.mismatch)), trace, others)
+    machine = [f"plant's {words}" if name in trace.scenario.law.gains else words for name, words in true.items()]
     return ", ".join([*[condition] * bool(condition), *settings.values(), *machine])
 
 
@@ -326,12 +324,6 @@ def _settings(trace: Trace) -> Mapping[str, object]:
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
     kept = {name: value for name, value in fields.items() if name not in ("law", "plant", "mismatch")}
     return dict(scenario.law.gains) | kept
-
-
-@once_per_trace
-def _machine(trace: Trace) -> Mapping[str, object]:
-    """Return the true parameters of a run's machine."""
-    return vars(trace.scenario.plant.values(trace.scenario.mismatch))
 
 
 def distinct(names: Sequence[str]) -> list[str]:

@@ -58,7 +58,8 @@ class Act:
             [None] * len(some) if arms else states.timeline(trace, some, hold) for some in (times, grid)
         )
         self.motion = motion(trace, np.union1d(grid, times))
-        self.x, self.r = (positions(trace.t, values, times)[:, :n] for values in (trace.x, trace.r))
+        shown = (trace.x.T[:n], trace.r.T[:n])  # linear between samples; after a failure the last finite one
+        self.x, self.r = (np.stack([np.interp(times, trace.t, each) for each in its], axis=1) for its in shown)
         self.ahead = rotors(trace, edges)[:, :n]
 
     def failed(self, time: float) -> bool:
@@ -90,11 +91,6 @@ def motion(trace: Trace, times: np.ndarray) -> Motion | None:
     rotors = [name for name in names if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + name) >= 0]
     moved = poses(trace, times) if len(names) + len(rotors) != model.nq else None
     return None if moved is None else Motion(times, moved)
-
-
-def positions(t: np.ndarray, x: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return x (K + 1, n) at the times, (times, n), linear between samples; after a failure the last finite one."""
-    return np.stack([np.interp(times, t, channel) for channel in x.T], axis=1)
 
 
 def rotors(trace: Trace, edges: np.ndarray) -> np.ndarray:

@@ -72,9 +72,3 @@ def project(points: np.ndarray, turn: np.ndarray, place: np.ndarray, size: tuple
 def pixel(size: tuple[int, int]) -> float:
     """Return the tangent of one px at the picture's middle."""
     return float(np.tan(np.radians(FOVY) / 2) / (size[1] / 2))
-
-
-def floor_distance(turn: np.ndarray, place: np.ndarray, size: tuple[int, int]) -> float:
-    """Return how far along its view a camera sees the floor z = 0 at the top of its picture, m; inf at the horizon."""
-    ray = turn[:, 1] * pixel(size) * size[1] / 2 - turn[:, 2]
-    return float(-place[2] / ray[2]) if ray[2] < 0.0 else np.inf

@@ -9,7 +9,6 @@ from PIL import Image, ImageDraw
 
 from smc_mujoco.control.source import by_words
 from smc_mujoco.draw import style
-from smc_mujoco.draw.film import pace
 from smc_mujoco.draw.film.arrows import Scale
 from smc_mujoco.draw.film.camera import Room
 from smc_mujoco.draw.film.scene import MAX_CHANNELS
@@ -162,7 +161,9 @@ class Caption:
         for k in np.flatnonzero(self.gauges):
             if not failed[k]:
                 self._strip(ImageDraw.Draw(image), int(k), time)
-        self._clock(ImageDraw.Draw(image), f"{time:.{3 if speed < 0.2 else 2}f} s", pace.speed_words(speed))
+        pace = f"{1.0 / speed:.3g}× slower" if speed < 1.0 else f"{speed:.3g}× faster"
+        pace = pace if abs(speed - 1.0) > 1e-9 else ""
+        self._clock(ImageDraw.Draw(image), f"{time:.{3 if speed < 0.2 else 2}f} s", pace)
         return np.asarray(image)
 
     def _clock(self, draw: ImageDraw.ImageDraw, time: str, speed: str) -> None:

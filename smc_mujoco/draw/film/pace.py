@@ -110,10 +110,3 @@ def impacts(runs: Sequence[Trace]) -> list[float]:
         touch = states.extended(np.asarray(states.in_contact(trace).any(axis=1)), trace.t, states.MIN_STATE_TIME)
         starts += trace.t[np.flatnonzero(np.diff(touch.astype(int), prepend=1) > 0)].tolist()
     return starts
-
-
-def speed_words(speed: float) -> str:
-    """Return a playback speed in words, as "4× slower"; "" for real time."""
-    if abs(speed - 1.0) < 1e-9:
-        return ""
-    return f"{1.0 / speed:.3g}× slower" if speed < 1.0 else f"{speed:.3g}× faster"

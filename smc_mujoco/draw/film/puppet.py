@@ -42,7 +42,9 @@ class Puppet:
         ids = joint_ids(model)
         rotors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, ROTOR + model.joint(i).name) for i in ids]
         self.slides = model.jnt_type[ids] == SLIDE
-        self.rail = scene.rail(self.scenario, model)  # m, on which a cart stays; inf without one
+        self.rail = np.inf  # m, length along x of what does not move, on which a cart stays
+        if self.scenario.plant.on_stage and self.scenario.plant.unit != "rad" and not self.scenario.plant.pose:
+            self.rail = float(2 * np.abs(scene.fixed_boxes(model)[..., 0]).max())
         self._ids, self._joints = ids, model.jnt_qposadr[ids]
         self._rotors = [(k, model.jnt_qposadr[rotor]) for k, rotor in enumerate(rotors) if rotor >= 0]
         self.links = moved_bodies(model, ids)

@@ -112,7 +112,9 @@ def set_floor(
     cell = min(sizes, key=lambda size: abs(np.log(FLOOR_CELLS * size / model.stat.extent)))
     model.mat_texrepeat[model.material("floor").id] = 1.0 / cell
     start = float(((points - place) @ -turn[:, 2]).max())
-    stop = min(camera.floor_distance(turn, place, size), HAZE_HORIZON * start)
+    ray = turn[:, 1] * camera.pixel(size) * size[1] / 2 - turn[:, 2]  # at the top of the picture
+    floor = float(-place[2] / ray[2]) if ray[2] < 0.0 else np.inf  # m along the view; inf: it sees the horizon
+    stop = min(floor, HAZE_HORIZON * start)
     if stop < MIN_HAZE_DISTANCE * start:  # a view from above: the floor is no farther than the machine
         stop = HAZE_HORIZON * start
     model.vis.map.fogstart = start / model.stat.extent
@@ -239,13 +241,6 @@ def first_channels(scenario: Scenario) -> Scenario:
     plant = dataclasses.replace(plant, n=MAX_CHANNELS, x0=plant.x0[:MAX_CHANNELS])
     x0, v0 = (values[:MAX_CHANNELS] for values in (scenario.resolved.x0, scenario.resolved.v0))
     return dataclasses.replace(scenario, plant=plant, x0=x0, v0=v0)
-
-
-def rail(scenario: Scenario, model: mujoco.MjModel) -> float:
-    """Return the length of the rail along x, m, from what does not move; inf for machines without one."""
-    if scenario.plant.unit == "rad" or scenario.plant.pose or not scenario.plant.on_stage:
-        return np.inf
-    return float(2 * np.abs(fixed_boxes(model)[..., 0]).max())
 
 
 def restyle(model: mujoco.MjModel) -> None:

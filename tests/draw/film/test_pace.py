@@ -102,13 +102,6 @@ def test_a_diverged_run_does_not_make_the_others_rest(base):
     assert len(pace.clock([bad], FPS).times) > 10
 
 
-@pytest.mark.parametrize(
-    ("speed", "words"), [(1.0, ""), (0.125, "8× slower"), (4.0, "4× faster"), (0.3, "3.33× slower")]
-)
-def test_speeds_in_words(speed, words):
-    assert pace.speed_words(speed) == words
-
-
 def test_most_frames_of_a_settling_run_show_motion():
     traces = smc.run(
         list(smc.paper.comparison("van_der_pol", laws=("observer_free", "classical"), duration=10.0).values())
