@@ -62,10 +62,6 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
     assert f"{len(lines)} of {len(laws())} {words}" in flat(out)
 
 
-def test_laws_of_a_plant(call):
-    assert "hierarchical" in call("list", "--plant", "overhead_crane")[1]
-
-
 def test_where_no_law_suits_it_says_so(call):
     out = flat(call("list", "--needs", "one-gain")[1])
     assert out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, or --plant"

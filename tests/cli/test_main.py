@@ -27,7 +27,7 @@ from smc_mujoco.common import gl
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.common.text import capital
 from smc_mujoco.draw.film import film
-from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
+from smc_mujoco.mechanisms.hardware.friction import Viscous
 from smc_mujoco.metrics.catalogue import metrics, score
 from smc_mujoco.simulation import run as runs
 
@@ -338,16 +338,6 @@ def test_show_prints_every_metric_with_its_value(call, trace):
     values = {name: value for name, value in everything.items() if name not in realistic}
     assert set(rows) & realistic == set()
     assert {name: rows[name] for name in values} == {name: tables.number(value) for name, value in values.items()}
-
-
-def test_show_of_a_realistic_run_tells_of_friction_too(call, folder):
-    stuck = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.3, friction=Coulomb(5.0)))
-    stuck.save(folder / "stuck.npz")
-    code, out, err = call("show", "stuck.npz")
-    assert (code, err) == (0, "")
-    rows = {line.split()[0]: line.split()[1:] for line in out.splitlines() if line and not line.startswith(" ")}
-    assert rows["stick_time"][:2] == ["0.300", "s"]
-    assert rows["peak_reaction"][:2] == [tables.number(score(stuck)["peak_reaction"]), "N"]
 
 
 def test_show_says_that_half_the_step_was_not_tried_where_it_matters(call, trace, folder):

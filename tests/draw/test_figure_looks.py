@@ -321,19 +321,13 @@ def test_a_panel_that_is_asked_for_is_drawn_for_each_joint_of_an_arm(arm):
     ]
 
 
-def test_blows_and_jumps_do_not_cover_curves(one):
+def test_words_of_a_jump_do_not_cover_curves(one):
     jump = dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0})))
     for shown in (None, ["channels"]):
         page = figure([jump], panels=shown)
         page.draw_without_rendering()
         (words,) = [text for ax in page.axes for text in ax.texts if "mass" in text.get_text()]
         assert words.get_window_extent().y0 >= page.axes[0].get_window_extent().y1 - 1
-    hit = dataclasses.replace(one, reaction=np.where(np.arange(len(one.t)) == 700, 500.0, 0.0)[:, None])
-    (ax,) = figure([hit], panels=["reaction"]).axes
-    assert ax.get_title(loc="right") == "|reaction| up to 500 N"
-    (mark,) = [line for line in ax.lines if line.get_marker() == 2]
-    assert mark.get_xdata().tolist() == [one.t[700]]
-    assert mark.get_ydata().tolist() == [ax.get_ylim()[1]]
 
 
 def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(one):

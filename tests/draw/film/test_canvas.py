@@ -79,13 +79,6 @@ def test_two_machines_that_move_far_apart_are_drawn_in_two_rectangles(monkeypatc
     assert sum(map(canvas.pixels, drawn[1:])) < 0.75 * (right - left) * max(low, high)
 
 
-@pytest.mark.slow
-def test_cylinders_have_few_stacks_unless_the_model_has_large_round_shapes():
-    for plant, few in (("van_der_pol", True), ("inverted_pendulum", False)):
-        with stage(plant) as shown:
-            assert (shown.model.vis.quality.numstacks == canvas.FEW_STACKS) is few
-
-
 def test_arcs_have_as_many_chords_as_can_be_told_apart():
     """The middle of a chord is r (1 - cos(a / 2)) from its arc, a: its angle."""
     for radius, angle in ((15.0, np.pi), (60.0, 2 * np.pi)):

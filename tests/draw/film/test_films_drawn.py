@@ -103,6 +103,7 @@ def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_a
     ticks = sorted(line[0] for line in lines if abs(line[0] - middle) > 0.6)
     assert np.diff(ticks) == pytest.approx(step, abs=0.7)
     assert (ticks[0] - middle) / step % 1.0 == pytest.approx(-now % 1.0, abs=0.05)
+    assert any("counts of the encoder" in words for words in caption.key)
     assert (dot[0] + dot[2]) / 2 == pytest.approx(middle + (round(then - 0.2 / count) - now) * step, abs=0.6)
 
 

@@ -23,19 +23,6 @@ if SUITE is None or not SUITE.submodule_search_locations:
 FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
 
 
-@pytest.mark.slow
-@without_charts
-def test_a_foreign_model_has_its_picture(tmp_path):
-    """From above, as its camera sees it. Its target reaches below the floor."""
-    plant = smc.plant_from(FOREIGN / "reacher.xml", {"shoulder": None, "wrist": None})
-    runs = [smc.Scenario(plant=plant, law=law, duration=0.2) for law in ("none", "super_twisting")]
-    traces = smc.run(runs)
-    still = smc.film(traces, tmp_path / "a.png", at=0.1, size=(640, 360))
-    assert np.asarray(Image.open(still))[60:200].std() > 5.0
-    smc.figure(traces, tmp_path / "a.svg")
-    assert all((tmp_path / name).stat().st_size for name in ("a.svg", "a.png"))
-
-
 @pytest.mark.parametrize(
     ("group", "floor", "words"), [(3, "", "shows no part that moves"), (0, '<geom type="box" size="9 9 .1"/>', None)]
 )
