@@ -224,51 +224,35 @@ def test_effort_is_the_worst_channel_and_does_not_grow_with_n():
     assert m.hf_share(run(t, u=np.column_stack([u] * 4))) == pytest.approx(m.hf_share(one))
 
 
-@pytest.mark.parametrize("k", [1000, 1001])
-@pytest.mark.parametrize(("low", "high"), [(1.0, 1.0), (3.0, 1.0), (0.0, 2.0), (2.0, 0.0)])
-def test_hf_share_of_two_sines_is_their_share_of_the_power(k, low, high):
-    t = np.arange(k + 1) * 1e-3 * (1000 / k)  # 1 s: whole periods
-    u = 7.0 + low * np.sin(2 * np.pi * 20 * t) + high * np.cos(2 * np.pi * 120 * t)
-    assert m.hf_share(run(t, u=u)) == pytest.approx(high**2 / (low**2 + high**2), abs=1e-9)
+def tone(t, hertz, size=1.0):
+    return size * np.sin(2 * np.pi * hertz * (t - t[0]))
 
 
-def test_hf_share_counts_half_the_sampling_rate_once():
-    k = 1000
-    t = np.arange(k + 1) / k
-    alternating = (-1.0) ** np.arange(k + 1)  # power 1 at 500 Hz; the sine's is 1/2
-    assert m.hf_share(run(t, u=alternating + np.sin(2 * np.pi * 10 * t))) == pytest.approx(2 / 3)
+def alternating(t):
+    return (-1.0) ** np.arange(t.size)
 
 
-def test_hf_share_counts_the_highest_frequency_of_an_odd_number_of_samples():
-    k = 1001
-    t = np.arange(k + 1) / k
-    u = np.sin(2 * np.pi * 500 * t) + np.sin(2 * np.pi * 10 * t)
-    assert m.hf_share(run(t, u=u)) == pytest.approx(1 / 2)
+SECOND, ODD, SLOWLY = clock(1, 1e-3), np.arange(1002) / 1001, clock(10, 0.01)
+HF_SHARES = [  # share of the power, u over t, and why
+    (0.1, SECOND, lambda t: 7.0 + tone(t, 20, 3.0) + tone(t, 120), "two sines have their shares, whatever the mean"),
+    (0.1, ODD, lambda t: 7.0 + tone(t, 20, 3.0) + tone(t, 120), "also of an odd number of samples"),
+    (1.0, SECOND, lambda t: tone(t, 51), "all is above 50 Hz"),
+    (0.0, SECOND, lambda t: tone(t, 50), "50 Hz itself is not"),
+    (0.0, 1000.1 + clock(0.3, 1e-3), lambda t: tone(t, 50), "where 15 periods over the time are 50 + 6e-12 Hz"),
+    (2 / 3, SECOND, lambda t: alternating(t) + tone(t, 10), "power 1 at half the sampling rate counts once"),
+    (1 / 2, ODD, lambda t: tone(t, 500) + tone(t, 10), "the highest frequency of an odd number of samples counts"),
+    (0.1, SECOND, lambda t: np.column_stack([tone(t, 10, 3.0), tone(t, 100)]), "channels are pooled"),
+    (0.0, SECOND, lambda t: np.column_stack([tone(t, 10, 3.0), 1e-17 * alternating(t)]), "with one at rest"),
+    (0.0, SECOND, lambda t: np.full(t.size, 0.1), "a constant has none"),
+    (0.0, SECOND, lambda t: 3.0 + tone(t, 100, 1.2e-12), "nor has rounding, of a range of 0.8e-12"),
+    (1.0, SECOND, lambda t: 3.0 + tone(t, 100, 1.8e-12), "a range of 1.2e-12 is more"),
+    (0.0, SLOWLY, alternating, "nor have samples at 100 Hz"),
+]
 
 
-def test_fifty_hertz_itself_is_not_above_fifty_hertz():
-    for t in (clock(1, 1e-3), 1000.1 + clock(0.3, 1e-3)):  # 15 / (t[-1] - t[0]) of the second is 50 + 6e-12
-        assert m.hf_share(run(t, u=np.sin(2 * np.pi * 50 * (t - t[0])))) == pytest.approx(0, abs=1e-9)
-    t = clock(1, 1e-3)
-    assert m.hf_share(run(t, u=np.sin(2 * np.pi * 51 * t))) == pytest.approx(1)
-
-
-def test_hf_share_pools_the_channels():
-    t = clock(1, 1e-3)
-    slow, fast = 3 * np.sin(2 * np.pi * 10 * t), np.sin(2 * np.pi * 100 * t)
-    rest = 1e-17 * (-1.0) ** np.arange(t.size)
-    assert m.hf_share(run(t, u=np.column_stack([slow, fast]))) == pytest.approx(0.1)
-    assert m.hf_share(run(t, u=np.column_stack([slow, rest]))) == pytest.approx(0, abs=1e-9)
-
-
-def test_hf_share_is_zero_for_a_constant_and_for_slow_sampling():
-    t = clock(1, 1e-3)
-    assert m.hf_share(run(t, u=0.1)) == 0.0
-    fast = np.sin(2 * np.pi * 100 * t)  # its range is twice its amplitude
-    assert m.hf_share(run(t, u=3.0 + 3.0 * 0.4e-12 * fast)) == 0.0  # rounding
-    assert m.hf_share(run(t, u=3.0 + 3.0 * 0.6e-12 * fast)) > 0.9
-    slow = clock(10, 0.01)
-    assert m.hf_share(run(slow, u=(-1.0) ** np.arange(slow.size))) == 0.0
+@pytest.mark.parametrize(("share", "t", "u", "words"), HF_SHARES, ids=[row[-1] for row in HF_SHARES])
+def test_hf_share(share, t, u, words):
+    assert m.hf_share(run(t, u=u(t))) == pytest.approx(share, abs=0.01 if "1.2e-12" in words else 1e-9)
 
 
 # The sliding variable and the network
