@@ -293,14 +293,6 @@ def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
     assert "band:" not in words(draw_figure.figure(pair))
 
 
-# realistic mechanisms
-
-
-def realistic(law: str = "observer_free", plant: str = "duffing", **parts) -> smc.Trace:
-    given = smc.paper.scenario(plant, law).law
-    return smc.run(smc.Scenario(plant=plant, law=given, **({"duration": 3.0} | parts)))
-
-
 @pytest.mark.slow
 def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(pair, tmp_path):
     alone, listed = figure(pair[0], tmp_path / "deep" / "lam_0.5", None), figure(pair[:1], tmp_path / "b.png", None)

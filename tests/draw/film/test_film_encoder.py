@@ -60,23 +60,6 @@ def test_an_error_of_the_encoder_ends_the_film_in_one_sentence_and_soon(tmp_path
     assert len(calls) <= 3 + MAX_WAITING  # none that came later
 
 
-def test_after_an_error_no_more_pictures_are_made():
-    made = []
-
-    def broken(picture):
-        raise OSError("Broken pipe")
-
-    def make():
-        with in_thread(broken) as write:
-            for k in range(1000):
-                made.append(k)
-                write(PICTURE)
-
-    with pytest.raises(OSError, match="Broken pipe"):
-        make()
-    assert len(made) < MAX_WAITING + 5
-
-
 def test_an_error_with_the_last_picture_is_not_lost(tmp_path, monkeypatch):
     def broken(self, picture):
         raise OSError("Broken pipe")
