@@ -4,47 +4,71 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, Basin
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.control.source import Source
 from smc_mujoco.draw import page as pages
 from smc_mujoco.draw import style
+from smc_mujoco.draw.page import Size
 
 SHADES = ("dark", "middle", "light")  # from early to late
 UNDECIDED, LIGHTEST = "#F4F4F4", 82.0  # a colour; lightness of the latest shade in CIELAB
-MAP_SIZE = (5.4, 5.3)  # inches, width and height of a map
+MAP_SIZE = (5.4, 5.3)  # inches on a full page, width and height of a map
 
 
-def draw(region: Basin, path: str | os.PathLike[str] | None = None) -> Figure | SubFigure:
-    """Draw a map with its legend; `path` is as in `figure`."""
-    after, colours = convergence_times([region]), colours_of(region.law)
-    classes, width = colour_indices(region, after), MAP_SIZE[0]
+def draw(
+    maps: Sequence[Basin],
+    path: str | os.PathLike[str] | None = None,
+    size: Size = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure | SubFigure:
+    """Draw maps side by side; `path`, `size` and `fig` are as in `figure`."""
+    paths = pages.files(path)
+    if not maps:
+        raise ScenarioError("no map to draw: give at least one")
+    width, height = (MAP_SIZE[0] * len(maps), None) if size is None and fig is None else pages.measure(size, fig)
+    with style.page(style.FULL_WIDTH if size is None and fig is None else width):
+        rest = Line2D([], [], color=style.INK, marker="+", ms=style.points(11), lw=0, label="rest")
+        across = max(1, min(len(maps), int(width / style.points(3.2)))) if size is not None else len(maps)
+        down, space = -(-len(maps) // across), pages.head_height(width, [rest])
+        tall = MAP_SIZE[1] if size is None else down * width / across * 1.08
+        page = pages.blank(width, height or tall + space, fig)
+        axes, after = page.subplots(down, across, squeeze=False).ravel(), convergence_times(maps)
+        plants = dict.fromkeys(region.plant for region in maps)
+        words, gains = pages.gain_sources([[Source(kind=region.source)] for region in maps])
+        for ax, region, source in zip(axes, maps, words, strict=False):
+            plant = f", {style.plant_name(region.plant, short=True)}" * (len(plants) > 1)
+            draw_map(ax, region, after, style.law_name(region.law) + plant + source.replace(", ", "\n"))
+        for ax in axes[len(maps) :]:
+            ax.remove()
+        pages.set_head(page, width, f"Region of attraction: {style.heading([*plants], short=True)}", [rest], gains)
+        pages.write(page, paths)
+    return page
+
+
+def draw_map(ax: Axes, region: Basin, after: Sequence[float], title: str) -> None:
+    """Fill a matplotlib axes with a map and its legend; `after` is from `convergence_times` of all maps."""
+    classes = colour_indices(region, after)
+    colours = colours_of(region.law)
+    ax.pcolormesh(region.x, region.v, classes, cmap=ListedColormap(colours), vmin=-0.5, vmax=4.5, rasterized=True)
+    for colour, wide in ((style.PAPER, 3.2), (style.INK, 1.4)):
+        ax.plot(0.0, 0.0, "+", color=colour, markersize=style.points(11), markeredgewidth=style.points(wide))
+    ax.grid(visible=False)
+    ax.set_title(title, parse_math=False)
+    ax.set_xlabel(f"initial position ({region.unit})")
+    ax.set_ylabel(f"initial velocity ({region.unit}/s)")
     marks = [
         Patch(facecolor=colours[k], edgecolor=style.RULE, label=f"{words}: {100 * share:.3g} %")
         for k, words in meanings(after, "comes to rest, by {:.3g} s", f"not within {region.duration:g} s").items()
         if (share := (classes == k).mean())
     ]
-    with style.page():
-        rest = Line2D([], [], color=style.INK, marker="+", ms=style.points(11), lw=0, label="rest")
-        page = pages.blank(width, MAP_SIZE[1] + pages.head_height(width, [rest]))
-        ax, shades = page.subplots(), ListedColormap(colours)
-        ax.pcolormesh(region.x, region.v, classes, cmap=shades, vmin=-0.5, vmax=4.5, rasterized=True)
-        for colour, wide in ((style.PAPER, 3.2), (style.INK, 1.4)):
-            ax.plot(0.0, 0.0, "+", color=colour, markersize=style.points(11), markeredgewidth=style.points(wide))
-        ax.grid(visible=False)
-        ax.set_title(style.law_name(region.law), parse_math=False)
-        ax.set_xlabel(f"initial position ({region.unit})")
-        ax.set_ylabel(f"initial velocity ({region.unit}/s)")
-        look = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "fontsize": style.points(9.5)}
-        ax.legend(handles=marks, ncols=2, **look)
-        _, gains = pages.gain_sources([[Source(kind=region.source)]])
-        pages.set_head(page, width, f"Region of attraction: {style.heading([region.plant], short=True)}", [rest], gains)
-        pages.write(page, pages.files(path))
-    return page
+    ax.legend(handles=marks, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=style.points(9.5))
 
 
 def colours_of(law: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from smc_mujoco.analysis.tuning import search_space
 from smc_mujoco.analysis.tuning.objective import Evaluation, Objective, restore
+from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.files import read_json, reading, with_ending, write_json
 from smc_mujoco.common.tabular import Tables, Tabular
 from smc_mujoco.common.text import counted
@@ -17,6 +18,7 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
+COMPARED_FIELDS = ("rule", "plant", "definition", "budget", "seed", "versions")  # equal in tunings that are compared
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 NEAR = 0.03  # of the best J: gains within it are as good
@@ -221,3 +223,17 @@ def load(path: str | os.PathLike[str], plant: Plant | None = None) -> Tuned:
 
 def _short(value: float) -> float:
     return float(f"{value:.6g}")
+
+
+def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
+    """Return the tunings, best first. Raise ScenarioError unless all were made in the same way."""
+    if not tuned:
+        raise ScenarioError("cannot compare []: give a list of tunings")
+    for one in tuned:
+        pairs = {field: (getattr(one, field), getattr(tuned[0], field)) for field in COMPARED_FIELDS}
+        pairs["number of searches"] = len(one.searches), len(tuned[0].searches)
+        for name, (value, other) in pairs.items():
+            if value != other:
+                words = f"{name} cannot be compared, {one.law.name} has {value}, {tuned[0].law.name} {other}"
+                raise ScenarioError(f"laws tuned with unequal {words}: tune them in the same way")
+    return sorted(tuned, key=lambda one: one.objective)

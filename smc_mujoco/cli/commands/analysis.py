@@ -332,7 +332,7 @@ def basin(
     if json:
         terminal.wrote(region.save(json))
     if pictures:
-        draw(region, out)
+        draw([region], out)
         terminal.wrote(*pictures)
 
 

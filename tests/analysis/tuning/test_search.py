@@ -12,7 +12,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search, search_space
 from smc_mujoco.analysis.tuning.evaluator import EQUATION, MUJOCO, Evaluator
 from smc_mujoco.analysis.tuning.objective import FAILURE_COST, Evaluation, Objective
-from smc_mujoco.analysis.tuning.result import load
+from smc_mujoco.analysis.tuning.result import compare, load
 from smc_mujoco.analysis.tuning.search import tune
 from smc_mujoco.control.law import catalogue
 from smc_mujoco.control.units import FORCE, TIME, Gain, Unit
@@ -336,6 +336,28 @@ def test_a_run_that_fails_costs_more_than_any_other_and_less_the_later_it_fails(
     assert costs == sorted(costs, reverse=True)
     assert len(set(costs)) == 5
     assert costs[-1] < 1.0 < FAILURE_COST <= costs[-2]
+
+
+# equal terms
+
+
+def test_a_law_that_got_more_than_its_rivals_is_not_compared(found, refused):
+    rival = dataclasses.replace(found, law=smc.law("classical"))
+    assert {one.law.name for one in compare([rival, found])} == {"classical", "observer_free"}
+    assert compare([rival, found]) == sorted([rival, found], key=lambda one: one.objective)
+    unequal = {
+        "budget": dataclasses.replace(rival, budget=17),
+        "searches": dataclasses.replace(rival, searches=rival.searches[:2]),
+        "rule": dataclasses.replace(rival, rule="by hand"),
+        "objective": dataclasses.replace(rival, definition=Objective(duration=0.5, u_max=12.0)),
+        "seed": dataclasses.replace(rival, seed=4),
+        "plant": dataclasses.replace(rival, plant=smc.plant("duffing", M=2.0)),
+    }
+    away = dataclasses.replace(rival, law=dataclasses.replace(rival.law, function=None))
+    assert len(compare([away, found])) == 2
+    for one in unequal.values():
+        refused(lambda one=one: compare([found, one]))
+    refused(lambda: compare([]))
 
 
 # files
