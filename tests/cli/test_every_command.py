@@ -16,6 +16,7 @@ from typer.models import OptionInfo
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main
+from smc_mujoco.cli.commands.options import actuator
 from smc_mujoco.common.constraints import of_parameters
 
 CALLS = {  # command line -> the functions that it calls, of which the last does the work; not for audits
@@ -216,6 +217,10 @@ def test_a_file_of_another_kind_is_refused_before_the_work(line, option, capsys)
         reached(words, CALLS[line])
     assert end.value.code == 2
     assert "'a.gif': end the name in" in capsys.readouterr().err
+
+
+def test_drives_on_the_command_line_are_those_of_python():
+    assert actuator("lag:0.01+Backlash:0.2") == (smc.Lag(0.01), smc.Backlash(0.2))
 
 
 def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:

@@ -205,9 +205,13 @@ class Caption:
             draw.ellipse((x - 0.6 * half, y - 0.6 * half, x + 0.6 * half, y + 0.6 * half), fill=fill)
             place = box[0] + half + 1.1 * LABEL_SIZE * s, y
             draw.text(place, text, style.INK, style.font(LABEL_SIZE * s, bold=True), anchor="lm")
+        looks = {CALM: (style.PAPER, style.MUTED), STUCK: (style.INK, style.PAPER), STRUCK: (style.REACTION,) * 2}
         for state, box in zip(states, self.badges, strict=False):
-            if state:
-                self._badge(draw, state, box)
+            if state:  # pale while it moves, dark while friction holds it, bright in contact
+                (fill, rim), middle = looks[state.mood], ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
+                draw.rounded_rectangle(tuple(box), radius=5 * s, fill=fill, outline=rim, width=max(1, round(s)))
+                letters = style.font(BADGE_SIZE * s, bold=True)
+                draw.text(middle, state.words, style.letters_on(fill), letters, anchor="mm")
         return sheet
 
     def _keys(self) -> Image.Image:
@@ -221,14 +225,6 @@ class Caption:
                 draw.rectangle(((EDGE - 4) * s, y - 1, right, y + KEY_PITCH * s), (*style.rgb(style.PAPER), 190))
             draw.text((EDGE * s, y), text, style.DISTURBANCE, style.font(KEY_SIZE * s))
         return sheet
-
-    def _badge(self, draw: ImageDraw.ImageDraw, state: State, box: np.ndarray) -> None:
-        """Draw a machine's state: pale while it moves, dark while friction holds it, bright in contact."""
-        looks = {CALM: (style.PAPER, style.MUTED), STUCK: (style.INK, style.PAPER), STRUCK: (style.REACTION,) * 2}
-        fill, rim = looks[state.mood]
-        s, middle = self.scale, ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
-        draw.rounded_rectangle(tuple(box), radius=5 * s, fill=fill, outline=rim, width=max(1, round(s)))
-        draw.text(middle, state.words, style.letters_on(fill), style.font(BADGE_SIZE * s, bold=True), anchor="mm")
 
     def _strip(self, draw: ImageDraw.ImageDraw, k: int, time: float) -> None:
         """Draw the counts of machine k's encoder around its position at a time, s, and which of them is read."""
