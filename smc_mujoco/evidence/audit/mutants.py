@@ -19,7 +19,7 @@ from smc_mujoco.evidence.audit.runs import Result, Runs
 from smc_mujoco.evidence.audit.variants import variant
 from smc_mujoco.evidence.audit.verdict import Evidence, sentences
 
-MUTANTS = {"wrong sign": "reversed", "zero gain": "zero", "no memory": "forgetful", "relay": "relay"}
+MUTANTS = ("reversed", "zero", "forgetful", "relay")  # of VARIANTS
 KEPT, BLIND = "kept by every mutant", "not supported, and no mutant changes its numbers"
 
 
@@ -48,7 +48,7 @@ def survivors(
     def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
         """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
         shared: dict[str, Result] = {}
-        replaced = {law: functools.partial(variant, name=MUTANTS[mutant])} if mutant else {}
+        replaced = {law: functools.partial(variant, name=mutant)} if mutant else {}
         for name in names:
             runs = Runs(audited, name, quick, replaced, threads, {}, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):

@@ -113,10 +113,7 @@ def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table
         "How far the twin is from the machine", named(), Column("records\nare", no_wrap=True), *heads, pad_edge=False
     )
     for group in twin_figures.summaries(rows):
-        apart = (twin_figures.percent(share) for share in (group.median, group.largest))
-        table.add_row(
-            group.rig, group.use, f"{len(group.rows)}", *apart, f"{group.inside}", twin_figures.percent(group.published)
-        )
+        table.add_row(*group.cells)
     ends = right("sets in the\nmachine's order"), right("tau")
     orders = titled("Laws in the machine's order", named(), "condition", "twin", *ends, pad_edge=False)
     for one in by_laws:

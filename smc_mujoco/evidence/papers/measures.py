@@ -1,8 +1,9 @@
-"""Measures that the claims of several papers share."""
+"""Measures that the claims of several papers share, and what several of their laws solve."""
 
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numba import njit
 
 from smc_mujoco.metrics.limit_cycle import limit_cycle
 from smc_mujoco.simulation.trace import Trace
@@ -13,6 +14,16 @@ END_SAMPLES = 3000  # the same at every control period, because a maximum grows 
 def late(signal: np.ndarray) -> float:
     """Return the largest magnitude of a signal, (samples, channels), at the end of its run."""
     return float(np.abs(signal[-END_SAMPLES:]).max())
+
+
+def half(signal: np.ndarray) -> np.ndarray:
+    """Return the last half of a signal."""
+    return signal[len(signal) // 2 : -1]
+
+
+def largest(signal: np.ndarray) -> float:
+    """Return the largest magnitude in the last half of a signal; NaN if the run failed."""
+    return float(np.abs(half(signal)).max())
 
 
 def late_step(signal: np.ndarray) -> float:
@@ -42,3 +53,15 @@ def cycle(trace: Trace, part: float = 0.5) -> tuple[float, float]:
     """Return amplitude of s and frequency, Hz, of the limit cycle in the last part of a run; NaN, NaN without one."""
     first = int(len(trace.t) * (1.0 - part))
     return limit_cycle(trace.t[first:], trace.s[first:, 0])
+
+
+@njit
+def two_signs(first, a, second, b):
+    """Return v with v + a sgn(v - first) + b sgn(v - second) = 0, both signs set-valued at 0.
+
+    The left side grows with v and jumps at two places. Its zero is at one of them, or at one of the three values that v
+    has between them.
+    """
+    if first > second:
+        first, second, a, b = second, first, b, a
+    return min(a + b, max(first, min(b - a, max(second, -a - b))))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
@@ -55,16 +56,13 @@ class Flight:
     def sentence(self) -> str:
         """Return who is unbeaten how often, in the median, and whose worst run is the smallest how often."""
         count, blocks = len(self.board.blocks), self.board.blocks
-        unbeaten = {law: sum(law in block.best for block in blocks) for law in self.laws}
-        least = dict.fromkeys(self.laws, 0)
-        for block in blocks:
-            least[min(self.laws, key=lambda law: self.worst[block.condition, law])] += 1
-        told = [f"{words.law(law)} in {n}" for law, n in sorted(unbeaten.items(), key=lambda pair: -pair[1]) if n]
-        calm = [f"{words.law(law)} in {n}" for law, n in sorted(least.items(), key=lambda pair: -pair[1]) if n]
-        return (
-            f"Of {count} conditions these laws are unbeaten: {', '.join(told) or 'none'}. The smallest worst run is "
-            f"of: {', '.join(calm)}."
+        unbeaten = [law for law in self.laws for block in blocks if law in block.best]
+        least = [min(self.laws, key=lambda law: self.worst[block.condition, law]) for block in blocks]
+        told, calm = (
+            ", ".join(f"{words.law(law)} in {n}" for law, n in Counter(sorted(laws)).most_common())
+            for laws in (unbeaten, least)
         )
+        return f"Of {count} conditions these laws are unbeaten: {told or 'none'}. The smallest worst run is of: {calm}."
 
 
 def condition(name: str) -> Condition:

@@ -25,6 +25,7 @@ from smc_mujoco.evidence.papers.gaber import scenarios
 from smc_mujoco.evidence.report import answer, charts, oscillation, rigs, words
 from smc_mujoco.evidence.report.plan import GAINS
 from smc_mujoco.evidence.report.stages import Findings
+from smc_mujoco.evidence.rigs import twin_figures
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies.board import relevance
 
@@ -77,6 +78,7 @@ def page(findings: Findings) -> str:
         board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),
         set_margins=pivot(((m.kind, m.plant, m.law), name, m) for name, some in findings.by_set.items() for m in some),
         gains=pivot(((row.plant, row.law), row.set, row) for row in findings.about.gains),
+        twins=twin_figures.summaries(twin_figures.rows()),
         # how it was computed
         laws=laws(),
         objective=Objective(),

@@ -14,7 +14,7 @@ from smc_mujoco.common.text import capital
 from smc_mujoco.control.source import in_words
 from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.plan import Report, Work
-from smc_mujoco.evidence.rigs import ensemble, records, twin_figures
+from smc_mujoco.evidence.rigs import ensemble, records
 from smc_mujoco.evidence.rigs.rig import Fall, Rig, rig, rigs
 from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
@@ -132,12 +132,3 @@ def fit(values: Mapping[str, float]) -> str:
     if -math.inf in values.values():
         return str(next(value for value in values.values() if isinstance(value, Fall)))
     return ", ".join(f"{name} {value:z.1f}" for name, value in values.items()) + f" {words.typeset('%')}"
-
-
-def told() -> list[tuple[str, ...]]:
-    """Return how far twins are from their machines, by machine and by what its records were used for, as cells."""
-    return [
-        (one.rig, one.use, f"{len(one.rows)}", *map(twin_figures.percent, (one.median, one.largest)), f"{one.inside}",
-         twin_figures.percent(one.published))
-        for one in twin_figures.summaries(twin_figures.rows())
-    ]  # fmt: skip

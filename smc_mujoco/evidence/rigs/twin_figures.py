@@ -129,6 +129,12 @@ class Summary(NamedTuple):
         known = [abs(row.published / row.machine - 1.0) for row in self.rows if not math.isnan(row.published)]
         return float(np.median(known)) if known else math.nan
 
+    @property
+    def cells(self) -> list[str]:
+        """The summary as the cells of a table: rig, use, rows, median, largest, within its range, published."""
+        median, largest, published = map(percent, (self.median, self.largest, self.published))
+        return [self.rig, self.use, f"{len(self.rows)}", median, largest, f"{self.inside}", published]
+
 
 def percent(share: float) -> str:
     """Return a share as percent; "" for none, and "falls" for a twin that falls."""

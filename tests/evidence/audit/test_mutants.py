@@ -75,10 +75,9 @@ def winding(y, gains, memory):
 
 def test_mutants_reverse_the_command_drop_it_forget_or_switch():
     scenario = smc.Scenario(plant="duffing", law=winding(), duration=0.05)
-    laws = [variant(winding(), name) for name in MUTANTS.values()]
+    laws = [variant(winding(), name) for name in MUTANTS]
     true, *broken = smc.run([scenario, *(smc.Scenario(plant="duffing", law=law, duration=0.05) for law in laws)])
     wrong, without, forgetful, relay = broken
-    assert list(MUTANTS) == ["wrong sign", "zero gain", "no memory", "relay"]
     assert true.u[0, 0] == -wrong.u[0, 0] < 0.0
     assert not without.u.any()
     assert set(np.unique(relay.u)) == {-6.0}

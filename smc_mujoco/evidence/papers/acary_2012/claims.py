@@ -7,10 +7,9 @@ that with the observer sees the position alone.
 import math
 
 import numpy as np
-from numba import njit
 
 from smc_mujoco.control.law import law_function, sgn
-from smc_mujoco.evidence.papers.measures import exponent, settled
+from smc_mujoco.evidence.papers.measures import exponent, half, largest, settled, two_signs
 
 GAINS = {"a": 1.0, "alpha": 2.0, "start": 0.5}
 
@@ -55,14 +54,6 @@ def with_model(y, gains, memory):
     return u, y.de + gains.kx * y.e
 
 
-@njit
-def two_signs(first, a, second, b):
-    """Return v with v + a sgn(v - first) + b sgn(v - second) = 0, both signs set-valued at 0."""
-    if first > second:
-        first, second, a, b = second, first, b, a
-    return min(a + b, max(first, min(b - a, max(second, -a - b))))
-
-
 @law_function(gains={"mu": 1.0, "nu": 2.0}, positive=("mu", "nu"), relative_degree=2)
 def implicit_twisting_50(y, gains, memory):
     """Eq. 50: u = -mu sgn(y+) - nu sgn(x+), where y+ = y + h u and x+ = x + h y+."""
@@ -94,16 +85,6 @@ def observed_twisting_60(y, gains, memory):
     memory[1] = estimate + h * u - 1.0
     memory[0] = (y.e - error) + h * (1.0 + memory[1]) - 1.0
     return u, b
-
-
-def half(signal):
-    """Return the last half of a signal."""
-    return signal[len(signal) // 2 : -1]
-
-
-def largest(signal):
-    """Return the largest magnitude in the last half; NaN if the run failed."""
-    return float(np.abs(half(signal)).max())
 
 
 def variation_of(signal):

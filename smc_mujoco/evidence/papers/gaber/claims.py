@@ -435,22 +435,18 @@ def globally_stable(runs):
     cells = [(name, share) for name in runs.plants if smallest[name] > 0.0 for share in ratios]
     lams = [(name, share * smallest[name]) for name, share in cells]
     unscaled = [(name, runs.law(name, OURS).gains["lam"]) for name in runs.plants]
-    shares = iter(converging(runs, [*lams, *unscaled], starts))
+    tried = [*lams, *unscaled]
+    grid = [long_run(runs, name, lam, position, rate) for name, lam in tried for position, rate in starts]
+    near = [
+        scores["ultimate_bound"] <= runs.values["within"] * max(map(abs, scenario.plant.x0))
+        for scenario, scores in zip(grid, runs.scores(grid), strict=True)
+    ]
+    shares = iter(np.reshape(near, (len(tried), len(starts))).mean(axis=1).tolist())
     return {
         "share that converges": {f"{name}, {share:g} of the smallest lambda": next(shares) for name, share in cells},
         "smallest lambda": smallest,
         "share at the set's lambda": {name: next(shares) for name in runs.plants},
     }
-
-
-def converging(runs, lams, starts):
-    """Return the share of runs that converge, of those of each plant and lambda."""
-    grid = [long_run(runs, name, lam, position, rate) for name, lam in lams for position, rate in starts]
-    near = [
-        scores["ultimate_bound"] <= runs.values["within"] * max(map(abs, scenario.plant.x0))
-        for scenario, scores in zip(grid, runs.scores(grid), strict=True)
-    ]
-    return np.reshape(near, (len(lams), len(starts))).mean(axis=1).tolist()
 
 
 def any_gain(runs):
@@ -772,11 +768,13 @@ def table_one(runs):
     """Claim T: table I: no chattering, observer-free, bounded input, delay-tolerant, smoothness."""
     steps = {law: worst_ratio(runs, law, "max_step", law, "max_u") for law in LAWS}
     rates = {law: worst_ratio(runs, law, "tv_rate", CLASSICAL, "tv_rate") for law in LAWS}
+    longest = largest_delays(runs, runs.plants, LAWS)
+    longer = {law: min(longest[p, law] - longest[p, CLASSICAL] for p in runs.plants) for law in LAWS}
     properties = {  # property -> its unit, and its number for each law
         "no chattering": ("TV rate over classical's", rates),
         "observer-free": ("estimated signals", {law: estimated(runs, law) for law in LAWS}),
         "bounded input": ("growth of max |u|", {law: growth(runs, law) for law in LAWS}),
-        "delay-tolerant": ("delay less classical's, s", tolerance(runs)),
+        "delay-tolerant": ("delay less classical's, s", longer),
         "smoothness": ("largest step over max |u|", steps),
     }
     evidence = []
@@ -798,12 +796,6 @@ def worst_ratio(runs, law, metric, other, reference):
     """Return a metric of a law over a reference metric of another law, nominal, worst plant; inf if it is 0 / 0."""
     ratios = [ratio(runs.score(plant, law)[metric], runs.score(plant, other)[reference]) for plant in runs.plants]
     return math.inf if any(map(math.isnan, ratios)) else max(ratios)
-
-
-def tolerance(runs):
-    """Return law -> largest delay less classical's, s, worst plant."""
-    longest = largest_delays(runs, runs.plants, LAWS)
-    return {law: min(longest[p, law] - longest[p, CLASSICAL] for p in runs.plants) for law in LAWS}
 
 
 def growth(runs, law):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from smc_mujoco.control.law import command, law_function
+from smc_mujoco.evidence.papers.measures import two_signs
 
 
 @law_function(gains={"G": 10.0, "beta": 0.3}, positive=("G", "beta"), memory=1, relative_degree=2)
@@ -10,14 +11,10 @@ def implicit_twisting(y, gains, memory):
     """Twisting with both signs at the end of the period: v = -a S1 - b S2, a = G (1 + beta dt/2), b = G beta.
 
     S1 is in sgn(e+ + dt/2 e'+) and S2 in sgn(e'+), with e'+ = e' + dt v and e+ = e + dt (e' + e'+)/2, v the
-    acceleration of the error. v + a S1 + b S2 grows with v and jumps at two places. Its zero is at one of them, or at
-    one of the three values that v has between them.
+    acceleration of the error.
     """
     a, b = gains.G * (1.0 + gains.beta * y.dt / 2.0), gains.G * gains.beta
-    first, second = -(y.e + 1.5 * y.dt * y.de) / y.dt**2, -y.de / y.dt
-    if first > second:
-        first, second, a, b = second, first, b, a
-    return command(y, min(a + b, max(first, min(b - a, max(second, -a - b))))), y.e
+    return command(y, two_signs(-(y.e + 1.5 * y.dt * y.de) / y.dt**2, a, -y.de / y.dt, b)), y.e
 
 
 def quarter(signal):

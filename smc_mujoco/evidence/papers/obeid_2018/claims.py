@@ -3,7 +3,7 @@
 import numpy as np
 
 import smc_mujoco as smc
-from smc_mujoco.evidence.papers.measures import settled
+from smc_mujoco.evidence.papers.measures import largest, settled
 
 MAX_STEP_RATIO = 1.9  # h (k_max + D) / eps: at 2 a step from one end of the set reaches the other
 QUICK_PERIOD, FORCE = 5e-4, 13.0  # s, of a quick audit; N, the largest d with what a spring adds
@@ -19,11 +19,6 @@ def sampled(runs):
     return {"control_period": runs.values["quick_period"]} if runs.quick and "quick_period" in runs.values else {}
 
 
-def half(signal):
-    """Return the largest magnitude of a signal in the last half of its run; NaN if the run failed."""
-    return float(np.abs(signal[len(signal) // 2 : -1]).max())
-
-
 def by_condition(runs, measure):
     """Return condition -> what is measured on its run."""
     measured = runs.measured(runs.grid(**sampled(runs)), measure)
@@ -33,7 +28,7 @@ def by_condition(runs, measure):
 def stays(runs):
     """Largest |s| of the last half of 8 s over eps, under d = D sin 2t with D = 0.5, 2 and 10 N."""
     shares = {
-        f"{plant}, {condition}": half(trace.s) / trace.scenario.law.gains["eps"]
+        f"{plant}, {condition}": largest(trace.s) / trace.scenario.law.gains["eps"]
         for (plant, _, condition), trace in runs.traced(runs.grid(**sampled(runs))).items()
     }
     return {"largest |s| of the last half / eps": shares}
@@ -50,7 +45,9 @@ def limit(runs):
             adapted, d = runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size), smc.Sine(size, 2.0)
             name = f"{1e3 * h:g} ms, D = {size:.3g} N"
             grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
-        measured[f"{side}: largest |s| of the last half / eps"] = runs.measured(grid, lambda trace: half(trace.s) / eps)
+        measured[f"{side}: largest |s| of the last half / eps"] = runs.measured(
+            grid, lambda trace: largest(trace.s) / eps
+        )
     return measured
 
 
@@ -58,7 +55,7 @@ def predefined(runs):
     """Largest |s| of the last half of 8 s over eps = 0.3, 0.1 and 0.03, under d = 2 sin 2t."""
     laws = {f"eps = {eps:g}": runs.law(runs.plant, *runs.laws, eps=eps) for eps in runs.values["widths"]}
     grid = {name: runs.only(law=law, **sampled(runs)) for name, law in laws.items()}
-    shares = runs.measured(grid, lambda trace: half(trace.s) / trace.scenario.law.gains["eps"])
+    shares = runs.measured(grid, lambda trace: largest(trace.s) / trace.scenario.law.gains["eps"])
     return {"largest |s| of the last half / eps": shares}
 
 
@@ -71,7 +68,7 @@ def converges(runs):
 
 def not_overestimated(runs):
     """Largest |u|, which is the gain K as u = -K sgn s, of the last half of 8 s, over the largest |d|."""
-    ratios = by_condition(runs, lambda trace: half(trace.u) / half(trace.d))
+    ratios = by_condition(runs, lambda trace: largest(trace.u) / largest(trace.d))
     return {"largest gain of the last half / largest |d|": ratios}
 
 
@@ -90,7 +87,7 @@ def within(runs):
     """Largest |s| of the last half of 8 s over eps D / (1 + D), under d = D sin 2t with D = 0.5, 2 and 10 N."""
 
     def share(trace):
-        bound = half(trace.d)
-        return half(trace.s) / (trace.scenario.law.gains["eps"] * bound / (1.0 + bound))
+        bound = largest(trace.d)
+        return largest(trace.s) / (trace.scenario.law.gains["eps"] * bound / (1.0 + bound))
 
     return {"largest |s| of the last half / (eps D / (1 + D))": by_condition(runs, share)}
