@@ -136,13 +136,6 @@ def test_universal_claims_are_those_of_the_list():
     assert {id for id, one in GABER.claims.items() if one.quantifier == UNIVERSAL} == UNIVERSALS
 
 
-def test_sets_that_agree_give_their_verdict_and_others_flip():
-    assert combined({"study": REFUTED, "tuned": REFUTED}) == (REFUTED, False, "")
-    overall, flips, sentence = combined({"study": SUPPORTED, "tuned": REFUTED})
-    assert (overall, flips) == (PARTLY, True)
-    assert "supported with study gains, refuted with tuned gains" in sentence
-
-
 def test_two_numbers_of_one_name_are_refused():
     with pytest.raises(ScenarioError, match="'yes' twice"):
         judged(entry(), {"study": [YES, YES]})
@@ -424,12 +417,6 @@ def test_a_folder_is_no_file_to_write(terminal, tmp_path):
     done = terminal("3", "--evidence", str(tmp_path / "folder.json"))
     assert done.exit_code == 2
     assert "it is a folder" in done.stderr
-
-
-def test_a_claim_that_is_none_ends_in_a_sentence(terminal):
-    done = terminal("999")
-    assert done.exit_code == 2
-    assert "unknown claim '999'" in done.stderr
 
 
 @pytest.mark.parametrize(("quick", "told"), [(True, "; here, quickly, 51 x 51 points"), (False, "one pendulum")])

@@ -260,13 +260,6 @@ def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
     assert min(words.style.distance(*pair) for pair in several) > 11.0
 
 
-def test_a_page_of_thirteen_laws_names_each(findings):
-    cell = [s for s in findings.scores if s.law == "classical"]
-    many = tuple(s._replace(law=law) for law in THIRTEEN for s in cell)
-    text = page.page(dataclasses.replace(findings, scores=many))
-    assert all(words.law(law) in text for law in THIRTEEN)
-
-
 def test_what_comes_from_outside_is_escaped(findings):
     evil = "<script>alert(1)</script>"
     scores = tuple(s._replace(law=evil) if s.law == "classical" else s for s in findings.scores)
@@ -323,12 +316,6 @@ def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(
 
 def test_a_law_alone_does_not_win(findings):
     assert "wins" not in told(findings, scores(classical=1.0))
-
-
-def test_the_answer_says_where_seeds_change_nothing(findings):
-    cells = scores(runs=1, observer_free=2.0, classical=1.0), scores("noise", observer_free=2.0, classical=1.0)
-    assert "In 1 of the cells seeds change nothing" in told(findings, *cells)
-    assert "seeds change nothing" not in told(findings, cells[1])
 
 
 def test_where_the_papers_law_loses_is_listed_worst_first():
