@@ -46,7 +46,6 @@ from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case
 
 ACCURACY_CONDITIONS = ("constant", "coulomb")  # a steady force, and dry friction
 FIELD_POINTS = 121  # of a map of V', along each axis
-SURFACE_TOLERANCE = 1e-6  # |s| up to this is s = 0, as in the claim on V'
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -73,7 +72,7 @@ class Field:
     @property
     def rises(self) -> np.ndarray:
         """Where V' is positive off s = 0, bool."""
-        return (self.vdot > 0) & (np.abs(self.s) > SURFACE_TOLERANCE)
+        return (self.vdot > 0) & (np.abs(self.s) > lyapunov.SURFACE_TOLERANCE)
 
     @property
     def share(self) -> float:

@@ -397,7 +397,6 @@ def with_estimators(runs):
 
 # the stability analysis
 
-SURFACE_TOLERANCE = 1e-6  # |s| at and below which the claim says nothing
 MIN_RISE_SHARE = 1e-12  # of the run's largest V: less is rounding
 
 
@@ -408,7 +407,7 @@ def decreases(runs):
         plant, gains = find_plant(name), runs.law(name, OURS).gains
         x, v = lyapunov.plane(plant, gains["k1"], points=51 if runs.quick else lyapunov.GRID_POINTS)
         states = plant, gains["lam"], gains["k1"], x, v
-        rate = np.where(np.abs(lyapunov.surface(*states)) > SURFACE_TOLERANCE, lyapunov.vdot(*states), -np.inf)
+        rate = np.where(np.abs(lyapunov.surface(*states)) > lyapunov.SURFACE_TOLERANCE, lyapunov.vdot(*states), -np.inf)
         at = np.unravel_index(np.argmax(rate), rate.shape)
         share[name], worst[name] = np.mean(rate > 0.0), (rate[at], x[at], v[at])
     names = ("largest Vdot", "largest Vdot, at x", "largest Vdot, at v")

@@ -25,6 +25,7 @@ import numpy as np
 from smc_mujoco.mechanisms.plant import Plant
 
 GRID_POINTS = 201  # of a grid along each axis: odd, so that it has the origin
+SURFACE_TOLERANCE = 1e-6  # |s| at and below which the claim on V' says nothing
 GRID_REACH = 2.0  # times the largest |x0|, chosen: the states from which the study starts lie well within
 
 
