@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.tuning import search_space
-from smc_mujoco.analysis.tuning.evaluator import Ended, Evaluator
+from smc_mujoco.analysis.tuning.evaluator import Evaluator
 from smc_mujoco.analysis.tuning.objective import Objective
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning
 from smc_mujoco.common.files import shipped
@@ -430,6 +430,6 @@ def test_a_log_that_is_not_finite_counts_as_a_failure_where_it_begins(drone):
     evaluate = Evaluator(goal, goal.scenarios(drone, smc.law("geometric")), ("kx",))
     log = np.zeros((101, 6), [(name, float) for name in ("x", "r", "u")])
     log["x"][:, 0] = 1.0
-    assert evaluate._terms(0, Ended(None, log))[0] == pytest.approx(0.005, rel=0.02)  # 0.1^2 / 2
+    assert evaluate._terms(0, None, log)[0] == pytest.approx(0.005, rel=0.02)  # 0.1^2 / 2
     log["x"][50:, 4] = np.nan
-    assert evaluate._terms(0, Ended(None, log)) == goal.terms_of_failure(0.05)
+    assert evaluate._terms(0, None, log) == goal.terms_of_failure(0.05)
