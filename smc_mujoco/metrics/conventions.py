@@ -165,10 +165,11 @@ class Metric:
         unit = self.unit_for(x) if x else "" if "{" in self.unit else self.unit
         return self.label + f" ({unit})" * (unit not in ("", "1"))
 
-    def unit_in(self, machine: Plant | Scenario) -> str:
-        """Return the unit in the first driven group."""
-        first, *_ = groups(machine)
-        return self.unit_for(first.unit, first.effort)
+    def unit_in(self, machine: Plant | Scenario, group: str = "") -> str:
+        """Return the unit in the group of that name, such as "free"; without a name, that of the first driven group."""
+        of_plant = groups(machine)
+        chosen = next((known for known in of_plant if known.name == group), of_plant[0])
+        return self.unit_for(chosen.unit, chosen.effort)
 
 
 def metric(
