@@ -34,10 +34,7 @@ OTHERS = {  # title -> names of modules that are no public names
     draw.film.film.Frames
     evidence.certificates.certificate.Certificate
     evidence.rigs.rig.Rig
-    envs.gymnasium_env.PlantEnv
     envs.flight_env.FlightEnv
-    envs.vector_env.BatchEnv
-    envs.dm_control_env.load
     studies.advice.Advice
     analysis.tuning.result.Tuned
     analysis.gains_for.Design
