@@ -1,11 +1,11 @@
-"""What laws of free bodies share: the attitude that turns the thrust to a wanted force, its rate, and their commands.
+"""What laws of free bodies share: the attitude that turns the thrust to a wanted force, its rate, and the command.
 
 A law wants an acceleration v(e, e') of the position's error, of stiffness -dv/de and damping -dv/de'. So it wants the
-force F = m (r'' + v) + h, and F' = m (r''' - stiffness e' - damping e''), from which the wanted attitude's rate wd
-follows. r''' is that of r'' from sample to sample, which has no noise. e'' is the measured e' through p B / (p + B), 0
-at rest, so that no steady error knows of it, and on the path. A gust is followed late, by 1 / B. Attitudes from sample
-to sample would carry the noise of F over the period into wd. The change of wd is left out, as in the Crazyflie's
-firmware. Attitudes are unit quaternions (w, x, y, z), body to world, see mechanisms/rotation.py.
+force F = m (r'' + v) + h, and wd, the wanted attitude's rate, follows from F' = m (r''' - stiffness e' - damping e'').
+r''' is the difference of r'' over a sample, which has no noise. e'' is the measured e' through p B / (p + B): 0 at rest
+and on the path, so that it adds to no steady error, and late by 1 / B after a gust. The difference of the wanted
+attitude over a sample would bring the noise of F, divided by the period, into wd. wd' is left out, as in the
+Crazyflie's firmware. Attitudes are unit quaternions (w, x, y, z), body to world, see mechanisms/rotation.py.
 """
 
 import math
@@ -17,18 +17,18 @@ from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
 
 BANDWIDTH = 20.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
-LEAST = 0.127  # of the weight, of the thrust: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
+LEAST = 0.127  # least thrust over weight: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
 STEERING = 2  # slots of a law's memory, the first ones, which `steer` keeps
 MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
-MIN_SINE = 1e-6  # chosen: of the angle between thrust and heading, below which the heading says nothing
+MIN_SINE = 1e-6  # chosen: sine of the angle between thrust and heading; below it the heading says nothing
 
 
 @njit(error_model="numpy")
 def of_thrust(F, r):
     """Return the attitude whose third axis is along the force F, (3,), and whose first is nearest to the heading.
 
-    The heading is the first axis of the rotation vector r, (3,). It is the third axis with the minus sign if the force
-    is along the first, as in a flip.
+    The heading is the first axis of the rotation vector r, (3,), or minus its third one if the force is along the
+    first, as in a flip.
     """
     size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
     z = (F[0] / size, F[1] / size, F[2] / size) if size > MIN_FORCE else turned(heading, 0.0, 0.0, 1.0)
@@ -41,10 +41,7 @@ def of_thrust(F, r):
 
 @njit(error_model="numpy")
 def rate_of(wanted, F, dF, r, dr):
-    """Return the rate of an attitude `of_thrust`, in its own axes, where the force changes by dF, (3,), per second.
-
-    The heading's rotation vector changes by dr, (3,).
-    """
+    """Return the rate of the attitude `wanted` by `of_thrust`, in its axes, as F and r change by dF and dr a second."""
     size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
     if size <= MIN_FORCE:
         return 0.0, 0.0, 0.0
@@ -61,7 +58,7 @@ def rate_of(wanted, F, dF, r, dr):
 
 @njit(error_model="numpy")
 def _ahead(z, heading):
-    """Return the axis of the heading's attitude, in its own axes, to which the first one of `of_thrust` is nearest."""
+    """Return the axis that is the heading for `of_thrust`, in the axes of the quaternion `heading`."""
     y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
     return (1.0, 0.0, 0.0) if math.sqrt(_dot(y, y)) >= MIN_SINE else (0.0, 0.0, -1.0)
 
@@ -109,11 +106,11 @@ def slide(y, c, K, rho):
 
 @njit(error_model="numpy")
 def steer(y, v, stiffness, damping, memory):
-    """Return the force for the acceleration v of the position's error, and by how much the attitude is off it.
+    """Return the force for the acceleration v of the position's error, and how the attitude that it wants is missed.
 
-    Arguments are vectors (3,). The result is the force, (3,), the error quaternion from the wanted attitude, the
-    angular velocity relative to it and that of it, both in the axes of the body. Of the law's memory two slots are
-    kept: the filtered e' and r'' of the sample before, and whether there was one.
+    Arguments are vectors (3,). After the force come the quaternion from the wanted attitude to the body's, and two
+    angular velocities in the axes of the body: of the body relative to the wanted attitude, and of the latter. In two
+    slots the memory keeps the filtered e' and r'' of the sample before, and whether there was one.
     """
     m, F, dF = y.M[0, 0], np.zeros(3), np.zeros(3)
     if memory[0, 1] == 0.0:
@@ -147,10 +144,10 @@ def shorter(error, turning):
 
 @njit(error_model="numpy")
 def wrench(y, F, v, moving):
-    """Return a law's command, (6,): the force F along the body's third axis, and the torque for the change v.
+    """Return a law's command, (6,): the share of F along the body's third axis, and the torque for the acceleration v.
 
-    The force is at least `LEAST` of the weight, also upside down. v, (3,), is that of the angular velocity relative to
-    the wanted one, `moving`, both in the axes of the body.
+    The thrust is at least `LEAST` of the weight, also upside down. v, (3,), is the change of the angular velocity
+    relative to the wanted one, `moving`, in the axes of the body.
     """
     u, w = np.zeros(6), (y.v[3], y.v[4], y.v[5])
     up, carried = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0), _cross(w, moving)

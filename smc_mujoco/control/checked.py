@@ -6,10 +6,10 @@
 Such code cannot see the plant, the noise, the clock or a file, and keeps nothing between calls but its memory. Numba's
 own results are examined twice. First its typed instructions: each must be one of a short list, each call must be of a
 mathematical function or of a helper for which the same holds, and each global must be a number, a tuple of numbers or
-a read-only array, of which compiled code has a copy. Arrays are read and written within their bounds. Then the machine-
-independent code that LLVM gets: it may declare functions of these lists only, and have neither addresses as constants,
-nor calls through an address, nor instructions of the processor, nor variables of its own. What compiled code does for
-an operation of numba's own types must be written in numba itself.
+a read-only array, of which compiled code has a copy. Arrays are read and written within their bounds. Then the code
+that numba gives to LLVM: it may declare functions of these lists only, and have neither addresses as constants, nor
+calls through an address, nor instructions of the processor, nor variables of its own. The code of operations on numba's
+own types must be numba's own.
 
 A law that runs in Python, in C from elsewhere or in an FMU is unchecked. The file that defines a law runs as a program
 when it is imported; this check says nothing of that.
@@ -86,8 +86,9 @@ INTRINSICS = re.compile(
 # Numba's own functions: memory that it counts, arithmetic that no processor has, and linear algebra.
 RUNTIME = re.compile(
     r"NRT_(MemInfo_(alloc\w*|call_dtor|data\w*|varsize\w*|new_varsize\w*)|Allocate\w*|Reallocate|Free|incref|decref)"
-    r"|numba_(x|ez_|raw_)\w+|numba_fatal_error|__powidf2|__muloti4|__divti3|__modti3|numba_gil_(ensure|release)|Py_FatalError|(_?_?numba_)?_?py_?\w*mod|numba_(cpow|gamma|lgamma|erf"
-    r"|erfc|frexp|ldexp|modf|ndtr|nextafter|attempt_nocopy_reshape)\w*"
+    r"|numba_(x|ez_|raw_)\w+|numba_fatal_error|__powidf2|__muloti4|__divti3|__modti3|numba_gil_(ensure|release)"
+    r"|Py_FatalError|(_?_?numba_)?_?py_?\w*mod"
+    r"|numba_(cpow|gamma|lgamma|erf|erfc|frexp|ldexp|modf|ndtr|nextafter|attempt_nocopy_reshape)\w*"
 )
 LIBM = re.compile(
     r"(a?(sin|cos|tan)h?|atan2|exp|exp2|expm1|log|log10|log1p|log2|sqrt|cbrt|hypot|pow|fmod|remainder|fabs|floor|ceil"
@@ -131,7 +132,7 @@ def _found(function: Callable, kind: str, gains: tuple[str, ...], shared: tuple[
         return f"may run {whose}, which changes what numba compiles for its own types"
     try:
         compiled = compiled_for(function, _argument_types(kind, gains, shared, joint))
-        requests = Examination().all(compiled)
+        requests = Examination().examine(compiled)
         _examine_llvm(compiled.library, requests)
     except NotCompilable as error:
         return f"does not compile and runs in Python: {one_line(str(error))}"
@@ -163,7 +164,7 @@ class Examination:
         self.requests = False
         self.written: set[Any] = set()  # names and texts in the function that is examined
 
-    def all(self, compiled: Any) -> bool:
+    def examine(self, compiled: Any) -> bool:
         """Examine a compiled function. Return whether it asks the nominal model for numbers. Raise Found."""
         self.known.add(id(compiled))
         about, outer = compiled.type_annotation, self.written
@@ -298,7 +299,7 @@ class Examination:
             raise Found(f"calls {_name(dispatcher)}, which is not compiled as laws are")
         for compiled in dispatcher.overloads.values():
             if id(compiled) not in self.known:
-                self.all(compiled)
+                self.examine(compiled)
 
 
 def _words(code: CodeType) -> set[Any]:
@@ -308,7 +309,7 @@ def _words(code: CodeType) -> set[Any]:
 
 
 def _home(source: Any, home: str = "numba") -> bool:
-    """Return whether an implementation, or numba's template of one, is written in this package."""
+    """Return whether an implementation, or numba's template of one, is written in the package `home`."""
     written = getattr(source, "_overload_func", None) or getattr(source, "_definition_func", source)
     return f"{_module(written)}.".startswith(f"{home}.")
 

@@ -1,8 +1,8 @@
 """Components: pure functions with named gains and a memory. Laws, surfaces and estimators are components.
 
 A `Template` is the function with its default gains. Called with gains it returns a `Component`, the plain data in a
-Scenario. The function is called as `function(y, gains, memory)` and reads y and gains by attribute. The memory is an
-array of floats, one per channel, which the function may change. It is zero at the start of a run.
+Scenario. The function is called as `function(y, gains, memory)` and reads y and gains by attribute. Each channel has
+its own memory, an array of floats that the function may change. It is zero at the start of a run.
 """
 
 import dataclasses
@@ -34,7 +34,7 @@ class Rest(NamedTuple):
     """The linear part of a law that is linear near s = 0."""
 
     linear: Callable[[SimpleNamespace], tuple[float, float]]  # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
-    force: Callable  # (gains, errors x of shape (k,)) -> the force towards 0 at rest at x, shape (k,)
+    force: Callable  # (gains, errors at rest, (k,)) -> the force towards 0 at each, (k,)
 
 
 class Options(TypedDict, total=False):
@@ -95,7 +95,7 @@ class Component:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={gain_text(v)}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
-        """Pickle the name of the template: in its module, a decorated function's name is that of the template."""
+        """Pickle the name that its template has in its module: that of the function before it was decorated."""
         name = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
         template = _template_at(*name)
         if template is not None and template.function is self.function:

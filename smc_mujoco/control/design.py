@@ -39,7 +39,7 @@ def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
 
 
 def at_plant(law: Law, plant: Plant) -> Law:
-    """Return a law whose gains that are the plant's, and were not given, have the values of `linearised`."""
+    """Return a law with the values of `linearised` for those of its gains a1, a2 and b that were not given."""
     if law.each:
         return dataclasses.replace(law, each=tuple(at_plant(one, plant) for one in law.each))
     known = law.template.gains if law.template else {}

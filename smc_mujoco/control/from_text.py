@@ -98,11 +98,11 @@ def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
 
 
 def _of_python(path: str) -> list[Law]:
-    """Return the laws that a file of Python makes with @smc.law_function, with their default gains, or smc.law_from."""
+    """Return the laws of a Python file: of @smc.law_function, with their default gains, and of smc.law_from."""
     values = execute(Path(path)).values()
     templates = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
     bound = {value.name: value for value in values if isinstance(value, Law) and value.kind == "law"}
-    made = {template.function for template in (*templates.values(), *known_laws().values())}  # bound ones are the same
+    made = {template.function for template in (*templates.values(), *known_laws().values())}  # not again where bound
     laws = [template() for name, template in templates.items() if template is not known_laws().get(name)]
     laws += [law for law in bound.values() if not made & {part.function for part in law.parts}]
     if not laws:
@@ -144,7 +144,7 @@ def _reader(text: str) -> Callable[[str], list[Any]] | None:
 
 
 def parsed_gains(text: str, what: str) -> dict[str, Any]:
-    """Return the gains in a text such as "lam=6,k1=3 5", with two joints' k1. `what` names the text in errors."""
+    """Return the gains in a text such as "lam=6,k1=3 5", where k1 is 3 and 5 for two joints. Errors call it `what`."""
     parsed: dict[str, GainValue] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
         name, _, value = (word.strip() for word in part.partition("="))

@@ -6,7 +6,7 @@
 - study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
 - tuned: the gains that independent searches by `tuning` found, for every general law, with a cost of the variation of
   u. The runs of a study use their sets in turn, run i that of search i, so that gains are part of the sample. The laws
-  of COMPARED have twelve searches. All others have three, which no verdict follows from.
+  of COMPARED have twelve searches, all others three, too few for a verdict.
 - tracking: the same for the laws of LAWS, of three searches, without that cost.
 - default: the default gains of the law.
 
@@ -65,8 +65,7 @@ STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 def law(plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | None = None) -> Component:
     """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
 
-    A run with this seed has the gains of search number `seed` modulo their number. Without a seed: the gains with the
-    least J of all searches.
+    With a seed, the gains are those of search `seed` modulo their number; without, those of the least J of all.
     """
     base = find_law(name)
     if gains == "default":

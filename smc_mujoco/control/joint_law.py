@@ -7,7 +7,7 @@
 
 The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' + h(x, v) = u + d. A
 law of one channel sees x'' = f + g u instead. M and h come from MuJoCo's own functions for your own models,
-`double_pendulum` and `panda`. The other plants have one equation per channel, so their M is diagonal.
+`double_pendulum`, `panda` and `quadrotor`. The other plants have one equation per channel, so their M is diagonal.
 
 A gain is a vector (n,), unless its `Gain` is shared. The memory is an array (n, slots). The measurement's arrays are
 copies, which a law may overwrite. A law without the model (`y.model == 0.0`) sees M = 1 and h = g = 0.

@@ -191,8 +191,8 @@ def law(name: str, **gains: float | Sequence[float]) -> Law:
 def suits(law: Law | Template, plant: Plant) -> bool:
     """Return whether a law is for a plant: for all plants, for this one, or for user's models of the same kind.
 
-    A law with gains of the plant's linearisation, which nobody gave, is for plants that have one. Nothing is known of
-    a law without code, as that of a loaded trace may be.
+    A template with gains of the plant's linearisation is for plants that have one. A law without code, as a loaded
+    trace may name, is taken to suit.
     """
     if law.function is None:
         return True

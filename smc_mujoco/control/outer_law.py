@@ -3,10 +3,10 @@
     smc.law("adrc", wc=12.0).on_computed_torque()
 
 u = M(x) (v + r'') + h(x, v) with the nominal M and h, and v_i the outer law's command for joint i. With the perfect
-model each joint obeys e'' = v + d_a, d_a = M^-1 d, whatever the others do, so the outer law meets the double integrator
-of its theorem: its b is 1, and what it estimates or integrates is friction, payload and the model's error, as an
-acceleration. The bound that it is told of is the acceleration that its motor can still give while the others rest,
-(u_max - |h_i|) / M_ii, so its anti-windup is right for one joint that saturates, and approximate for several.
+model each joint obeys e'' = v + d_a, d_a = M^-1 d, whatever the others do. So the outer law meets the double integrator
+of its theorem, with b = 1. What it estimates or integrates is friction, payload and the model's error, as an
+acceleration. Its bound is the acceleration that its motor can still give while the others rest, (u_max - |h_i|) / M_ii.
+So its anti-windup is right for one joint that saturates, and approximate for several.
 """
 
 # pyright: reportCallIssue=false

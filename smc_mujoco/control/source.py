@@ -26,9 +26,9 @@ KINDS = {
 MAX_SPREAD = 1.0  # larger ones are told as a multiple
 
 
-def spread_in_words(searches: int, spread: float, others: int = 0) -> str:
-    """Return how far J of searches differ: "12 searches, J up to 4.1 % above the least"; "3 to 12 searches, ..."."""
-    number = f"{others} to {searches}" * (others not in (0, searches)) or f"{searches}"
+def spread_in_words(searches: int, spread: float, fewest: int = 0) -> str:
+    """Return how far J of searches differ: "12 searches, J up to 4.1 % above the least"; "3 to 12 ..." of some laws."""
+    number = f"{fewest} to {searches}" * (fewest not in (0, searches)) or f"{searches}"
     if number == "1":
         return "1 search"
     above = f"{100.0 * spread:.2g} % above" if spread < MAX_SPREAD else f"{1.0 + spread:.2g} times"
@@ -117,7 +117,7 @@ def _search_text(searches: Mapping[str, Sequence[Search]]) -> str:
 
 
 def untuned_laws(words: Mapping[str, str]) -> list[str]:
-    """Return a sentence on laws with default gains that are compared with tuned ones; [] if there are none.
+    """Return a list of one sentence on laws with default gains that are compared with tuned ones, else [].
 
     `words` maps a law to where its gains come from, see `kinds`.
     """
@@ -137,5 +137,5 @@ def by_words(words: Mapping[str, str]) -> str:
         if kind not in ("", NONE):
             laws.setdefault(kind, []).append(law)
     if len(laws) < 2:
-        return "".join(f"gains: {words}" for words in laws)
-    return f"gains: {', '.join(f'{joined(names)} {words}' for words, names in laws.items())}"
+        return "".join(f"gains: {kind}" for kind in laws)
+    return f"gains: {', '.join(f'{joined(names)} {kind}' for kind, names in laws.items())}"

@@ -41,7 +41,7 @@ def correction(a, p, m, L, share):
         "order": Gain(2.0, positive=True, held=True),
     },
     memory=5,
-    conditions={"order is 1, 2 or 3, else the nearest": lambda g: g.order in (1.0, 2.0, 3.0)},
+    conditions={"order is 1, 2 or 3, else rounded down and limited": lambda g: g.order in (1.0, 2.0, 3.0)},
 )
 def levant(y, gains, memory):
     n, h, L = min(max(int(gains.order), 1), 3), y.dt, gains.L

@@ -18,7 +18,7 @@ from smc_mujoco.control.units import Gain
 
 MAX_READINGS = 128  # readings in memory
 CONDITIONS = {
-    f"whole window and degree, and 1 <= degree < window <= {MAX_READINGS}, else the nearest": lambda g: (
+    f"whole window and degree, and 1 <= degree < window <= {MAX_READINGS}, else rounded down and limited": lambda g: (
         g.window == int(g.window) and g.degree == int(g.degree) and 1 <= g.degree < g.window <= MAX_READINGS
     )
 }

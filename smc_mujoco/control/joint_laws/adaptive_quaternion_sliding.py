@@ -4,8 +4,8 @@
 
 It is `quaternion_sliding` whose K, for each axis, grows where |s| is large: of the position with s = e' + c e, and of
 the attitude with s = we + lam sgn(q0) qv. So K falls where |s| is below eps / rho, 0.025 rad/s and 0.0011 m/s by
-default. Steady errors are those of `quaternion_sliding` with the K that was reached, which moves slowly: with the
-published Gx 6 g on 32 g still cost 0.34 m after 10 s.
+default. Steady errors are those of `quaternion_sliding` with the K that was reached. K moves slowly: with the published
+Gx, a payload of 6 g on 32 g still costs 0.34 m after 10 s.
 Proved in the source: bounded in the end from every attitude, without unwinding, K without overgrowth.
 The public code differs from its text in six places, and here, one by one:
 (a) it multiplies by the period where it differentiates the path, so that jerk and snap do not count: here the jerk is

@@ -16,8 +16,8 @@ of them = 1.191e-7 N m in roll, with the lever a = 0.03253 m, 4 c of them = 5.38
     climb         P 25, I 15 thousand      x 4000 x 0.12 / 65535 / 0.0319    = 5.740, 3.444
     position      P 2; height P 2, I 0.5; speed 1 m/s, tilt 20 degrees, least thrust 20,000 of 42,700 PWM in hover
 
-Here the model carries the weight, in the firmware a base of 36,000 PWM and the integral; all loops run at each sample,
-there the inner ones at 500 Hz and the outer ones at 100 Hz. No w x J w is added, as there.
+In the firmware a base of 36,000 PWM and the integral carry the weight, here the model does. There the inner loops run
+at 500 Hz and the outer ones at 100 Hz, here all at each sample. Neither adds w x J w.
 Gains: P and Pz [1/s], of the position, z the height; Iz [1/s^2], of its integral; Pv and Pvz [1/s], of the velocity;
 Iv and Ivz [1/s^2], of its integral; Pa and Paz [1/s], of the attitude, z the yaw; Ia and Iaz [1/s^2], of its integral;
 Daz, of the yaw's rate; Pr and Prz [1/s], of the rate; Ir and Irz [1/s^2], of its integral; Dr, of its change; speed
@@ -74,13 +74,13 @@ def _gains(turns, **values):
 def cascaded_pid(y, gains, memory):
     s, F, v, started = np.zeros(6), np.zeros(3), np.zeros(3), memory[0, 3]
     memory[0, 3] = 1.0
-    weight, slope = y.h[2] / y.M[2, 2], math.tan(gains.tilt)
+    gravity, slope = y.h[2] / y.M[2, 2], math.tan(gains.tilt)
     for i in range(3):
         P, I, Pv, Iv = (gains.P, 0.0, gains.Pv, gains.Iv) if i < 2 else (gains.Pz, gains.Iz, gains.Pvz, gains.Ivz)
         memory[i, 0] = _integrated(memory[i, 0], -y.e[i], y.dt, gains.speed / I if I > 0.0 else 0.0)
         wanted = min(max(I * memory[i, 0] - P * y.e[i], -gains.speed), gains.speed)
         s[i] = y.v[i] - wanted
-        memory[i, 1] = _integrated(memory[i, 1], -s[i], y.dt, weight * slope / Iv if Iv > 0.0 else 0.0)
+        memory[i, 1] = _integrated(memory[i, 1], -s[i], y.dt, gravity * slope / Iv if Iv > 0.0 else 0.0)
         F[i] = y.M[i, i] * (Iv * memory[i, 1] - Pv * s[i]) + y.h[i]
     F[2] = max(F[2], LEAST * y.h[2])
     sideways = math.sqrt(F[0] * F[0] + F[1] * F[1])

@@ -1,8 +1,8 @@
 """H-infinity loop shaping: u = k v + k wi w, w' = v, where v = F x^ keeps a guaranteed margin of the shaped plant.
 
-The shaped plant is k (s + wi) / s times the plant e'' = a1 e + a2 de + b u. Of all errors of its normalised coprime
-factors that are smaller than 1 / gamma none makes the loop unstable. The least gamma is known in closed form, gamma_min
-= sqrt(1 + rho(Z X)), X and Z the solutions of two Riccati equations; the law takes 1.1 gamma_min. It is an observer
+The shaped plant is k (s + wi) / s times the plant e'' = a1 e + a2 de + b u. No error of its normalised coprime factors
+smaller than 1 / gamma makes the loop unstable. The least gamma is known in closed form, gamma_min = sqrt(1 + rho(Z X)),
+X and Z the solutions of two Riccati equations; the law takes 1.1 gamma_min. It is an observer
 
     x^' = A x^ + B v + Hs (C x^ - e),  Hs = -Z C',  F = -B' ((1 - gamma^-2) I - gamma^-2 X Z)^-1 X.
 

@@ -4,15 +4,15 @@
 
 on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of the observer of `adrc`, which knows a1 e +
 a2 de, and us = -d / b, so a constant disturbance leaves no error. P is the solution of the discrete Riccati equation,
-so that without bounds the law is the linear quadratic regulator with d taken away. It differs from that regulator,
+so that without bounds the law is the linear quadratic regulator, and cancels d. It differs from that regulator,
 clipped, only where a later move is at the bound: real gains need bounds on states or rates, or a reference known ahead.
-As long as the same moves are held at a bound the plan is an affine function of e, de and the bounds, which is kept and
-is as fast as a regulator. Where it may end it is checked move by move, and where it has ended the plan is solved, by
-projected Newton steps from its clipped moves, or from none where that fails, until the gradient of the moves that are
-free is 1e-13 of the linear term; every plan keeps the bounds. Of 24,000 jumps to a random state 10 were not solved, one
-of them with a cost 64 % too large, the others 4 % at most. H must be long against the control period, and N H as long
-as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates e'' = v, so a1,
-a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the first move.
+As long as the same moves are held at a bound, the plan is an affine function of e, de and the bounds. The law keeps
+this function, and is as fast as a regulator. Where the function may end it is checked move by move. Where it has ended,
+projected Newton steps find a new plan, from the last one, clipped, or from v = 0 where that fails, until the gradient
+of the free moves is 1e-13 of the linear term. Every plan keeps the bounds. Of 24,000 jumps to a random state 10 were
+not solved, one of them with a cost 64 % too large, the others 4 % at most. H must be long against the control period,
+and N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates
+e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the first move.
 Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N,
 number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the plant at
 its origin.
@@ -34,7 +34,7 @@ from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 
 # The memory: 0 to 4 the observer; 5, 1 once the matrices are there; 6, the held moves of the Cholesky factor, as bits;
 # 7 to 9, the observer's corrections; 10 to 17, where the tabulated plan was last checked, see `room`; then a row for
-# each move: itself, its side (-1 and 1, held at the lower and the upper bound, and 0), its function of e, de and the
+# each move: itself, its side (-1 held at the lower bound, 1 at the upper, 0 free), its function of e, de and the
 # bounds' middle and reach, the linear term by e and by de; the gradient, the step, what a share of it changes; and the
 # Hessian and the factor, 20 x 20, by rows.
 MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = 20, 40, 40, 40  # chosen; from no plan 34 steps were enough in 60,000 states
@@ -42,7 +42,7 @@ AT_E, AT_DE, AT_MIDDLE, AT_REACH, MOST_E, MOST_DE, MOST_MIDDLE, ROOM = range(10,
 PLAN, SIDE, FROM_E, FROM_DE, FROM_MIDDLE, FROM_REACH, BY_E, BY_DE = range(18, 26)
 ROW, GRADIENT, STEP, MOVED, HESSIAN, FACTOR, SLOTS = 8, 178, 198, 218, 238, 638, 1038
 UNBOUNDED = 1e30  # in place of no bound, as 0 times infinity is no number
-ENOUGH, FAR = 1e-13, 1e-6  # gradient of the free moves, of the largest linear term: solved, and not yet near
+ENOUGH, FAR = 1e-13, 1e-6  # gradient of free moves over the linear term: solved up to it; above it, solved from v = 0
 SUFFICIENT = 1e-4  # share of the decrease that the gradient promises, L. Armijo's
 
 
@@ -237,7 +237,7 @@ def solve(n, e, de, low, high, kept, memory):
 def tabulate(n, low, high, memory):
     """Write the plan as a function of e, de and the bounds' middle and reach, as long as the same moves are held.
 
-    Of a held move it is the gradient, over the move's curvature. Return 1.
+    For a held move, write the gradient over the move's curvature instead. Return 1.
     """
     memory[6] = factor(n, low, high, memory)
     for i in range(n):
@@ -264,7 +264,7 @@ def tabulate(n, low, high, memory):
     for i in range(n):
         memory[MOST_E] = max(memory[MOST_E], abs(memory[FROM_E + ROW * i]))
         memory[MOST_DE] = max(memory[MOST_DE], abs(memory[FROM_DE + ROW * i]))
-        moves = 1.0 - abs(memory[SIDE + ROW * i])  # the bound of a free move is the middle's
+        moves = 1.0 - abs(memory[SIDE + ROW * i])  # the bounds of a free move shift with the middle
         memory[MOST_MIDDLE] = max(memory[MOST_MIDDLE], abs(memory[FROM_MIDDLE + ROW * i] - moves))
     return 1.0
 
@@ -297,7 +297,7 @@ def recall(n, e, de, middle, reach, memory):
 
 @njit
 def room(e, de, middle, reach, memory):
-    """Return how far all moves are from the end of the tabulated function at least, from where it was last recalled."""
+    """Return how far from its end the tabulated function is at least, by the distance from where it was recalled."""
     if reach != memory[AT_REACH]:
         return -1.0
     spent = memory[MOST_E] * abs(e - memory[AT_E]) + memory[MOST_DE] * abs(de - memory[AT_DE])

@@ -9,10 +9,10 @@ first order with the bandwidth l. A constant d leaves no error. Three laws of ot
   last period's mean disturbance, am the pole of its predictor, and its filter is l.
 - ADRC with a measured rate, whose observer is of first order.
 
-On e'' = g u and l = 2 wc it is stable for 0.10 < g / b, and sampled for g / b below about 2 / (1 - exp(-l dt)). A delay
-times wc must stay below 0.31. It needs a good rate: it loses its margin with an encoder's differences, delays and slow
-drives, and is at home under loads that change. With the model b = g, and f and r'' are known and fed forward. With a
-switching term in place of wc^2 e it is `disturbance_observer`. The trace's s is wc^2 e + 2 wc de.
+On e'' = g u with l = 2 wc it is stable for 0.10 < g / b; sampled, g / b must also be below about 2 / (1 - exp(-l dt)).
+A delay times wc must stay below 0.31. It needs a good rate: it loses its margin with an encoder's differences, delays
+and slow drives, and is at home under loads that change. With the model b = g, and f and r'' are known and fed forward.
+With a switching term in place of wc^2 e it is `disturbance_observer`. The trace's s is wc^2 e + 2 wc de.
 Gains: wc, bandwidth of the loop [1/s]; l, bandwidth of the observer [1/s]; b, assumed input gain [1/kg].
 Sources: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion for attitude control of micro
 air vehicles", J. Guid. Control Dyn. 39(3):450, 2016 (synchronised filters); P. Acquatella, W. van Ekeren & Q. P. Chu,
