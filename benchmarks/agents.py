@@ -4,8 +4,8 @@
 
 Only ratios within one run mean anything on a shared machine; each is the median over rounds that alternate between the
 two sides. Single environments are measured in processor time, which other work does not stretch, batches in wall time.
-A step of ours is one RK4 step of 1 ms, of dm_control's pendulum one Euler step, of gymnasium's InvertedPendulum two RK4
-steps, which alone take a third of its time: the last row counts those one by one.
+A step of ours is one RK4 step of 1 ms, a step of dm_control's pendulum one Euler step. One of gymnasium's
+InvertedPendulum is two RK4 steps, which take a third of its time: the last row is per RK4 step.
 """
 
 import importlib.util

@@ -1,7 +1,7 @@
 """Calibrate the ranges of predicted chattering on random loops that are integrated exactly.
 
     python benchmarks/chattering.py [--loops 200] [--seed 0]
-    python benchmarks/chattering.py --halving duffing    # behind which drives half the physics step changes which laws
+    python benchmarks/chattering.py --halving duffing    # whose cycles half the physics step changes, by drive
 
 A range is widened by a factor, so that it holds the exact amplitude, or frequency, in more than 95 % of the loops. The
 script prints the factors, which `smc_mujoco/analysis/chattering.py` has as constants, and how good the predictions are.
@@ -29,7 +29,7 @@ from smc_mujoco.control import gain_sets  # noqa: E402
 from smc_mujoco.simulation.grid import case  # noqa: E402
 
 SHARE = 0.97  # of the loops whose ranges are to hold the truth, over 95 %: chosen after a trial on 60 other loops
-SLOWEST = 1.0  # Hz, of the cycles that count
+SLOWEST = 1.0  # Hz: a slower cycle does not count
 MANY = 40  # samples a period, from which on a cycle hardly locks to them: chosen
 DRIVES = {
     "none": None,

@@ -3,10 +3,10 @@
     python benchmarks/families.py benchmarks/drawn_plants.py:drawn_slide --lot 584051958 --condition differenced_5ms
     python benchmarks/families.py benchmarks/drawn_plants.py:drawn_pendulum --lot 584110175 --condition light
 
-SEED is what the clock said, before anything was run on them. A mass on a spring: M x'' = -k x - b x' + u + d. A
+SEED is what the clock said before anything was run on them. A mass on a spring: M x'' = -k x - b x' + u + d. A
 pendulum, m l^2 x'' = m g l sin x - b x' + u + d, that stands or hangs; one that half of u_max cannot hold is drawn
-again. The seeds of the levels come from the same lot; the conditions, too, of six. That of the slide was drawn again,
-as `jitter`, which came first, takes ten times as long.
+again. From the same lot come the seeds of the levels (--lot) and the conditions, out of six. The slide's was drawn
+twice: the first, `jitter`, takes ten times as long.
 """
 
 import math

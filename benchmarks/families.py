@@ -4,15 +4,15 @@
 
 A plant is a name, FILE.xml:joint, or FILE.py:plant of a file that defines it. Each law has the gains of twelve
 searches, run i those of search i, from start i: shipped ones, or searches of the same rule and budget, which are kept
-beside --out. A level is told without units: the load's frequency and the delay by the bandwidth wc of the tuned ADRC,
-noise by the start, dry friction by u_max. Only the force of a load is in N or N m; where u_max is not 6, it is more or
-less in proportion. With `--lot`, levels are drawn within the range of each sentence of the page, to check it. The error
-is rms_error, of the last three quarters of 8 s, at least 1e-4 of the start. The cost is what the gains were searched
-for, ITAE/|x0| plus the weighted variation of u, of this one run.
+beside --out. A level has no unit: the load's frequency and the delay count by the bandwidth wc of the tuned ADRC, noise
+by the start, dry friction by u_max. Only the force of a load is in N or N m; where u_max is not 6, it is more or less
+in proportion. With `--lot`, levels are drawn within the range of each sentence of the page, to check it. The error is
+rms_error, of the last three quarters of 8 s, at least 1e-4 of the start. The cost is what the gains were searched for,
+ITAE/|x0| plus the weighted variation of u, of this one run.
 
-In each family the law is chosen by half of the runs and told by the other half, and the reverse, so the larger family
-has no advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), and it is
-told at half the physics step, too. A plant of one channel takes about 6 minutes of processor time, and 4 for searches.
+One half of the runs chooses the law of a family for the other half, whose scores count, so the larger family has no
+advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), also at half the
+physics step. A plant of one channel takes about 6 minutes of processor time, and 4 for searches.
 
 What the page shows, call by call:
 
@@ -63,7 +63,7 @@ from smc_mujoco.simulation.scenario import U_MAX, Scenario, default_u_max
 from smc_mujoco.simulation.signals import Noise, Sine
 from smc_mujoco.studies.fair_gains import Candidate, Trial
 
-RUNS, DURATION, LOAD = 12, 8.0, 1.0  # runs a cell; s; N or N m, where the bound on |u| is 6 N or N m
+RUNS, DURATION, LOAD = 12, 8.0, 1.0  # runs a cell; s; N or N m, for |u| <= 6 N or N m
 FORCE_AT = 0.5  # of wc, the frequency of the loads whose force varies
 DRAWN = 3  # levels a sentence, by lot
 FORCE = "load at 0.5 wc, N or N m"
@@ -89,13 +89,9 @@ SENTENCES = (
 )
 SURE = {"implicit_first_order": "d", "super_twisting": "d'"}  # laws whose theorem bounds the load, or its rate
 SCORES, KINDS = ("error", "cost"), ("switching", "smoothed")
-COLOURS, FIGURE_WIDTH, ROW_HEIGHT, LIMIT = (
-    ("#0072B2", "#7CC0E8", "#D55E00", "#F0B080"),
-    7.0,
-    1.75,
-    1e3,
-)  # inches; of the drawn leads
-FAILED = 1e3  # score of a run that fails, times its scale: chosen, beyond all others
+COLOURS = "#0072B2", "#7CC0E8", "#D55E00", "#F0B080"
+FIGURE_WIDTH, ROW_HEIGHT, LIMIT = 7.0, 1.75, 1e3  # inches; largest lead that is drawn
+FAILED = 1e3  # score of a run that fails: chosen, beyond all others
 
 
 class Subject(NamedTuple):
@@ -153,7 +149,7 @@ class Subject(NamedTuple):
 def subject(
     text: str, folder: Path, condition: str = "nominal", gains: str = "tuned", laws: Sequence[str] = COMPARED
 ) -> Subject:
-    """Return a plant as its name, FILE.xml:joint or FILE.py says, and its laws; the folder keeps what is tuned."""
+    """Return the plant of a name, FILE.xml:joint or FILE.py:plant, with its laws; the folder keeps what is tuned."""
     file, _, name = text.partition(".py")
     plant = of_file(Path(f"{file}.py"), name.removeprefix(":")) if text != file else as_plant(text)
     templates = [catalogue()[law] for law in dict.fromkeys((*laws, "adrc"))]
@@ -197,19 +193,19 @@ def cells(subject: Subject, axis: str, level: float, families: dict[str, list[st
     values = {law: scores(its) for law, its in made.items()}
     fine: dict[str, np.ndarray] = {}
     for k, score in enumerate(SCORES):
-        told, best, told_fine = {}, {}, {}
+        family_scores, best, fine_scores = {}, {}, {}
         for family, laws in families.items():
-            told[family], picked = told_by(np.array([values[law][k] for law in laws]))
+            family_scores[family], picked = told_by(np.array([values[law][k] for law in laws]))
             best[family] = [laws[i] for i in picked]
             for law in set(best[family]) - set(fine):
                 fine[law] = scores([halved(one) for one in made[law]])
-            told_fine[family] = np.empty(RUNS)
+            fine_scores[family] = np.empty(RUNS)
             for half in (0, 1):
-                told_fine[family][half::2] = fine[best[family][half]][k, half::2]
+                fine_scores[family][half::2] = fine[best[family][half]][k, half::2]
         medians = {law: float(np.median(its[k])) for law, its in values.items()}
         for kind in KINDS:
-            lead, low, high = map(math.exp, interval(np.log(told["rivals"] / told[kind]), 0.025))
-            at_half = math.exp(interval(np.log(told_fine["rivals"] / told_fine[kind]), 0.025)[0])
+            lead, low, high = map(math.exp, interval(np.log(family_scores["rivals"] / family_scores[kind]), 0.025))
+            at_half = math.exp(interval(np.log(fine_scores["rivals"] / fine_scores[kind]), 0.025)[0])
             cell = {"plant": subject.plant.name, "axis": axis, "level": level, "score": score, "kind": kind}
             cell |= {"lead": lead, "low": low, "high": high, "half": at_half, "law": best[kind]}
             runs = {law: its[k].tolist() for law, its in values.items()}

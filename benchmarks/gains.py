@@ -6,8 +6,8 @@
 
 Every law by the same rule: twelve searches for the laws of the report's first page, which come first, three for all
 others and for the set "tracking". The gains of a law on a plant are stored as soon as their searches end, so this may
-be stopped at any time, and goes on there. Gains that another rule found stay until their own are found again, with that
-rule beside them.
+be stopped at any time, and goes on there. Gains that another rule found stay, with that rule beside them, until this
+rule has found some.
 """
 
 import argparse

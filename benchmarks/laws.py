@@ -4,9 +4,9 @@
 
 "call" is the law's compiled C function alone, on states that vary from sample to sample. "sample" is all that the
 callback does once a control period in a channel - read, estimate, nominal model, law, clip, log - with that law in it,
-for a row of 100 pendulums; the target, 3x the classical law, is held to it, but for `mpc`, which solves a program where
-its bounds come and go, as on these states: its median over a run's samples is held to 4x pid. Only ratios within one
-run mean anything on a shared machine; each number is the least of several rounds, for what else runs only adds to it.
+for a row of 100 pendulums; its target is 3x the classical law. The target of `mpc`, which solves a program where bounds
+come and go, as on these states, is 4x pid for the median over the samples of a run. Only ratios within one run mean
+anything on a shared machine; each number is the least of several rounds, as other work only adds to it.
 """
 
 # pyright: reportCallIssue=false

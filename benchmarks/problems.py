@@ -5,15 +5,15 @@
     python benchmarks/problems.py measure controls seen.json --instances 15
     python benchmarks/problems.py freeze visible.json controls.json seen.json  # writes the targets into the rules
     python benchmarks/problems.py hold                     # do both controls hold on every problem of every suite?
-    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of the rules? all of it
+    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of the rules?
     python benchmarks/problems.py measure laws hidden.json --number random
     python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
     python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
 
 `measure laws` runs every general law with its best shipped gains on every problem of the paper's plants, `measure
-controls` the controls on all problems; ten minutes of processor time each. With `--version 2` they and `freeze` are of
-the rules of flight, where levels come from no law. They and `enter` go on where they were stopped. `smc-mujoco site`
-shows the results of `enter`.
+controls` the controls on all problems; ten minutes of processor time each. With `--version 2`, `measure` and `freeze`
+are for the rules of flight, where levels come from no law. `measure` and `enter` go on where they were stopped.
+`smc-mujoco site` shows the results of `enter`.
 """
 
 import argparse

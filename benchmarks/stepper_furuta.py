@@ -9,10 +9,10 @@ distance of its figures from the recorded ones is counted in the standard deviat
 so that a figure counts as much as it tells. The first round draws from the prior, the second about the nearest of it.
 The nearest of both are the ensemble. No figure of another law is looked at.
 
-The nearest are so by luck, too. So the second search, whose rule was fixed before it ran, and whose prior allows a
-larger error of the upright, runs the nearest again from new seeds. It accepts those with the recorded rms of alpha in
-the hold within the 5 to 95 % of their seeds, which rest there for at least half of the time in the median, and of which
-no run falls. On 2026-11-26 it accepted one of 16, the rig's published set "second_search".
+Some are near by luck. So the second search, whose rule was fixed before it ran, and whose prior allows a larger error
+of the upright, runs the nearest again from new seeds. It accepts a set if no run falls, and if in the hold the recorded
+rms of alpha is within the 5 to 95 % of its seeds, and the median run rests for at least half of the time. On 2026-11-26
+it accepted one of 16, the rig's published set "second_search".
 """
 
 import math

@@ -3,10 +3,10 @@
     pip install '.[rl]' stable-baselines3
     python examples/learned_rival.py            # train five seeds, a minute of processor time each, then compare
 
-The policy sees the angle, its rate, the integral of the angle, as without it a constant load leaves an offset, and its
-last action. It is trained for what laws are tuned for, less angle and less variation of the command, from all starts of
-the comparison and under constant torques of up to 1 N m, with a period of 10 ms; it runs at the period of all laws, 1
-ms. Bound, plant, starts, noise and loads of the comparison are the same for all. No seed is left out.
+The policy sees the angle, its rate, its last action, and the integral of the angle, without which a constant load
+leaves an offset. It is trained for what laws are tuned for, less angle and less variation of the command, from all
+starts of the comparison, under constant torques of up to 1 N m, with a period of 10 ms. It runs at the period of all
+laws, 1 ms. Bound, plant, starts, noise and loads of the comparison are the same for all. No seed is left out.
 """
 
 # pyright: reportMissingImports=false

@@ -1,7 +1,7 @@
 """Which law of many joints keeps a seven-joint arm's tip on its path, with friction and a payload that no law knows of?
 
-The arm swings every joint, with the friction identified on a real Panda, and carries 2 kg. The laws know the masses of
-the links and nothing else. Their gains come from equal searches at 1 kg, see arms/__init__.py.
+The arm swings every joint, with the friction identified on a real Panda, and carries 2 kg. The laws know the nominal
+model of the links at most. Their gains come from equal searches at 1 kg, see arms/__init__.py.
 
 Look for: the bars, which show how much of each motor the swing takes; and who needs a rough torque to be exact.
 """

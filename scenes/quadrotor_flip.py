@@ -2,9 +2,9 @@
 
 A Crazyflie is at rest 20 m above the ground, rolled by 170 degrees and turning by 10, 5 and 3 rad/s about its axes, and
 has to stop there, upright. Its rotors push one way only, by up to 1.5 times its weight: downwards until it has turned
-over. Once it has the numbers of arXiv 2508.06568, without drag, and once those of the library.
+over. In one row it has the numbers of arXiv 2508.06568, without drag, in the other those of the library.
 
-Look for: the time until a drone is on its side, in the order of which they fall. The geometric law's error of the
+Look for: the time until a drone is on its side: the longer, the further it falls. The geometric law's error of the
 attitude is the sine of the angle, which is small near 180 degrees, so that it turns last.
 """
 

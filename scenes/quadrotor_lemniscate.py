@@ -1,6 +1,6 @@
 """How closely does a drone follow a figure of eight, and how does its error grow as it flies faster?
 
-A Crazyflie flies a lemniscate of 2 m by 1 m, three laps each in 6, 4 and 3 s; in the last its acceleration reaches
+A Crazyflie flies a lemniscate of 2 m by 1 m, three laps of 6, 4 or 3 s each; in the fastest its acceleration reaches
 0.9 g. Drag and the lag of the rotors are in no law.
 
 Look for: the distance between the dark path and the flown one on the outer arcs, where drag and lag take most.

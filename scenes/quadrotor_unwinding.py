@@ -2,7 +2,7 @@
 
 Two quaternions, q and -q, are one attitude. A hovering Crazyflie turns its heading by 40 degrees under the attitude's
 part of `quaternion_sliding`, s = w + lam sgn(q0) qz. Its quaternion starts as either of the two, and never jumps from
-one to the other. Once it has the sign of its first number in s, and once 1 in its place.
+one to the other. One law has the sign of q0 in s, the other 1 in its place.
 
 Look for: the drone without the sign that starts with -q. It turns away from where it has to be, and unwinds.
 """

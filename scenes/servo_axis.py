@@ -1,7 +1,7 @@
 """Which law keeps a servo axis from sticking and slipping when it crawls at 1 mm/s?
 
-The axis of a published benchmark (95 kg, 20 N of dry friction), whose friction is LuGre's here: it sticks with half as
-much again (chosen). A soft PID waits for its integral to break the axis loose, shoots ahead, and waits again.
+The axis of a published benchmark (95 kg, 20 N of dry friction), here with LuGre's friction, whose static force is half
+as large again (chosen). A soft PID waits for its integral to break the axis loose, shoots ahead, and waits again.
 
 Look for: the staircase of the soft PID; the stiff one crawls evenly after its first step. The boundary layer lags by a
 third of a millimetre. Super-twisting follows within 0.1 um, at the price of a busy motor.

@@ -80,7 +80,7 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
 
 
 def hybrid(friction: bool = False) -> Law:
-    """Return the law that presses on the wall, gained as computed_torque_sliding. If `friction`, it knows the arm's."""
+    """Return the law that presses on the wall, with computed_torque_sliding's gains and, if `friction`, the arm's."""
     gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
     if friction:
         known = arm().friction
@@ -157,6 +157,6 @@ def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
 
 
 def back_within(trace: Trace, distance: float, after: float) -> float:
-    """Return how long after `after`, s, the tip stays within `distance`, m, of its path; inf if never or failed."""
+    """Return the time from `after`, s, until the tip is within `distance`, m, of its path for good; inf for never."""
     distances = np.nan_to_num(off_path(trace, after), nan=math.inf)  # NaN after a failure
     return last_exit(trace.t[trace.t >= after], distances, distance)

@@ -121,8 +121,8 @@ class Setting:
     ) -> Iterator[int]:
         """Write inputs into ctrl (..., nu) over a control period; yield after each how many physics steps it lasts.
 
-        `command` is (..., driven); `drive_states`, (2, ..., driven), is updated in place; `qvel` is (..., nv). The
-        mean force of a drive acts throughout a step, whereas a run gives RK4 behind a Lag its first moment, too.
+        `command` is (..., driven); `drive_states`, (2, ..., driven), is updated in place; `qvel` is (..., nv). The mean
+        force of a drive acts throughout a step. In a run with RK4, a Lag's first moment acts, too.
         """
         effect, steps = self.scenario.drive_step, self.scenario.steps
         if effect is None:

@@ -3,10 +3,10 @@
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
 An observation is one array of positions and velocities, and for `track` also r, r', r''. An action is the command of
-the driven channels, divided by their limits. An episode is truncated at the scenario's duration, which is
-also the max_episode_steps of its spec, and terminated if the plant diverges. The info has "time", s since the start,
-and "error", the e of the task in each channel. The module `tasks` describes tasks and rewards; `vector_env` has many
-copies of a plant in one batch.
+the driven channels, divided by their limits. An episode is truncated at the scenario's duration, the max_episode_steps
+of its spec, and terminated if the plant diverges. The info has "time", s since the start, and "error", the e of the
+task in each channel. The module `tasks` describes tasks and rewards; `vector_env` has many copies of a plant in one
+batch.
 """
 
 import copy
