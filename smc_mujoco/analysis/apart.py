@@ -2,7 +2,7 @@
 
 They do where they are more than 5 % apart, or where only some of the runs have the number, such as a limit cycle.
 Values below what matters in the problem count as equal. Under an integrator of first order half the step removes half
-of the error: the value that is as far from that at half the step as this one from that at the step counts, too.
+of the error. So the value without it, 2 y' - y with y' that at half the step, counts as one more.
 """
 
 import math
@@ -14,8 +14,8 @@ MAX_CHANGE = 0.05  # relative change of a number above which it is marked: chose
 def relative_range(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> float:
     """Return the range of a number in several runs over its smallest magnitude; inf if only some of them have it.
 
-    What lies within `least` of 0 matters in no problem, see `paired_runs.floor`. NaN is a run without the number. With
-    `first_order` the first two are of a run and of the same at half the step, under an integrator of first order.
+    Magnitudes up to `least` do not matter, see `paired_runs.floor`. NaN is a run without the number. With `first_order`
+    the first two values are of a run under an integrator of first order, and of the same run at half the step.
     """
     if first_order and all(map(math.isfinite, values[:2])):
         values = [*values, 2.0 * values[1] - values[0]] if len(values) > 1 else values

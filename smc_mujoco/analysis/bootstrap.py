@@ -34,8 +34,8 @@ class Interval(NamedTuple):
     """A median, or a share, with its interval."""
 
     median: float  # of the values; for `share_interval` the share
-    low: float  # NaN for the median of a single seed
-    high: float  # NaN for the median of a single seed, inf if it may be "never"
+    low: float  # NaN for the median of a single sample
+    high: float  # NaN for the median of a single sample, inf if it may be "never"
     n: int  # number of samples: seeds, or sets of gains
 
 
@@ -85,11 +85,11 @@ def share_interval(share: float, n: int) -> Interval:
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
     centre, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
     low, high = ((centre + side * half) / (1 + z * z / n) for side in (-1, 1))
-    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # after rounding it has the share
+    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # rounding aside, it has it
 
 
 @functools.lru_cache(maxsize=8)
 def draws(n: int) -> np.ndarray:
-    """Return how often each of n seeds is drawn in each resample, (n, RESAMPLES)."""
+    """Return how often each of n samples is drawn in each resample, (n, RESAMPLES)."""
     drawn = np.random.default_rng(0).multinomial(n, np.full(n, 1 / n), size=RESAMPLES)
     return np.ascontiguousarray(drawn.T, np.int32)

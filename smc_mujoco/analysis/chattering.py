@@ -35,7 +35,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
 GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35  # cells of the coarse grid on which cycles are sought: chosen
-CUTS = 8  # of a cell's sides, at most: a cell of the finest grid is 11 % in amplitude and 1.5 % in frequency; chosen
+CUTS = 8  # parts of a coarse cell's sides: a cell of the finest grid is 11 % in amplitude, about 1.5 % in frequency
 CELL_MARGIN = 0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
 COARSE_SAMPLES = 60.618  # samples of a period on the grid; not whole, so that they move from period to period; chosen
 MAX_OTHER_CYCLES = 3  # stable ones beside the predicted; more are artefacts of the sampling: chosen
@@ -159,9 +159,9 @@ def switches(loop: Loop) -> bool:
 
 
 def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
-    """Return the ranges of a cycle that is locked to the samples, of a law that switches.
+    """Return the ranges of a cycle of a law that switches, locked to the samples.
 
-    It switches at most half a control period later than on average, so the cycle with so much more delay is a bound.
+    It then switches at most half a control period later than on average: the cycle with that delay more is a bound.
     """
     control_period = loop.scenario.control_period
     later = loop.later(0.5 * control_period)
@@ -189,10 +189,10 @@ def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
 
 
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
-    """Yield groups of neighbouring cells of a fine grid whose images under N L wind around 1: one has a solution.
+    """Yield groups of neighbouring cells, of which one has a solution: their images under N L wind around 1.
 
-    A coarse cell is cut into four, again and again, where N L may be 1 in it. N is that of few samples, so the images
-    of some neighbours wind without a solution, one to the left and the next to the right.
+    Cells in which N L may be 1 are cut into four, down to the finest grid. With few samples N is rough: two neighbours
+    may wind without a solution, one to the left and the other to the right.
     """
     from scipy.ndimage import label
 
@@ -296,7 +296,7 @@ def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
 
 
 def _of_two_samples(loop: Loop) -> list[Balance]:
-    """Return the stable cycles of two samples. For them N L is real, so its magnitude decides."""
+    """Return the stable cycles of two samples a period. For them N L is real, so its magnitude decides."""
     from scipy.optimize import brentq
 
     fastest = math.pi / loop.scenario.control_period
@@ -316,7 +316,7 @@ def _of_two_samples(loop: Loop) -> list[Balance]:
 
 
 def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
-    """Return the cycles at which a larger oscillation decays (Loeb's criterion), none a turn of L beyond a slower one.
+    """Return the cycles at which a larger oscillation decays (Loeb's criterion), but not a turn of L beyond a slower.
 
     A delay gives a row of such cycles, with a turn of phase between them, of which only the slowest is stable.
     """

@@ -1,4 +1,4 @@
-"""Gains from a wanted amplitude: the largest gains whose chattering stays below it, at the upper end of its range.
+"""Gains from a wanted amplitude: the largest gains whose chattering, at the upper end of its range, stays below it.
 
 All gains of a law follow from two numbers, its size q and its speed w. For the same mass, positions become q times as
 large, times 1/w as large, and forces q w^2 times as large. A gain with the unit F^a X^b T^c is multiplied by
@@ -60,10 +60,10 @@ def gains_for(
 ) -> Design:
     """Return the largest gains whose chattering stays below an amplitude, a frequency or both.
 
-    The amplitude decides the size of the law: the upper end of `amplitude_range` is the wanted one, or the frequency is
-    reached before. A frequency also decides its speed, of 21 from a tenth to ten times that of the given gains: the one
-    with the largest forces. Those whose cycle is too fast before the size is known do not count. No force among the
-    gains exceeds u_max. So the size is the largest at its speed, to 0.1 %; a speed between the 21 may allow more.
+    The amplitude decides the size of the law, to 0.1 %: the largest at which `amplitude_range` ends below it, the cycle
+    is no faster than the frequency, and no force among the gains exceeds u_max. A frequency also decides the speed, of
+    21 from a tenth to ten times that of the given gains: the one with the largest forces. Speeds whose cycle is too
+    fast at size 1 do not count, and one between the 21 may allow more.
 
     Args:
       law: a law or its name. Its gains give the proportions.
@@ -153,7 +153,7 @@ def _largest(
 ) -> tuple[float, float]:
     """Return the size and the speed with the largest forces within both bounds, given speeds as `_forces` does.
 
-    What a speed allows is known only when its size is, so the next ones are tried while they may allow more.
+    The forces of a speed are known only with its size, so speeds are tried while they may allow larger ones.
     """
     best, largest, refusals = (0.0, 0.0), 0.0, []
 
@@ -198,24 +198,24 @@ def _force_headroom(base: Scenario) -> float:
 
 
 def _largest_size(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
-    """Return the largest scale up to `limit` with at most the wanted amplitude; a lost cycle counts as too large."""
+    """Return the largest size up to `limit` with at most the wanted amplitude; a lost cycle counts as too large."""
     limit = min(limit, MAX_SIZE_RATIO)
     low, high, oscillates = 0.0, math.inf, False
 
-    def amplitude_at(scale: float) -> float:
+    def amplitude_at(size: float) -> float:
         nonlocal low, high, oscillates
-        amplitude = predicted(scale)
+        amplitude = predicted(size)
         if amplitude > wanted or (oscillates and math.isnan(amplitude)):
-            high = scale
+            high = size
         else:
-            low, oscillates = scale, not math.isnan(amplitude)
+            low, oscillates = size, not math.isnan(amplitude)
         return amplitude
 
     amplitude = amplitude_at(min(1.0, limit))
     guess = min(1.0, limit) * wanted / amplitude
-    for scale in (guess, guess * (1.0 + SIZE_TOLERANCE)):
-        if low < scale < min(high, limit * (1.0 + SIZE_TOLERANCE)):
-            amplitude_at(min(scale, limit))
+    for size in (guess, guess * (1.0 + SIZE_TOLERANCE)):
+        if low < size < min(high, limit * (1.0 + SIZE_TOLERANCE)):
+            amplitude_at(min(size, limit))
     while not low:
         if high < 1.0 / MAX_SIZE_RATIO:
             found = f"that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}"

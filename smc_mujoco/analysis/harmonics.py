@@ -34,8 +34,8 @@ from smc_mujoco.simulation.scenario import Scenario
 DIFFERENCE_STEP = 1e-6  # SI units, of finite differences
 CHUNK_SAMPLES = 50_000  # samples for which a law is called at once
 MAX_SAMPLES = 10**9  # in a period, for a describing function
-MAX_SAMPLES_PER_PERIOD = 1000  # a law with a shorter control period is called that often
-EXCITATION_SAMPLES = 3  # samples of an excitation, about, as a multiple of the largest number in a period
+MAX_SAMPLES_PER_PERIOD = 1000  # of an excitation: a law that would take more is called this often
+EXCITATION_SAMPLES = 3  # times the largest number in a period: about as many samples has an excitation
 MIN_PERIODS, MAX_PERIODS = 12, 600  # of an excitation
 SETTLING_SHARE = 0.4  # of an excitation, while memories settle: left out
 REST_SAMPLES = 1000  # samples before an encoder's reading moves by one count, and as many after it
@@ -85,13 +85,13 @@ class Loop:
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise_mechanism()
         self.nominal_models = [self._nominal_model(joint) for joint in self.joints]
-        # all amplitudes of a frequency have the same answer and the same clock, and a later loop has the same gains
+        # all amplitudes of a frequency share an answer and a clock, and the loops of `later` share them and the gains
         self._answer = functools.lru_cache(maxsize=1024)(self._solve)
         self.gain = functools.lru_cache(maxsize=10_000)(self._gain)
         self._clock = functools.lru_cache(maxsize=4)(self._clock_of)
 
     def later(self, delay: float) -> "Loop":
-        """Return the loop with a delay, s, in addition."""
+        """Return the loop with an additional delay, s."""
         made = copy.copy(self)
         made.delay = self.delay + delay
         return made
@@ -145,7 +145,7 @@ class Loop:
         return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
 
     def _solve(self, omega: complex) -> np.ndarray:
-        """Return MuJoCo's state at samples per unit of held u, with u's images at omega + 2 pi m / control_period."""
+        """Return the state at samples per unit of held u, with u's images at omega + 2 pi m / control_period."""
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))

@@ -1,9 +1,9 @@
-"""Time of a law a sample: of its compiled code alone, on this machine, on what it measures in a run.
+"""Time that a law takes for a sample: its compiled code alone, on this machine, on what it measures in a run.
 
 Every sample of the run is given to several copies of the law at once, each with its own memory, so that a clock can
-tell tens of ns. Of a few rounds the least time of each sample counts, as what else the machine does only adds to it.
-So the 99 % quantile is over samples: of a law that iterates it is the time of its hard ones. The code is warm: it and
-its memory are in the processor's caches. The law `pid` takes its turn on the same measurements.
+tell tens of ns. The least time of each sample in a few rounds counts, as what else the machine does only adds to it.
+The 99 % quantile is thus over samples: for a law that iterates, the time of its hard ones. The code is warm: it and
+its memory are in the processor's caches. The law `pid` is timed in turn with it, on the same measurements.
 """
 
 # pyright: reportCallIssue=false
@@ -28,7 +28,7 @@ ROUNDS = 5
 
 
 class LawTime(NamedTuple):
-    """The time of a law a sample."""
+    """The time that a law takes for a sample."""
 
     median: float  # s
     high: float  # s, the 99 % quantile over samples
@@ -48,7 +48,7 @@ class _Listener:
 
 
 def law_time(scenario: Scenario) -> LawTime | None:
-    """Return the time of a scenario's law in its channel 0; None for a law that does not compile, or of many joints."""
+    """Return the time of a scenario's law in channel 0; None if it is of many joints, does not compile, or fails."""
     of_channel = scenario.resolved.law
     if of_channel.joint:
         return None

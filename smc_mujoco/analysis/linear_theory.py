@@ -117,7 +117,7 @@ def smallest_lam(plant: Plant, k1: Natural) -> float:
 
 @constrained
 def critical_delay(plant: Plant, lam: Natural, k1: Natural, control_period: Positive) -> float:
-    """Return the input delay in s up to which (1) is stable: 0 if it is unstable without delay, inf if it never is.
+    """Return the input delay in s up to which (1) is stable: 0 if it is unstable without one, inf if any is allowed.
 
     With a delay of m periods h the equation of a mode is 1 + z^-m N(w) / det(w - E) = 0, with w = z - 1 and
     N = lam (k1, 1) adj(w - E) Gamma. |N| = |det| on the circle |z| = 1 is a quadratic in y = |w|^2 / 2. The phase
@@ -181,7 +181,7 @@ def restoring_force(plant: Plant, law: Law, u_max: float = math.inf) -> Callable
 def tolerated_force(plant: Plant, law: Law, max_error: Positive, u_max: float = math.inf) -> float | None:
     """Return the largest constant d, or dry friction, with which the plant comes to rest within |x| <= max_error.
 
-    It is None for a law without linear part. Dry friction up to this level may also stop the plant closer to 0.
+    None for a law that is not linear near s = 0. Dry friction up to this level may also stop the plant closer to 0.
     """
     from scipy.optimize import minimize_scalar
 

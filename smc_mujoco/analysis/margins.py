@@ -1,15 +1,17 @@
 """Margins: the largest delay, disturbance, friction, mass ratio, noise and jitter that a law tolerates on a plant.
 
 A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
-(`conventions`). Then the envelope has shrunk, as the paper's claim on delay requires, because it starts at the scale.
+(`conventions`). As a run starts at the scale, its envelope has then shrunk, which the paper's claim on delay requires.
 The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
 tolerated, until the margin is known to one control period (delay), an eighth of one (jitter) or 2 % (others). There
 may be tolerated levels above one that is not, and levels that are not between two that were tried. Noise is one
-realisation, seed 0, the same for every law. A disturbance acts on every channel, and both of its signs are tolerated.
+realisation, seed 0, the same for every law. A disturbance acts on every channel, and both of its signs are tried.
 
 Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
 from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant at
-5 % of its scale. The plant may stop closer to the reference. All searches advance together, a batch of runs per round.
+5 % of its scale; with friction it may stop closer to the reference.
+
+All searches advance together, a batch of runs per round.
 """
 
 import dataclasses
@@ -80,7 +82,7 @@ class Search:
 
     @property
     def left(self) -> int:
-        """The number of runs still to come, estimated."""
+        """The number of levels still to try, estimated."""
         if self.high == math.inf:
             return sum(level > self.low for level in self.levels) + EXPECTED_HALVINGS
         return math.ceil(max(0.0, math.log2((self.high - self.low) / self.resolution(self.low))))
@@ -107,7 +109,7 @@ class Kind:
     levels: tuple[float, ...]  # tried first, from small to large
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
-    signed: bool = False  # whether a level is tolerated only if minus the level is, too
+    signed: bool = False  # whether a level is tolerated only if its negative is, too
     quantum: Callable[[Scenario], float] = lambda base: 0.0  # of which a level is a multiple; 0: any level
     theory: Callable[[Scenario], float | None] = lambda base: None  # largest level by linear theory, if there is any
 
@@ -217,7 +219,7 @@ class Margin:
     plant: str  # its name
     law: str  # its name
     kind: str  # one of MARGIN_KINDS
-    value: float  # largest tolerated level below the first one tried that is not; NaN if even the run without it is not
+    value: float  # largest tolerated level below the first one tried that is not; NaN if not even the unchanged run is
     unit: str  # of value, resolution, searched and theory
     resolution: float  # a level that is not tolerated is at most this much larger
     searched: float  # largest level of the search; if it is the value, all that were tried are tolerated

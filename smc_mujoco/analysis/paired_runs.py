@@ -20,7 +20,7 @@ from smc_mujoco.simulation.scenario import Scenario
 
 MIN_COMMAND_SHARE = 1e-3  # of the bound on u: smaller values of u matter on no machine; chosen
 EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have four digits; chosen
-ROUNDING = 1e-9  # in SI units: results that differ by less in all metrics repeat each other
+ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are compared
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
 UNITS = {SETTLES: "", OBJECTIVE: "s^2"} | {metric.name: metric.unit for metric in metrics()}  # of what boards compare
@@ -182,7 +182,7 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a number for each row, the same for the same gains; refuse a cell's runs that differ beyond the law."""
+    """Return a number for each row, equal for equal gains; refuse runs of a cell that differ in more than the law."""
     try:
         texts = table.column("scenario")
     except ScenarioError:
@@ -260,10 +260,10 @@ def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
 
     With X0 the largest |x0| of a driven channel, of a free body from its rest, and T the duration it is, for
 
-    - an error of the last part, and for shares of the start: the larger of half a count of the encoder, the standard
+    - an error of the last part, and a share of the start: the largest of half a count of the encoder, the standard
       deviation of the noise and eps X0;
-    - other errors: eps X0; integrals of errors: that of an error that is eps X0 throughout, and so on;
-    - a time: one control period; what counts events: one in the run;
+    - another error: eps X0; an integral of errors: that of an error that is eps X0 throughout, and so on;
+    - a time: one control period; a rate: one event in the run; a ratio: eps;
     - u and its variation: MIN_COMMAND_SHARE of the bound on u, because u of a joint that friction holds varies by less.
     """
     if scenario is None or metric == SETTLES:

@@ -1,8 +1,8 @@
 """Comparison of laws on the runs that they share: which law is better in which block, and places over all blocks.
 
-Blocks and samples are as in `bootstrap`. A unit is a run: the gains that one search found, in one instance of the
-conditions. Runs that are linked by a shared set of gains of either law are one unit, whose lead is the median of
-theirs. A run that repeats the results of both laws is not counted.
+Blocks and samples are as in `bootstrap`. A unit is one run, with the gains that one search found, in one instance of
+the conditions; or all runs that share sets of gains of either law, directly or through others: its lead is the median
+of theirs. A run that repeats the results of both laws is not counted.
 
 The lead. With y a law's value in a run, y' that of the same run at half the physics step, and rho how the value changes
 over the last fifth of the run,
@@ -10,20 +10,20 @@ over the last fifth of the run,
     high = max(y, y') max(1, rho)^5         low = min(y, y') min(1, rho)^5
     d_i  = log( max(low of the rival, q) / max(high of the law, q) )        one for each unit i
 
-q is the smallest value that matters in the problem, see `paired_runs.floor`. rho^5 is the value after as much time
-again, if the trend goes on: only a law that rises and a rival that falls are charged. rho is the median of a law's
-runs in a block, and 1 if it differs from 1 by no more than what is relevant. Where only some of the runs were repeated
-at half the step, the median of their relative changes widens the others. For shares, d is the difference.
+q is the smallest value that matters in the problem, see `paired_runs.floor`. If the trend goes on, the value changes by
+the factor rho^5 in as much time again: only a law that rises and a rival that falls are charged. rho is the median of
+a law's runs in a block, and 1 if it differs from 1 by no more than what is relevant. Where only some of the runs were
+repeated at half the step, the median of their relative changes widens the others. For shares, d is the difference.
 
 The test. A law is better than a rival if the number of pairs i <= j with d_i + d_j > -2 log(1 - r) is too large for the
 exact law of the signed ranks; r is the share that is relevant. That is F. Wilcoxon's test (Biometrics Bulletin 1(6),
 1945) in the form of J. W. Tukey: it rejects that the law is not lower by the share r. It is monotone: d never
 falls because a value of the law's own falls, or one of its rival's rises; so a winner that becomes better in its block
-stays its winner. There are two limits. Where some runs were repeated, a value that falls without that at half the step
-is a change by the step, and widens the others. And Holm's limit, below, depends on all p-values of the family. The test
-does not depend on units. Besides, the law must not fail more often. The estimate is the median of the means of all
-pairs (J. L. Hodges, E. L. Lehmann, Annals of Mathematical Statistics 34(2), 1963), and an interval has the centres that
-the test does not reject.
+stays its winner. There are two exceptions. Where only some runs were repeated, a value that falls alone is farther from
+that at half the step, and widens the others. And Holm's limit, below, depends on all p-values of the family. The test
+does not depend on the metric's unit. Besides, the law must not fail more often. The estimate is the median of the means
+of all pairs (J. L. Hodges, E. L. Lehmann, Annals of Mathematical Statistics 34(2), 1963), and an interval has the
+centres that the test does not reject.
 
 The correction. There are two families, over all blocks of a metric in a table, however the table is grouped into
 boards. Both are corrected by S. Holm's method (Scandinavian Journal of Statistics 6(2), 1979), with two-sided p-values.
@@ -103,9 +103,9 @@ class Comparison:
     """Every law compared with every other in every block.
 
     Scores are law -> (blocks, n) or (n,), lower is better, inf for never, NaN where no law has a run. If they are
-    `shares`, 0.0 or 1.0, means are compared instead of medians. Floors are the q of the blocks, `untested` says whether
-    a value is no sample, such as a worst case, and `first_order` whether the integrator is of first order: one for all
-    blocks, or one for each. Outcomes and sets are law -> a number per cell, equal if two seeds gave the same result, or
+    `shares`, 0.0 or 1.0, means are compared instead of medians. One for all blocks, or one for each: floors are their
+    q, `untested` says whether a value is no sample, such as a worst case, and `first_order` whether the integrator is
+    of first order. Outcomes and sets are law -> a number per cell, equal if two seeds gave the same result, or
     had the same gains; default: all results differ, and all gains are the same. Limits are given where the blocks
     belong to a larger family. `halves` and `trends` are law -> y' and rho of each run, NaN where they are not known;
     default: nowhere.
@@ -376,7 +376,7 @@ def _centres(by_run: np.ndarray, runs: np.ndarray, labels: tuple[int, ...] | Non
 def least_visible_lead(leads: ArrayLike, error: float, relevant: float = RELEVANT) -> float:
     """Return the least lead that the test sees with a probability of 80 %, as a share; 1 if it can see none.
 
-    With n units whose d (n,) have the standard deviation s, and t the quantiles of Student's law,
+    With n units whose d (n,) have the standard deviation s, and t(p) exceeded with probability p by Student's law,
 
         L = 1 - (1 - r) exp( -(t(error) + t(0.2)) s sqrt(pi / 3n) )
 
@@ -544,7 +544,7 @@ def min_p(n: int) -> float:
 
 
 def _tail(n: int, sums: np.ndarray) -> np.ndarray:
-    """Return the probability that random signs of the ranks 1 to n give a sum as large as these."""
+    """Return the probability that random signs of the ranks 1 to n give a sum at least as large as these."""
     if n <= MAX_EXACT:
         return _distribution(n)[sums]
     from scipy.special import ndtr

@@ -4,19 +4,19 @@ All channels of a network start from the same state. x is not wrapped: a pendulu
 
 The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in the band while
 |e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2 + (v/V)^2 is below
-(0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
+(0.2 %)^2, at a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
 beginning, for 40 %, and those still undecided for the whole duration.
 - Early, a run converges if it is in the band throughout the last third of the run, and in the second half of this third
-  it is near, or its largest squared distance is a tenth smaller than in the first. Near the reference the distance need
-  not decrease, because a law that switches leaves a ripple. If a run starts near, the distance must decrease, because a
-  run that leaves slowly is near for long.
-- Early, a run does not converge if it failed, or if it rests outside the band in that third: x, v and u change by less
-  than 1e-6 of X, V and u_max (of the largest |u|, if u has no bound).
+  it is near, or its largest squared distance is at least a tenth smaller than in the first. Near the reference the
+  distance need not decrease, because a law that switches leaves a ripple. If a run starts near, it must decrease,
+  because a run that leaves slowly is near for long.
+- A run that failed does not converge. Early, nor does one that rests outside the band in that third: x, v and u change
+  by at most 1e-6 of X, V and u_max (of the largest |u|, if u has no bound).
 - At the end, a run converges if it is in the band throughout the last 20 % of the run, and in the second half of this
   part it is near, or its largest squared distance is at most 5 % larger than in the first. It does not converge if it
   is never in the band in that part, unless it still approaches: its largest squared distance falls by a tenth from each
-  of the last four fifths of the run to the next. Otherwise it is undecided. A run that leaves more slowly, at 2.5 % a
-  second in runs of 10 s, counts as one that stays.
+  of the last four fifths of the run to the next. Otherwise it is undecided. A run that leaves slowly, at 2.5 % a second
+  or less in runs of 10 s, counts as one that stays.
 
 Early verdicts are no proofs, because a run that approaches in the band might leave later. Tests compare them with whole
 runs. `basin` integrates with implicitfast, four times as fast as RK4, with a difference of 1e-3 rad or m, less than a
@@ -56,7 +56,7 @@ MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9  # of the squared distance (e/X)^2 
 NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
 POSITION_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X, chosen
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
-MIN_SAMPLES = 10  # of the shortest runs: then each half of their last fifth has one
+MIN_SAMPLES = 10  # of the shortest runs: then each half of their last third has one
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
 
 

@@ -1,7 +1,8 @@
 """Sobol indices of a score over a class of uncertainty, the regions where runs fail, and the axis to improve.
 
 An index is estimated from Saltelli's design: points A and B, which are independent, and for each axis A with one
-column of B. What is chosen is chosen from A, and told from B. `smc.sensitivity` describes the whole.
+column of B. Regions and the axis to improve are chosen by the runs at A; their numbers are those of the runs at B.
+`smc.sensitivity` describes the whole.
 """
 
 import dataclasses
@@ -160,9 +161,9 @@ def _standardised(f: np.ndarray) -> np.ndarray:
 
 
 def possible(first: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Return estimates (k,) each, as (2, k), within what indices obey: 0 <= first <= total <= 1, sums up to and from 1.
+    """Return estimates, (k,) each, moved to where indices can be, as (2, k): 0 <= first <= total <= 1.
 
-    Sums beyond are scaled.
+    They are scaled where the first add up to more than 1, or the totals to less.
     """
     total = np.clip(total, 0.0, 1.0)
     total = np.minimum(total / min(total.sum() or 1.0, 1.0), 1.0)
@@ -245,7 +246,7 @@ def _rate(failed: np.ndarray) -> Interval:
 
 
 def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
-    """Return by how much a region where more fail explains failures, as the gain in log likelihood less BIC's price."""
+    """Return how well a region where more fail explains failures: the gain in log likelihood less BIC's price."""
     n, inside = len(failed), int(within.sum())
     if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
         return 0.0

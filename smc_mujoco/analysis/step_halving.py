@@ -2,11 +2,11 @@
 
 A number is marked where its values in these runs are apart by the rule of `analysis.apart`: under an integrator of
 first order half the step has half of the error, so there 2.5 % are enough. The rule holds for every number
-of scenes, boards and tables of chattering. Boards, whose instances have starts of their own, repeat runs at half the
-step alone, and compare medians.
+of scenes, boards and tables of chattering. Boards, whose runs start in many places, repeat them at half the step only,
+and compare medians.
 
-`smc.fidelity.step_halving([trace])[0].marked` says it of the limit cycle of a run, for two more runs. A number without
-the mark may still depend on the step.
+`smc.fidelity.step_halving([trace])[0].marked` says it of the limit cycle of a run, and takes two more runs. A number
+without the mark may still depend on the step.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-MARK = "*"  # behind such a number
+MARK = "*"  # behind a number that depends on the step
 NUDGE = 1e-9  # of its start, by which a run is moved to see whether it wanders
 APART = f"{100.0 * MAX_CHANGE:g} % ({50.0 * MAX_CHANGE:g} % without RK4)"  # at half the step, see `analysis.apart`
 NUDGED = (
@@ -42,12 +42,12 @@ class StepChange:
 
     @property
     def marked(self) -> bool:
-        """Whether the amplitude or the frequency changes by more than 5 %."""
+        """Whether the amplitude or the frequency depends on the step, by the rule of `analysis.apart`."""
         return max(self.amplitude, self.frequency) > MAX_CHANGE
 
 
 def repeats_all(scenario: Scenario) -> bool:
-    """Return whether every run is repeated at half the step: the integrator is not RK4, or constraints may act."""
+    """Return whether a study repeats every such run at half the step: constraints may act, or it is not under RK4."""
     return scenario.realistic or first_order(scenario)
 
 

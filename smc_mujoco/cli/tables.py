@@ -66,7 +66,7 @@ def plain(*columns: Column | str, **options: Any) -> Table:
 def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
     """Return a table for each group of channels, with a line for each run and a column for each metric.
 
-    Scores that differ in the same runs `again` are marked, with the largest and the smallest value.
+    Scores that differ from those of the same runs `again` are marked, with the smallest and the largest value.
     """
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
@@ -99,7 +99,7 @@ def _noted(tables: list[Table], *words: str) -> list[Table]:
 def _several(
     scored: Callable[[Trace], T], traces: Mapping[str, Trace], again: Again | None
 ) -> dict[str, list[T | None]]:
-    """Return label -> scores of a run, then of the same run again; None for one that failed. Not if all failed."""
+    """Return label -> scores of a run and of its repetitions, None for one that failed; no label of which all did."""
     runs = {label: (trace, *(again or {}).get(label, ())) for label, trace in traces.items()}
     values = {
         label: [None if one.diverged_at is not None else scored(one) for one in its] for label, its in runs.items()

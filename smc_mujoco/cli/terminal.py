@@ -15,7 +15,7 @@ from smc_mujoco.common.scripts import users_traceback
 
 @contextlib.contextmanager
 def errors_as_sentences() -> Iterator[None]:
-    """Exit with a sentence on an error that the user can correct, and with their script's traceback on its own."""
+    """Exit with a sentence on an error that the user can correct; with a traceback of their script if it fails."""
     try:
         yield
     except ScenarioError as error:

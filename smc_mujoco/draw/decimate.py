@@ -1,4 +1,4 @@
-"""Reduction of a dense signal for drawing: its range in few windows of time, and one line.
+"""Reduction of a dense signal for drawing: to its range in few windows of time, and to one line.
 
 A chattering control drawn sample by sample is a solid block. Its range shows how hard it switches. Its mean acts on the
 plant: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is this mean while the

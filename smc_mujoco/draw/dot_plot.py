@@ -22,7 +22,7 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 from smc_mujoco.simulation.trace import Trace
 
 METRICS = ("settling_time", "ultimate_bound", "tv_rate")
-MIN_SIZE = 1e-9  # a size below it is printed as "<1e-9"
+MIN_SIZE = 1e-9  # smaller sizes are drawn at it
 LINE_HEIGHT = 0.18  # inches on a full page, height of a law's line
 
 
@@ -39,8 +39,7 @@ def plot(
 
     Medians and intervals are those of a leaderboard: of the runs that all laws have. Runs that share one of several
     sets of gains are one sample. There is a column of panels per metric and a row per plant. A dot at the right edge,
-    under "never", is a law whose median run fails or does not settle. Sizes below 1e-9 are rounding: they are drawn at
-    1e-9.
+    under "never", is a law whose median run fails or does not settle. Sizes below 1e-9 are drawn at it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.

@@ -26,10 +26,10 @@ from smc_mujoco.simulation.trace import Trace
 
 LAST_SAMPLES = 60  # control samples in the close-up of u
 MIN_CLOSE_UP = 0.02  # least height of the close-up, of the largest |u|, so that it hides round-off; chosen
-MAX_DRAWN_CHANNELS = 40  # channels of a network that are drawn one by one; of more, those between which all lie
+MAX_DRAWN_CHANNELS = 40  # of a network, drawn one by one: of more, evenly chosen ones and the extreme ones
 LASTING_QUANTILE = 0.98  # of |reaction|, or of what an arrow shows: values above it are short peaks; chosen
 MIN_WORDS = 4.0  # of a panel's height, in heights of letters, from which on it has room for words; chosen
-CROWDED_STRIP = 3  # groups of channels: a film of so many or more has no panel of the error
+CROWDED_STRIP = 3  # groups of channels, from which on a film has no panel of the error
 LINE, LIGHT_LINE = 1.5, 0.8  # points, width of every curve, and of a single channel among several
 SLOWEST_LINE = 2.4  # points, width of the channel whose x comes to its reference last
 COINCIDENT_DISTANCE = 0.01  # of a panel's height, below the width of a line: curves no farther apart agree
@@ -225,7 +225,7 @@ def smoothed(trace: Trace) -> bool:
 
 
 def mean_window(traces: Sequence[Trace]) -> float | None:
-    """Return the longest window of the means drawn for u, s; None if no u chatters visibly."""
+    """Return the longest window of the means of u, s; None if no u chatters visibly."""
     low, high = limits(traces, "u")
     times = []
     for trace in filter(smoothed, traces):
@@ -370,7 +370,7 @@ def partings(shared: Sequence[Agreement], count: int) -> list[float]:
 
 
 def _parting(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray], apart: float) -> float:
-    """Return until when two lines are no farther apart than that, s, but for a small share of their points."""
+    """Return until when, s, but for a small share of their points, two lines are no farther than `apart` apart."""
     t = one[0][one[0] <= other[0].max(initial=-np.inf) + 1e-9]
     if not t.size:
         return -np.inf
@@ -564,9 +564,9 @@ def crowded(panel: Panel) -> bool:
 
 
 def drawn_channels(y: np.ndarray) -> np.ndarray:
-    """Return the indices of the channels that are drawn one by one, of y (K + 1, n), with its least and largest value.
+    """Return the indices of the channels of y, (K + 1, n), that are drawn one by one.
 
-    Their curves reach over all that the channels do, so that no state is hidden.
+    Those of its least and largest value are among them, so that their curves reach as far as those of all.
     """
     n = y.shape[1]
     if n <= MAX_DRAWN_CHANNELS:

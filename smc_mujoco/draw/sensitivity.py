@@ -1,7 +1,7 @@
 """The indices of a sensitivity as bars, beside the runs over the two axes that tell most.
 
 A bar is dark up to the first-order index and light up to the total index, with its interval. On the right a dot is a
-run, darker the worse its score is, and a cross one that fails. A dashed line bounds the first region where runs fail.
+run, darker the worse its score is, and a cross a run that fails. A dashed line bounds the first region of failures.
 """
 
 import os

@@ -48,12 +48,12 @@ if __name__ == "__main__":
 
 
 class Slider(NamedTuple):
-    """A number of a scenario: its present value, its range, and the fields of a scenario that has another."""
+    """A number of a scenario: its present value, its range, and the fields that change with it."""
 
     value: float
     low: float
     high: float
-    fields: Callable[[Scenario, float], dict[str, Any]]
+    fields: Callable[[Scenario, float], dict[str, Any]]  # what a scenario with another value has
 
     def changed(self, scenario: Scenario, value: float) -> Scenario:
         """Return the scenario with another number."""

@@ -1,7 +1,7 @@
 """`smc.view`: any machine in MuJoCo's Studio, in a browser tab, stepped by the compiled loop of `smc.run`.
 
 Studio shows copies of the runs' positions, so nothing in its panels changes a run but the panel "Laws", the push of the
-mouse and Reset. Its page runs in a thread of its own: it asks, and the loop of `view` does it between two frames.
+mouse and Reset. Its page runs in a thread of its own, which only asks: the loop of `show` acts between two frames.
 """
 
 # pyright: reportMissingImports=false
@@ -131,7 +131,7 @@ def show(session: Session, page: Any, panel: Any, watched: Callable[[Session], b
             panel.ghost_at = session.state(1)[0].copy()
         before_sync = data.time
         page.sync(model, data)
-        if data.time == 0.0 < before_sync:
+        if data.time == 0.0 < before_sync:  # Studio's Reset
             session.reset()
             pull[:] = data.xfrc_applied[:] = 0.0
         pulled = data.xfrc_applied[:, :3].copy()

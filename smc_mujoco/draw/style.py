@@ -2,8 +2,8 @@
 
 Laws and plants state their labels in their own files. A law has one colour in nearly all pictures: the one that its
 file states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else one of
-`_palette`. Matplotlib's petroff10 has only ten colours for fifty laws. Two of them are the grey of failed runs, and one
-is the violet of friction.
+`_palette`. Matplotlib's petroff10 has only ten colours, fewer than there are laws; two of them are the grey of failed
+runs, and one is the violet of friction.
 """
 
 import colorsys
@@ -57,8 +57,8 @@ SIGHTS = np.array([  # linear sRGB -> as it looks with all cones, no red, no gre
 ])  # fmt: skip
 XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]])
 
-# Inches. A full page is 845 px of SVG, so that its least letters have 11 px in 800 px, as in a README; narrower pages
-# than a journal's have letters of 8 points, slides such of 16.
+# Inches. A full page is 845 px of SVG, so that its least letters have 11 px in 800 px, as in a README. Letters of
+# narrower pages than a journal's have 8 points, those of slides 16.
 FULL_WIDTH, JOURNAL_WIDTH, SLIDE_WIDTH = 8.8, 8.5, 13.3
 RC = {
     "font.family": "DejaVu Sans",
@@ -157,8 +157,7 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
 def _palette() -> dict[str, str]:
     """Return the colours of the library's laws that state none, each the farthest from all before it.
 
-    Those of LAWS are first, then baselines. The former are at least MIN_DISTANCE apart in four sights. All 62 cannot
-    be: 298 of their 1,891 pairs are closer.
+    Those of LAWS are first, then baselines. The former are at least MIN_DISTANCE apart in all SIGHTS; all cannot be.
     """
     laws = known_laws().own.values()
     free = sorted(
@@ -284,7 +283,7 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
 def _differing(
     settings: Callable[[Trace], Mapping[str, object]], trace: Trace, others: Sequence[Trace]
 ) -> dict[str, str]:
-    """Return the settings of a run that not all others have, in words that no other value of a run has."""
+    """Return the settings of a run that not all others share, in words that tell it from the others."""
     mine, *tables = _in_parts([settings(run) for run in (trace, *others)])
     words = {}
     for name, value in mine.items():
@@ -299,7 +298,7 @@ def _differing(
 
 
 def _in_parts(tables: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
-    """Return settings with the fields of a part or signal, such as "disturbance omega", where all have one alike."""
+    """Return settings with the fields of a part or signal, such as "disturbance omega", where all are of one kind."""
     found = [dict(table) for table in tables]
     for name in tables[0]:
         values = [table.get(name) for table in tables]
@@ -535,5 +534,5 @@ def _luminance(colour: str) -> float:
 
 
 def short(value: float, digits: int = 2) -> str:
-    """Return a number with few digits, such as 0.25, 6, 280; with an exponent only from 1e6 on."""
+    """Return a number with few digits, such as 0.25, 6, 280; with an exponent from 1e6 on and below 1e-4."""
     return f"{float(f'{value:.{digits}g}'):g}"

@@ -113,7 +113,7 @@ def with_gains(law: Component, names: Sequence[str], values: Sequence[float]) ->
 
 
 def _that_fit(prepared: Sequence[Prepared], candidates: int) -> int:
-    """Return how many candidates may run at once: at most as many as given, so that their memory is bounded."""
+    """Return how many of these candidates may run at once: as many as fit the memory of a batch."""
     return max(1, min(candidates, BATCH_BYTES // sum(item.bytes for item in prepared)))
 
 

@@ -50,7 +50,7 @@ FAILURE_COST = 1e9  # s^2, also the cap of ITAE / |x0|, reached without a failur
 
 
 class Evaluation(NamedTuple):
-    """One set of gains, in the order of `Tuned.bounds`: J = tracking + weight variation."""
+    """One set of gains, in the order of `Tuned.bounds`: J = tracking + weight variation + `Objective.excess`."""
 
     gains: tuple[float, ...]
     objective: float
@@ -67,8 +67,8 @@ class Evaluation(NamedTuple):
 class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 
-    `chattering` is the largest predicted amplitude of the limit cycle of s of the first channel, in its unit, in the
-    first condition, see `smc.chattering`. None: chattering costs its variation only.
+    `chattering` bounds the predicted amplitude of the limit cycle of s of the first channel, in its unit, in the first
+    condition, see `smc.chattering`. None: chattering costs its variation only.
     """
 
     conditions: tuple[Condition, ...] = CONDITIONS  # names, or your own; each is one run of a candidate

@@ -72,7 +72,7 @@ class Tuned(Tables):
 
     law: Component  # with the gains of the least J
     searches: tuple[Found, ...]  # in order
-    before: float  # J of the law's original gains on the runs of the best search, which no search starts from, s^2
+    before: float  # J of the law's original gains, from which no search starts, on the runs of the best search, s^2
     plant: Plant
     definition: Objective  # with its conditions and u_max
     rule: str  # the search, in words

@@ -12,14 +12,15 @@ law. Run i of a study uses the gains that search i found, see `gain_sets`. A sea
    with n gains, lower J by less than 0.1 %.
 
 Where a plant is nothing but its equation under RK4, the `equation` takes the place of MuJoCo, in a fifteenth of the
-time. J on record is MuJoCo's, from one evaluation of the best gains; if the two differ by more than 1 %, MuJoCo makes
-the search again. Elsewhere the first two stages are cheap: they use Euler's method in place of RK4, or one step of
-another integrator a control period, and leave out limits and contacts. Descents run as a scenario does.
+time. J on record is MuJoCo's, from one evaluation of the best gains. If the two J differ by more than 1 %, the search
+is made again in MuJoCo. Elsewhere the first two stages are cheap: they use Euler's method in place of RK4, or one step
+of another integrator a control period, and leave out limits and contacts that are the plant's own. Descents run as a
+scenario does.
 
-Gains are rounded to four digits, so the printed gains are those that were run. A set that was evaluated before costs no
-budget. `search_space` gives the box from which starts are drawn; a search may leave it by a decade. `Tuned.at_bound`
-names gains at the limit of that. No search depends on the others, so more of them repeat those of fewer. `objective`
-defines what is minimised.
+Gains are rounded to four digits, so the printed gains are those that were run. In the first two stages a set that was
+evaluated before costs no budget. `search_space` gives the box from which starts are drawn; a search may leave it by a
+decade. `Tuned.at_bound` names gains at that limit. No search depends on the others, so more of them repeat those of
+fewer. `objective` defines what is minimised.
 """
 
 import contextlib
@@ -77,8 +78,8 @@ PATIENCE = 1e-3  # a descent ends when 2 n + 2 evaluations lower J by a smaller 
 GAIN_DIGITS = 4
 
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
-# How long a search takes, as a rule, in evaluations of its whole budget: its descent, which ends early; and all stages
-# by the equation, with the evaluation by MuJoCo in the end.
+# Shares of a search's budget that are used, as a rule: by a descent, which ends early, and by all stages of a search by
+# the equation with MuJoCo's evaluation in the end.
 LAST_SHARE, USUAL_SHARE = 0.1, 1.0
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
@@ -349,7 +350,7 @@ def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed
 
 
 def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
-    """Return why a law cannot be tuned on a plant, in a sentence; "" if it can. BrokenLawError: no run of it can be."""
+    """Return why a law cannot be tuned on a plant, or "". Raise BrokenLawError if it cannot even be run there."""
     try:
         _task(plant, coerce.law(law), goal, BUDGET, 0, None)
     except BrokenLawError:

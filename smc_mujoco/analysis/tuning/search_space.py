@@ -5,11 +5,11 @@ The plant has four scales, from which each gain's scale follows:
     X = max |x0|        position, rad or m
     F = u_max           force, N m or N
     M = 1 / g(0)        inertia, kg m^2 or kg; of the driven joints, where others are free
-    T = sqrt(M X / u_max)   time in which the actuator moves the plant by X (by X / 2, from rest)
+    T = sqrt(M X / u_max)   s, time in which the actuator moves the plant from rest by X / 2
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5, and a search may leave
-this box by a decade. That holds for forces too, such as lambda of -lambda tanh(s): the actuator clips the command of
-every law alike, so a law with 2 a in place of lambda, or 1 / tau in place of k, has the same search. A law may divide
+this box by a decade. That holds for forces too, such as lambda of -lambda tanh(s), as the actuator clips the command of
+every law alike. A law with 1 / tau in place of k has the same search. A law may divide
 a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as
 a force, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
 

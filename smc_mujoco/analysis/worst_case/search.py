@@ -5,6 +5,7 @@ A search tries the same members in the same order, whatever its budget:
 1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
 2. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
 3. relays of weighted sums of these, forces that switch once, and waves about the frequency at which the loop swings;
+   then errors of measurement, constant or switching as the loop swings;
 4. the worst member so far, with a force along the motion from some time on: such a force drives a fallen pendulum;
 5. in turns, two ways to change the worst members. The first reverses a piece of a force, shifts a switch or moves
    constants, in members of different origin. The second is an evolution of the worst member by separable CMA-ES (R. Ros

@@ -63,7 +63,7 @@ class Uncertainty:
       mass: lowest and highest factor on the plant's mass.
       parameters: name -> lowest and highest factor on other parameters of the plant, or what is added to one of
         `plant.added`: {"payload": (0.0, 2.0)}.
-      friction: lowest and highest dry friction, N or N m, beside the scenario's own; `friction_scale` leaves it.
+      friction: lowest and highest dry friction, N or N m, beside the scenario's own; `friction_scale` leaves it out.
       friction_scale: lowest and highest factor on the friction of the scenario and on the dry friction of its plant.
       encoder: lowest and highest counts of a position encoder, see `smc.Encoder`; equal ratios are equally likely.
       bound: lowest and highest factor on u_max.
@@ -178,7 +178,7 @@ class Members:
     """The members of a class around one scenario, or around the same scenario on several parameter sets.
 
     `constants` has a `Constant` for each share of a member. If there are several parameter sets, the first chooses one.
-    `ends` are the shares at corners. `bare` has no force or noise, and shares of 0.5.
+    `ends` are the shares at corners. `bare` has no force or noise, and shares of 0.5, on the first parameter set.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
@@ -228,7 +228,7 @@ class Members:
         return dataclasses.replace(scenario, noise=dataclasses.replace(scenario.noise, **errors))
 
     def signal(self, values: np.ndarray) -> Signal:
-        """Return values at the samples as a signal: steps if few of them change and may jump, else straight lines."""
+        """Return values at the samples as a signal: steps if it may jump and does so rarely, else straight lines."""
         change = np.diff(values)
         steps = not self.slope and 2 * np.count_nonzero(change) < len(change)
         bends = change != 0.0 if steps else np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
@@ -269,7 +269,7 @@ class Members:
         return dataclasses.replace(member, shares=np.clip(member.shares + moves, 0.0, 1.0))
 
     def size(self, knots: int) -> int:
-        """Return how many numbers `moved` takes."""
+        """Return how many numbers `moved` takes as z."""
         return len(self.constants) + knots * (self.forced + 2 * (self.times > 0))
 
     def moved(self, member: Member, z: np.ndarray, knots: int) -> Member:
@@ -378,7 +378,7 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
 
 
 def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:
-    """Return the lowest and the highest multiple of a step within bounds; ScenarioError for none but 0, or for one."""
+    """Return the lowest and the highest multiple of a step within bounds; refuse a range with one, or only 0."""
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
     if high < max(low, step) or (low == high and bounds[0] < bounds[1]):

@@ -158,7 +158,7 @@ def worst(
 ) -> None:
     """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
 
-    Only what you bound is uncertain; all else is as in the condition. Without bounds, the plant's count, such as an
+    Only what you bound is uncertain; all else is as in the condition. By default that is what the plant declares, as an
     arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. On a rig, such as qube_servo,
     the adversary also chooses a parameter set. The search is the same for all laws; there may be worse than it finds.
 
@@ -303,7 +303,7 @@ def basin(
     condition: options.Condition = "nominal",
     threads: options.Threads = None,
 ) -> None:
-    """Map a region of attraction: run a grid of initial positions and velocities, and show which come to rest at 0.
+    """Map a region of attraction: run a grid of initial positions and velocities, and show which come to rest.
 
     Positions reach half a turn to either side; on a rail, twice as far as the plant's start. The largest velocity is
     three times the largest position, per second. All channels of a network have the same start. A run ends as soon as
@@ -355,9 +355,9 @@ def chatter(
 
     If a law switches and the actuator lags, the loop oscillates without end, where the law's describing function N and
     the response L of the linearised mechanism have N L = 1. The column "±" is how far the prediction may be off. A star
-    marks a run that changes by more than 5 % at half the physics step, or from a start moved by 1e-9 of itself. The
-    column "third" is the third harmonic over the first. With several driven channels, "coupling" is how far this
-    channel's command moves another one, over how far it moves this one: if that is not small, the prediction fails.
+    marks a run that changes by more than 5 % from a start moved by 1e-9 of itself, or at half the physics step (2.5 %
+    without RK4). The column "third" is the third harmonic over the first. With several driven channels, "coupling" is
+    how far this channel's command moves another one, over how far it moves this one: if large, the prediction fails.
 
     Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
     """

@@ -266,7 +266,7 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
 
 
 def only_for(ctx: typer.Context, names: Iterable[str], allowed: bool, kind: str) -> None:
-    """Raise ScenarioError if one of these options was given although it does not fit: it is only for a kind of call."""
+    """Raise ScenarioError if one of these options, which are only for a kind of call, was given where not `allowed`."""
     for name in () if allowed else names:
         if str(ctx.get_parameter_source(name)).endswith("COMMANDLINE"):
             flags = next(parameter.opts for parameter in ctx.command.params if parameter.name == name)

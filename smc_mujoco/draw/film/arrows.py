@@ -2,7 +2,7 @@
 
 An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
 swings that switches faster than the film. With a drive, arrow and bar show its force, and a pale arrow the command.
-Arrows lie along a pendulum's arc, beyond the bob; or along the rail, above the cart, or before it if it carries
+Arrows lie along a pendulum's arc, beyond the bob; or along the rail, above the cart, in the picture if it carries
 something. At a hinge of a user's model, whose links may have any shape, they bend around its axis. On a free body the
 control's are those of its actuators, at their places, and the disturbance's is one force from its middle. All are
 drawn over the picture, so that no link hides them.
@@ -69,7 +69,7 @@ class Mount(NamedTuple):
     joint: int
     unit: float  # at a slide, length of the longest arrow, m; at a hinge, a factor on HINGE_LENGTH of the pendulum's
     thick: float  # thickness at a slide, m
-    front: np.ndarray | None  # direction to the camera, (3,), of arrows before a slide that carries something
+    front: np.ndarray | None  # direction to the camera, (3,), for arrows at a slide that carries something
     beyond: bool = False  # whether on the other side of a hinge than the body: a network's pendulums pass each other
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
     # Of an actuator of a free body: its place, m, and the direction of its force, in the axes of the body

@@ -4,10 +4,10 @@ Software OpenGL takes time in proportion to the pixels and the shapes that it dr
 one before, in which some rectangles are drawn again: those around everything that moved, where it was and where it is,
 and around its shadow. Shapes outside a rectangle are left out of its drawing.
 
-Shadows on the floor are flattened copies of what casts them.
-A directional light casts a point (x, y, z) to the floor along its direction w, to (x, y, z) - z w / w_z. As this is
-linear, a shape's shadow is the same shape under another matrix. Its edges are as smooth as all others. MuJoCo looks its
-shadows up in a picture from the light: they have saw-tooth edges, and take as long to draw as all the rest.
+Shadows on the floor are flattened copies of what casts them. A directional light casts a point (x, y, z) along its
+direction w to the floor, at (x, y, z) - z w / w_z. As this is linear, a shape's shadow is the same shape under another
+matrix, with edges as smooth as all others. MuJoCo looks its own shadows up in a picture from the light: they have
+saw-tooth edges, and take as long to draw as all the rest.
 """
 
 import itertools
@@ -23,7 +23,7 @@ THICKNESS = 1e-4  # of a shadow, of its shape's height: normals of a flat shape 
 FLOOR_DISTANCE = 4e-4  # of the model's extent: height of shadows over the floor
 SHADOW_EMISSION = 20.0  # so large that a shadow is as dark whichever light falls on it
 SHADE = (0.70, 0.715, 0.74)  # red, green, blue of the floor in shadow, chosen
-MIN_CAST, MIN_BOX_CAST = 1.0, 3.0  # px: half the thickness of shapes, and of boxes such as scale marks, with a shadow
+MIN_CAST, MIN_BOX_CAST = 1.0, 3.0  # px, half the least thickness of what casts a shadow: shapes; boxes, as scale marks
 MIN_ARM_CAST = 3.0  # px, the same of rings around an arm's links, which are in the shadow of the links
 MIN_MOTION = 0.2  # px: a shape that has moved less since it was drawn is not drawn again; chosen
 EDGE_MARGIN = 3  # px around what has changed, for smoothed edges
@@ -260,7 +260,7 @@ def flattening(way: np.ndarray) -> np.ndarray:
 
 
 def casting(model: mujoco.MjModel, pixel: float, flat: float = 0.0) -> np.ndarray:
-    """Return which geoms cast shadows, (geoms,): opaque ones, neither thin nor flat; `pixel` is the size of one, m."""
+    """Return which geoms cast shadows if opaque, (geoms,): not thin or flat ones; `pixel` is the size of one, m."""
     thinnest = np.where(model.geom_type == mujoco.mjtGeom.mjGEOM_BOX, MIN_BOX_CAST, MIN_CAST) * pixel
     half = np.sort(model.geom_aabb[:, 3:], axis=1)
     return (half[:, 1] > thinnest) & (half[:, 0] > flat * pixel) & (model.geom_type != scene.PLANE)

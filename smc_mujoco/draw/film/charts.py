@@ -2,7 +2,7 @@
 
 Two pictures are drawn: the panels with every curve, and the panels with faint curves. A frame takes the columns up to
 the clock from the first and the rest from the second, so that it costs one copy. The time until all rest has most of
-the width, and what follows a grey strip.
+the width; the rest of the run has a grey strip.
 """
 
 from collections.abc import Sequence

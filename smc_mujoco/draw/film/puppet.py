@@ -50,7 +50,7 @@ class Puppet:
         self.links = moved_bodies(model, ids)
         off_stage = not self.scenario.plant.on_stage
         self.free = model.jnt_qposadr[model.jnt_type == FREE]
-        self.place = np.zeros(3)  # m, of the machine in the film, which free bodies are not fixed to
+        self.place = np.zeros(3)  # m, of the machine in the film, to which `qpos` moves free bodies
         self.ids, self.mounts, self.lowered = ids.tolist(), list[arrows.Mount](), 0.0
         self._start = models.initial_state(model, self.scenario)[0] if off_stage else model.qpos0
 

@@ -254,7 +254,7 @@ def restyle(model: mujoco.MjModel) -> None:
 
 
 def cut(machines: Sequence[mujoco.MjModel], points: np.ndarray, slides: np.ndarray, own: bool) -> float:
-    """Shorten columns, and rails along `slides`, (m, 3), to what moves, whose points are (m, 3) m, in all models.
+    """Shorten columns, and rails along `slides`, (k, 3), to what moves, whose points are (m, 3) m, in all models.
 
     The foot of a column and the posts at the ends of a rail come closer, and marks beyond are hidden. Columns are cut
     of the library's `own` machines. Returns how far the foot came up, m.
