@@ -6,13 +6,13 @@ RECORD has the columns t, theta, alpha, Vm of datos/cable_theta/pruebaincial_rea
 thesis that smc_mujoco/evidence/rigs/machines/quanser.py names (MIT); without it, an excerpt of every tenth sample. At
 -1 V the arm turns until it meets a stop (0.91 s) and comes back. Both parts are fitted, the way back from its measured
 place with free velocities, as the stop is not modelled. The falls are two numbers: 2.432 Hz, and a damping ratio of
-.0261, while the pendulum's swings are 8 to 25 degrees; here they are the means of the first periods of three falls,
+0.0261, while the pendulum's swings are 8 to 25 degrees; here they are the means of the first periods of three falls,
 which cover that range.
 
 The cable is a spring, and bristles that bend with the arm until they slip (LuGre without a Stribeck drop): it resists
 a turn of the arm as dry friction does, and a fall, in which the arm swings by 5 to 15 degrees, mostly as a spring.
 Other causes of the falls' small damping are tried beside it: no hysteresis, and an amplifier that brakes during falls.
-What a residual of one is was chosen, the arm's half of the pendulum's, whose residuals are larger in all fits.
+Residuals are in units that were chosen: the arm's is half of the pendulum's, whose residuals are larger in all fits.
 
 The equation is integrated by RK4 here and shares nothing with the suite.
 """

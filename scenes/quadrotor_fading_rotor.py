@@ -3,8 +3,8 @@
 At 1 s the front right rotor of a hovering Crazyflie loses 10, 20, 30 or 40 % of its thrust. Its largest is 0.12 N, and
 hovering takes 0.078 N of each, so that up to 35 % the others need not change: the rotor has only to turn faster.
 
-Look for: the lean and the sag that remain up to 30 %, except under the firmware's PID: no law knows of the loss, and it
-alone has an integral of the height's error; and at 40 % the end, because four rotors without reserve cannot hold
+Look for: how far aside and below the drone stays, as no law knows of the loss, and only the firmware's PID has an
+integral of the position's loop. Super-twisting falls at 30 %, all at 40 %: four rotors without reserve cannot hold
 attitude and height.
 """
 

@@ -13,8 +13,8 @@ proves only S -> 0. To first order, without friction, both joints come to rest i
     (1 - a L) p^3 + (c2 - a L c1) p^2 + a grav p + a c1 grav = 0,    L = 4 l/3 for cart_pole, -l for overhead_crane
 
 lie in the left half-plane (x + L q is a flat output: its second derivative is grav q). For a > 0 this means 0 < c1 < c2
-and a L < 1. The default gains give cart_pole a triple root at p = -2 1/s. u is singular at a g = -gq, for cart_pole at
-cos q = a L, 63 degrees; beyond this angle the pole falls.
+and a L < 1. The default gains bring the three roots of cart_pole near -2 1/s. u is singular at a g = -gq, for cart_pole
+at cos q = a L, 63 degrees; beyond this angle the pole falls.
 
 Your own model can use the law if its joint has the same sign: q > 0 leans a pole towards growing x, and swings a load
 the other way. If it does not, reverse the axis of the joint.
