@@ -4,7 +4,7 @@ All channels of a network start from the same state. x is not wrapped: a pendulu
 
 The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in the band while
 |e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2 + (v/V)^2 is below
-(0.2 %)^2, at a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
+(0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
 beginning, for 40 %, and those still undecided for the whole duration.
 - Early, a run converges if it is in the band throughout the last third of the run, and in the second half of this third
   it is near, or its largest squared distance is at least a tenth smaller than in the first. Near the reference the
