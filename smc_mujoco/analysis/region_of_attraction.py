@@ -7,11 +7,11 @@ The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the 
 (0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
 beginning, for 40 %, and those still undecided for the whole duration.
 - Early, a run converges if it is in the band throughout the last third of the run, and in the second half of this third
-  it is near, or its largest squared distance is at least a tenth smaller than in the first. Near the reference the
+  it is near, or its largest squared distance is a tenth smaller than in the first. Near the reference the
   distance need not decrease, because a law that switches leaves a ripple. If a run starts near, it must decrease,
   because a run that leaves slowly is near for long.
 - A run that failed does not converge. Early, nor does one that rests outside the band in that third: x, v and u change
-  by at most 1e-6 of X, V and u_max (of the largest |u|, if u has no bound).
+  by less than 1e-6 of X, V and u_max (of the largest |u|, if u has no bound).
 - At the end, a run converges if it is in the band throughout the last 20 % of the run, and in the second half of this
   part it is near, or its largest squared distance is at most 5 % larger than in the first. It does not converge if it
   is never in the band in that part, unless it still approaches: its largest squared distance falls by a tenth from each
