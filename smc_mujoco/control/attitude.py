@@ -106,11 +106,11 @@ def slide(y, c, K, rho):
 
 @njit(error_model="numpy")
 def steer(y, v, stiffness, damping, memory):
-    """Return the force for the acceleration v of the position's error, and how the attitude that it wants is missed.
+    """Return the force for the acceleration v of the position's error, and how far the body is off its attitude.
 
     Arguments are vectors (3,). After the force come the quaternion from the wanted attitude to the body's, and two
-    angular velocities in the axes of the body: of the body relative to the wanted attitude, and of the latter. In two
-    slots the memory keeps the filtered e' and r'' of the sample before, and whether there was one.
+    angular velocities in the axes of the body: the body's relative to the wanted attitude, and that attitude's own. In
+    two slots the memory keeps the filtered e' and r'' of the sample before, and whether there was one.
     """
     m, F, dF = y.M[0, 0], np.zeros(3), np.zeros(3)
     if memory[0, 1] == 0.0:

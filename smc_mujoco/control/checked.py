@@ -339,7 +339,7 @@ def _elsewhere() -> str:
 
 
 def _written(how: Any) -> Any:
-    """Return the function that numba wraps for an attribute."""
+    """Return the code of an attribute, out of numba's wrapper."""
     names = getattr(getattr(how, "__code__", None), "co_freevars", ())
     return how.__closure__[names.index("real_impl")].cell_contents if "real_impl" in names else how
 

@@ -4,8 +4,9 @@
 
 with H a Butterworth filter of second order of `cutoff` hertz, A what the law takes for the rotors, and force, wanted
 attitude and wd those of `geometric`. It needs J but no model of the torques that act: w' = A v + (1 - A H) d, with d
-the change that anything unknown makes, if A is right. So a constant torque leaves no error. With a wrong inertia c J in
-place of J, A H (1 - c) is small where A H is. A yaw torque of rotors that speed up, M + spin M', is taken into account:
+the change that anything unknown makes, if A is right. So a constant torque leaves no error. With c J in place of J, w'
+= (c A v + (1 - A H) d) / (1 - A H (1 - c)), which in slow motion, A H = 1, is still v. A yaw torque of rotors that
+speed up, M + spin M', is taken into account:
 
     dMz = (Jz (vz - wfz') + spin / dt dMz_) / (1 + spin / dt),    spin = Jr / (2 kf W c)
 

@@ -297,7 +297,7 @@ def recall(n, e, de, middle, reach, memory):
 
 @njit
 def room(e, de, middle, reach, memory):
-    """Return how far from its end the tabulated function is at least, by the distance from where it was recalled."""
+    """Return the least distance of the tabulated plan from its end, by how far the state is from the last `recall`."""
     if reach != memory[AT_REACH]:
         return -1.0
     spent = memory[MOST_E] * abs(e - memory[AT_E]) + memory[MOST_DE] * abs(de - memory[AT_DE])
