@@ -16,7 +16,7 @@ from smc_mujoco.simulation.run import poses
 from smc_mujoco.simulation.trace import Trace
 
 
-class Push(NamedTuple):
+class Drawn(NamedTuple):
     """The arrows of a machine at a time, s: each with its channel."""
 
     time: float
@@ -52,7 +52,7 @@ class Act:
         self.trace, self.colour, times = trace, colour, edges[1:]
         n = scene.first_channels(trace.scenario).plant.n
         sizes = [] if arms else arrows.scales_by_channel(trace, scales)[:n]
-        self.pushes, self.framing = (pushes(trace, some, sizes, colour) for some in (edges, grid))
+        self.drawn, self.framing = (drawn(trace, some, sizes, colour) for some in (edges, grid))
         hold = max(states.MIN_STATE_TIME, float(np.diff(edges).max()))
         self.states, self.told = (
             [None] * len(some) if arms else states.timeline(trace, some, hold) for some in (times, grid)
@@ -67,13 +67,13 @@ class Act:
         return self.trace.diverged_at is not None and time >= self.trace.diverged_at
 
 
-def pushes(trace: Trace, edges: np.ndarray, sizes: Sequence[arrows.Scale], colour: str) -> list[Push]:
+def drawn(trace: Trace, edges: np.ndarray, sizes: Sequence[arrows.Scale], colour: str) -> list[Drawn]:
     """Return the arrows of a machine in each frame between `edges`, s, for what acts on its channels."""
     acting = arrows.loads(trace, edges)
     if trace.scenario.plant.pose and sizes:
-        return [Push(float(time), arrows.flying(acting, k, sizes[0], colour)) for k, time in enumerate(edges[1:])]
+        return [Drawn(float(time), arrows.flying(acting, k, sizes[0], colour)) for k, time in enumerate(edges[1:])]
     return [
-        Push(float(time), [(i, a) for i, size in enumerate(sizes) for a in arrows.arrows(acting, k, i, size, colour)])
+        Drawn(float(time), [(i, a) for i, size in enumerate(sizes) for a in arrows.arrows(acting, k, i, size, colour)])
         for k, time in enumerate(edges[1:])
     ]
 

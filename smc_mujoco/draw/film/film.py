@@ -274,7 +274,7 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
                 lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
                 stage.aim(k, act.r[frame] if lost and not failed[k] else None)
                 stage.set_colour(k, style.FAILED if failed[k] else act.colour)
-                drawn += [] if failed[k] else [(k, *each) for each in act.pushes[frame].arrows]
+                drawn += [] if failed[k] else [(k, *each) for each in act.drawn[frame].arrows]
             picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame)

@@ -7,7 +7,7 @@ import numpy as np
 
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.draw.film import arrows, scene
-from smc_mujoco.draw.film.act import Motion, Push
+from smc_mujoco.draw.film.act import Drawn, Motion
 from smc_mujoco.draw.states import shapes
 from smc_mujoco.mechanisms.hardware.part import ROTOR, joint_ids
 from smc_mujoco.simulation import model as models
@@ -78,12 +78,12 @@ class Puppet:
         return pose
 
     def reach(
-        self, trace: Trace, motion: Motion | None = None, pushes: Sequence[Push] = (), cut: bool = False
+        self, trace: Trace, motion: Motion | None = None, drawn: Sequence[Drawn] = (), cut: bool = False
     ) -> np.ndarray:
         """Return what must be in the picture, (points, 3) m from the machine's place.
 
         These are the corners of the boxes of all that the channels move, over the poses of its trace and its reference,
-        and the arrows of `pushes` at `mounts`. Of other things only the part close to these counts, such as the upper
+        and the arrows `drawn` at `mounts`. Of other things only the part close to these counts, such as the upper
         half of a stand; with `cut`, rails and columns end there. Joints without a channel move as in `motion`, or stay
         where they start.
         """
@@ -106,7 +106,7 @@ class Puppet:
                 world = scene.boxes(self.shapes[now].model, data[now])
                 moved.append(world[links].reshape(-1, 3))
             others.append(world[~links & ~plane & ~fixed])
-        points = np.concatenate([*moved, *self.pushed(trace, motion, pushes, np.ptp(np.concatenate(moved), axis=0))])
+        points = np.concatenate([*moved, *self.lines(trace, motion, drawn, np.ptp(np.concatenate(moved), axis=0))])
         groups = model.geom_group.copy()
         if cut and len(points):
             axes = data[0].xaxis[self.ids][self.slides]
@@ -129,19 +129,17 @@ class Puppet:
         near[still, :, 2] = near[still, :, 2].clip(low[2] - STAND_SHARE * size, high[2] + STAND_SHARE * size)
         return np.concatenate([points, near.reshape(-1, 3)])
 
-    def pushed(
-        self, trace: Trace, motion: Motion | None, pushes: Sequence[Push], sides: np.ndarray
-    ) -> list[np.ndarray]:
-        """Return the lines of arrows on a machine, (m, 3) m each; those that bend suit the `sides` of what moves, m."""
+    def lines(self, trace: Trace, motion: Motion | None, drawn: Sequence[Drawn], sides: np.ndarray) -> list[np.ndarray]:
+        """Return the lines of arrows on a machine, (m, 3) m each; bent ones suit the `sides` of what moves, m."""
         radius, lines = arrows.BENT_SIZE * float(sides.max(initial=0.0)), []
         self.mounts = [mount._replace(radius=min(mount.radius, radius)) for mount in self.mounts]
         data = [mujoco.MjData(shape.model) for shape in self.shapes]
-        for time, drawn in pushes:
+        for time, some in drawn:
             now, sample = self.shape(time), min(int(np.searchsorted(trace.t, time - 1e-9)), len(trace.t) - 1)
             rest = None if motion is None else motion.at(time)
             data[now].qpos[:] = self.qpos(trace.x[sample, : self.shown], rest=rest)
             scene.forward(self.shapes[now].model, data[now])
-            found = (arrows.path(self.shapes[now].model, data[now], self.mounts[i], arrow) for i, arrow in drawn)
+            found = (arrows.path(self.shapes[now].model, data[now], self.mounts[i], arrow) for i, arrow in some)
             lines += [line for line, _ in filter(None, found)]
         return lines
 

@@ -57,11 +57,11 @@ class Stage:
         self.shown, self.is_users = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
         turn = scene.turn(scenarios[0], chosen)
         self.motions = [act.motion for act in acts] or [None] * len(traces)
-        pushes = [act.framing for act in acts] or [()] * len(traces)
+        drawn = [act.framing for act in acts] or [()] * len(traces)
         cut = scene.in_a_row(scenarios[0], turn)
         for puppet in self.puppets:
             puppet.mounts = arrows.mounts(puppet.scenario, puppet.ids, puppet.slides, puppet.rail, turn[:, 2])
-        runs = zip(self.puppets, traces, self.motions, pushes, strict=True)
+        runs = zip(self.puppets, traces, self.motions, drawn, strict=True)
         reaches = [puppet.reach(trace, motion, its, cut) for puppet, trace, motion, its in runs]
         where, seen, place = placed(self.puppets, reaches, turn, size, room, apart)
         for puppet, there in zip(self.puppets, where, strict=True):
@@ -87,7 +87,7 @@ class Stage:
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
             self.pose(k, traces[k].x[0, : self.shown[k]])
-        layers = [arrow.layer for its in pushes for push in its for _, arrow in push.arrows]
+        layers = [arrow.layer for its in drawn for one in its for _, arrow in one.arrows]
         most = arrows.MAX_BENT_SHARE * size[1] / (1.0 + arrows.BENT_DISTANCE * max(layers, default=0))  # px
         most *= camera.pixel(size) * float((place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2])  # m
         self.mounts = [
