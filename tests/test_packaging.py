@@ -16,8 +16,6 @@ from pathlib import Path
 
 import pytest
 
-from smc_mujoco.common import extras
-
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 README = (ROOT / "README.md").read_text("utf-8")
@@ -306,12 +304,6 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     assert {named(need) for need in tested} <= locked("requirements.lock", "requirements-test.lock")
 
 
-def test_an_extra_that_pip_cannot_install_here_names_a_python_on_which_it_can(monkeypatch):
-    monkeypatch.setattr(extras, "LAST_PYTHON", {"dm": (3, 10)})
-    assert extras.cure("dm").startswith("take Python 3.10, ")
-    assert extras.cure("rl") == "pip install 'smc-mujoco[rl]'"
-
-
 def test_every_extra_is_named_where_it_is_missing_and_no_other():
     code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "smc_mujoco").rglob("*.py"))
     assert set(re.findall(r"""\b(?:extra|missing|cure)\(["'](\w+)""", code)) == set(EXTRAS) - {"all"}
@@ -341,7 +333,6 @@ def imposter(folder: Path, script: str) -> str:
     ("script", "sentence"),
     [
         ("echo 3.8", "needs Python 3.11 or newer, but"),
-        ("echo 2.7", "needs Python 3.11 or newer, but"),
         ("exit 127", "needs Python 3.11 or newer and cannot run"),
         ('case "$2" in *ensurepip*) exit 1;; esac; echo 3.11', "has no venv module"),
     ],

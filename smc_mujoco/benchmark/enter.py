@@ -70,7 +70,10 @@ def enter(
         report, marks = _all_runs(entry.name, order, first, progress)
         content = made.read_bytes()
         if verify:
-            _verify(table, content, folder)
+            with reading(table, "table of runs", "enter the law first, without verify") as file:
+                same = file.read_bytes() == content
+            if not same:
+                raise ScenarioError(f"{table} is not what {folder} gives here: enter it again, with the same versions")
             return target
         target.mkdir(parents=True, exist_ok=True)
         with replacing(table) as file:
@@ -145,14 +148,6 @@ def _all_runs(
             if where := entrant.same(once, again, order["problems"]):
                 marks.append(f"it answers {where} otherwise after other runs: it keeps something between runs")
     return report, marks
-
-
-def _verify(table: Path, content: bytes, folder: str | os.PathLike[str]) -> None:
-    """Raise ScenarioError if a table is not what an entry gives."""
-    with reading(table, "table of runs", "enter the law first, without verify") as file:
-        same = file.read_bytes() == content
-    if not same:
-        raise ScenarioError(f"{table} is not what {folder} gives here: enter it again, with the same versions")
 
 
 def _better_on_visible(visible: runs.Runs, hidden: runs.Runs) -> list[str]:

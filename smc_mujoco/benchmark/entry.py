@@ -47,23 +47,14 @@ DIVISIONS = {
 }
 EVERYWHERE = "all"  # the set of gains of the division "one set"
 MODULES = {"math", "numpy", "smc_mujoco"}  # that a checked law's file may import
-BUILTINS = {
-    *(
-        "abs", "all", "any", "bool", "dict", "divmod", "enumerate", "float", "int", "isinstance", "len", "list", "max",
-        "min",
-    ),
-    *("pow", "range", "reversed", "round", "set", "sorted", "str", "sum", "tuple", "zip"),
-    *("ArithmeticError", "ValueError", "ZeroDivisionError", "__name__"),
-}  # fmt: skip
+BUILTIN_NAMES = """abs all any bool dict divmod enumerate float int isinstance len list max min pow range reversed round
+set sorted str sum tuple zip ArithmeticError ValueError ZeroDivisionError __name__"""
+BUILTINS = {*BUILTIN_NAMES.split()}
 FRAMES = {"gi_frame", "cr_frame", "ag_frame", "tb_frame"}  # from which all names of Python can be reached
 WRITERS = {"tofile", "dump"}  # of arrays
-NUMPY_NAMES = {
-    *(
-        "arange", "argmax", "argmin", "array", "asarray", "clip", "cross", "diag", "dot", "empty", "eye", "float64",
-        "full",
-    ),
-    *("interp", "linspace", "max", "min", "ndarray", "ones", "sum", "trapezoid", "zeros"),
-}  # fmt: skip
+OF_NUMPY = """arange argmax argmin array asarray clip cross diag dot empty eye float64 full interp linspace max min
+ndarray ones sum trapezoid zeros"""
+NUMPY_NAMES = {*OF_NUMPY.split()}
 LIBRARY_NAMES = {"law_function", "Measurement", "surface_function", "estimator_function"}  # that it may take from smc
 
 
@@ -155,19 +146,16 @@ def _of_library(name: str) -> Entry:
 
 def _fields(about: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of an Entry that a file about it gives."""
-    find_all = {*TEXTS, "authors", "division", "gains"}
     for name in about:
-        find("line of entry.toml", name, dict.fromkeys(sorted(find_all)))
+        find("line of entry.toml", name, dict.fromkeys((*TEXTS, "authors", "division", "gains")))
     texts = {name: _text(name, about.get(name)) for name in TEXTS}
     authors = about.get("authors")
     if not isinstance(authors, list) or not authors:
         raise ScenarioError(f'authors is {shown(authors)}: give names, as authors = ["A. Author"]')
-    division = find("division", about.get("division"), DIVISIONS)
-    return texts | {
-        "authors": tuple(_text("an author", author) for author in authors),
-        "division": about["division"],
-        "gains": _gains(about.get("gains", {}), about["division"] if division else ""),
-    }
+    find("division", about.get("division"), DIVISIONS)
+    names = tuple(_text("an author", author) for author in authors)
+    gains = _gains(about.get("gains", {}), about["division"])
+    return texts | {"authors": names, "division": about["division"], "gains": gains}
 
 
 def _text(name: str, value: object) -> str:

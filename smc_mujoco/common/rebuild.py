@@ -24,10 +24,7 @@ class Names(NamedTuple):
 
 def rebuild(function: Any, finish: Callable[[Any], Any], copies: dict[Callable, Any] | None = None) -> Any:
     """Return a copy of a function that calls copies of its compiled helpers."""
-    return _rebuild(getattr(function, "py_func", function), finish, {} if copies is None else copies)
-
-
-def _rebuild(function: Any, finish: Callable, copies: dict) -> Any:
+    function, copies = getattr(function, "py_func", function), {} if copies is None else copies
     if not isinstance(function, FunctionType):
         return finish(function)
     if function not in copies and not _calls_compiled(function):
@@ -47,7 +44,7 @@ def _rebuild(function: Any, finish: Callable, copies: dict) -> Any:
 def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
     """Return the copy of a compiled function, or of a module with such attributes among `names`; else the value."""
     if isinstance(value, Dispatcher):
-        return _rebuild(value.py_func, finish, copies)
+        return rebuild(value, finish, copies)
     if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():

@@ -73,13 +73,6 @@ def test_numbers_that_json_lacks_are_words():
 # every file of ours
 
 
-def test_scenarios():
-    scenario = smc.Scenario(plant="duffing", law=smc.law("super_twisting"))
-    text = to_json(serialise.describe(scenario))
-    strict(text)
-    assert serialise.restore(from_json(text)).law.gains["w_max"] == math.inf
-
-
 def margin(value: float, searched: float) -> Margin:
     return Margin(
         plant="duffing",

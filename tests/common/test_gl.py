@@ -50,21 +50,10 @@ def report(hidden: tuple[str, ...] = (), first: str = "", **variables: str) -> t
 
 
 @pytest.fixture(scope="module")
-def default() -> tuple[str, str, str]:
-    return report()
-
-
-def test_unset_takes_a_backend_without_a_word(default):
-    backend, note, _ = default
-    assert backend in ("egl", "osmesa", "disabled")
-    assert note == "None"
-
-
-def test_unset_renders_where_egl_does(default):
-    backend, _, missing = default
-    if backend != "egl":
-        pytest.skip("no libEGL here")
-    assert missing == "None" or missing.startswith("no film: egl does not render")
+def renders() -> None:
+    """Skip where pictures cannot be rendered."""
+    if (missing := report()[2]) != "None":
+        pytest.skip(missing)
 
 
 def test_without_libraries_all_but_films_works():
@@ -73,12 +62,6 @@ def test_without_libraries_all_but_films_works():
     assert note == "MUJOCO_GL=osmesa does not load here: films are off"
     assert "apt-get install libegl1 libgl1" in missing
     assert "MUJOCO_GL=osmesa" in missing
-
-
-def test_a_display_that_is_not_there_is_named():
-    backend, note, missing = report(MUJOCO_GL="glfw")
-    assert (backend, note) == ("glfw", "None")
-    assert missing.startswith("no film: MuJoCo cannot open a window")
 
 
 def test_choose_gl_sets_nothing_once_mujoco_is_imported():
@@ -206,22 +189,19 @@ threading.keep = gl.renderer(model)  # closed by nobody, and freed after MuJoCo'
 """
 
 
-def test_a_renderer_works_where_nothing_was_chosen(default):
-    if default[2] != "None":
-        pytest.skip(default[2])
+@pytest.mark.usefixtures("renders")
+def test_a_renderer_works_where_nothing_was_chosen():
     assert fresh(PICTURE) == ""
 
 
-def test_a_renderer_works_where_mujoco_was_imported_without_one(default):
-    if default[2] != "None":
-        pytest.skip(default[2])
+@pytest.mark.usefixtures("renders")
+def test_a_renderer_works_where_mujoco_was_imported_without_one():
     first = "import os, mujoco; del os.environ['MUJOCO_GL']\n"
     assert fresh(first + PICTURE, MUJOCO_GL="disabled") == ""
 
 
-def test_a_renderer_that_fails_leaves_nothing_in_mujoco(default):
-    if default[2] != "None":
-        pytest.skip(default[2])
+@pytest.mark.usefixtures("renders")
+def test_a_renderer_that_fails_leaves_nothing_in_mujoco():
     code = PICTURE.replace("renderer = gl.renderer(model, 48, 64)", WRONG)
     assert fresh(code.partition("renderer.update")[0] + "assert dict(vars(module)) == held") == ""
 

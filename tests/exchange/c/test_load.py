@@ -7,7 +7,6 @@ import re
 import stat
 import subprocess
 import sys
-import time
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -308,7 +307,6 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     ("body", "words"),
     [
         ("out[0] = *(volatile int *)(y->t > 0.1 ? 16 : (long)&gains[0]);", "smc_law died of SIGSEGV (Seg"),
-        ("volatile int on = 1; while (on) pause(); out[0] = 0;", "smc_law did not end within 3 s"),
         ("out[0] = y->e / (y->t - y->t);", "smc_law returned u = inf, s = 1.00"),
         ("out[0] = 0.0; return 4;", "smc_law returned 4 at t = 0, e = 1"),
         ("memory[8] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
@@ -325,13 +323,12 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     ],
 )  # fmt: skip
 def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
-    timeout = 3.0 if "did not end" in words else 30.0
     with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
         smc.exchange.law_from_c(
             file("#define SMC_REAL float\n" * ("of floats" in body) + law(body, KEPT)),
             gains={"k": 3.0},
             isolate=True,
-            timeout=timeout,
+            timeout=30.0,
         )
     assert "\n" not in str(error.value)
 
@@ -477,18 +474,6 @@ def test_what_a_set_up_prints_is_not_kept(file):
         assert tracemalloc.get_traced_memory()[1] < 1e7
     finally:
         tracemalloc.stop()
-
-
-def test_what_a_command_leaves_behind_is_ended_too(tmp_path):
-    told = tmp_path / "pid"
-    with pytest.raises(build.TimedOut):
-        build.timed(["sh", "-c", f"sleep 60 & echo $! > '{told}'"], 0.3)
-    for _ in range(200):  # until the process that inherits orphans has noticed
-        state = Path(f"/proc/{told.read_text().strip()}/stat")
-        if not state.exists() or state.read_text().rpartition(")")[2].split()[0] == "Z":
-            return
-        time.sleep(0.01)
-    pytest.fail("it still runs")
 
 
 def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
