@@ -187,9 +187,6 @@ def test_steady_metrics_of_a_sine_about_an_offset():
     assert m.ripple(trace) == pytest.approx(0.1, rel=1e-6)
 
 
-# Integrals
-
-
 # The command
 
 
