@@ -104,33 +104,25 @@ def _apply_to_joints(sim, data, stage):
 
 @njit(error_model="numpy", inline="always")
 def _late(sim, k):
-    """Return by how many physics steps sample k is late."""
+    """Return by how many physics steps sample k is late; -1 if it does not run."""
     if k == 0 or k == sim.samples - 1:
         return 0
+    if sim.missed != 0.0 and philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed:
+        return -1
     if sim.pause != 0:
-        return max(0, after_pauses(k, sim.steps, sim.pause, sim.pause_samples, sim.pause_phase))
+        return after_pauses(k, sim.steps, sim.pause, sim.pause_samples, sim.pause_phase)
     if sim.jitter == 0:
         return 0
     return int(philox.uniform(sim.seed, 0, philox.JITTER, k) * (sim.jitter + 1))
 
 
 @njit(error_model="numpy", inline="always")
-def _missed(sim, k):
-    """Return whether sample k does not run."""
-    if k == 0 or k == sim.samples - 1:
-        return False
-    if sim.pause != 0 and after_pauses(k, sim.steps, sim.pause, sim.pause_samples, sim.pause_phase) < 0:
-        return True
-    return sim.missed != 0.0 and philox.uniform(sim.seed, 0, philox.MISSED, k) < sim.missed
-
-
-@njit(error_model="numpy", inline="always")
 def _sample(address, sim, data, k, within):
     """Run the law at sample k, if the sample comes in this physics step, `within` steps into its period."""
-    late, missed = _late(sim, k), _missed(sim, k)
-    if within == 0 and (late != 0 or missed):
+    late = _late(sim, k)
+    if within == 0 and late != 0:
         _repeat_command(sim, k)
-    if within != late or missed:
+    if within != late:
         return record.FINE
     t = k * sim.period + late * sim.step
     failure = _measure(address, sim, data, k, t)
@@ -412,7 +404,7 @@ def _actuate(sim, data, step):
             state_at(sim.states, i).delayed = buffer[i]
             if sim.has_drives == 0 and i < (sim.driven if sim.mixer == 0 else sim.actuators):
                 data.ctrl[channel_at(sim.channels, i).ctrl] = sim.scale * buffer[i]
-            if sim.motors != 0 and i < sim.driven and not _missed(sim, past // sim.steps):
+            if sim.motors != 0 and i < sim.driven:
                 _command_stepper(_motor_at(sim, i), sim.stepper, buffer[i], step * sim.step)
     if sim.motors != 0:
         for i in range(sim.driven):

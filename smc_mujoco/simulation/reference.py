@@ -182,7 +182,7 @@ class Loop:
         k, within = divmod(step, self.scenario.steps)
         if within == 0:
             self.commands.append(self.commands[-1] if k else np.zeros(self.scenario.plant.n))
-        if within == self.late(k) and not self.missed(k):
+        if within == self.late(k):
             t = k * self.scenario.control_period + within * self.scenario.physics_step
             at = self.channels
             if self.scenario.model == "true":
@@ -195,7 +195,7 @@ class Loop:
             self.delayed = self.commands[past // self.scenario.steps]
         if self.motors:
             sampled = past // self.scenario.steps if past >= 0 else 0
-            arrives = past >= 0 and past % self.scenario.steps == self.late(sampled) and not self.missed(sampled)
+            arrives = past >= 0 and past % self.scenario.steps == self.late(sampled)
             for motor, u in zip(self.motors, self.delayed, strict=False):
                 motor.step(float(u) if arrives else None, step, self.scenario.physics_step)
             return
@@ -226,25 +226,17 @@ class Loop:
             self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
 
     def late(self, k: int) -> int:
-        """Return by how many physics steps sample k is late."""
-        steps = self.scenario.clock.jitter_steps(self.scenario.physics_step)
+        """Return by how many physics steps sample k is late; -1 if it does not run."""
+        clock, seed = self.scenario.clock, self.scenario.noise_seed
         if k in (0, self.scenario.samples):
             return 0
+        if clock.missed and philox.random_words(seed, 0, philox.MISSED, k)[0] * 2.0**-53 < clock.missed:
+            return -1
         if self.loops is not None:
-            return self.loops.get(k, 0)
-        if not steps:
+            return self.loops.get(k, -1)
+        if not (steps := clock.jitter_steps(self.scenario.physics_step)):
             return 0
-        return int(philox.random_words(self.scenario.noise_seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
-
-    def missed(self, k: int) -> bool:
-        """Return whether sample k does not run."""
-        if k in (0, self.scenario.samples):
-            return False
-        if self.loops is not None and k not in self.loops:
-            return True
-        if not (probability := self.scenario.clock.missed):
-            return False
-        return philox.random_words(self.scenario.noise_seed, 0, philox.MISSED, k)[0] * 2.0**-53 < probability
+        return int(philox.random_words(seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
 
     def with_pauses(self) -> dict[int, int] | None:
         """Return the samples of a loop with pauses, and by how many physics steps each is late; None without pauses."""

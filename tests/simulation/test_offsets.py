@@ -78,35 +78,6 @@ def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
         callback.checked_offsets(*live)
 
 
-def test_a_field_less_is_refused(monkeypatch, live):
-    doctored(monkeypatch, "mjData", lambda fields: fields[1:])
-    with pytest.raises(callback.LayoutError, match=r"does not have mjData\.qpos at byte"):
-        callback.checked_offsets(*live)
-
-
-def test_two_arrays_that_change_places_are_refused(monkeypatch, live):
-    def swap(fields):
-        i, j = position(fields, "qpos"), position(fields, "qvel")
-        fields[i], fields[j] = fields[j], fields[i]
-        return fields
-
-    doctored(monkeypatch, "mjData", swap)
-    with pytest.raises(callback.LayoutError, match="qpos"):
-        callback.checked_offsets(*live)
-
-
-def test_arrays_in_another_order_are_refused(monkeypatch, live):
-    """Also where the last field that we read comes first, or one is gone."""
-
-    def turn(fields):
-        fields.insert(0, fields.pop(position(fields, "sensordata")))
-        return fields
-
-    doctored(monkeypatch, "mjData", turn)
-    with pytest.raises(callback.LayoutError):
-        callback.checked_offsets(*live)
-
-
 @pytest.mark.parametrize("name", ["qpos", "sensordata"])
 def test_an_array_that_is_gone_is_refused(monkeypatch, live, name):
     def remove(fields):

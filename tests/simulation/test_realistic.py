@@ -7,7 +7,6 @@ import dataclasses
 import functools
 import itertools
 import math
-import pickle
 
 import mujoco
 import numpy as np
@@ -528,12 +527,6 @@ def test_the_reaction_of_a_sliding_joint_is_its_friction(name):
     np.testing.assert_allclose(fast.reaction[1:], -0.3, rtol=1e-3)
 
 
-def test_two_frictions_react_together():
-    friction = (smc.Coulomb(0.3), smc.hardware.LuGre(0.2, 0.2, 0.1))
-    fast = smc.run(scenario(friction=friction, v0=2.0, x0=0.3, duration=0.05))
-    np.testing.assert_allclose(fast.reaction[20:], -0.5, rtol=2e-3)
-
-
 def test_nothing_reacts_on_an_ideal_plant():
     for name in smc.paper.GAINS:
         trace = smc.run(scenario(name))
@@ -607,13 +600,6 @@ def test_forces_are_means_over_the_control_period():
 
 
 # what is refused
-
-
-def test_a_csv_with_gaps_or_nan_is_refused_in_one_sentence(tmp_path, refused):
-    for text in ("t,d\n0,1\n1,\n2,3\n", "t,d\n0,1\n1,nan\n2,3\n", "t,d\n0,1\n1,1\n2,1\n9,1\n"):
-        path = tmp_path / "force.csv"
-        path.write_text(text)
-        refused(lambda path=path: smc.signals.TimeSeries.from_csv(path))
 
 
 def test_what_does_not_fit_is_refused_in_one_sentence(refused):
@@ -722,15 +708,6 @@ def test_parameters_that_no_springs_have_are_refused_before_anything_runs(fields
         pytest.fail("was not refused")
 
 
-def test_the_plain_loop_refuses_a_start_inside_too(refused):
-    @smc.law_function
-    def slow(y, gains, memory):
-        return float(str(y.x)), 0.0  # numba makes no number of a text
-
-    inside = smc.Scenario(plant="duffing", law=slow(), duration=0.01, contact="stops", x0=1.9)
-    refused(lambda: smc.run(inside))
-
-
 # scenarios as values
 
 
@@ -813,15 +790,6 @@ def test_a_scenario_keeps_none_and_resolves_to_the_default():
     assert hash(s) == hash(explicit)
 
 
-def test_a_realistic_scenario_survives_a_pickle_and_stays_refillable():
-    s = scenario(**EVERYTHING)
-    again = pickle.loads(pickle.dumps(s))
-    assert again == s
-    assert hash(again) == hash(s)
-    ideal = {"friction": (), "actuator": (), "contact": "none", "mechanism": "equation"}
-    assert dataclasses.replace(again, **ideal, sensor=None, input_delay=0.0).resolved.integrator == "RK4"
-
-
 @PLANTS
 def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
     offers = smc.plant(name)
@@ -838,11 +806,6 @@ def test_a_realistic_trace_comes_back_from_its_file(name, tmp_path):
 def test_a_loaded_scenario_finds_its_defaults_again(tmp_path):
     loaded = smc.load(smc.run(scenario(friction=LUGRE)).save(tmp_path / "a.npz")).scenario
     assert dataclasses.replace(loaded, friction=()) == scenario()
-
-
-def test_parts_that_differ_make_scenarios_that_differ():
-    every = [scenario(**fields) for fields in PARTS.values()]
-    assert len(set(every)) == len(every)
 
 
 def test_an_order_of_drive_and_play_that_says_the_same_is_the_same():

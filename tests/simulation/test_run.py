@@ -4,7 +4,6 @@
 import dataclasses
 import json
 import math
-import os
 import signal
 import sys
 import time
@@ -237,15 +236,6 @@ def test_a_law_that_returns_the_wrong_thing_is_named(name, capfd):
     assert capfd.readouterr().err == ""
 
 
-def test_a_generator_is_no_law():
-    def generates(y, gains, memory):
-        yield 0.0
-        yield 0.0
-
-    trace = plainly(scenario(made(generates)))
-    assert trace.failure is not None or np.all(trace.u == 0.0)
-
-
 def changes_its_gains(y, gains, memory):
     """Breaks its contract."""
     gains.k = 5.0
@@ -351,12 +341,6 @@ def test_a_signal_that_fails_fails_the_run_and_is_timed(signal, field):
     assert trace.diverged_at in (pytest.approx(0.004), pytest.approx(0.005))  # some stage of a step, or the next
 
 
-@pytest.mark.parametrize("law", ["classical", "none"])
-def test_a_disturbance_that_is_nan_from_the_start_fails_the_run_at_the_start(law):
-    failed(smc.run(scenario(law, disturbance=Rotten(-1.0))), 0.0)
-    failed(smc.run(scenario(law, disturbance=[Rotten(-1.0), smc.Constant(1.0)], control_period=0.01)), 0.0)
-
-
 @pytest.mark.parametrize("field", ["reference", "disturbance"])
 def test_a_signal_of_the_wrong_shape_fails_the_run(field):
     failed(plainly(scenario("none", **{field: Flat()})), 0.0, "Flat")
@@ -435,11 +419,6 @@ def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_calle
 
     with pytest.warns(smc.errors.PlainLoopWarning, match="loaded.*json"):
         smc.run(scenario(velocity=loaded()))
-
-
-def test_a_law_from_a_file_without_its_code_is_refused(tmp_path, refused):
-    smc.run(scenario(made(lambda y, gains, memory: (0.0, 0.0)))).save(tmp_path / "a.npz")
-    refused(lambda: smc.run(smc.load(tmp_path / "a.npz").scenario))
 
 
 def test_an_estimator_from_a_file_without_its_code_is_refused(tmp_path, refused):
@@ -543,21 +522,3 @@ def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     assert mujoco.get_mjcb_control() is None
     assert mujoco.get_mju_user_warning() is handler
     assert smc.run(scenario()).diverged_at is None
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
-def test_scenarios_travel_to_another_process(tmp_path):
-    code = """
-import multiprocessing, smc_mujoco as smc
-if __name__ == "__main__":
-    one = smc.Scenario(plant="duffing", law=smc.law("classical", k=2.0), duration=0.02, noise=smc.Noise(0.1))
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        trace = pool.apply(smc.run, (one,))
-    assert trace.scenario == one
-    assert (trace.x == smc.run(one).x).all()
-    assert not trace.x.flags.writeable
-    print("done")
-"""
-    done = python("-c", code, folder=tmp_path)
-    assert done.stderr == ""
-    assert done.stdout == "done\n"

@@ -676,18 +676,6 @@ def test_names_that_make_the_same_file_are_refused(refused):
 
 
 @dataclasses.dataclass(frozen=True)
-class Ramp(smc.Signal):
-    """A user's signal."""
-
-    slope: float = 0.1
-
-    @staticmethod
-    def value(t, p):
-        """A ramp."""
-        return p.slope * t, p.slope, 0.0
-
-
-@dataclasses.dataclass(frozen=True)
 class Sine(smc.Signal):
     """A user's signal that is named as one of the library, with other parameters and another shape."""
 
@@ -699,14 +687,6 @@ class Sine(smc.Signal):
     def value(t, p):
         """No sine."""
         return p.amplitude, 0.0, 0.0
-
-
-@pytest.mark.parametrize(("field", "kind"), [("reference", Ramp(0.3)), ("disturbance", Sine(0.2, 5.0))])
-def test_a_trace_of_a_signal_of_one_s_own_comes_back_as_it_was_where_its_class_is(field, kind, tmp_path):
-    trace = smc.run(scenario(**{field: kind}))
-    loaded = smc.load(trace.save(tmp_path / "a.npz"))
-    assert loaded.scenario == trace.scenario
-    assert same(smc.run(loaded.scenario), trace)
 
 
 def test_a_trace_of_a_signal_that_is_gone_is_refused_with_the_name_of_its_module(tmp_path, monkeypatch, refused):
@@ -782,11 +762,6 @@ MECHANISM = """
 
 def mechanism(drive: str, joint: str = "slide", axis: str = "1 0 0") -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(MECHANISM.format(drive=drive, joint=joint, axis=axis))
-
-
-@pytest.mark.parametrize("joint", ["slide", "hinge"])
-def test_a_motor_of_gear_1_on_a_joint_makes_a_channel(joint):
-    assert channels(mechanism('joint="j"', joint)).shape == (1,)
 
 
 @pytest.mark.parametrize(

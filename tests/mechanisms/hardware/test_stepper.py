@@ -221,9 +221,9 @@ def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
     one = scenario(dataclasses.replace(MOTOR, steps=math.inf), SLOW, clock=smc.Clock(missed=0.3), duration=0.5)
     loop, speed, last = looped(one), 0.0, 0.0
     for k, t in enumerate(PERIOD * np.arange(one.samples)):
-        if not loop.missed(k):
+        if loop.late(k) >= 0:
             speed, last = speed + loop.log["u"][k, 0] * (t - last), t
-    assert 10 < sum(loop.missed(k) for k in range(one.samples)) < 50
+    assert 10 < sum(loop.late(k) < 0 for k in range(one.samples)) < 50
     assert loop.motors[0].state.speed == pytest.approx(speed, rel=1e-12)
 
 
