@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from smc_mujoco.analysis.apart import MAX_CHANGE
 from smc_mujoco.analysis.chattering import predict
 from smc_mujoco.analysis.step_halving import step_halving
 from smc_mujoco.draw import page as pages
@@ -79,7 +78,7 @@ def amplitudes(
         handles.append(Line2D([], [], color=style.MUTED, label="predicted"))
         handles.append(Line2D([], [], color=style.MUTED, marker="o", lw=0, label="run"))
         if hollow:
-            label = f"run that half the step changes by > {100 * MAX_CHANGE:g} %"
+            label = "run that half the step or a nudged start changes"
             handles.append(Line2D([], [], color=style.PAPER, mec=style.MUTED, marker="o", lw=0, label=label))
         unit = next(iter(runs.values()))[0].scenario.plant.unit
         ax.set(xscale="log", yscale="log", xlabel="lag of the actuator (ms)", ylabel=f"amplitude of s ({unit}/s)")
