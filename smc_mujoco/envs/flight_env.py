@@ -62,7 +62,7 @@ class FlightEnv(PlantEnv):
         with callback.installed():
             self.batch = ScenarioBatch([prepare(start)], threads=1)
         self.memory = state.view(self.batch.packed[0].numbers, int(self.batch.records["law"]["memory"][0]), (len(x0),))
-        self.sample = 0
+        self.episodes, self.sample = self.episodes + 1, 0
         self.read_state(data)
 
     def advance(self, action: Any) -> None:

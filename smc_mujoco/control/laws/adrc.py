@@ -9,7 +9,7 @@ the law is a PID controller with a filter of second order:
     u = -(wc^2 w^3 + (3 wc^2 w^2 + 2 wc w^3) p + (3 w wc^2 + 6 wc w^2 + w^3) p^2) / (b p (p^2 + (3 w + 2 wc) p + 3 w^2
         + 6 w wc + wc^2)) e
 
-with p = d/dt. On e'' = g u it is stable for 0.24 < g / b < 4.1 if w = 2 wc, and for 0.11 < g / b < 6.2 if w = 10 wc;
+with p = d/dt. On e'' = g u it is stable for 0.245 < g / b < 4.05 if w = 2 wc, and for 0.11 < g / b < 6.2 if w = 10 wc;
 a delay times wc must stay below 0.39 and 0.19. The observer uses u after saturation, so z3 does not wind up. It is
 discretised exactly for u constant over the period, with all poles at exp(-w dt). It needs no rate but at the first
 sample. With the model b = g, and f and r'' are known to the observer and fed forward. `extended_state` has this
