@@ -108,12 +108,6 @@ class Store:
             if (part := self._read(path)) is not None:
                 yield from part.take(indices).to_pylist()
 
-    def row(self, name: str) -> dict[str, Any]:
-        """Return the row of a finished run in its part."""
-        path, i = self.where[name]
-        part = self._read(path)
-        return {} if part is None else part.slice(i, 1).to_pylist()[0]
-
     def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
         """Write the table of these finished runs, in this order.
 
