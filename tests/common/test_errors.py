@@ -135,7 +135,8 @@ def test_what_is_no_mapping_is_refused_in_a_sentence(value):
 def test_a_frozen_mapping_does_not_change():
     values = frozen({"a": 1})
     changes = (lambda: values.update(b=2), values.clear, values.popitem, lambda: values.pop("a"))
-    for change in (*changes, lambda: values.setdefault("b", 2), lambda: values.__setitem__("a", 2)):
+    changes += (lambda: values.setdefault("b", 2), lambda: values.__setitem__("a", 2))
+    for change in (*changes, lambda: values.__delitem__("a"), lambda: values.__ior__({"a": 2})):
         with pytest.raises(TypeError, match=r"^a checked mapping does not change: make a new one$"):
             change()
     assert values == {"a": 1}

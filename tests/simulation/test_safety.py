@@ -248,14 +248,6 @@ def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(fu
 # (d) signs
 
 STUDIED = list(smc.paper.GAINS["duffing"])  # the other laws' signs are tested with their theorems
-TURNING = {"k", "k1", "k2", "gamma", "c", "leak", "deadzone", "k0", "lam", "phi", "w_max"}
-# observer_free holds a plant that has a spring for some negative k1 (lam k1 > -K), so it may have one
-SIGNED = [
-    (name, gain)
-    for name in STUDIED
-    for gain in catalogue()[name].defaults
-    if gain in TURNING and (name, gain) != ("observer_free", "k1")
-]
 
 
 def seen(e: float, de: float, dt: float = 1e-3) -> Measurement:
@@ -265,16 +257,6 @@ def seen(e: float, de: float, dt: float = 1e-3) -> Measurement:
 
 def record(gains) -> types.SimpleNamespace:
     return types.SimpleNamespace(**gains)
-
-
-def test_every_gain_of_the_study_is_among_these():
-    assert {gain for name in STUDIED for gain in catalogue()[name].defaults} <= TURNING
-
-
-def test_a_negative_gain_that_would_turn_a_law_round_is_refused():
-    for (name, gain), value in zip(SIGNED, itertools.cycle([-1.0, -1e-300, -1e9])):
-        with pytest.raises(smc.ScenarioError, match=f"{name}'s {gain} is -"):
-            smc.law(name, **{gain: value})
 
 
 @pytest.mark.parametrize("name", STUDIED)
@@ -713,22 +695,6 @@ MAPPINGS = {
     "factors": lambda s: s.jump.factors,
     "parameters": lambda s: s.plant.parameters,
 }
-CHANGES = {
-    "set": lambda m, key: m.__setitem__(key, -1.0), "new": lambda m, key: m.__setitem__("new", -1.0),
-    "delete": lambda m, key: m.__delitem__(key), "update": lambda m, key: m.update({key: -1.0}),
-    "or": lambda m, key: m.__ior__({key: -1.0}), "setdefault": lambda m, key: m.setdefault("new", -1.0),
-    "pop": lambda m, key: m.pop(key), "popitem": lambda m, key: m.popitem(), "clear": lambda m, key: m.clear(),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("mapping", MAPPINGS)
-def test_a_mapping_that_was_checked_cannot_be_changed(mapping):
-    held = MAPPINGS[mapping](WHOLE)
-    before = dict(held)
-    for change in CHANGES.values():
-        with pytest.raises(TypeError):
-            change(held, next(iter(held)))
-        assert dict(held) == before
 
 
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))])
