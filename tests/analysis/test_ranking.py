@@ -803,6 +803,7 @@ def test_positions_are_told_apart_as_far_as_the_sensor_of_the_condition_resolves
     )
     assert cells.floor(noisy, "overshoot") == pytest.approx(100 * 0.02 / 1.5)
     assert cells.floor(noisy, "settling_time") == 1e-3  # s, a control period
+    assert cells.floor(paper.scenario("duffing", "none", changes={"x0": 0.0}), "overshoot") == 0.0
     assert cells.floor(noisy, "ultimate_bound", eps=0.0) == 0.02
     high = smc.Scenario(plant="quadrotor", law="none", x0=(0.3, 0.0, 1.1, 0.0, 0.0, 0.2))
     assert cells.floor(high, "ultimate_bound") == pytest.approx(3e-5)  # of the way to rest, which is at 1 m

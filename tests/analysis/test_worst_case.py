@@ -268,6 +268,8 @@ def test_bad_values_get_a_sentence(refused):
         lambda: smc.worst_case(scenario(), within=smc.Uncertainty(friction_scale=(0, 2))),
     ):
         refused(make)
+    with pytest.raises(smc.ScenarioError, match=r"\b0\.5\b"):  # s that are left of the run
+        smc.worst_case(scenario(input_delay=1.5), within=smc.Uncertainty(delay=(0.0, 1.0)))
 
 
 @pytest.mark.parametrize(("plant", "force", "length"), [("duffing", "N", "m"), ("inverted_pendulum", "N m", "rad")])

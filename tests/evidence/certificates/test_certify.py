@@ -37,6 +37,7 @@ KEPT = {
     ("van_der_pol", "observer_free"): {"lam": 6.0, "k1": 1.992},
     ("inverted_pendulum", "classical"): {"k": 1.523, "c": 15.36},
     ("duffing", "terminal"): {"k": 1.848, "b": 2.288, "bound": 0.02173},
+    ("duffing", "pid"): {"kp": 5.0, "ki": 0.0, "kd": 3.0},
     ("inverted_pendulum", "super_twisting"): {"k1": 2.025, "k2": 8.678, "c": 9.658},
 }
 
@@ -494,6 +495,7 @@ OTHERS = {
     "another L": ("duffing", "super_twisting", put("parts", TWISTING, "L", change=times(1.2))),
     "a negative bound of d'": ("duffing", "super_twisting", no_rate),
     "k2": ("duffing", "super_twisting", put("law", "gains", "k2", change=times(0.999))),
+    "an integral beside a proof without one": ("duffing", "pid", put("law", "gains", "ki", change=lambda _: 0.5)),
     "a spring that pushes": ("pendulum_network", "observer_free", put("plant", "parameters", "kc", change=times(-1))),
     "inverted pendulums": (
         "pendulum_network", "observer_free", put("plant", "name", change=lambda _: "inverted_pendulum_network"),
