@@ -37,6 +37,12 @@ C_TIME = ctypes.CDLL(ctypes.util.find_library("c")).clock
 C_TIME.restype, C_TIME.argtypes = ctypes.c_long, []
 
 
+@pytest.fixture(autouse=True)
+def library_is_examined_too(monkeypatch, library_is_checked):
+    """Examine the library's laws here, on which other tests rely."""
+    monkeypatch.setattr(checked, "_found", library_is_checked)
+
+
 @numba.cfunc("float64(float64)")
 def from_elsewhere(x):
     return 2.0 * x

@@ -10,6 +10,7 @@ import pytest
 from helpers.live import READ, node
 
 import smc_mujoco as smc
+from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.control import estimator, surface
 from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement, catalogue
@@ -39,8 +40,7 @@ def measured(rng: random.Random, k: int) -> dict[str, float]:
 
 def outputs(component, y, gains, memory) -> tuple[float, float]:
     """The two results of a component's Python; NaN for the acceleration of an estimator that gives none."""
-    function = getattr(component.function, "py_func", component.function)
-    found = function(
+    found = rebuild(component.function, lambda plain: plain)(
         (Reading(y["dt"], y["x"], y["v"]) if component.kind == "estimator" else Measurement(**y)), gains, memory
     )
     first, second = found if isinstance(found, tuple) else (found, math.nan)
