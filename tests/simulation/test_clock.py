@@ -68,12 +68,12 @@ def test_a_pause_makes_all_later_samples_later_and_covers_some():
     assert set(np.diff(paused)) == {7}
     assert paused[0] < 7
     assert_same(compiled, reference.run(scenario(clock)))
-    delayed = scenario(clock, input_delay=0.007)
+    delayed = scenario(clock, input_delay=0.007, duration=0.2)
     assert_same(smc.run(delayed), reference.run(delayed))
     short = scenario(smc.Clock(pause=PERIOD / STEPS, pause_every=7.0 * PERIOD))  # of one step: covers few samples
     assert_same(compiled := smc.run(short), reference.run(short))
     assert 3 <= (late(compiled) < -0.5).sum() <= 8
-    seeds = [dataclasses.replace(scenario(clock, duration=0.3), seed=i) for i in range(20)]
+    seeds = [dataclasses.replace(scenario(clock, duration=0.1), seed=i) for i in range(20)]
     firsts = {int(np.argmax(np.diff(np.unique(trace.u[1:-1, 0])) > 0.02)) for trace in smc.run(seeds)}
     assert len(firsts) > 3  # the first depends on the seed
     with pytest.raises(smc.ScenarioError, match=r"jitter 0\.001 and pause 0\.01"):
