@@ -109,7 +109,7 @@ def test_a_file_that_can_do_more_than_compute_is_told(line, words, tmp_path):
     assert entry.read(written(tmp_path / "fair", f"{first}\n{fair}\n{PLAIN}\n{main}")).why_unread == ""
 
 
-def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path, small):
+def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path, small, monkeypatch):
     folder, out = written(tmp_path / "entry"), tmp_path / "results"
     target = entering.enter(folder, out=out, instances=2)
     assert entering.enter(folder, out=out, instances=2, verify=True) == target  # the same bytes again
@@ -125,6 +125,7 @@ def test_entering_twice_gives_equal_bytes_and_a_forged_table_is_refused(tmp_path
     runs.write(table, rows)  # the runs of another law
     with pytest.raises(ScenarioError, match="not the table that its result was written for"):
         smc.results(target.parent)
+    monkeypatch.setattr(guard, "tried", lambda module, order, limit: entrant.attempt(order, lambda *stage: None))
     with pytest.raises(ScenarioError, match="not what"):
         entering.enter(folder, out=out, instances=2, verify=True)
     for name in ("x" * 5000, "a\0b", "\ud800"):  # names that no file system takes
