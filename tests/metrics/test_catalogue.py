@@ -80,7 +80,7 @@ def second_order(zeta, omega, t):
 STEP, PULSE = [9, 9, 13, 13, 13], [0, 2, 2, 2, 0, 0, 0]  # of the reference
 LAST = np.zeros((11, 2))
 LAST[8:] = [-1, 2], [-2, -2], [-3, 0]  # the last part is t = 8, 9, 10
-UNEVEN = {"t": [0, 1, 3], "x": [[2, -1], [1, 0], [0, 0]]}
+UNEVEN = {"t": [0, 1, 3], "x": [[3, -1], [1, 0], [0, 0]]}
 STOPS = np.array([1, 0, 1, 0, 0, 1, 0, 0])  # a speed: at rest from sample 3 to 4, and from 6 to 7
 BOTH = np.column_stack([STOPS, np.ones(8)])
 LONG = clock(10, 1e-2)
@@ -112,8 +112,8 @@ BY_HAND = [  # metric, its value, of a run with these signals, at t = 0, 1, 2, .
     (m.steady_error, 2.0, {"x": LAST}, "each channel has its own sign"),
     (m.ripple, 4.0, {"x": LAST}, "the channel with the largest range"),
     (m.ultimate_bound, 3.0, {"x": LAST}, "of either sign"),
-    (m.iae, 3 / 2 + 1 + 0.5, UNEVEN, "trapezoids, summed over channels"),
-    (m.ise, 5 / 2 + 1 + 0.5, UNEVEN, "trapezoids of squares"),
+    (m.iae, 4 / 2 + 1 + 0.5, UNEVEN, "trapezoids, summed over channels"),
+    (m.ise, 10 / 2 + 1 + 0.5, UNEVEN, "trapezoids of squares"),
     (m.itae, 1 / 2 + 1, UNEVEN, "trapezoids of t |e|"),
     (m.itae, 1 / 2 + 1, UNEVEN | {"t": [5, 6, 8]}, "of the time since the first sample"),
     # the command at the last sample is held for no time
