@@ -123,7 +123,7 @@ def library_is_checked():
     ours, examined = {"control.laws", "control.joint_laws", "control.surfaces", "control.estimators"}, checked._found
 
     def found(function, *rest):
-        room = getattr(function, "__module__", "").removeprefix("smc_mujoco.").rpartition(".")[0]
+        room = (function.__module__ or "").removeprefix("smc_mujoco.").rpartition(".")[0]
         return "" if room in ours else examined(function, *rest)
 
     checked._found = found

@@ -33,11 +33,12 @@ class Clock(NamedTuple):
 
     times: np.ndarray  # of the run, (frames,) s, ascending
     speeds: np.ndarray  # of playback, (frames,), 1 for real time
+    begin: float = 0.0  # when the first is shown, s of the film: a part of a film is drawn as in the whole
 
     @property
     def shown(self) -> np.ndarray:
         """When each frame is shown, (frames,) s of the film."""
-        return np.append(0.0, np.cumsum(np.diff(self.times) / self.speeds[:-1]))
+        return self.begin + np.append(0.0, np.cumsum(np.diff(self.times) / self.speeds[:-1]))
 
     def part(self, start: float, stop: float) -> "Clock":
         """Return the frames from `start` to `stop` of the run, s."""
