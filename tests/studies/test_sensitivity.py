@@ -239,6 +239,7 @@ def test_few_points_are_told():
     )
     assert "16 points, which is few" in str(few.tables[0])
     assert "which is few" not in str(enough.tables[0])
+    assert [row[:3] for row in enough.tables[0].rows] == [["mass", "0.5 of nominal", "2 of nominal"]]
 
 
 def test_scores_that_only_mixed_points_tell_apart_explain_nothing_and_no_index_is_above_1():

@@ -89,6 +89,8 @@ def test_every_plant_of_the_page_has_laws_and_an_opening(vendor, tmp_path):
         assert set(plant["start"]) <= set(plant["laws"]) <= set(found["laws"])
         for condition in plant["conditions"]:
             assert condition["least"] <= condition["value"] <= condition["most"]
+            if condition["name"] in ("friction", "delay", "noise", "amplitude"):  # a page begins without any
+                assert condition["value"] == condition["least"] == 0.0
 
 
 def test_the_fields_of_a_model_follow_the_mass_as_in_a_run(vendor, tmp_path):
