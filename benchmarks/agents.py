@@ -4,8 +4,8 @@
 
 Only ratios within one run mean anything on a shared machine; each is the median over rounds that alternate between the
 two sides. Single environments are measured in processor time, which other work does not stretch, batches in wall time.
-A step of ours is one RK4 step of 1 ms, a step of dm_control's pendulum one Euler step. One of gymnasium's
-InvertedPendulum is two RK4 steps, which take a third of its time: the last row is per RK4 step.
+Here a step is one RK4 step of 1 ms. In dm_control's pendulum it is one Euler step. In gymnasium's InvertedPendulum it
+is two RK4 steps, which take a third of its time; so the last row counts those one by one.
 """
 
 import importlib.util

@@ -12,8 +12,8 @@ DRONE = smc.plant("quadrotor")
 LAWS = ("cascaded_pid", "geometric", "quaternion_sliding", "adaptive_quaternion_sliding", "super_twisting_attitude")
 
 
-def sag(trace):
-    return 1e3 * (1.0 - trace.x[trace.t < 3.0, 2][-1])
+def height(trace):
+    return trace.x[trace.t < 3.0, 2][-1]
 
 
 def back(trace):
@@ -22,8 +22,8 @@ def back(trace):
 
 def answer(runs):
     returned = runs.who("returns within 20 mm", "return within 20 mm", lambda trace: back(trace) < 3.0)
-    low = f"{runs.least(sag, unit='mm')} to {runs.most(sag, unit='mm')} too low"
-    return f"before the drop it is {low}; 3 s after it, {returned}; first {runs.least(back, unit='s')}"
+    low, high, first = runs.least(height, unit="m"), runs.most(height, unit="m"), runs.least(back, unit="s")
+    return f"before the drop it is at {low} to {high}, not 1 m; 3 s after it, {returned}; first {first}"
 
 
 scene = smc.Scene(

@@ -117,7 +117,7 @@ def fixed_noise_key():
 
 @pytest.fixture(autouse=True, scope="session")
 def library_is_checked():
-    """Take the library's laws for checked, each of which test_checked.py compiles and examines: others need a run."""
+    """Take the library's laws as checked: test_checked.py alone compiles and examines each of them, for seconds."""
     from smc_mujoco.control import checked
 
     ours, examined = {"control.laws", "control.joint_laws", "control.surfaces", "control.estimators"}, checked._found

@@ -9,9 +9,9 @@ The plant has four scales, from which each gain's scale follows:
 
 A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5, and a search may leave
 this box by a decade. That holds for forces too, such as lambda of -lambda tanh(s), as the actuator clips the command of
-every law alike. A law with 1 / tau in place of k has the same search. A law may divide
-a gain by another one, such as k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as
-a force, for the b of each candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
+every law alike. A law with 1 / tau in place of k has the same search. A law may divide a gain by another one, such as
+k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as a force, for the b of each
+candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
 Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest |x0| of all joints,
 also of free ones, which must have one unit: on a cart with a pole, in m and rad, no distance says how far the pole may

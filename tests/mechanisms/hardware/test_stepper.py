@@ -171,7 +171,7 @@ def looped(one):
     return loop
 
 
-# the joint moves behind the steps of the other kinds, see below
+# all kinds: the motion test below, which is integrated with these steps
 @pytest.mark.parametrize("kind", ["slow", "fast", "each step when it is due", "turns at once"])
 def test_the_steps_are_those_of_an_event_integration(kind):
     motor, push = KINDS[kind]
