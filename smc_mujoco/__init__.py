@@ -16,7 +16,7 @@ The names by task, those of a first script first; `help(smc.run)` tells what a n
     Plants: plant, plants, plant_from, Channel
     Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder, Backlash, DCMotor, Lag
     Compare: compare, which, tune, margins, grid, study, leaderboard, Table
-    More to run and to look at: stream, scores, Scene, play, live, ScenarioError
+    More to run and to look at: stream, scores, Scene, play, ScenarioError
     Surfaces, estimators, policies: surface, surface_function, estimator, estimator_function, Law, policy
     Machines: Plant, Contact, rig, rigs, identify
     Signals and time: Signal, Push, Jump, Clock

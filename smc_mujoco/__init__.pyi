@@ -40,7 +40,6 @@ from smc_mujoco.evidence.rigs.identify import identify as identify
 from smc_mujoco.evidence.rigs.rig import rig as rig
 from smc_mujoco.evidence.rigs.rig import rigs as rigs
 from smc_mujoco.exchange.law_from import law_from as law_from
-from smc_mujoco.exchange.live.build import live as live
 from smc_mujoco.exchange.policy import policy as policy
 from smc_mujoco.mechanisms.custom.plant_from import Channel as Channel
 from smc_mujoco.mechanisms.custom.plant_from import plant_from as plant_from

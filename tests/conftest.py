@@ -105,27 +105,3 @@ def coarse_grid(monkeypatch):
 def present_objects_frozen():
     """Exclude the present objects from a test's own `gc.collect`, which takes half a second with them."""
     gc.freeze()
-
-
-@pytest.fixture(autouse=True, scope="session")
-def fixed_noise_key():
-    """Draw the same noise key for every study, so that tests have the same numbers each time."""
-    from smc_mujoco.studies import noise_key
-
-    noise_key.draw_key = lambda: 20_090_531
-
-
-@pytest.fixture(autouse=True, scope="session")
-def library_is_checked():
-    """Take the library's laws as checked: test_checked.py alone compiles and examines each of them, for seconds."""
-    from smc_mujoco.control import checked
-
-    ours, examined = {"control.laws", "control.joint_laws", "control.surfaces", "control.estimators"}, checked._found
-
-    def found(function, *rest):
-        room = (function.__module__ or "").removeprefix("smc_mujoco.").rpartition(".")[0]
-        return "" if room in ours else examined(function, *rest)
-
-    checked._found = found
-    yield examined
-    checked._found = examined

@@ -246,15 +246,6 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
     return {law: tuple(known) for law, known in by_law.items()}
 
 
-def unchecked(table: Columns, rows: np.ndarray) -> tuple[str, ...]:
-    """Return the laws whose code is unchecked in some rows; () for a table without that column."""
-    try:
-        laws, checked = (np.asarray(table.column(name))[rows] for name in ("law", "checked"))
-    except ScenarioError:
-        return ()
-    return tuple(sorted({law for law, known in zip(laws.tolist(), checked.tolist(), strict=True) if known is False}))
-
-
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
     """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where it is not known.
 

@@ -54,7 +54,7 @@ def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any
 
 def _about(entry: entries.Entry, scenario: Scenario, timed: bool) -> dict[str, Any]:
     """Return why the code of a law is not checked, "" if it is, and its time a sample: s, and the ratio to pid's."""
-    why = entry.why_unread or scenario.law.why_unchecked
+    why = entry.why_unread
     found = None
     if timed and not why:
         from smc_mujoco.analysis.law_time import law_time

@@ -134,16 +134,6 @@ class Component:
         """The laws of its channels if they are different laws, else itself."""
         return self.each or (self,)
 
-    @property
-    def why_unchecked(self) -> str:
-        """Why it is not `checked`, in one sentence; "" if it is."""
-        return importlib.import_module("smc_mujoco.control.checked").why_unchecked(self)  # which imports this module
-
-    @property
-    def checked(self) -> bool:
-        """Whether its compiled code reads its arguments and constants alone, see `smc_mujoco.control.checked`."""
-        return not self.why_unchecked
-
     def on_computed_torque(self) -> "Component":
         """Return a law of many joints with this law, of one channel, as the outer law of computed torque."""
         return importlib.import_module("smc_mujoco.control.outer_law").on_computed_torque(self)  # which imports this

@@ -56,7 +56,7 @@ Fields = Mapping[str, Any]
 Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
 
 MAX_JOINED = 20  # conditions in one name: chosen
-GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "noise_key", "duration")  # that a grid sets itself
+GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
 ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
 ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name

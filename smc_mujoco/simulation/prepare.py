@@ -3,9 +3,10 @@
     prepared = prepare(scenario)              # functions, mechanism, key
     record[i], arrays = pack(prepared, log)   # see state.py
 
-What does not compile runs in the reference loop; `prepared.why_not` says why.
+What does not compile is called in Python; `prepared.why_not` says what.
 """
 
+import contextlib
 import dataclasses
 import itertools
 import math
@@ -17,7 +18,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.errors import BrokenLawError, ScenarioError, shown, unknown
-from smc_mujoco.common.jit import Function, NotCompilable
+from smc_mujoco.common.jit import Function, NotCompilable, Uncompiled
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.component import gain_at
 from smc_mujoco.control.estimator import Reading
@@ -85,8 +86,6 @@ def prepare(scenario: object) -> Prepared:
     key = shared, scenario.control_period, scenario.samples
     reason = why_not(scenario)
     _refuse_mistakes(scenario.resolved, reason)
-    if reason and scenario.plant.pose:
-        raise ScenarioError(f"{reason}, and the reference loop moves no free body: write what numba compiles")
     return Prepared(scenario, reason, shared, key)
 
 
@@ -149,15 +148,16 @@ class Packed:
     references: np.ndarray  # (driven,) FUNCTION; (0,) if all channels have the same
     frictions: np.ndarray  # by a formula, (n,) FUNCTION, or (0,)
     mixer: np.ndarray  # (actuators, 8) of a free body; (0, 8) for other plants
+    python: list[Any]  # the functions that are called in Python
     nominal: Any  # a Native, if MuJoCo computes the nominal model and the law uses it; else None
 
 
-def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
+def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tuple, Packed]:
     """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it points to.
 
     The log, (K + 1, n) LOG, is written at samples. It and `prepared` must outlive the run.
     """
-    s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, state.Buffer()
+    s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, Functions(prepared.scenario.resolved, python)
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
     values = _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, mechanism.model, buffer)
@@ -179,23 +179,55 @@ def pack(prepared: Prepared, log: np.ndarray) -> tuple[tuple, Packed]:
     values |= {"rotors": has_rotors(mechanism.model)}
     values |= {"samples": len(log), "disturbance_count": len(s.disturbance)}
     values |= {"channels": state.address(mechanism.channels), "log": state.address(log)}
-    return buffer.as_tuple(state.SIMULATION, values), Packed(numbers, **arrays, nominal=nominal, mixer=rows)
+    return buffer.as_tuple(state.SIMULATION, values), Packed(
+        numbers, **arrays, python=buffer.python, nominal=nominal, mixer=rows
+    )
 
 
-def _function(compiled: Any, values: Any, buffer: state.Buffer, memory: int = 0, channels: int = 1) -> dict[str, int]:
+class Functions(state.Buffer):
+    """The buffer of a run, and its functions: compiled, or in `python` if they do not compile or that is wanted."""
+
+    def __init__(self, s: Resolved, python: bool):
+        from smc_mujoco.simulation import python_functions
+
+        super().__init__()
+        self.wrap = python_functions
+        self.s, self.all_python, self.python = s, python, list[Any]()
+
+    def _found(self, compiler: Any, thing: Any, otherwise: Any, *arguments: Any) -> Any:
+        with contextlib.suppress(NotCompilable):
+            if not self.all_python:
+                return compiler(thing)
+        self.python.append(otherwise(thing, *arguments))
+        return self.python[-1]
+
+    def component(self, c: Any) -> Any:
+        return self._found(cfunctions.compile_component, c, self.wrap.of_component, self.s.plant.n, self.s)
+
+    def signal(self, signal: Signal) -> Any:
+        return self._found(cfunctions.compile_signal, signal, self.wrap.of_signal)
+
+    def laws(self) -> list[Any]:
+        """The laws of the driven channels, or one for all; one each if they may keep state in Python."""
+        law = self.s.law
+        each = isinstance(law.function, Uncompiled) and not law.joint
+        return [law] * self.s.plant.driven if each else law.of_channels(self.s.plant.driven)
+
+
+def _function(compiled: Any, values: Any, buffer: "Functions", memory: int = 0, channels: int = 1) -> dict[str, int]:
     """Return the fields of a FUNCTION. Its parameters, and its memory in each channel, go into the buffer."""
     parameters, first = buffer.put(values), buffer.reserve(memory * channels)
     return {"address": compiled.address, "parameters": parameters, "memory": first, "stride": 8 * memory}
 
 
-def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str, Any]]]:
+def _tables(prepared: Prepared, buffer: "Functions") -> dict[str, list[dict[str, Any]]]:
     """Return the laws, references and frictions of the channels, and the disturbances, as fields of records."""
     s = prepared.scenario.resolved
     n, memory = s.plant.n, {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
     each = range(n if s.law.joint else 1)  # numbers of a gain
     laws = [
-        (cfunctions.compile_component(law), [gain_at(value, i) for value in law.gains.values() for i in each])
-        for law in s.law.of_channels(s.plant.driven)
+        (buffer.component(law), [gain_at(value, i) for value in law.gains.values() for i in each])
+        for law in buffer.laws()
     ]
     return {
         "laws": [_function(compiled, gains, buffer) | memory for compiled, gains in laws],
@@ -210,11 +242,11 @@ def _tables(prepared: Prepared, buffer: state.Buffer) -> dict[str, list[dict[str
     }
 
 
-def _shared_functions(s: Resolved, nominal: Native | None, buffer: state.Buffer) -> dict[str, Any]:
+def _shared_functions(s: Resolved, nominal: Native | None, buffer: "Functions") -> dict[str, Any]:
     """Return the functions of a record that all channels share, except law and reference."""
     fields = {}
     for c in filter(None, (s.velocity, s.surface)):
-        compiled = cfunctions.compile_component(c)
+        compiled = buffer.component(c)
         fields[c.kind] = _function(compiled, c.gains.values(), buffer, c.memory, s.plant.n)
     if nominal is not None:
         fields["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
@@ -225,9 +257,9 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: state.Buffer)
     return fields | {name: _signal(signal, buffer) for name, signal in signals.items() if signal}
 
 
-def _signal(signal: Signal, buffer: state.Buffer, channels: int = 1) -> dict[str, int]:
+def _signal(signal: Signal, buffer: "Functions", channels: int = 1) -> dict[str, int]:
     """Return the fields of a signal's FUNCTION."""
-    compiled = cfunctions.compile_signal(signal)
+    compiled = buffer.signal(signal)
     return _function(compiled, cfunctions.signal_values(signal), buffer, signal.memory, channels)
 
 
@@ -242,14 +274,14 @@ def _settings(s: Resolved) -> dict[str, Any]:
         "scale": math.prod(part.scale for part in s.actuator),
         "has_drives": drives is not None or s.stepper is not None, "drive_step": drives._asdict() if drives else {},
         "stepper": pulsing(s.stepper)._asdict() if s.stepper else {}, "exact_friction": s.exact_friction,
-        "seed": s.noise_seed, "sigma_x": s.noise.position, "sigma_v": s.noise.velocity, "bias": sensor.bias,
+        "seed": s.seed, "sigma_x": s.noise.position, "sigma_v": s.noise.velocity, "bias": sensor.bias,
         "counts": 0.0 if sensor.counts == math.inf else sensor.counts, "dropout": sensor.dropout,
         "read_period": sensor.period or 0.0, "read_delay": sensor.delay, "uses_model": s.model != "none",
         "drive_gain": s.nominal_drive.gain, "drive_drag": s.nominal_drive.drag,
     }  # fmt: skip
 
 
-def _arrays(s: Resolved, model: mujoco.MjModel, buffer: state.Buffer) -> dict[str, Any]:
+def _arrays(s: Resolved, model: mujoco.MjModel, buffer: "Functions") -> dict[str, Any]:
     """Return the arrays of a record in which the callback keeps measurements, commands and states."""
     n, width = s.plant.n, s.plant.n if s.law.joint else 1
     late = not s.clock.regular  # a late command may take effect after the next sample began
@@ -281,18 +313,18 @@ def known_values(s: Resolved) -> list[float]:
 def pause_phase(s: Resolved) -> int:
     """Return by how many samples the first pause of the controller comes earlier than the others."""
     samples = s.clock.pauses(s.control_period, s.physics_step)[1]
-    return int(philox.random_words(s.noise_seed, 0, philox.PAUSE, 0)[0] * 2.0**-53 * samples)
+    return int(philox.random_words(s.seed, 0, philox.PAUSE, 0)[0] * 2.0**-53 * samples)
 
 
 def motors_at_start(s: Resolved) -> list[dict[str, float]]:
     """Return each stepper motor at the start of a run: at rest, with its field at its joint."""
     zero = dict.fromkeys(GENERATOR, 0.0) | {"stepped": -math.inf, "until": math.inf}
-    phases = (philox.random_words(s.noise_seed, i, philox.REFILL, 0)[0] * 2.0**-53 for i in range(s.plant.driven))
+    phases = (philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53 for i in range(s.plant.driven))
     return [zero | {"phase": phase, "origin": s.x0[i]} for i, phase in enumerate(phases)]
 
 
 def _joint_measurement(
-    s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: state.Buffer
+    s: Resolved, nominal: Native | None, functions: Mapping[str, Any], buffer: "Functions"
 ) -> dict[str, Any]:
     """Return the fields of a record that only a law of many joints has."""
     stored = joint_law.stored_dtype(s.plant.n)
@@ -317,7 +349,7 @@ def _native_nominal(s: Resolved) -> Native | None:
     return s.plant.nominal.native_dynamics(s.plant.parameters, s.plant.tip, at_rest)
 
 
-def _frictions(prepared: Prepared, buffer: state.Buffer) -> list[dict[str, int]]:
+def _frictions(prepared: Prepared, buffer: "Functions") -> list[dict[str, int]]:
     """Return the FUNCTIONs of a friction by a formula, one for each joint. Their numbers go into the buffer."""
     if (friction := prepared.scenario.formula_friction) is None:
         return []

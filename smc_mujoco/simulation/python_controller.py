@@ -85,7 +85,7 @@ class Controller:
 
     def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
         """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and loss."""
-        sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.noise_seed
+        sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.seed
         if sigma.position or sigma.velocity:
             z = normals(seed, i, philox.MEASUREMENT, j)
             x, v = x + sigma.position * z[0], v + sigma.velocity * z[1]

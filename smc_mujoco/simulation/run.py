@@ -27,9 +27,11 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.mechanisms.plant import field_array
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation import model as models
+from smc_mujoco.simulation.controller import MAX_STATE
 from smc_mujoco.simulation.prepare import Packed, Prepared, pack, prepare
 from smc_mujoco.simulation.python_controller import Failure, NominalDynamics, PythonComponent
 from smc_mujoco.simulation.scenario import Resolved, Scenario
+from smc_mujoco.simulation.trace import PLANT_DIVERGED as PLANT_DIVERGED_SHORT
 from smc_mujoco.simulation.trace import Trace, from_log
 
 # isort: split
@@ -43,11 +45,25 @@ FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_C
 DRY_FRICTION = "dof_frictionloss", "tendon_frictionloss"  # fields of a model
 LOST_CONTACTS = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
 
+DISTURBANCE_NOT_FINITE = "the disturbance became NaN or inf"
+PLANT_DIVERGED = f"{PLANT_DIVERGED_SHORT} (|x| or |v| above {MAX_STATE:g}, or NaN)"
+
+
+def interrupted(name: str) -> str:
+    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the control callback."""
+    name = name or "control"
+    so = ", so that its law was not called" * (name == "control")
+    return (
+        f"other code replaced MuJoCo's {name} callback during the run{so}: "
+        f"call mujoco.set_mjcb_{name} before or after the run, or restore what mujoco.get_mjcb_{name}() returned"
+    )
+
+
 Report = Callable[[int], None]  # called with the number of steps since its last call
 
 
 class PlainLoopWarning(UserWarning):
-    """A warning: a law or signal does not compile and runs in the reference loop, several times slower, on one core."""
+    """A warning: a law or signal does not compile and is called in Python, which takes several times longer."""
 
 
 @overload
@@ -91,13 +107,10 @@ def stream(
     """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
-    uncompiled: list[tuple[int, Prepared]] = []
     for index, prepared in enumerate(map(prepare, scenarios)):
         if prepared.why_not:
-            warnings.warn(f"{prepared.why_not}; the run takes the reference loop", PlainLoopWarning, users_stacklevel())
-            uncompiled.append((index, prepared))
-        else:
-            groups.setdefault(prepared.key, []).append((index, prepared))
+            warnings.warn(f"{prepared.why_not}; it is called in Python", PlainLoopWarning, users_stacklevel())
+        groups.setdefault(prepared.key, []).append((index, prepared))
     for group in groups.values():
         for batch in _batches(group, threads):
             items = [prepared for _, prepared in batch]
@@ -106,13 +119,6 @@ def stream(
             if len(batch) >= MIN_TRIM_RUNS:
                 return_freed_memory()
             yield from zip((index for index, _ in batch), traces, strict=True)
-    for index, prepared in uncompiled:
-        from smc_mujoco.simulation import reference
-
-        with memory_for([prepared]):
-            trace = reference.run(prepared.scenario, prepared.mechanism)
-        yield index, trace
-        report(prepared.scenario.work)
 
 
 @contextlib.contextmanager
@@ -159,15 +165,12 @@ def cores(threads: Annotated[int, Whole(low=1, high=1024)] | None = None) -> int
     return threads
 
 
-def poses(trace: Trace, times: np.ndarray) -> np.ndarray | None:
+def poses(trace: Trace, times: np.ndarray) -> np.ndarray:
     """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the last one.
 
-    A trace has the channels only, so the run is simulated again; None if that would take long, because the law or a
-    signal does not compile.
+    A trace has the channels only, so the run is simulated again.
     """
     prepared = prepare(trace.scenario)
-    if prepared.why_not:
-        return None
     scenario = trace.scenario.resolved
     total = scenario.samples * scenario.steps
     wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
@@ -190,8 +193,8 @@ class ScenarioBatch:
     Without `constraints`, no limit, contact, dry friction or equality constraint acts.
     """
 
-    def __init__(self, prepared: Sequence[Prepared], threads: int, constraints: bool = True):
-        self.prepared = prepared
+    def __init__(self, prepared: Sequence[Prepared], threads: int, constraints: bool = True, python: bool = False):
+        self.prepared, self.python = prepared, python
         self.scenarios = scenarios = [item.scenario.resolved for item in prepared]
         first, count = scenarios[0], len(scenarios)
         self.base, self.model = prepared[0].mechanism.model, copy.copy(prepared[0].mechanism.model)
@@ -206,7 +209,7 @@ class ScenarioBatch:
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
         for i, (item, log) in enumerate(zip(prepared, self.logs, strict=True)):
-            self.records[i], packed = pack(item, log)
+            self.records[i], packed = pack(item, log, python)
             self.packed.append(packed)
         # persistent: at a sample, mjData still holds the forces of this simulation's last step
         self.batch = Batch(self.model, count, min(threads, count), persistent=True)
@@ -343,20 +346,23 @@ class ScenarioBatch:
 
     def failure(self, i: int, code: int) -> str:
         """Return the failure of simulation i in words."""
-        from smc_mujoco.simulation import reference
-
         if code == state.DIVERGED:
-            return self.errors.get(i, reference.PLANT_DIVERGED)
+            return self.errors.get(i, PLANT_DIVERGED)
         if code == state.INTERRUPTED:
-            return reference.interrupted(self.replaced)
+            return interrupted(self.replaced)
         if code == state.DISTURBANCE_NOT_FINITE:
-            return reference.DISTURBANCE_NOT_FINITE
+            return DISTURBANCE_NOT_FINITE
+        if told := [str(one.error) for one in self.packed[i].python if one.error]:
+            return told[0].replace("in channel 0", f"in channel {int(self.records['seen']['i'][i])}")
         scenario = self.scenarios[i]
         of_law = code in (state.LAW_RAISED, state.NOT_FINITE)
         if of_law and (told := law_failure(scenario, self.records[i], self.packed[i])):
             return told
-        told = reference.run(scenario).failure
-        return told.rpartition(", at t = ")[0] if told else "a function of the run failed, though not in Python"
+        if self.python:
+            return "a function of the run failed, though not in Python"
+        again = ScenarioBatch([self.prepared[i]], 1, python=True)  # compiled code keeps no text of an exception
+        again.simulate(lambda steps: None)
+        return again.failure(0, int(again.records["failure"][0]))
 
 
 def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:

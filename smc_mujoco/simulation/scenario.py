@@ -8,8 +8,6 @@ plant's nominal parameters.
 import copy
 import dataclasses
 import functools
-import hashlib
-import importlib
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +17,7 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common import html
-from smc_mujoco.common.constraints import MAX_SEED, Number, OneOf, Seed, of_fields, suggesting
+from smc_mujoco.common.constraints import Number, OneOf, Seed, of_fields, suggesting
 from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, shown, users_stacklevel
 from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.control import design
@@ -118,8 +116,6 @@ class Scenario:
         payload in kg, the value is added instead. `mass` is the plant's mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
-      noise_key: a number that changes the random numbers of every seed. Comparisons draw it after the laws are fixed,
-        so that no law can know its noise. 0: the random numbers depend on the seed alone.
       integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
         a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
       friction: on every joint, in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
@@ -165,7 +161,6 @@ class Scenario:
     mismatch: Mapping[str, float] = field(coerce.mismatch, None)
     jump: Jump | None = field(coerce.instance(Jump, "smc.Jump(time=..., factors=...)"), None)
     seed: Seed = 0
-    noise_key: Seed = 0
     integrator: Annotated[str, OneOf(names=coerce.INTEGRATORS)] | None = None
     friction: tuple[Friction, ...] = field(coerce.friction, None)
     contact: Contact = field(coerce.contact, None)
@@ -199,7 +194,6 @@ class Scenario:
             mismatch: Mapping[str, float] | None = None,
             jump: Jump | None = None,
             seed: int = 0,
-            noise_key: int = 0,
             integrator: str | None = None,
             friction: Friction | Sequence[Friction] | None = None,
             contact: Contact | str | None = None,
@@ -235,24 +229,6 @@ class Scenario:
                 vars(self)[f.name] = convert(f.name, value, self)  # the class is frozen
             elif f.name in declared:
                 vars(self)[f.name] = declared[f.name](f.name, value)
-
-    @functools.cached_property
-    def noise_seed(self) -> int:
-        """The seed of the generator: `seed`, or a hash of it and of the noise key."""
-        if not self.noise_key:
-            return self.seed
-        return int.from_bytes(hashlib.sha256(f"{self.noise_key} {self.seed}".encode()).digest()[:7]) % (MAX_SEED + 1)
-
-    @property
-    def checked(self) -> bool:
-        """Whether its law, surface and estimator are checked, see `Law.checked`, and all of the run is compiled code.
-
-        What does not compile, such as a signal, runs in Python with all else: a law is then what its file makes of it
-        during the run, and not the code that was checked.
-        """
-        prepare = importlib.import_module("smc_mujoco.simulation.prepare")  # which imports this module
-        parts = (self.law, self.surface, self.velocity)
-        return all(part.checked for part in parts if part) and not prepare.why_not(self)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.resolved._values() == other.resolved._values()

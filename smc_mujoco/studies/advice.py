@@ -60,7 +60,7 @@ class Choice:
     @property
     def gains(self) -> str:
         """Where the gains come from, in words."""
-        remarks = filter(None, (self.remark, self.law.why_unchecked))
+        remarks = filter(None, (self.remark,))
         return "; ".join([f"gains: {self.law.source}", *remarks])
 
     def below(self, need: str) -> str:
@@ -84,7 +84,6 @@ class Advice(Tables):
     table: Table  # the runs
     effort: str = ""  # unit of u; "" for that of a force, or where conditions differ
     untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is advised
-    unchecked: tuple[str, ...] = ()  # the laws whose code is unchecked, none of which is advised over others
 
     @property
     def law(self) -> Component:
@@ -100,11 +99,6 @@ class Advice(Tables):
     def barred(self) -> list[str]:
         """The rivals with default gains over which the first of the `choices` is not advised."""
         return [name for name in self.untuned if name != self.law.name]
-
-    @property
-    def outside(self) -> bool:
-        """Whether the first of the `choices` is not advised: its code is unchecked, and that of others is checked."""
-        return self.law.name in self.unchecked and len(self.unchecked) < len(self.choices)
 
     @property
     def blocks(self) -> list[tuple[str, str]]:
@@ -144,7 +138,7 @@ class Advice(Tables):
         return 1 < len(self.compared) == len(self.level) + 1
 
     def __repr__(self) -> str:
-        return f"Advice({self.plant.name}: {'no law' if self.barred or self.outside else self.law})"
+        return f"Advice({self.plant.name}: {'no law' if self.barred else self.law})"
 
     # the table
 
@@ -232,9 +226,6 @@ class Advice(Tables):
         if self.barred:
             why = f"No law is advised over {first_of(self.barred)}, with default gains"
             parts = [f"{why}: tune them, or ask for it with defaults=True (--defaults).", robust]
-        if self.outside:
-            why = f"No law is advised: {self.law.name} is first, and its code is unchecked ({self.law.why_unchecked})"
-            parts = [f"{why}; ask for it with unchecked=True (--unchecked).", robust]
         return list(filter(None, parts))
 
     def _use(self) -> str:

@@ -38,7 +38,6 @@ from smc_mujoco.simulation.conditions import DIFFERENCED, Condition, applicable,
 from smc_mujoco.simulation.grid import Starts, case, check_moving, listed, listed_laws
 from smc_mujoco.studies.advice import NEEDS, ROBUST, Advice, Choice, ties
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
-from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, default_budget
 
@@ -76,9 +75,7 @@ def which(
     threads: int | None = None,
     progress: bool = False,
     defaults: bool = False,
-    unchecked: bool = False,
     relevant: Relevant = RELEVANT,
-    noise_key: int | str = DRAWN,
     within: Uncertainty | None = None,
 ) -> Advice:
     """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
@@ -96,8 +93,7 @@ def which(
       quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64, and a third of an adversary's
         runs.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
-      unchecked: whether a law whose code is unchecked, see `Law.checked`, may be advised over checked ones.
-      starts, relevant, noise_key, threads, progress: as in `compare`.
+      starts, relevant, threads, progress: as in `compare`.
       within: the class for the need "robust". Default: that of `worst_case`.
 
     Raises:
@@ -110,7 +106,7 @@ def which(
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
     candidates = _candidates(trial, _suited(machine, wanted, laws), extent, defaults)
-    table = trial.run({machine.name: [*candidates.values()]}, seeds, noise_key=noise_key)
+    table = trial.run({machine.name: [*candidates.values()]}, seeds)
     worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
     return Advice(
@@ -123,7 +119,6 @@ def which(
         table=table,
         effort=effort,
         untuned=() if defaults else tuple(n for n, c in candidates.items() if c.law.source.kind == source.DEFAULT),
-        unchecked=() if unchecked else tuple(n for n, c in candidates.items() if not c.law.checked),
     )
 
 

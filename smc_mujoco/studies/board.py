@@ -26,8 +26,6 @@ MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", 
 LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
 MAX_NAMES = 6  # in a sentence; chosen
 MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
-UNCHECKED = "unchecked"  # the mark of a law
-UNCHECKED_WORDS = "'unchecked': its code may read more than its arguments, see why_unchecked of the law."
 TIMED = (
     "Time: of the law's compiled code a sample on this machine, the median over that of pid; below it, the median and "
     "the 99 % quantile over the samples of a run."
@@ -46,7 +44,6 @@ class Entry:
     failed: int  # number of its runs that failed, or have no value, such as those that never settle
     runs: int  # number of its runs, equal ones counted once
     sources: tuple[Source, ...] = ()  # of its gains; none where the table does not say
-    checked: bool = True  # whether its code is checked, see `Law.checked`, or the table does not say
 
 
 class Lead(NamedTuple):
@@ -86,23 +83,16 @@ class Block:
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     given: tuple[str, ...] = ()  # the laws with one set of gains, where another law has several
     untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is named the winner
-    unchecked: tuple[str, ...] = ()  # the laws whose code is unchecked, none of which is named the winner over others
 
     @property
     def winner(self) -> str | None:
-        """The law that is better than every other, among several, unless `barred` or `outside`."""
-        return None if self.barred or self.outside else self.ahead
+        """The law that is better than every other, among several, unless `barred`."""
+        return None if self.barred else self.ahead
 
     @property
     def barred(self) -> tuple[str, ...]:
         """The laws with default gains that are worse than the law ahead, which is then not named the winner."""
         return tuple(law for law in self.untuned if law != self.ahead) if self.ahead else ()
-
-    @property
-    def outside(self) -> str | None:
-        """The law ahead if its code is unchecked and another's is not: it is then not named the winner."""
-        others = set(self.medians) - set(self.unchecked)
-        return self.ahead if self.ahead in self.unchecked and others else None
 
     @property
     def sample(self) -> str:
@@ -275,8 +265,6 @@ class Board(Tables):
             return "one law"
         if barred := self.barred:
             return f"none is named over {joined(barred)} with default gains"
-        if outside := dict.fromkeys(block.outside for block in self.blocks if block.outside):
-            return f"{joined(outside)} {'is' if len(outside) == 1 else 'are'} ahead of checked laws, but unchecked"
         if all(not block.best for block in self.blocks) and all(all(block.lacking.values()) for block in self.blocks):
             return f"every law has runs that {self._fail}"
         undecided = ", or has too few samples to tell" * any(block.undecided for block in self.blocks)
@@ -413,14 +401,12 @@ def _table(
     """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
     sources_of = sources(boards)
     cells = {(i, entry.law): _cell(board, entry) for i, board in enumerate(boards) for entry in board.entries}
-    unchecked = {entry.law for board in boards for entry in board.entries if not entry.checked}
     places: dict[str, list[float]] = {}
     for entry in (entry for board in boards for entry in board.entries):
         places.setdefault(entry.law, []).append(entry.rank.place)
     rows: list[list[Cell | str]] = []
     for law in sorted(places, key=lambda law: (places[law], law)):
-        marks = filter(None, (kinds(sources_of[law]), UNCHECKED * (law in unchecked)))
-        name_cell = Cell(law, ", ".join(marks), colour=style.law_colour(law))
+        name_cell = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
         found = worst.get(law)
         case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}") if found else ""] * bool(worst)
         time = [_time(times[law]) if law in times else ""] * bool(times)
@@ -489,8 +475,6 @@ def key(boards: Sequence[Board]) -> str:
             f" 'by the step': the medians at the physics step and at half of it, which differ by more than {APART}."
         )
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
-    if any(not entry.checked for board in boards for entry in board.entries):
-        words += f" {UNCHECKED_WORDS}"
     gains = in_words(sources(boards))
     return f"{words} {capital(gains)}." if gains else words
 

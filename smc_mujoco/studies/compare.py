@@ -35,7 +35,6 @@ from smc_mujoco.studies import executors
 from smc_mujoco.studies.board import Boards
 from smc_mujoco.studies.fair_gains import Candidate, Trial, law_or_template
 from smc_mujoco.studies.leaderboard import METRICS, leaderboard, objective_boards
-from smc_mujoco.studies.noise_key import DRAWN
 from smc_mujoco.studies.study import FULL, QUICK, Extent, Traces
 from smc_mujoco.studies.table import Table
 
@@ -189,10 +188,8 @@ def compare(
     budget: Budget = BUDGET,
     quick: bool = False,
     defaults: bool = False,
-    unchecked: bool = False,
     relevant: Relevant = RELEVANT,
     traces: Traces = "none",
-    noise_key: int | str = DRAWN,
     threads: int | None = None,
     progress: bool = True,
 ) -> Compared:
@@ -201,7 +198,6 @@ def compare(
     A law whose gains you gave keeps them. Any other law has those that come with the package for the plant, or is tuned
     by one rule, yours too: run i has the gains that search i found, so twelve searches are twelve answers to "what do
     I get if I tune it?". The folder keeps each search and each run: after a kill, the same call goes on from there.
-    Laws whose code is unchecked, see `Law.checked`, are marked.
 
     Args:
       laws: names, or your own laws. Default: those of the report's first page, of these the ones that come with gains
@@ -212,9 +208,9 @@ def compare(
         law, and the gains of the next search. With more seeds than searches, runs take these in turn.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
       worst: whether to search the worst case of each law on each plant too; or the class in which to search it.
-      executor, noise_key, traces: as in `study`. Default: this machine, a new key, no traces.
+      executor, traces: as in `study`. Default: this machine, no traces.
       out: folder for gains and runs.
-      metrics, defaults, unchecked, relevant: as in `leaderboard`.
+      metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
@@ -234,14 +230,13 @@ def compare(
     number = (QUICK_SEARCHES if quick else SEARCHES) if searches is None else searches
     options = {"tune": tune and gains == "tuned", "gains": gains, "searches": number, "budget": budget}
     candidates = trial.gains(_checked(trial, laws), defaults, **options)
-    table = trial.run(candidates, seeds, executor=workers, traces=traces, noise_key=noise_key)
+    table = trial.run(candidates, seeds, executor=workers, traces=traces)
     found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
     by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
-    boards = leaderboard(table, metrics, by, defaults, relevant, found, unchecked)
-    unseen = trial.unseen(candidates, seeds, int(table.column("noise_key")[0]))
+    boards = leaderboard(table, metrics, by, defaults, relevant, found)
+    unseen = trial.unseen(candidates, seeds)
     sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
-    outside = {p: tuple(c.law.name for c in candidates[p] if not c.law.checked) for p in unseen}
-    boards[:0] = objective_boards(unseen, sources, defaults, relevant, outside, unchecked)
+    boards[:0] = objective_boards(unseen, sources, defaults, relevant)
     boards.times = times = _times(trial, candidates)
     return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found, times=times)
 

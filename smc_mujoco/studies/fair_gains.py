@@ -58,13 +58,13 @@ class Candidate(NamedTuple):
         return self.sets[seed % len(self.sets)]
 
     def unseen(
-        self, plant: Plant, goal: Objective, count: int, noise_key: int, threads: int | None
+        self, plant: Plant, goal: Objective, count: int, threads: int | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return J on instances 0, 1, ..., that of one in four at half the physics step, and the sets' numbers."""
         from smc_mujoco.analysis.tuning.evaluator import objectives
 
         instances, again = range(count), range(0, count, REPEATED_SEEDS)
-        options = {"threads": threads, "noise_key": noise_key}
+        options = {"threads": threads}
         values = objectives(plant, [self(i) for i in instances], goal, instances, **options)
         halves = np.full(count, math.nan)
         halves[::REPEATED_SEEDS] = objectives(plant, [self(i) for i in again], goal, again, halved=True, **options)
@@ -277,7 +277,7 @@ class Trial(NamedTuple):
         options |= {"half_steps": True, "threads": self.threads, "progress": self.progress}
         return study(runs, self.folder, **options)
 
-    def unseen(self, candidates: Mapping[str, Sequence[Candidate]], count: int, noise_key: int) -> dict[str, Unseen]:
+    def unseen(self, candidates: Mapping[str, Sequence[Candidate]], count: int) -> dict[str, Unseen]:
         """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is left out."""
         found, several = {}, [(plant, c) for plant in self.plants for c in candidates[plant.name]]
         with bar("J on runs that no search has seen", len(several), self.progress, counted=True) as shown:
@@ -285,7 +285,7 @@ class Trial(NamedTuple):
                 goal, its = self._goal(plant, self.starts), {}
                 for candidate in candidates[plant.name]:
                     with contextlib.suppress(ScenarioError):
-                        its[candidate.law.name] = candidate.unseen(plant, goal, count, noise_key, self.threads)
+                        its[candidate.law.name] = candidate.unseen(plant, goal, count, self.threads)
                     shown.advance(1.0)
                 if len(its) == len(candidates[plant.name]):
                     values, halves, sets = ({law: one[k] for law, one in its.items()} for k in range(3))

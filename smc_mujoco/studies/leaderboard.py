@@ -17,7 +17,6 @@ from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, ByRo
 from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, shown
-from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control.source import DEFAULT, Source
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.board import Block, Board, Boards, Entry, Lead
@@ -44,7 +43,6 @@ def leaderboard(
     defaults: bool = False,
     relevant: float = RELEVANT,
     worst: "Mapping[str, Mapping[str, WorstCase]] | None" = None,
-    unchecked: bool = False,
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
@@ -61,7 +59,6 @@ def leaderboard(
       relevant: the least relevant difference, as a share of the larger value. Values below
         `paired_runs.floor` count as equal, and a lead that is less than it is called that.
       worst: plant -> law -> its `worst_case`, for a column of the tables of a plant.
-      unchecked: whether a law whose code is unchecked, see `Law.checked`, may be named the winner over checked laws.
 
     Raises:
       ScenarioError: no runs, an unknown metric or group, two runs in a cell, laws without a common cell, or a worst
@@ -83,15 +80,12 @@ def leaderboard(
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
         at_default = (law for law, its in sources.items() if any(source.kind == DEFAULT for source in its))
         untuned = () if defaults else tuple(at_default)
-        outside = paired_runs.unchecked(table, group.rows[group.rows >= 0])
         for metric, values in by_row.items():
             limits, family = families[metric]
             scores = group.scores(values)
             if scores.blocks:
                 comparison = _compared(scores, ran, metric, relevant, limits)
-                boards.append(
-                    _board(group, scores, ran, metric, comparison, untuned, sources, family, outside, unchecked)
-                )
+                boards.append(_board(group, scores, ran, metric, comparison, untuned, sources, family))
     return boards
 
 
@@ -100,13 +94,10 @@ def objective_boards(
     sources: Mapping[str, Mapping[str, tuple[Source, ...]]],
     defaults: bool,
     relevant: float,
-    outside: Mapping[str, tuple[str, ...]] = frozen({}),
-    unchecked: bool = False,
 ) -> list[Board]:
     """Return a board of J on unseen instances for each plant.
 
-    `sources` is plant -> law -> those of its gains, `outside` is plant -> its unchecked laws. Others as in
-    `leaderboard`.
+    `sources` is plant -> law -> those of its gains. Others as in `leaderboard`.
     """
 
     def compared(plant: str, limits: Limits) -> Comparison:
@@ -122,15 +113,14 @@ def objective_boards(
         its = sources.get(plant, {})
         untuned = () if defaults else tuple(law for law in its if any(one.kind == DEFAULT for one in its[law]))
         count = len(next(iter(unseen[plant].values.values())))
-        none = outside.get(plant, ())
-        block = _block((plant, "unseen runs"), count, comparison, 0, untuned, () if unchecked else none)
+        block = _block((plant, "unseen runs"), count, comparison, 0, untuned)
         sets = {law: np.atleast_2d(numbers) for law, numbers in unseen[plant].sets.items()}
         boards.append(
             Board(
                 group={"plant": plant},
                 metric=OBJECTIVE,
                 unit=UNITS[OBJECTIVE],
-                entries=_entries(comparison, sets, its, none),
+                entries=_entries(comparison, sets, its),
                 blocks=(block,),
                 family=sum(len(one.laws) > 1 for one in alone) or 1,
                 relevant=relevant,
@@ -159,8 +149,6 @@ def _board(
     untuned: tuple[str, ...],
     sources: Mapping[str, tuple[Source, ...]],
     family: int,
-    outside: tuple[str, ...],
-    unchecked: bool,
 ) -> Board:
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
     unit = UNITS[metric]
@@ -168,14 +156,13 @@ def _board(
     if len(others) == 1 and (other := others.pop()):
         unit = unit.replace("({u})", other if other.isalpha() else f"({other})").replace("{u}", other)
     blocks = tuple(
-        _block(group.blocks[k], group.seeds[k], comparison, at, untuned, () if unchecked else outside)
-        for at, k in enumerate(scores.blocks)
+        _block(group.blocks[k], group.seeds[k], comparison, at, untuned) for at, k in enumerate(scores.blocks)
     )
     return Board(
         group=group.name,
         metric=metric,
         unit=unit,
-        entries=_entries(comparison, scores.sets, sources, outside),
+        entries=_entries(comparison, scores.sets, sources),
         blocks=blocks,
         family=family,
         relevant=comparison.relevant,
@@ -223,7 +210,6 @@ def _block(
     comparison: Comparison,
     at: int,
     untuned: tuple[str, ...],
-    outside: tuple[str, ...],
 ) -> Block:
     """Return block `at` of a comparison, with its plant and condition and the number of seeds."""
     sets = comparison.sets[:, at]
@@ -246,7 +232,6 @@ def _block(
         sets=int(sets[sets > 1].min()) if (sets > 1).any() else 1,
         given=tuple(law for law, n in zip(comparison.laws, sets, strict=True) if n == 1 and (sets > 1).any()),
         untuned=untuned,
-        unchecked=outside,
     )
 
 
@@ -292,7 +277,6 @@ def _entries(
     comparison: Comparison,
     sets: Mapping[str, np.ndarray],
     sources: Mapping[str, tuple[Source, ...]],
-    outside: tuple[str, ...],
 ) -> tuple[Entry, ...]:
     """Return the entries of all laws."""
     entries = []
@@ -306,6 +290,6 @@ def _entries(
             interval = median_of(values, samples)
         failed, runs = int(comparison.without_value[at].sum()), int((~np.isnan(values)).sum())
         its = sources.get(rank.law, ())
-        known = {"law": rank.law, "checked": rank.law not in outside, "sources": its}
+        known = {"law": rank.law, "sources": its}
         entries.append(Entry(interval=interval, rank=rank, failed=failed, runs=runs, **known))
     return tuple(entries)

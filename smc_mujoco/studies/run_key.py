@@ -16,7 +16,7 @@ from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_conditi
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
-NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "noise_key", "x0", "duration", "versions", "condition")
+NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
     "benchmark/realaigym", "evidence/audit", "evidence/papers", "exchange/live", "draw", "testing",
     "control/tuned_gains",
@@ -53,20 +53,9 @@ def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
     return {
         "hash": key(scenario, data, plants), "plant": scenario.plant.name, "law": scenario.law.name,
         "gains": to_json(dict(scenario.law.gains)), **source(scenario), "condition": condition(scenario, data),
-        "seed": scenario.seed, "noise_key": scenario.noise_key, "duration": scenario.duration,
+        "seed": scenario.seed, "duration": scenario.duration,
         "versions": to_json(data["versions"]), "scenario": to_json(data),
     }  # fmt: skip
-
-
-def withheld(scenario: Scenario) -> dict[str, Any]:
-    """Return the columns of a part that differ from those of `row`: they do not tell the noise key before the end."""
-    return {"noise_key": 0, "scenario": None} if scenario.noise_key else {}
-
-
-def secrets(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
-    """Return the columns that parts `withheld`, as the table has them."""
-    data = row(scenario, plants) if scenario.noise_key else {}
-    return {name: data[name] for name in withheld(scenario)}
 
 
 def source(scenario: Scenario) -> dict[str, str | None]:

@@ -38,7 +38,6 @@ from smc_mujoco.simulation.run import cores, stream
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 from smc_mujoco.studies import executors, run_key
-from smc_mujoco.studies import noise_key as noise
 from smc_mujoco.studies import table as tables
 from smc_mujoco.studies.executors import Batch, ResultColumns
 from smc_mujoco.studies.table import Table
@@ -180,7 +179,6 @@ def study(
     threads: int | None = None,
     progress: bool = False,
     traces: Traces = "none",
-    noise_key: int | str = 0,
     half_steps: bool = False,
 ) -> Table:
     """Run and score scenarios; write a table with a row for each to out/results.parquet, and return it.
@@ -199,8 +197,6 @@ def study(
       progress: whether to show a progress bar.
       traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: of a failed
         run, else of one that never settles, else of the one with the largest ultimate bound.
-      noise_key: key of all runs, see `Scenario`. "drawn": a new random key, or the folder's if the study goes on, so
-        that no law can know its noise.
       half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no winner that the step
         decides: all of them where constraints may act or the integrator is not RK4, elsewhere one seed in four.
 
@@ -212,41 +208,29 @@ def study(
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}
-    by_key = _by_key(_checked(scenarios), noise_key, store, Path(out), resume, plants)
+    by_key = _by_key(_checked(scenarios), store, resume, plants)
     repeated = _repeated(by_key, plants) if half_steps else {}
     every = by_key | {name: scenario for name, scenario in repeated.values() if name not in by_key}
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
         print(f"{done} of {len(every)} runs are in {printable(str(store.parts))}", file=sys.stderr)
     _compute(missing, store, plants, where, threads, progress, folder if traces == "all" else None)
-    changes = {name: run_key.source(s) | run_key.secrets(s, plants) for name, s in by_key.items()}
+    changes = {name: run_key.source(s) for name, s in by_key.items()}
     for name, scores in _half_step_scores(repeated, store).items():
         changes[name] = changes[name] | {"half_step": scores}
     store.collect(list(by_key), changes)
-    if noise_key == noise.DRAWN:
-        noise.publish(Path(out), by_key.values())
     table = dataclasses.replace(Table.read(store.results), known=by_key)
     _save_traces(table, traces, folder, threads, progress)
     return table
 
 
-def _by_key(
-    scenarios: Iterator[Scenario], noise_key: int | str, store: Store, out: Path, resume: bool, plants: run_key.Hashes
-) -> dict[str, Scenario]:
-    """Return hash -> scenario with its noise key, and open the store. No unchecked law runs with a public key."""
-    given = list(scenarios) if noise_key == noise.DRAWN else scenarios
+def _by_key(scenarios: Iterator[Scenario], store: Store, resume: bool, plants: run_key.Hashes) -> dict[str, Scenario]:
+    """Return hash -> scenario, and open the store."""
     by_key: dict[str, Scenario] = {}
-    for scenario in noise.keyed(given, noise_key, out, resume):
+    for scenario in scenarios:
         by_key.setdefault(run_key.key(scenario, plants=plants), scenario)
     store.open(resume)
-    missing = [scenario for name, scenario in by_key.items() if name not in store.where]
-    if noise_key != noise.DRAWN or not noise.public(out) or all(scenario.checked for scenario in missing):
-        return by_key
-    print(
-        "an unchecked law may have read the noise key: a new one is drawn, and all runs are done again", file=sys.stderr
-    )
-    noise.forget(out)
-    return {run_key.key(s, plants=plants): s for s in noise.keyed(given, noise_key, out)}
+    return by_key
 
 
 def _compute(
@@ -260,16 +244,16 @@ def _compute(
 ) -> None:
     """Compute runs, given by key, store their rows as they finish, and save the traces of local ones in a folder."""
     # made before any run: a law may change its globals
-    first = {id(scenario): {"hash": key, "checked": scenario.checked} for key, scenario in missing.items()}
+    first = {id(scenario): {"hash": key} for key, scenario in missing.items()}
 
     def finish(batch: Batch, results: Sequence[ResultColumns]) -> None:
         scenarios = [prepared.scenario for prepared in batch]
-        known = [run_key.row(s, plants) | run_key.withheld(s) | first[id(s)] for s in scenarios]
+        known = [run_key.row(s, plants) | first[id(s)] for s in scenarios]
         store.add([row | result for row, result in zip(known, results, strict=True)])
 
     def finish_here(batch: Batch, finished: Sequence[Trace]) -> None:
         if traces:
-            for trace in (trace for trace in finished if not trace.scenario.noise_key):  # others are saved at the end
+            for trace in finished:
                 trace.save(trace_file(traces, run_key.row(trace.scenario, plants)))
         finish(batch, [executors.result_columns(trace) for trace in finished])
 

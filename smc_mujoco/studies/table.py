@@ -6,14 +6,14 @@
 
 Columns:
 
-- the run: `hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, `noise_key` (0: noise by the seed alone), and
+- the run: `hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, and
   `duration` in s;
 - where its gains come from: `source`, a kind of `control.source`, and `search` as JSON, null if there was no search;
 - every metric of `smc.score`: null if the run failed or the metric does not apply, inf for "never";
 - how the run failed: `diverged_at` in s, and `failure`;
 - what `leaderboard` charges: `half_step`, the scores of the same run at half the physics step, as JSON, null where it
   was not repeated; `trends`, the ratios of the metrics of the last part to those before it, see `ranking`, as JSON;
-- `checked`: whether the code of its law, surface and estimator reads its arguments alone, see `Law.checked`;
+
 - the data to repeat it, as JSON: `versions` and `scenario`.
 """
 
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 # Column -> its type. RUN_COLUMNS stand before the metrics, RESULT_COLUMNS after them.
 RUN_COLUMNS = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
-RUN_COLUMNS |= {"seed": "int64", "noise_key": "int64", "duration": "float64"}
+RUN_COLUMNS |= {"seed": "int64", "duration": "float64"}
 RESULT_COLUMNS = {"diverged_at": "float64", "failure": "string", "half_step": "string", "trends": "string"}
 RESULT_COLUMNS |= {"checked": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}

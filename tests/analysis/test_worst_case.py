@@ -14,7 +14,8 @@ from smc_mujoco.analysis.worst_case.search import Search, loop_frequency, record
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from smc_mujoco.simulation import reference, serialise
+from helpers import reference
+from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.studies.worst_case import WorstCases, default_budget
 

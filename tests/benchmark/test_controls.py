@@ -8,7 +8,7 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco.benchmark import controls, entry
 from smc_mujoco.control.law import law_function
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 
 @law_function(requires_model=True)

@@ -442,7 +442,7 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
 
 def test_an_entry_is_deterministic_and_runs_in_the_reference_loop_alike(traces):
     short = dataclasses.replace(boards.entry("acrobot"), duration=0.2)
-    from smc_mujoco.simulation import reference
+    from helpers import reference
 
     plain = reference.run(short)
     np.testing.assert_allclose(plain.x, traces["acrobot"].x[:101], atol=1e-12)

@@ -17,7 +17,7 @@ from smc_mujoco.draw import decimate, panels, style
 from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.metrics.conventions import groups
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 LAWS = ("observer_free", "classical")
 

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 JOINTED = [name for name in smc.plants() if not smc.plant(name).pose]  # the plants that are no free body
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")

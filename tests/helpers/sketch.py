@@ -8,7 +8,7 @@ import numpy as np
 from PIL import ImageDraw
 
 import smc_mujoco as smc
-from smc_mujoco.simulation.reference import PLANT_DIVERGED
+from helpers.reference import PLANT_DIVERGED
 from smc_mujoco.simulation.trace import ARRAYS
 
 

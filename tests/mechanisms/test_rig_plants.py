@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_0
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 GRAV = 9.81
 STATES = 1000

@@ -20,7 +20,7 @@ from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.laws.hierarchical import hierarchical
 from smc_mujoco.control.surface import surface as surface_of
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 NAMES = ("cart_pole", "overhead_crane")
 PLANTS = pytest.mark.parametrize("name", NAMES)

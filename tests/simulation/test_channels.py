@@ -9,7 +9,7 @@ from helpers import arms
 from helpers.runs import ARRAYS, assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import reference
+from helpers import reference
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.studies import run_key
 

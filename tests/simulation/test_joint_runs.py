@@ -15,7 +15,7 @@ from smc_mujoco.control.joint_law import catalogue, coriolis, jacobian, norm, pr
 from smc_mujoco.control.law import FREE_BODY
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Values
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 
 @pytest.fixture(scope="module")

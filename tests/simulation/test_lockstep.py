@@ -22,7 +22,7 @@ from helpers.pages import ROOT
 from helpers.runs import ARRAYS, JOINTED, assert_loops_agree, assert_same
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 PLANTS = pytest.mark.parametrize("plant", JOINTED)
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]

@@ -17,7 +17,7 @@ import smc_mujoco as smc
 from smc_mujoco.control.law import suits
 from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation import reference
+from helpers import reference
 from smc_mujoco.simulation.prepare import prepare
 from smc_mujoco.simulation.scenario import REALISTIC_STEP
 from smc_mujoco.simulation.signals import PerChannel

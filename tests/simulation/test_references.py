@@ -9,7 +9,7 @@ import pytest
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import catalogue
-from smc_mujoco.simulation import reference
+from helpers import reference
 from smc_mujoco.simulation.signals import MinimumJerk, Ramp, Sine, Step
 
 REFERENCES = [Ramp(0.7, 0.3), Ramp(-2.0), MinimumJerk(1.5, 0.2, 0.9), MinimumJerk(-0.4, -0.1, 2.0), Sine(0.5, 3.0, 0.2)]

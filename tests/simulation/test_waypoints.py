@@ -8,7 +8,7 @@ from helpers.runs import assert_same
 from numpy.polynomial import Polynomial
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 pytestmark = pytest.mark.quick
 

@@ -244,7 +244,6 @@ def objectives(
     instances: Sequence[int] | None = None,
     threads: int | None = None,
     halved: bool = False,
-    noise_key: int = 0,
 ) -> np.ndarray:
     """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo.
 
@@ -253,13 +252,11 @@ def objectives(
       instances: numbers of the instances, in place of 0, 1, ...
       threads: as in `run`.
       halved: whether the runs have half their physics step.
-      noise_key: of their noise, see `Scenario`.
     """
     numbers = range(len(laws)) if instances is None else instances
     if len(numbers) != len(laws):
         raise ScenarioError(f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law")
     cases = [goal.unseen(plant, law, number) for law, number in zip(laws, numbers, strict=True)]
-    cases = [[dataclasses.replace(case, noise_key=noise_key) for case in its] for its in cases]
     if halved:
         cases = [[dataclasses.replace(c, physics_step=0.5 * c.resolved.physics_step) for c in its] for its in cases]
     traces = iter(run([case for its in cases for case in its], threads))

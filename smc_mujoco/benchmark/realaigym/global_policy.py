@@ -109,7 +109,7 @@ def global_row(name: str, scenario: Scenario, seeds: Sequence[int] = SEEDS) -> G
     swing_ups, uptime = (
         float(np.mean(values)) for values in zip(*((r.swing_ups, r.uptime) for r in runs), strict=True)
     )
-    return GlobalRow(name + " (unchecked)" * (not scenario.checked), swing_ups, uptime, uptime / DURATION)
+    return GlobalRow(name, swing_ups, uptime, uptime / DURATION)
 
 
 @njit(error_model="numpy")

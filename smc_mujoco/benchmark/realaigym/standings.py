@@ -79,7 +79,6 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
                 f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
                 "use smc.boards.on_board"
             )
-    name += " (unchecked)" * (not trace.scenario.checked)
     return Row(name=name, score=score(values), **{field: getattr(values, field) for field in Row._fields[1:6]})
 
 

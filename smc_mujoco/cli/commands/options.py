@@ -69,9 +69,6 @@ Condition = Annotated[
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
-Unchecked = Annotated[
-    bool, typer.Option("--unchecked", help="Name a winner whose code is unchecked also over checked laws.")
-]
 Defaults = Annotated[bool, typer.Option("--defaults", help="Name a winner also over laws with default gains.")]
 Disturbance = Annotated[
     float | None, typer.Option(min=0.0, help="Bound on |d|, N or N m; default that of the plant or the condition.")
@@ -99,9 +96,6 @@ Laws = Annotated[
         help=f"Laws of `smc-mujoco list`, as a,b. {GAINS_HELP} May be repeated.",
         show_default=False,
     ),
-]
-NoiseKey = Annotated[
-    int | None, typer.Option(min=0, help="Key of the noise, to repeat a table; 0: public seeds; default: drawn now.")
 ]
 Plants = Annotated[
     list[str] | None,

@@ -36,7 +36,6 @@ def which(
     relevant: options.Relevant = RELEVANT,
     out: options.Folder = Path("which"),
     defaults: options.Defaults = False,
-    unchecked: options.Unchecked = False,
     disturbance: options.Disturbance = None,
     threads: options.Threads = None,
 ) -> None:
@@ -58,7 +57,7 @@ def which(
     terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0)
     advice = advise(
         plant, tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
-        quick, threads, progress=True, defaults=defaults, unchecked=unchecked, relevant=relevant,
+        quick, threads, progress=True, defaults=defaults, relevant=relevant,
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
     )  # fmt: skip
     terminal.print(advice)
@@ -83,22 +82,19 @@ def compare(
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
     defaults: options.Defaults = False,
-    unchecked: options.Unchecked = False,
     out: options.Folder = Path("compared"),
     figure: Annotated[Path | None, options.picture("the medians")] = None,
     latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
     executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
     rig: Annotated[str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")] = None,
     traces: Annotated[str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")] = "none",
-    noise_key: options.NoiseKey = None,
     threads: options.Threads = None,
 ) -> None:
     """Compare laws on plants in conditions: tune what has no gains, run, and say which law is better, and how sure.
 
     A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of the package for the
     plant, or is tuned by the same rule, seconds to minutes for each law on each plant. If you stop the command, it
-    continues when you start it again. Laws whose code is unchecked are marked, and none is named the winner over
-    checked ones without --unchecked. --law all compares every general law. With --rig laws have the gains of the
+    continues when you start it again. --law all compares every general law. With --rig laws have the gains of the
     machine, or those of --searches on its parameter sets, and a line for each metric says if one law wins on all sets.
 
     Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
@@ -110,13 +106,13 @@ def compare(
         from smc_mujoco.draw.page import files
         from smc_mujoco.studies.compare import compare as run
 
-    terminal, key, start = Terminal(), "drawn" if noise_key is None else noise_key, options.starts(x0)
+    terminal, start = Terminal(), options.starts(x0)
     if rig is not None:
         if plants or condition or gains != "tuned" or worst or figure or latex or traces != "none":
             others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
             raise ScenarioError(f"--rig brings its own plant, parameter sets and gains: leave out {others}")
         _compare_on_rig(
-            rig, law, seeds, searches, duration, start, relevant, defaults, unchecked, out, executor, key, threads,
+            rig, law, seeds, searches, duration, start, relevant, defaults, out, executor, threads,
             terminal,
         )  # fmt: skip
         return
@@ -126,7 +122,7 @@ def compare(
     comparison = run(
         options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
         tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        unchecked=unchecked, searches=searches, relevant=relevant, traces=traces, noise_key=key, threads=threads,
+        searches=searches, relevant=relevant, traces=traces, threads=threads,
     )  # fmt: skip
     terminal.print(comparison)
     if latex:
@@ -140,8 +136,8 @@ def compare(
 
 def _compare_on_rig(
     rig: str, law: list[str] | None, seeds: int, searches: int | None, duration: float | None,
-    starts: "Starts | None", relevant: float, defaults: bool, unchecked: bool, out: Path, executor: str,
-    key: int | str, threads: int | None, terminal: Terminal,
+    starts: "Starts | None", relevant: float, defaults: bool, out: Path, executor: str,
+    threads: int | None, terminal: Terminal,
 ) -> None:  # fmt: skip
     """Compare laws over the parameter sets of a rig, and say if one law wins on all sets."""
     from smc_mujoco.common import annexes
@@ -154,8 +150,8 @@ def _compare_on_rig(
     tuning = {"starts": starts, "folder": out / "searches", "threads": threads, "progress": True}
     found = [] if searches is None else ensemble.tuned(machine, chosen, searches, **tuning)
     scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, starts)
-    table = study(scenarios, out, True, executor, threads, progress=True, noise_key=key, half_steps=True)
-    boards = leaderboard(table, defaults=defaults, relevant=relevant, unchecked=unchecked)
+    table = study(scenarios, out, True, executor, threads, progress=True, half_steps=True)
+    boards = leaderboard(table, defaults=defaults, relevant=relevant)
     terminal.print(boards)
     for one in found:
         terminal.note(f"{one.law}{one.remark and f': {one.remark}'}", wrap=True)
@@ -167,6 +163,5 @@ def _finish(table: "Table", out: Path, terminal: Terminal) -> None:
     """Print the number of runs and the file with all of them."""
     failed = len(table) - table.data["failure"].null_count
     runs = f"{counted(len(table), 'run')}, {failed} of them failed"
-    key = table.column("noise_key")[0]
-    terminal.note(f"{runs}, {f'noise key {key}' if key else 'noise of public seeds'}, {terminal.seconds:.0f} s")
+    terminal.note(f"{runs}, {terminal.seconds:.0f} s")
     terminal.wrote(out / "results.parquet")

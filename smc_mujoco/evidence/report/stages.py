@@ -39,7 +39,6 @@ from smc_mujoco.simulation.grid import grid as make_grid
 from smc_mujoco.simulation.run import run
 from smc_mujoco.studies.board import Board
 from smc_mujoco.studies.leaderboard import leaderboard
-from smc_mujoco.studies.noise_key import DRAWN, has_user_code
 from smc_mujoco.studies.study import study
 from smc_mujoco.studies.table import Table
 from smc_mujoco.studies.worst_case import DURATION, WorstCase, cached_worst_case
@@ -162,8 +161,7 @@ def grid(work: Work) -> Table:
     plan = work.plan
     runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
     with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
-        key = DRAWN if any(map(has_user_code, runs)) else 0  # the paper's claims share the runs of the package's laws
-        options: dict[str, Any] = {"noise_key": key, "half_steps": True}
+        options: dict[str, Any] = {"half_steps": True}
         return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, **options)
 
 

@@ -14,7 +14,7 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.rigs import firmware, predictions, stepper_record
 from smc_mujoco.evidence.rigs.firmware import FOUR_STATES, LINEAR, STEPS, TICK, TWO_STATES
 from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS, PREDICTION
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 RECORDS = Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"  # of the machine; not part of the package
 

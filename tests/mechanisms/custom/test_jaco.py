@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 START = (0.0, 2.5, 2.0, 0.0, 0.5, 0.0)  # rad
 LIMITS = [30.5] * 3 + [6.8] * 3  # N m, of the large and the small joints in dm_control

@@ -25,7 +25,7 @@ from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.simulation import model as models
-from smc_mujoco.simulation import reference as plain
+from helpers import reference as plain
 from smc_mujoco.studies import run_key
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)

@@ -11,7 +11,7 @@ import smc_mujoco as smc
 from smc_mujoco.analysis.margins import MARGIN_KINDS
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.drives import drive_step
-from smc_mujoco.simulation import reference
+from helpers import reference
 from smc_mujoco.simulation.state import LOGGED
 
 H = 5e-4  # s

@@ -13,7 +13,7 @@ import pytest
 from helpers.runs import JOINTED
 
 import smc_mujoco as smc
-from smc_mujoco.simulation import reference
+from helpers import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
 

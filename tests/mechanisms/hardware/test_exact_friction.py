@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 PERIOD = 1e-3
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}

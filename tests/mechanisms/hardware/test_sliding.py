@@ -13,7 +13,7 @@ import smc_mujoco as smc
 from smc_mujoco.control.units import Gain
 from smc_mujoco.mechanisms.hardware.servos import SERVOS
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from smc_mujoco.simulation import reference
+from helpers import reference
 
 # Gaz et al. 2019, table of the Panda's friction: N m, s/rad, rad/s
 P1 = np.array([0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489])

@@ -227,7 +227,7 @@ class Loop:
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late; -1 if it does not run."""
-        clock, seed = self.scenario.clock, self.scenario.noise_seed
+        clock, seed = self.scenario.clock, self.scenario.seed
         if k in (0, self.scenario.samples):
             return 0
         if clock.missed and philox.random_words(seed, 0, philox.MISSED, k)[0] * 2.0**-53 < clock.missed:
@@ -263,7 +263,7 @@ class Loop:
             if isinstance(signal, Push):
                 continue
             if signal.random:
-                seed = self.scenario.noise_seed
+                seed = self.scenario.seed
                 d = [evaluate(signal, t, state, seed, i, stream)[0] for i, state in enumerate(memory)]
             elif signal.sees:
                 d = self.feedback_force(signal, data, t, memory[0])
