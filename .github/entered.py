@@ -3,9 +3,10 @@
     BASE=COMMIT make entered                    # the one folder entries/NAME that differs from a commit
     NAME=soft_relay NUMBER=... make entered     # on hidden instances, too, if its law is checked
 
-In a workflow (CI=true) the law runs without network, without a way to gain rights, and without the environment, which
-has the workflow's tokens. A law whose file can do more than compute could read the number in the environment of the
-processes around it. So where there is a number, it does not run at all.
+In a workflow (CI=true) the law runs without network, without a way to gain rights, and without the
+environment, which has the workflow's tokens. A law whose file can do more than compute could read
+the number in the environment of the processes around it. So where there is a number, it does not
+run at all.
 """
 
 import json
@@ -29,7 +30,10 @@ def changed(base: str) -> str:
     if not COMMIT.fullmatch(base):
         sys.exit(f"BASE is {base!r}: give a commit of 40 hex digits")
     paths = subprocess.run(
-        ["git", "diff", "--name-only", "-z", base, "HEAD"], check=True, capture_output=True, text=True
+        ["git", "diff", "--name-only", "-z", base, "HEAD"],
+        check=True,
+        capture_output=True,
+        text=True,
     ).stdout.split("\0")[:-1]
     return folder({"/".join(path.split("/")[:2]) for path in paths})
 
@@ -38,7 +42,9 @@ def folder(names: set[str]) -> str:
     """Return the only folder, if it is one of an entry."""
     if len(names) != 1 or not FOLDER.fullmatch(*names):
         told = ", ".join(sorted(names)[:5]) or "nothing"
-        sys.exit(f"an entry's change is in one folder entries/NAME, of small letters, digits and _; this is in {told}")
+        sys.exit(
+            f"an entry's change is in one folder entries/NAME, of small letters, digits and _; this is in {told}"
+        )
     return names.pop()
 
 
@@ -61,10 +67,19 @@ def unread(place: str) -> str:
 def main() -> None:
     """Run it, on the visible instances first."""
     name, base, number = (os.environ.pop(key, "") for key in ("NAME", "BASE", "NUMBER"))
-    place = folder({f"entries/{name}"}) if name else changed(base)
+    if name:
+        place = folder({f"entries/{name}"})
+    else:
+        place = changed(base)
     if number and (why := unread(place)):
         sys.exit(f"{place} runs on no hidden instances before their number is published: {why}")
-    command = [str(Path(sys.executable).with_name("smc-mujoco")), "enter", place, "--results", str(RESULTS)]
+    command = [
+        str(Path(sys.executable).with_name("smc-mujoco")),
+        "enter",
+        place,
+        "--results",
+        str(RESULTS),
+    ]
     runs = alone if os.environ.get("CI") else list
     if code := subprocess.run(runs(command), check=False).returncode:
         sys.exit(code)
@@ -73,7 +88,9 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as secret:
             file = Path(secret, "number")
             file.write_text(number, encoding="ascii")
-            if code := subprocess.run(runs([*command, "--hidden", str(file)]), check=False).returncode:
+            if code := subprocess.run(
+                runs([*command, "--hidden", str(file)]), check=False
+            ).returncode:
                 sys.exit(code)
     shutil.make_archive(result.parent.name, "zip", result.parents[1])
 

@@ -1,7 +1,8 @@
 """The README and the links of a release, from one address: `repository` in pyproject.toml.
 
-The package index shows the README outside of the repository, where relative links lead nowhere. With an address they
-become absolute. Without one the README stays as it is, and the release has no links.
+The package index shows the README outside of the repository, where relative links lead nowhere.
+With an address they become absolute. Without one the README stays as it is, and the release has no
+links.
 """
 
 import re
@@ -15,7 +16,9 @@ FROM_A_FILE = "../../"  # how a badge's link leaves the folder of the branch
 
 
 def absolute(text: str, repository: str) -> str:
-    """Return Markdown with its relative links and pictures as addresses in a repository's main branch."""
+    """Return Markdown with its relative links and pictures as addresses in a repository's main
+    branch.
+    """
 
     def replaced(link: re.Match) -> str:
         target = link["target"]

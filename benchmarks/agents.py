@@ -2,10 +2,11 @@
 
     make bench            or            python benchmarks/agents.py [--quick]
 
-Only ratios within one run mean anything on a shared machine; each is the median over rounds that alternate between the
-two sides. Single environments are measured in processor time, which other work does not stretch, batches in wall time.
-Here a step is one RK4 step of 1 ms. In dm_control's pendulum it is one Euler step. In gymnasium's InvertedPendulum it
-is two RK4 steps, which take a third of its time; so the last row counts those one by one.
+Only ratios within one run mean anything on a shared machine; each is the median over rounds that
+alternate between the two sides. Single environments are measured in processor time, which other
+work does not stretch, batches in wall time. Here a step is one RK4 step of 1 ms. In dm_control's
+pendulum it is one Euler step. In gymnasium's InvertedPendulum it is two RK4 steps, which take a
+third of its time; so the last row counts those one by one.
 """
 
 import importlib.util
@@ -36,11 +37,18 @@ def seconds(action: Callable[[], object], clock: Callable[[], float]) -> float:
     return clock() - start
 
 
-def compare(table: Table, what: str, one: tuple, other: tuple, target: str, clock=time.perf_counter) -> None:
-    """A row: microseconds per step of (action, steps) and of another, and the median over rounds of their ratio."""
+def compare(
+    table: Table, what: str, one: tuple, other: tuple, target: str, clock=time.perf_counter
+) -> None:
+    """A row: microseconds per step of (action, steps) and of another, and the median over rounds of
+    their ratio.
+    """
     for action, _ in (one, other):
         action()
-    rounds = [(seconds(one[0], clock) * 1e6 / one[1], seconds(other[0], clock) * 1e6 / other[1]) for _ in range(ROUNDS)]
+    rounds = [
+        (seconds(one[0], clock) * 1e6 / one[1], seconds(other[0], clock) * 1e6 / other[1])
+        for _ in range(ROUNDS)
+    ]
     a, b = (statistics.median(side) for side in zip(*rounds, strict=True))
     r = statistics.median(x / y for x, y in rounds)
     table.add_row(what, f"{a:.2f}", f"{b:.2f}", f"{r:.2f}", target)
@@ -63,13 +71,29 @@ def singles(table: Table) -> None:
     from dm_control import suite as theirs
 
     endless = {"duration": 1e4}
-    peer = stepping(theirs.load("pendulum", "swingup", task_kwargs={"time_limit": float("inf")}), np.zeros(1))
+    peer = stepping(
+        theirs.load("pendulum", "swingup", task_kwargs={"time_limit": float("inf")}), np.zeros(1)
+    )
     for plant in ("inverted_pendulum", "duffing", "van_der_pol"):
         mine = stepping(dm_control_env.load(plant, changes=endless), np.zeros(1))
-        compare(table, f"dm_env {plant} / dm_control pendulum, per step", mine, peer, "<= 1.5", time.process_time)
-    mine = stepping(gymnasium.make("smc_mujoco:smc/InvertedPendulum-v0", changes=endless), np.zeros(1))
+        compare(
+            table,
+            f"dm_env {plant} / dm_control pendulum, per step",
+            mine,
+            peer,
+            "<= 1.5",
+            time.process_time,
+        )
+    mine = stepping(
+        gymnasium.make("smc_mujoco:smc/InvertedPendulum-v0", changes=endless), np.zeros(1)
+    )
     compare(
-        table, "gymnasium inverted_pendulum / dm_control pendulum, per step", mine, peer, "<= 1.5", time.process_time
+        table,
+        "gymnasium inverted_pendulum / dm_control pendulum, per step",
+        mine,
+        peer,
+        "<= 1.5",
+        time.process_time,
     )
 
 
@@ -80,7 +104,9 @@ def vectors(table: Table) -> None:
     ours = gymnasium.make_vec("smc_mujoco:smc/InvertedPendulum-v0", num_envs=COPIES)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # glfw misses a display that nobody asked for
-        theirs = gymnasium.make_vec("InvertedPendulum-v5", num_envs=COPIES, vectorization_mode="sync")
+        theirs = gymnasium.make_vec(
+            "InvertedPendulum-v5", num_envs=COPIES, vectorization_mode="sync"
+        )
     count = 20 if QUICK else 50
     skip = theirs.unwrapped.envs[0].unwrapped.frame_skip  # pyright: ignore[reportAttributeAccessIssue] of a vector of environments
 
@@ -109,4 +135,6 @@ if __name__ == "__main__":
     for part in (singles, vectors):
         part(table)
     console.print(table)
-    console.print(f"mujoco {mujoco.__version__}, median of {ROUNDS} alternating rounds, one machine, one run")
+    console.print(
+        f"mujoco {mujoco.__version__}, median of {ROUNDS} alternating rounds, one machine, one run"
+    )

@@ -3,9 +3,10 @@
     python benchmarks/chattering.py [--loops 200] [--seed 0]
     python benchmarks/chattering.py --halving duffing    # whose cycles half the physics step changes, by drive
 
-A range is widened by a factor, so that it holds the exact amplitude, or frequency, in more than 95 % of the loops. The
-script prints the factors, which `smc_mujoco/analysis/chattering.py` has as constants, and how good the predictions are.
-It takes about a minute and a half of processor time, the halving a third of that.
+A range is widened by a factor, so that it holds the exact amplitude, or frequency, in more than 95
+% of the loops. The script prints the factors, which `smc_mujoco/analysis/chattering.py` has as
+constants, and how good the predictions are. It takes about a minute and a half of processor time,
+the halving a third of that.
 """
 
 import argparse
@@ -28,7 +29,8 @@ from smc_mujoco.analysis.chattering import AMPLITUDE_FACTOR, FREQUENCY_FACTOR  #
 from smc_mujoco.control import gain_sets  # noqa: E402
 from smc_mujoco.simulation.grid import case  # noqa: E402
 
-SHARE = 0.97  # of the loops whose ranges are to hold the truth, over 95 %: chosen after a trial on 60 other loops
+# of the loops whose ranges are to hold the truth, over 95 %: chosen after a trial on 60 other loops
+SHARE = 0.97
 SLOWEST = 1.0  # Hz: a slower cycle does not count
 MANY = 40  # samples a period, from which on a cycle hardly locks to them: chosen
 DRIVES = {
@@ -45,21 +47,26 @@ DRIVES = {
 
 
 def halving(plant: str) -> None:
-    """Print the laws with tuned gains whose cycles half the step or a nudge changes, behind each drive."""
+    """Print the laws with tuned gains whose cycles half the step or a nudge changes, behind each
+    drive.
+    """
     marked, cases, laws = Counter(), Counter(), gain_sets.general_laws([plant], "tuned")
     for name, drive in DRIVES.items():
         changes = {} if drive is None else {"actuator": drive}
         runs = smc.run([case(plant, law, "nominal", 5.0, "tuned", changes=changes) for law in laws])
         integrator = runs[0].scenario.resolved.integrator
-        found = {
-            t.scenario.law.name: c for t, c in zip(runs, smc.fidelity.step_halving(runs, 0), strict=True) if c.marked
-        }
+        found = {}
+        for t, c in zip(runs, smc.fidelity.step_halving(runs, 0), strict=True):
+            if c.marked:
+                found[t.scenario.law.name] = c
         marked[integrator] += len(found)
         cases[integrator] += len(runs)
-        parts = [
-            f"{law} {100 * change.amplitude:.0f} %, {100 * change.frequency:.0f} %" for law, change in found.items()
-        ]
-        print(f"{name}: {len(found)} of {len(runs)}{', amplitude and frequency: ' * bool(parts)}{'; '.join(parts)}")
+        parts = []
+        for law, change in found.items():
+            parts.append(f"{law} {100 * change.amplitude:.0f} %, {100 * change.frequency:.0f} %")
+        print(
+            f"{name}: {len(found)} of {len(runs)}{', amplitude and frequency: ' * bool(parts)}{'; '.join(parts)}"
+        )
     print(*(f"{name}: {marked[name]} of {cases[name]}" for name in cases), sep=", ")
 
 
@@ -68,7 +75,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--loops", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--halving", metavar="PLANT", help="what half the physics step changes on this plant instead")
+    parser.add_argument(
+        "--halving",
+        metavar="PLANT",
+        help="what half the physics step changes on this plant instead",
+    )
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     if given.halving:
@@ -82,10 +93,14 @@ def main() -> None:
             continue
         cycle = smc.chattering(scenario(loop))
         none += not cycle
-        rows.append((
-            cycle.amplitude / amplitude, *(end / amplitude for end in cycle.amplitude_range),
-            cycle.frequency / frequency, *(end / frequency for end in cycle.frequency_range),
-        ))  # fmt: skip
+        rows.append(
+            (
+                cycle.amplitude / amplitude,
+                *(end / amplitude for end in cycle.amplitude_range),
+                cycle.frequency / frequency,
+                *(end / frequency for end in cycle.frequency_range),
+            )
+        )
         samples.append(1.0 / (frequency * loop.period))
     for name, factor, (ratio, low, high) in zip(
         ("amplitude", "frequency"),
@@ -94,8 +109,12 @@ def main() -> None:
         strict=True,
     ):
         held = np.mean((low <= 1.0) & (high >= 1.0))
-        needed = np.fmax(low * factor, factor / high)  # the factor with which the range just holds the truth
-        needed = np.sort(np.where(np.isnan(low), math.inf, needed))[math.ceil(SHARE * len(rows)) - 1]
+        needed = np.fmax(
+            low * factor, factor / high
+        )  # the factor with which the range just holds the truth
+        needed = np.sort(np.where(np.isnan(low), math.inf, needed))[
+            math.ceil(SHARE * len(rows)) - 1
+        ]
         errors = np.abs(ratio[~np.isnan(ratio)] - 1.0)
         print(
             f"{name}: factor {max(needed, 1.0):.4f} for {100 * SHARE:g} %; with {factor:g} the ranges hold "

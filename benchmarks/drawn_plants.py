@@ -1,12 +1,14 @@
-"""Two plants whose numbers were drawn by lot, to check the sentences of docs/where_sliding_mode_loses.md on them.
+"""Two plants whose numbers were drawn by lot, to check the sentences of
+docs/where_sliding_mode_loses.md on them.
 
-    python benchmarks/families.py benchmarks/drawn_plants.py:drawn_slide --lot 584051958 --condition differenced_5ms
-    python benchmarks/families.py benchmarks/drawn_plants.py:drawn_pendulum --lot 584110175 --condition light
+    python benchmarks/families.py benchmarks/drawn_plants.py:drawn_slide --lot 584051958 --condition
+    differenced_5ms python benchmarks/families.py benchmarks/drawn_plants.py:drawn_pendulum --lot
+    584110175 --condition light
 
-SEED is what the clock said before anything was run on them. A mass on a spring: M x'' = -k x - b x' + u + d. A
-pendulum, m l^2 x'' = m g l sin x - b x' + u + d, that stands or hangs; one that half of u_max cannot hold is drawn
-again. From the same lot come the seeds of the levels (--lot) and the conditions, out of six. The slide's was drawn
-twice: the first, `jitter`, takes ten times as long.
+SEED is what the clock said before anything was run on them. A mass on a spring: M x'' = -k x - b x'
++ u + d. A pendulum, m l^2 x'' = m g l sin x - b x' + u + d, that stands or hangs; one that half of
+u_max cannot hold is drawn again. From the same lot come the seeds of the levels (--lot) and the
+conditions, out of six. The slide's was drawn twice: the first, `jitter`, takes ten times as long.
 """
 
 import math
@@ -67,17 +69,23 @@ def hinge_fields(model, p):
 
 
 def hinge_nominal(x, v, i, p):
-    return (p.m * GRAVITY * p.h * math.sin(x[i]) - p.b * v[i]) / (p.m * p.h**2), 1.0 / (p.m * p.h**2)
+    return (p.m * GRAVITY * p.h * math.sin(x[i]) - p.b * v[i]) / (p.m * p.h**2), 1.0 / (
+        p.m * p.h**2
+    )
 
 
 def plant(name, unit, x0, parameters, mass, build, fields, nominal):
     """Return a plant of one channel."""
     about = {"mass": mass, "unit": unit, "x0": (x0,), "lane": (0.0, 1.0, 0.0)}
-    return Plant(name=name, parameters=parameters, build=build, fields=fields, nominal=nominal, **about)
+    return Plant(
+        name=name, parameters=parameters, build=build, fields=fields, nominal=nominal, **about
+    )
 
 
 numbers = {"M": even_ratio(0.3, 3.0), "k": even(0.0, 10.0), "b": even(0.0, 1.0)}
-drawn_slide = plant("drawn_slide", "m", even(0.1, 0.5), numbers, "M", slide, slide_fields, slide_nominal)
+drawn_slide = plant(
+    "drawn_slide", "m", even(0.1, 0.5), numbers, "M", slide, slide_fields, slide_nominal
+)
 while True:
     stands = bool(lot.integers(2))
     numbers = {"m": even_ratio(0.2, 1.5), "h": even_ratio(0.25, 0.9), "b": even(0.0, 0.1)}
@@ -85,4 +93,6 @@ while True:
     if numbers["m"] * GRAVITY * numbers["h"] <= HELD:
         break
 numbers["h"] = height = numbers["h"] if stands else -numbers["h"]
-drawn_pendulum = plant("drawn_pendulum", "rad", start, numbers, "m", hinge, hinge_fields, hinge_nominal)
+drawn_pendulum = plant(
+    "drawn_pendulum", "rad", start, numbers, "m", hinge, hinge_fields, hinge_nominal
+)

@@ -1,25 +1,30 @@
-"""Where sliding mode loses: its best law against the best rival, as a load, a delay, noise or friction grows.
+"""Where sliding mode loses: its best law against the best rival, as a load, a delay, noise or
+friction grows.
 
     python benchmarks/families.py PLANT [PLANT ...] [--lot SEED] [--out families.json]
 
-A plant is a name, FILE.xml:joint, or FILE.py:plant of a file that defines it. Each law has the gains of twelve
-searches, run i those of search i, from start i: shipped ones, or searches of the same rule and budget, which are kept
-beside --out. A level has no unit: the load's frequency and the delay count by the bandwidth wc of the tuned ADRC, noise
-by the start, dry friction by u_max. Only the force of a load is in N or N m; where u_max is not 6, it is more or less
-in proportion. With `--lot`, levels are drawn within the range of each sentence of the page, to check it. The error is
-rms_error, of the last three quarters of 8 s, at least 1e-4 of the start. The cost is what the gains were searched for,
-ITAE/|x0| plus the weighted variation of u, of this one run.
+A plant is a name, FILE.xml:joint, or FILE.py:plant of a file that defines it. Each law has the
+gains of twelve searches, run i those of search i, from start i: shipped ones, or searches of the
+same rule and budget, which are kept beside --out. A level has no unit: the load's frequency and the
+delay count by the bandwidth wc of the tuned ADRC, noise by the start, dry friction by u_max. Only
+the force of a load is in N or N m; where u_max is not 6, it is more or less in proportion. With
+`--lot`, levels are drawn within the range of each sentence of the page, to check it. The error is
+rms_error, of the last three quarters of 8 s, at least 1e-4 of the start. The cost is what the gains
+were searched for, ITAE/|x0| plus the weighted variation of u, of this one run.
 
-One half of the runs chooses the law of a family for the other half, whose scores count, so the larger family has no
-advantage. A lead is the ratio of the two scores, run by run, with its 95 % interval (signed ranks), also at half the
-physics step. A plant of one channel takes about 6 minutes of processor time, and 4 for searches.
+One half of the runs chooses the law of a family for the other half, whose scores count, so the
+larger family has no advantage. A lead is the ratio of the two scores, run by run, with its 95 %
+interval (signed ranks), also at half the physics step. A plant of one channel takes about 6 minutes
+of processor time, and 4 for searches.
 
 What the page shows, call by call:
 
     table         duffing inverted_pendulum --out two.json
-    no cost of u  duffing inverted_pendulum --only pid implicit_first_order boundary_layer --gains tracking
+    no cost of u  duffing inverted_pendulum --only pid implicit_first_order boundary_layer --gains
+    tracking
     picture       van_der_pol --lot 1795620293 --read two.json --figure where.svg
-    check, border van_der_pol inverted_pendulum_network pendulum_network --lot 1795620293 --read two.json
+    check, border van_der_pol inverted_pendulum_network pendulum_network --lot 1795620293 --read
+    two.json
     the cart      examples/my_smc_package/my_smc_package/plants.py --lot 1795620293
     slide by lot  benchmarks/drawn_plants.py:drawn_slide --lot 584051958 --condition differenced_5ms
     pendulum, too benchmarks/drawn_plants.py:drawn_pendulum --lot 584110175 --condition light
@@ -75,8 +80,9 @@ LEVELS = {
     "noise / start": (1e-5, 1e-4, 1e-3, 3e-3, 1e-2),
     "friction / u_max": (0.01, 0.02, 0.05, 0.1, 0.2),
 }
-# The sentences of docs/where_sliding_mode_loses.md: axis, lowest and highest level, score, kind, and what it does
-# against the best rival. "is level at best": it is ahead by no more than the share within which laws are level.
+# The sentences of docs/where_sliding_mode_loses.md: axis, lowest and highest level, score, kind,
+# and what it does against the best rival. "is level at best": it is ahead by no more than the share
+# within which laws are level.
 SENTENCES = (
     ("load, omega / wc", 0.5, 2.0, "error", "switching", "leads"),
     (FORCE, 0.25, 0.5, "cost", "switching", "leads"),
@@ -87,7 +93,10 @@ SENTENCES = (
     ("noise / start", 1e-3, 1e-2, "cost", "smoothed", "is level at best"),
     ("delay x wc", 0.0, 0.4, "cost", "switching", "is level at best"),
 )
-SURE = {"implicit_first_order": "d", "super_twisting": "d'"}  # laws whose theorem bounds the load, or its rate
+SURE = {
+    "implicit_first_order": "d",
+    "super_twisting": "d'",
+}  # laws whose theorem bounds the load, or its rate
 SCORES, KINDS = ("error", "cost"), ("switching", "smoothed")
 COLOURS = "#0072B2", "#7CC0E8", "#D55E00", "#F0B080"
 FIGURE_WIDTH, ROW_HEIGHT, LIMIT = 7.0, 1.75, 1e3  # inches; largest lead that is drawn
@@ -113,7 +122,10 @@ class Subject(NamedTuple):
 
     def load(self, axis: str, level: float) -> tuple[float, float]:
         """Return the force of a load, N or N m, and its frequency, rad/s."""
-        force, omega = (level, FORCE_AT) if axis == FORCE else (LOAD, level)
+        if axis == FORCE:
+            force, omega = (level, FORCE_AT)
+        else:
+            force, omega = (LOAD, level)
         return force * self.bound / U_MAX, omega * self.wc
 
     def changes(self, axis: str, level: float, run: int) -> dict:
@@ -131,27 +143,47 @@ class Subject(NamedTuple):
         """Return the runs of a law at a level."""
         changes = [self.changes(axis, level, run) for run in range(RUNS)]
         laws = [self.laws[law](run) for run in range(RUNS)]
-        return [case(self.plant, laws[i], self.condition, DURATION, seed=i, changes=changes[i]) for i in range(RUNS)]
+        return [
+            case(self.plant, laws[i], self.condition, DURATION, seed=i, changes=changes[i])
+            for i in range(RUNS)
+        ]
 
     def admitted(self, axis: str, level: float) -> dict[str, list[bool]]:
-        """Return whether the gains of each run admit a load from FORCE_AT wc on, for the laws of SURE."""
+        """Return whether the gains of each run admit a load from FORCE_AT wc on, for the laws of
+        SURE.
+        """
         if not axis.startswith("load") or (axis != FORCE and level < FORCE_AT):
             return {}
         force, omega = self.load(axis, level)
         sizes = {"d": force, "d'": force * omega}
-        its = {law: (what, catalogue()[law].admits[what]) for law, what in SURE.items() if law in self.laws}
+        its = {}
+        for law, what in SURE.items():
+            if law in self.laws:
+                its[law] = (what, catalogue()[law].admits[what])
         return {
-            law: [sizes[what] < most(SimpleNamespace(**self.laws[law](run).gains)) for run in range(RUNS)]
+            law: [
+                sizes[what] < most(SimpleNamespace(**self.laws[law](run).gains))
+                for run in range(RUNS)
+            ]
             for law, (what, most) in its.items()
         }
 
 
 def subject(
-    text: str, folder: Path, condition: str = "nominal", gains: str = "tuned", laws: Sequence[str] = COMPARED
+    text: str,
+    folder: Path,
+    condition: str = "nominal",
+    gains: str = "tuned",
+    laws: Sequence[str] = COMPARED,
 ) -> Subject:
-    """Return the plant of a name, FILE.xml:joint or FILE.py:plant, with its laws; the folder keeps what is tuned."""
+    """Return the plant of a name, FILE.xml:joint or FILE.py:plant, with its laws; the folder keeps
+    what is tuned.
+    """
     file, _, name = text.partition(".py")
-    plant = of_file(Path(f"{file}.py"), name.removeprefix(":")) if text != file else as_plant(text)
+    if text != file:
+        plant = of_file(Path(f"{file}.py"), name.removeprefix(":"))
+    else:
+        plant = as_plant(text)
     templates = [catalogue()[law] for law in dict.fromkeys((*laws, "adrc"))]
     trial = Trial([plant], (), DURATION, None, folder, None, progress=True)
     tuned = trial.gains({plant.name: templates}, defaults=False, gains=gains)[plant.name]
@@ -164,11 +196,15 @@ def subject(
 def of_file(path: Path, name: str = "") -> Plant:
     """Return the plant that a Python file defines; if several, that of a name."""
     plants = {value.name: value for value in execute(path).values() if isinstance(value, Plant)}
-    return find(f"plant of {path}", name, plants) if name or len(plants) != 1 else plants.popitem()[1]
+    if name or len(plants) != 1:
+        return find(f"plant of {path}", name, plants)
+    return plants.popitem()[1]
 
 
 def by_lot(seed: int) -> dict[str, list[float]]:
-    """Return levels of each axis, drawn within the range of each sentence; equal ratios are equally likely."""
+    """Return levels of each axis, drawn within the range of each sentence; equal ratios are equally
+    likely.
+    """
     rng, levels = np.random.default_rng(seed), {axis: [] for axis in LEVELS}
     for axis, lowest, highest, *_ in SENTENCES:
         first = lowest or LEVELS[axis][1]  # no delay has no ratio to others
@@ -183,12 +219,19 @@ def scores(made: Sequence[Scenario]) -> np.ndarray:
         if trace.failure is None:
             tracking, variation = cost.terms_of_run(trace)
             error = CATALOGUE["rms_error"].worst(by_group(trace))
-            values[:, i] = max(error, EPS * max(map(abs, trace.scenario.plant.x0))), tracking + cost.weight * variation
+            values[:, i] = (
+                max(error, EPS * max(map(abs, trace.scenario.plant.x0))),
+                tracking + cost.weight * variation,
+            )
     return values
 
 
-def cells(subject: Subject, axis: str, level: float, families: dict[str, list[str]]) -> Iterator[dict]:
-    """Yield the lead of sliding mode at a level, of each kind in each score: above 1, it is that many times better."""
+def cells(
+    subject: Subject, axis: str, level: float, families: dict[str, list[str]]
+) -> Iterator[dict]:
+    """Yield the lead of sliding mode at a level, of each kind in each score: above 1, it is that
+    many times better.
+    """
     made = {law: subject.scenarios(axis, level, law) for laws in families.values() for law in laws}
     values = {law: scores(its) for law, its in made.items()}
     fine: dict[str, np.ndarray] = {}
@@ -204,9 +247,19 @@ def cells(subject: Subject, axis: str, level: float, families: dict[str, list[st
                 fine_scores[family][half::2] = fine[best[family][half]][k, half::2]
         medians = {law: float(np.median(its[k])) for law, its in values.items()}
         for kind in KINDS:
-            lead, low, high = map(math.exp, interval(np.log(family_scores["rivals"] / family_scores[kind]), 0.025))
-            at_half = math.exp(interval(np.log(fine_scores["rivals"] / fine_scores[kind]), 0.025)[0])
-            cell = {"plant": subject.plant.name, "axis": axis, "level": level, "score": score, "kind": kind}
+            lead, low, high = map(
+                math.exp, interval(np.log(family_scores["rivals"] / family_scores[kind]), 0.025)
+            )
+            at_half = math.exp(
+                interval(np.log(fine_scores["rivals"] / fine_scores[kind]), 0.025)[0]
+            )
+            cell = {
+                "plant": subject.plant.name,
+                "axis": axis,
+                "level": level,
+                "score": score,
+                "kind": kind,
+            }
             cell |= {"lead": lead, "low": low, "high": high, "half": at_half, "law": best[kind]}
             runs = {law: its[k].tolist() for law, its in values.items()}
             cell |= {"rival": best["rivals"], "medians": medians, "runs": runs}
@@ -221,12 +274,22 @@ def draw(known: Sequence[dict], path: Path) -> None:
         panels = figure.subplots(len(LEVELS), len(plants), squeeze=False, sharex="row", sharey=True)
         for (i, axis), (k, plant) in itertools.product(enumerate(LEVELS), enumerate(plants)):
             ax = panels[i, k]
-            for (score, kind), colour in zip(itertools.product(SCORES, KINDS), COLOURS, strict=True):
+            for (score, kind), colour in zip(
+                itertools.product(SCORES, KINDS), COLOURS, strict=True
+            ):
                 wanted = {"plant": plant, "axis": axis, "score": score, "kind": kind}
                 its = [one for one in known if wanted.items() <= one.items()]
-                x = [one["level"] or LEVELS[axis][1] / 2 for one in its]  # no delay is drawn at half of the smallest
-                ends = [[one["lead"] - one["low"] for one in its], [one["high"] - one["lead"] for one in its]]
-                ax.errorbar(x, [one["lead"] for one in its], ends, fmt="o-", color=colour, ms=4, lw=1.2)
+                # no delay is drawn at half of the smallest
+                x = []
+                for one in its:
+                    x.append(one["level"] or LEVELS[axis][1] / 2)
+                ends = [
+                    [one["lead"] - one["low"] for one in its],
+                    [one["high"] - one["lead"] for one in its],
+                ]
+                ax.errorbar(
+                    x, [one["lead"] for one in its], ends, fmt="o-", color=colour, ms=4, lw=1.2
+                )
             ax.axhline(1.0, color=style.INK, lw=0.8)
             ax.set(xscale="log", yscale="log", ylim=(1 / LIMIT, LIMIT), xlabel=axis)
             ax.xaxis.set_minor_formatter(NullFormatter())
@@ -235,35 +298,49 @@ def draw(known: Sequence[dict], path: Path) -> None:
         for ax in panels[:, 0]:
             ax.set_ylabel("lead (ratio)")
         names = [f"{score}, {kind}" for score, kind in itertools.product(SCORES, KINDS)]
-        handles = [Line2D([], [], color=c, marker="o", label=name) for name, c in zip(names, COLOURS, strict=True)]
+        handles = []
+        for name, c in zip(names, COLOURS, strict=True):
+            handles.append(Line2D([], [], color=c, marker="o", label=name))
         pages.set_head(figure, FIGURE_WIDTH, "Sliding mode ahead above 1, a rival below", handles)
         pages.write(figure, pages.files(path))
 
 
 def borders(known: Sequence[dict]) -> Iterator[str]:
-    """Yield by how much a law leads in error where its gains admit a load from 0.5 wc on, and where they do not."""
+    """Yield by how much a law leads in error where its gains admit a load from 0.5 wc on, and where
+    they do not.
+    """
     for law, what in SURE.items():
         leads: dict[bool, list[float]] = {True: [], False: []}
         for one in known:
             if one["score"] != "error" or one["kind"] != KINDS[0] or law not in one["admitted"]:
                 continue
             runs = one["runs"]
-            rivals, _ = told_by(np.array([runs[rival] for rival in FAMILIES["rivals"] if rival in runs]))
+            rivals, _ = told_by(
+                np.array([runs[rival] for rival in FAMILIES["rivals"] if rival in runs])
+            )
             for within, rival, own in zip(one["admitted"][law], rivals, runs[law], strict=True):
                 leads[within].append(rival / own)
         for within, its in leads.items():
-            low, middle, high = np.quantile(its, [0.25, 0.5, 0.75]) if its else [math.nan] * 3
+            if its:
+                low, middle, high = np.quantile(its, [0.25, 0.5, 0.75])
+            else:
+                low, middle, high = [math.nan] * 3
             where = "within" if within else "beyond"
             yield f"{law}, {what} {where} what its gains admit: {middle:.3g} ({low:.3g} to {high:.3g}), {len(its)} runs"
 
 
 def judged(known: Sequence[dict]) -> Iterator[str]:
-    """Yield for each sentence and plant how many of its levels stand, are open, and are contradicted."""
+    """Yield for each sentence and plant how many of its levels stand, are open, and are
+    contradicted.
+    """
     counts, most = np.zeros(3, int), {"trails": 1.0, "is level at best": 1.0 / (1.0 - LEVEL_SHARE)}
     for axis, lowest, highest, score, kind, does in SENTENCES:
         for plant in dict.fromkeys(one["plant"] for one in known):
             wanted = {"plant": plant, "axis": axis, "score": score, "kind": kind}
-            its = [one for one in known if wanted.items() <= one.items() and lowest <= one["level"] <= highest]
+            its = []
+            for one in known:
+                if wanted.items() <= one.items() and lowest <= one["level"] <= highest:
+                    its.append(one)
             leads = does == "leads"
             stand = sum(one["low"] > 1.0 if leads else one["high"] < most[does] for one in its)
             against = sum(one["high"] < 1.0 if leads else one["low"] > most[does] for one in its)
@@ -275,16 +352,37 @@ def judged(known: Sequence[dict]) -> Iterator[str]:
 
 def main() -> None:
     """Print a line a cell, and write them all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("plants", nargs="*", help="names, FILE.xml:joint of your model, or FILE.py:plant")
-    parser.add_argument("--lot", type=int, metavar="SEED", help="levels drawn by lot, to check the page's sentences")
-    parser.add_argument("--condition", default="nominal", help="a condition of the suite, which the levels change")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument(
-        "--only", nargs="+", default=COMPARED, metavar="LAW", help="some laws, of each kind one or more"
+        "plants", nargs="*", help="names, FILE.xml:joint of your model, or FILE.py:plant"
+    )
+    parser.add_argument(
+        "--lot", type=int, metavar="SEED", help="levels drawn by lot, to check the page's sentences"
+    )
+    parser.add_argument(
+        "--condition", default="nominal", help="a condition of the suite, which the levels change"
+    )
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        default=COMPARED,
+        metavar="LAW",
+        help="some laws, of each kind one or more",
     )
     parser.add_argument("--without", metavar="LAW", help="leave this law out")
-    parser.add_argument("--gains", default="tuned", choices=OBJECTIVES, help="the set of shipped gains")
-    parser.add_argument("--read", nargs="+", type=Path, default=[], metavar="FILE", help="cells of earlier calls, too")
+    parser.add_argument(
+        "--gains", default="tuned", choices=OBJECTIVES, help="the set of shipped gains"
+    )
+    parser.add_argument(
+        "--read",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="FILE",
+        help="cells of earlier calls, too",
+    )
     parser.add_argument("--figure", type=Path, help="draw the cells, as this file")
     parser.add_argument("--out", type=Path, default=Path("families.json"))
     asked = parser.parse_args()

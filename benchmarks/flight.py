@@ -2,14 +2,15 @@
 
     python benchmarks/flight.py [--seeds 24] [--tuned | --twins] [--out FOLDER]
 
-Every law has its default gains, or with --tuned those that the same searches find for it, which takes an hour and a
-half of processor time. Runs start within 0.2 m and 0.2 rad, in each number, of the plant's own start beside a hover,
-and last 6 s. No law is told what a row changes. With --twins two sliding laws stand beside the same law without what is
-sliding or adaptive in it.
+Every law has its default gains, or with --tuned those that the same searches find for it, which
+takes an hour and a half of processor time. Runs start within 0.2 m and 0.2 rad, in each number, of
+the plant's own start beside a hover, and last 6 s. No law is told what a row changes. With --twins
+two sliding laws stand beside the same law without what is sliding or adaptive in it.
 
-The measure is the ultimate bound: the largest error along x, y or z, from the place or from the path, in the last
-fifth of a run. Below the table, sliding mode against its rivals: the ratio of the families' scores, run by run, with
-its 95 % interval; a family's law is chosen by the other half of the runs.
+The measure is the ultimate bound: the largest error along x, y or z, from the place or from the
+path, in the last fifth of a run. Below the table, sliding mode against its rivals: the ratio of the
+families' scores, run by run, with its 95 % interval; a family's law is chosen by the other half of
+the runs.
 """
 
 import argparse
@@ -37,16 +38,23 @@ def conditions() -> list[Any]:
 def twins() -> list[smc.Law]:
     """Return two laws with their default gains, and each without its idea.
 
-    `quaternion_sliding` has a line of the same slope in place of each tanh, which below 90 degrees is `geometric` to a
-    few per cent. The adaptive law keeps the gain that it starts with.
+    `quaternion_sliding` has a line of the same slope in place of each tanh, which below 90 degrees
+    is `geometric` to a few per cent. The adaptive law keeps the gain that it starts with.
     """
-    sliding, adaptive = (smc.law(name) for name in ("quaternion_sliding", "adaptive_quaternion_sliding"))
+    sliding, adaptive = (
+        smc.law(name) for name in ("quaternion_sliding", "adaptive_quaternion_sliding")
+    )
     its = SimpleNamespace(**sliding.gains)
     line = {"kx": its.Kx * its.rhox * its.c, "kv": its.c + its.Kx * its.rhox}
     line |= {"kR": its.K * its.rho * its.lam / 2, "kW": its.K * its.rho + its.lam / 2}
     still = smc.law("adaptive_quaternion_sliding", Gx=0, mux=0, G=0, mu=0)
     as_they_are = [smc.law(one.name, **one.gains) for one in (sliding, adaptive)]
-    return [as_they_are[0], smc.law("geometric", **line).named("its line"), as_they_are[1], still.named("its K fixed")]
+    return [
+        as_they_are[0],
+        smc.law("geometric", **line).named("its line"),
+        as_they_are[1],
+        still.named("its K fixed"),
+    ]
 
 
 def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
@@ -58,29 +66,46 @@ def rows(boards: Sequence[Any], laws: Sequence[str]) -> Iterator[str]:
         for law in laws:
             mark = "*" * (law in block.best)
             cells.append(
-                "falls" if block.lacking.get(law) else f"{mark}{float(format(1e3 * block.medians[law], '.3g')):g}{mark}"
+                "falls"
+                if block.lacking.get(law)
+                else f"{mark}{float(format(1e3 * block.medians[law], '.3g')):g}{mark}"
             )
         yield f"| {' | '.join([block.condition, *cells])} |"
 
 
 def main() -> None:
     """Run, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seeds", type=int, default=24, help="runs of a law in a condition")
-    parser.add_argument("--tuned", action="store_true", help="gains by the suite's searches, not the default ones")
+    parser.add_argument(
+        "--tuned", action="store_true", help="gains by the suite's searches, not the default ones"
+    )
     parser.add_argument("--out", help="folder that keeps searches and runs, to go on after a kill")
-    parser.add_argument("--twins", action="store_true", help="sliding laws, and each without its idea")
+    parser.add_argument(
+        "--twins", action="store_true", help="sliding laws, and each without its idea"
+    )
     chosen = parser.parse_args()
     names = [name for name in smc.laws(DRONE) if name != "none"]
-    laws = names if chosen.tuned else [smc.law(name, **smc.law(name).gains) for name in names]
+    if chosen.tuned:
+        laws = names
+    else:
+        laws = [smc.law(name, **smc.law(name).gains) for name in names]
     if chosen.twins:
         laws = twins()
         names = [law.name for law in laws]
     with tempfile.TemporaryDirectory() as passing:
         found = smc.compare(
-            laws, DRONE, conditions(), seeds=chosen.seeds, duration=6.0, metrics=(MEASURE,), out=chosen.out or passing,
+            laws,
+            DRONE,
+            conditions(),
+            seeds=chosen.seeds,
+            duration=6.0,
+            metrics=(MEASURE,),
+            out=chosen.out or passing,
             noise_key=1,
-        )  # fmt: skip
+        )
     print("\n".join(rows(found.leaderboard, names)))
     for one in leads(found.table, MEASURE, FAMILIES):
         sure = f"{one.first} by {one.times:.3g} times ({one.low:.3g} to {one.high:.3g}), {'/'.join(one.laws)}"

@@ -1,11 +1,13 @@
-"""Super-twisting over ADRC, coded twice: by this package, and by numpy alone, which shares gains and starts only.
+"""Super-twisting over ADRC, coded twice: by this package, and by numpy alone, which shares gains
+and starts only.
 
     python benchmarks/foreign.py
 
-This checks the main sentence of docs/where_sliding_mode_loses.md. Two plants, both laws, their sampling and
-Runge-Kutta's rule are written again here from their equations, and the scores, too. A row is a plant, a condition, and
-by how many times the error (rms) and the cost of super_twisting are less than those of adrc: the median over twelve
-runs by this package, then by the second coding. Noise is drawn otherwise in each. It takes some seconds.
+This checks the main sentence of docs/where_sliding_mode_loses.md. Two plants, both laws, their
+sampling and Runge-Kutta's rule are written again here from their equations, and the scores, too. A
+row is a plant, a condition, and by how many times the error (rms) and the cost of super_twisting
+are less than those of adrc: the median over twelve runs by this package, then by the second coding.
+Noise is drawn otherwise in each. It takes some seconds.
 """
 
 from collections.abc import Callable
@@ -16,12 +18,25 @@ import numpy as np
 
 from smc_mujoco.control import gain_sets
 
-H, SECONDS, RUNS, BOUND, WEIGHT = 1e-3, 8.0, 12, 6.0, 1e-3  # s, s, runs, N or N m, of the variation in the cost
+H, SECONDS, RUNS, BOUND, WEIGHT = (
+    1e-3,
+    8.0,
+    12,
+    6.0,
+    1e-3,
+)  # s, s, runs, N or N m, of the variation in the cost
 PLANTS: dict[str, Callable[..., np.ndarray]] = {  # x'' of (x, x', u)
     "duffing": lambda x, v, u: -0.2 * v + x - x**3 + u,
-    "inverted_pendulum": lambda x, v, u: (0.5 * 9.81 * 0.5 * np.sin(x) - 0.02 * v + u) / (0.5 * 0.5**2),
+    "inverted_pendulum": lambda x, v, u: (
+        (0.5 * 9.81 * 0.5 * np.sin(x) - 0.02 * v + u) / (0.5 * 0.5**2)
+    ),
 }
-CELLS = ("load, omega / wc", 0.5), ("load, omega / wc", 1.0), ("noise / start", 1e-3), ("noise / start", 1e-2)
+CELLS = (
+    ("load, omega / wc", 0.5),
+    ("load, omega / wc", 1.0),
+    ("noise / start", 1e-3),
+    ("noise / start", 1e-2),
+)
 
 
 class SuperTwisting:
@@ -62,17 +77,24 @@ class Adrc:
 LAWS = {"super_twisting": SuperTwisting, "adrc": Adrc}
 
 
-def simulate(plant: str, law: Callable, x: np.ndarray, omega: float, load: float, noise: float) -> np.ndarray:
+def simulate(
+    plant: str, law: Callable, x: np.ndarray, omega: float, load: float, noise: float
+) -> np.ndarray:
     """Return the rms error and the cost of twelve runs, (2, runs)."""
     f, rng, steps = PLANTS[plant], np.random.default_rng(0), round(SECONDS / H)
     phase = 2 * np.pi * np.arange(RUNS) / RUNS
     v, xs, us = np.zeros(RUNS), np.empty((steps + 1, RUNS)), np.empty((steps + 1, RUNS))
     for k in range(steps + 1):
-        seen = x + noise * rng.normal(size=RUNS), v + families.VELOCITY_NOISE_RATIO * noise * rng.normal(size=RUNS)
+        seen = (
+            x + noise * rng.normal(size=RUNS),
+            v + families.VELOCITY_NOISE_RATIO * noise * rng.normal(size=RUNS),
+        )
         u = np.clip(law(*seen), -BOUND, BOUND)
         xs[k], us[k] = x, u
 
-        def rate(after: float, state: np.ndarray, t: float = k * H, u: np.ndarray = u) -> np.ndarray:
+        def rate(
+            after: float, state: np.ndarray, t: float = k * H, u: np.ndarray = u
+        ) -> np.ndarray:
             return np.array([state[1], f(*state, u + load * np.sin(omega * (t + after) + phase))])
 
         state = np.array([x, v])
@@ -83,22 +105,36 @@ def simulate(plant: str, law: Callable, x: np.ndarray, omega: float, load: float
     t, start = H * np.arange(steps + 1), np.abs(xs[0])
     error = np.maximum(np.sqrt(np.mean(xs[t >= SECONDS / 4 - H / 2] ** 2, axis=0)), 1e-4 * start)
     variation = np.abs(np.diff(us, axis=0)).sum(axis=0) / (BOUND * SECONDS)
-    return np.array([error, np.trapezoid(t[:, None] * np.abs(xs), t, axis=0) / start + WEIGHT * variation])
+    return np.array(
+        [error, np.trapezoid(t[:, None] * np.abs(xs), t, axis=0) / start + WEIGHT * variation]
+    )
 
 
 def leads(subject: families.Subject, axis: str, level: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the median leads in error and cost, by this package and by the second coding, (2,) each."""
+    """Return the median leads in error and cost, by this package and by the second coding, (2,)
+    each.
+    """
     plant = subject.plant.name
     ours, theirs = {}, {}
     for name, law in LAWS.items():
         made = subject.scenarios(axis, level, name)
         ours[name] = families.scores(made)
         starts = np.array([np.ravel(one.resolved.x0)[0] for one in made])
-        gains = [[its[gain] for gain in its] for its in gain_sets.tuned(plant, name, "tuned").sets[:RUNS]]
-        load, omega = subject.load(axis, level) if axis.startswith("load") else (0.0, 0.0)
-        noise = 0.0 if load else level * max(map(abs, made[0].plant.x0))
+        gains = []
+        for its in gain_sets.tuned(plant, name, "tuned").sets[:RUNS]:
+            gains.append([its[gain] for gain in its])
+        if axis.startswith("load"):
+            load, omega = subject.load(axis, level)
+        else:
+            load, omega = (0.0, 0.0)
+        if load:
+            noise = 0.0
+        else:
+            noise = level * max(map(abs, made[0].plant.x0))
         theirs[name] = simulate(plant, law(np.array(gains).T), starts, omega, load, noise)
-    by_ours, by_theirs = (np.median(its["adrc"] / its["super_twisting"], axis=1) for its in (ours, theirs))
+    by_ours, by_theirs = (
+        np.median(its["adrc"] / its["super_twisting"], axis=1) for its in (ours, theirs)
+    )
     return by_ours, by_theirs
 
 
@@ -107,5 +143,7 @@ if __name__ == "__main__":
     for plant in PLANTS:
         subject = families.subject(plant, Path("foreign"))
         for axis, level in CELLS:
-            ours, theirs = (", ".join(f"{value:.3f}" for value in its) for its in leads(subject, axis, level))
+            ours, theirs = (
+                ", ".join(f"{value:.3f}" for value in its) for its in leads(subject, axis, level)
+            )
             print(f"{plant}, {axis} {level:g}: {ours} | {theirs}", flush=True)

@@ -4,10 +4,10 @@
     python benchmarks/gains.py my_law       # only those of some laws
     python benchmarks/gains.py --all        # all of them
 
-Every law by the same rule: twelve searches for the laws of the report's first page, which come first, three for all
-others and for the set "tracking". The gains of a law on a plant are stored as soon as their searches end, so this may
-be stopped at any time, and goes on there. Gains that another rule found stay, with that rule beside them, until this
-rule has found some.
+Every law by the same rule: twelve searches for the laws of the report's first page, which come
+first, three for all others and for the set "tracking". The gains of a law on a plant are stored as
+soon as their searches end, so this may be stopped at any time, and goes on there. Gains that
+another rule found stay, with that rule beside them, until this rule has found some.
 """
 
 import argparse
@@ -27,7 +27,8 @@ from smc_mujoco.evidence.papers.gaber.scenarios import PLANTS
 from smc_mujoco.simulation.scenario import U_MAX
 
 PROCESSES = 2
-OTHERS = 3  # searches of a law that is not on the first page, and of the set "tracking": too few for a verdict
+# searches of a law that is not on the first page, and of the set "tracking": too few for a verdict
+OTHERS = 3
 
 
 class Task(NamedTuple):
@@ -48,7 +49,9 @@ class Task(NamedTuple):
 
 def tasks() -> Iterator[Task]:
     """Every law on every plant: those of the first page first, in the set that ranks them."""
-    yield from (Task("tuned", plant, law, SEARCHES) for law in gain_sets.COMPARED for plant in PLANTS)
+    yield from (
+        Task("tuned", plant, law, SEARCHES) for law in gain_sets.COMPARED for plant in PLANTS
+    )
     others = [law for law in gain_sets.general() if law not in gain_sets.COMPARED]
     yield from (Task("tuned", plant, law, OTHERS) for law in others for plant in PLANTS)
     yield from (Task("tracking", plant, law, OTHERS) for law in gain_sets.LAWS for plant in PLANTS)
@@ -59,20 +62,27 @@ def tune(task: Task) -> dict[str, Any]:
     goal = gain_sets.OBJECTIVES[task.gains]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "no set of gains tried", smc.errors.ScenarioWarning)
-        return smc.tune(task.plant, task.law, objective=goal, threads=1, searches=task.searches).record()
+        return smc.tune(
+            task.plant, task.law, objective=goal, threads=1, searches=task.searches
+        ).record()
 
 
 def store(task: Task, record: dict[str, Any]) -> None:
     """Put a record into the file of a set, which has one line for each law on each plant."""
     path = gain_sets.file_of(task.gains)
     data = known(path)
-    data["plants"].setdefault(task.plant, {})[task.law] = {n: value for n, value in record.items() if n != "rule"}
+    data["plants"].setdefault(task.plant, {})[task.law] = {
+        n: value for n, value in record.items() if n != "rule"
+    }
     write(path, data)
 
 
 def known(path: Path) -> dict[str, Any]:
     """Return what the file of a set has; records that another rule than today's found say which."""
-    data = read_json(path) if path.exists() else {"rule": RULE, "plants": {}}
+    if path.exists():
+        data = read_json(path)
+    else:
+        data = {"rule": RULE, "plants": {}}
     if data["rule"] != RULE:
         for laws in data["plants"].values():
             laws.update({law: {"rule": data["rule"]} | record for law, record in laws.items()})
@@ -82,7 +92,9 @@ def known(path: Path) -> dict[str, Any]:
 def write(path: Path, data: dict[str, Any]) -> None:
     """Write the file of a set, a line for each record."""
     plants = (
-        f"{to_json(plant)}: {{\n" + ",\n".join(f" {to_json(law)}: {to_json(laws[law])}" for law in sorted(laws)) + "\n}"
+        f"{to_json(plant)}: {{\n"
+        + ",\n".join(f" {to_json(law)}: {to_json(laws[law])}" for law in sorted(laws))
+        + "\n}"
         for plant, laws in sorted(data["plants"].items())
     )
     with replacing(path) as file:
@@ -97,12 +109,16 @@ def wanted(laws: list[str], again: bool) -> list[Task]:
         record = known(gain_sets.file_of(task.gains))["plants"].get(task.plant, {}).get(task.law)
         return record is None or "rule" in record
 
-    return [task for task in tasks() if (again or is_missing(task)) and (not laws or task.law in laws)]
+    return [
+        task for task in tasks() if (again or is_missing(task)) and (not laws or task.law in laws)
+    ]
 
 
 def main() -> None:
     """Tune what is asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("laws", nargs="*", help="only these laws")
     parser.add_argument("--all", action="store_true", help="tune again what is there")
     asked = parser.parse_args()

@@ -1,13 +1,15 @@
-"""Coverage of identification: errors of the quantities over their stated standard errors, on three exact machines.
+"""Coverage of identification: errors of the quantities over their stated standard errors, on three
+exact machines.
 
     python benchmarks/identification.py [SEEDS [FORCE]]
 
-An axis with dry friction (noise, counts), a pendulum (counts) and a cart on a spring (noise) move under four sines of
-random frequencies. Their motions come from integrators that share nothing with the suite: closed forms between stops,
-and Dormand-Prince. The starts are 20 % off. Aim, set before any run: rms from 0.7 to 1.4, at least 90 % within two.
+An axis with dry friction (noise, counts), a pendulum (counts) and a cart on a spring (noise) move
+under four sines of random frequencies. Their motions come from integrators that share nothing with
+the suite: closed forms between stops, and Dormand-Prince. The starts are 20 % off. Aim, set before
+any run: rms from 0.7 to 1.4, at least 90 % within two.
 
-FORCE is the size of a random force that the record lacks, relative to the command; it lasts 50 ms. Standard errors do
-not allow for such a force. With 0.03 the notes must say so of each record.
+FORCE is the size of a random force that the record lacks, relative to the command; it lasts 50 ms.
+Standard errors do not allow for such a force. With 0.03 the notes must say so of each record.
 """
 
 import math
@@ -29,15 +31,20 @@ def command(rng, sizes):
     """Return times and a sum of sines, (K,) each."""
     t = STEP * np.arange(round(DURATION / STEP) + 1)
     return t, sum(
-        a * np.sin(w * t + p) for a, w, p in zip(sizes, rng.uniform(3, 33, 4), rng.uniform(0, 6.28, 4), strict=True)
+        a * np.sin(w * t + p)
+        for a, w, p in zip(sizes, rng.uniform(3, 33, 4), rng.uniform(0, 6.28, 4), strict=True)
     )
 
 
 def unrecorded(rng, u, share):
-    """Return a random force, (K,), of a share of the command's deviation: an Ornstein-Uhlenbeck process."""
+    """Return a random force, (K,), of a share of the command's deviation: an Ornstein-Uhlenbeck
+    process.
+    """
     kept, force = math.exp(-STEP / FORCE_TIME), np.zeros(len(u))
     if share:
-        for k, z in enumerate(share * u.std() * math.sqrt(1.0 - kept**2) * rng.normal(size=len(u) - 1)):
+        for k, z in enumerate(
+            share * u.std() * math.sqrt(1.0 - kept**2) * rng.normal(size=len(u) - 1)
+        ):
             force[k + 1] = kept * force[k] + z
     return force
 
@@ -51,10 +58,16 @@ def carriage(u):
         while left > 1e-15 and (v or abs(force) > dry):
             sign = math.copysign(1.0, v or force)
             final, lag = (force - dry * sign) / b, M / b
-            stop = lag * math.log((v - final) / -final) if v and final * sign < 0.0 else math.inf
+            if v and final * sign < 0.0:
+                stop = lag * math.log((v - final) / -final)
+            else:
+                stop = math.inf
             spent = min(left, stop)
             decay = math.exp(-spent / lag)
-            x, v = x + final * spent + (v - final) * lag * (1.0 - decay), final + (v - final) * decay
+            x, v = (
+                x + final * spent + (v - final) * lag * (1.0 - decay),
+                final + (v - final) * decay,
+            )
             v, left = (0.0 if spent == stop else v), left - spent
     return found
 
@@ -73,10 +86,17 @@ def machines(rng, share=0.0):
     """Yield name, plant with the true quantities, their names, and a record of each machine."""
     t, u = command(rng, (4, 3, 3, 2))
     x = carriage(u + unrecorded(rng, u, share)) + rng.normal(0.0, 1e-5, len(t))
-    yield "axis", smc.plant("servo_axis", **AXIS), AXIS, {"t": t, "x": 2e-5 * np.round(x / 2e-5), "u": u}
+    yield (
+        "axis",
+        smc.plant("servo_axis", **AXIS),
+        AXIS,
+        {"t": t, "x": 2e-5 * np.round(x / 2e-5), "u": u},
+    )
     t, u = command(rng, (0.3, 0.3, 0.2, 0.2))
     m, l = PENDULUM.values()
-    x = smooth(lambda x, v, f: (9.81 * math.sin(x) + f / (m * l)) / l, 2.8, u + unrecorded(rng, u, share))
+    x = smooth(
+        lambda x, v, f: (9.81 * math.sin(x) + f / (m * l)) / l, 2.8, u + unrecorded(rng, u, share)
+    )
     count = 2.0 * math.pi / 4096
     yield (
         "pendulum",
@@ -92,7 +112,9 @@ def machines(rng, share=0.0):
 
 
 def main(seeds, share):
-    """Print rms and share within two of errors over standard errors, and how many records have slow residuals."""
+    """Print rms and share within two of errors over standard errors, and how many records have slow
+    residuals.
+    """
     z: dict[str, list[list[float]]] = {}
     slow, fits = 0, []
     begin = time.process_time()
@@ -101,10 +123,14 @@ def main(seeds, share):
         for name, plant, truth, record in machines(rng, share):
             start = {key: value * rng.choice((0.8, 1.2)) for key, value in truth.items()}
             found = smc.identify(plant, record, list(truth), start=start, starts=1)
-            z.setdefault(name, []).append([(found.values[key] - truth[key]) / found.errors[key] for key in truth])
+            z.setdefault(name, []).append(
+                [(found.values[key] - truth[key]) / found.errors[key] for key in truth]
+            )
             slow += any("residuals are slow" in note for note in found.notes)
             fits.append(found.fits[0]["x"])
-    print(f"slow residuals noted of {slow} of {len(fits)} records, median fit {np.median(fits):.1f} %")
+    print(
+        f"slow residuals noted of {slow} of {len(fits)} records, median fit {np.median(fits):.1f} %"
+    )
     for name, each in z.items():
         values = np.array(each)
         rms, within = np.sqrt(np.mean(values**2, axis=0)), np.mean(np.abs(values) < 2.0)
@@ -113,4 +139,7 @@ def main(seeds, share):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20, float(sys.argv[2]) if len(sys.argv) > 2 else 0.0)
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 20,
+        float(sys.argv[2]) if len(sys.argv) > 2 else 0.0,
+    )

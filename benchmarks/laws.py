@@ -2,11 +2,12 @@
 
     python benchmarks/laws.py [--quick]
 
-"call" is the law's compiled C function alone, on states that vary from sample to sample. "sample" is all that the
-callback does once a control period in a channel - read, estimate, nominal model, law, clip, log - with that law in it,
-for a row of 100 pendulums; its target is 3x the classical law. The target of `mpc`, which solves a program where bounds
-come and go, as on these states, is 4x pid for the median over the samples of a run. Only ratios within one run mean
-anything on a shared machine; each number is the least of several rounds, as other work only adds to it.
+"call" is the law's compiled C function alone, on states that vary from sample to sample. "sample"
+is all that the callback does once a control period in a channel - read, estimate, nominal model,
+law, clip, log - with that law in it, for a row of 100 pendulums; its target is 3x the classical
+law. The target of `mpc`, which solves a program where bounds come and go, as on these states, is 4x
+pid for the median over the samples of a run. Only ratios within one run mean anything on a shared
+machine; each number is the least of several rounds, as other work only adds to it.
 """
 
 # pyright: reportCallIssue=false
@@ -37,9 +38,19 @@ from smc_mujoco.simulation.run import ScenarioBatch
 from smc_mujoco.simulation.state import FINE
 
 QUICK = "--quick" in sys.argv
-CALLS, ROUNDS = (50_000, 5) if QUICK else (200_000, 15)
-SAMPLES, PENDULUMS = (200, 100) if QUICK else (500, 100)
-MOST, SOLVERS, MOST_OF_PID = 3.0, ("mpc",), 4.0  # times the classical law; other laws; times pid, in a run
+if QUICK:
+    CALLS, ROUNDS = (50_000, 5)
+else:
+    CALLS, ROUNDS = (200_000, 15)
+if QUICK:
+    SAMPLES, PENDULUMS = (200, 100)
+else:
+    SAMPLES, PENDULUMS = (500, 100)
+MOST, SOLVERS, MOST_OF_PID = (
+    3.0,
+    ("mpc",),
+    4.0,
+)  # times the classical law; other laws; times pid, in a run
 AT = {name: i for i, name in enumerate(Measurement._fields)}
 E, DE, A = AT["e"], AT["de"], AT["a"]
 
@@ -90,9 +101,15 @@ def nanoseconds(component: Component, loop: Callable, model: float = 0.0) -> flo
 
 
 def sample(law: str, velocity: str = "measured") -> float:
-    """Least ns of the callback per control sample and channel: a row of pendulums, sampled without being stepped."""
+    """Least ns of the callback per control sample and channel: a row of pendulums, sampled without
+    being stepped.
+    """
     scenario = smc.Scenario(
-        plant=smc.plant("pendulum_network", n=PENDULUMS), law=law, velocity=velocity, integrator="Euler", duration=1.0
+        plant=smc.plant("pendulum_network", n=PENDULUMS),
+        law=law,
+        velocity=velocity,
+        integrator="Euler",
+        duration=1.0,
     )
     with installed():
         batch = ScenarioBatch([prepare(scenario)], 1)  # keeps what its record points to
@@ -120,7 +137,9 @@ def sample(law: str, velocity: str = "measured") -> float:
 def general(name: str) -> bool:
     """Whether a law is for the pendulums of the measurement."""
     template = laws()[name]
-    return template.relative_degree < 3 and (not template.plants or "pendulum_network" in template.plants)
+    return template.relative_degree < 3 and (
+        not template.plants or "pendulum_network" in template.plants
+    )
 
 
 def main() -> None:
@@ -137,23 +156,40 @@ def main() -> None:
         worst = max(worst, whole / sample_base if general(name) and name not in SOLVERS else 0.0)
         rows.append((blind, name, seeing, whole))
     for blind, name, seeing, whole in sorted(rows):
-        shown = ("", "") if np.isnan(whole) else (f"{whole:.0f}", f"{whole / sample_base:.2f}")
+        if np.isnan(whole):
+            shown = ("", "")
+        else:
+            shown = (f"{whole:.0f}", f"{whole / sample_base:.2f}")
         table.add_row(name, f"{blind:.1f}", f"{seeing:.1f}", f"{blind / call_base:.1f}", *shown)
     console.print(table)
     verdict = "held" if worst <= MOST else "missed"
-    console.print(f"largest time per sample: {worst:.2f}x classical, target <= {MOST:g}x: {verdict}", highlight=False)
+    console.print(
+        f"largest time per sample: {worst:.2f}x classical, target <= {MOST:g}x: {verdict}",
+        highlight=False,
+    )
     for name in SOLVERS:
         its = law_time(case("duffing", name, "nominal", 2.0, "tuned", 0))
         assert its is not None
-        verdict = "held" if its.ratio <= MOST_OF_PID else "missed"
+        if its.ratio <= MOST_OF_PID:
+            verdict = "held"
+        else:
+            verdict = "missed"
         words = f"{1e9 * its.median:.0f} ns, 99 % {1e9 * its.high:.0f} ns, {its.ratio:.2f}x pid"
-        console.print(f"{name} in a run: {words}, target <= {MOST_OF_PID:g}x: {verdict}", highlight=False)
+        console.print(
+            f"{name} in a run: {words}, target <= {MOST_OF_PID:g}x: {verdict}", highlight=False
+        )
     table = Table(box=box.SIMPLE_HEAD, title="Velocity estimators, ns", title_justify="left")
     for head in ("estimator", "call", "x classical", "sample", "x measured"):
         table.add_column(head, justify="left" if head == "estimator" else "right", no_wrap=True)
     for name in estimators():
         spent, whole = nanoseconds(smc.estimator(name), read), sample("classical", name)
-        table.add_row(name, f"{spent:.1f}", f"{spent / call_base:.1f}", f"{whole:.0f}", f"{whole / sample_base:.2f}")
+        table.add_row(
+            name,
+            f"{spent:.1f}",
+            f"{spent / call_base:.1f}",
+            f"{whole:.0f}",
+            f"{whole / sample_base:.2f}",
+        )
     console.print(table)
 
 

@@ -1,14 +1,16 @@
-"""What simulation said of real machines, and what these did: the rows of smc_mujoco/evidence/rigs/twin_figures.json.
+"""What simulation said of real machines, and what these did: the rows of
+smc_mujoco/evidence/rigs/twin_figures.json.
 
     python benchmarks/machines.py FOLDER [--seeds N] [--write]
 
-FOLDER has the public records as npz files, one array a column, under the names below. Their sources and licences are
-those that the rigs name; the records are not in the repository. Without a record its old rows stay. EMPS, the
-QUBE-Servo 3 and the stepper need no file: what they are compared with are numbers, a program and an excerpt.
+FOLDER has the public records as npz files, one array a column, under the names below. Their sources
+and licences are those that the rigs name; the records are not in the repository. Without a record
+its old rows stay. EMPS, the QUBE-Servo 3 and the stepper need no file: what they are compared with
+are numbers, a program and an excerpt.
 
-A figure of a signal is its rms about its mean. Records are replayed from their measured state: in closed loop where the
-machine's own controller is known, else under the recorded command; of the double pendulum the torques of the motion are
-predicted.
+A figure of a signal is its rms about its mean. Records are replayed from their measured state: in
+closed loop where the machine's own controller is known, else under the recorded command; of the
+double pendulum the torques of the motion are predicted.
 """
 
 import argparse
@@ -39,7 +41,10 @@ SYS_IDS = ("01", "03", "05", "07", "13")
 FILES: Mapping[str, list[tuple[str, str, str, str]]] = {
     "qube_servo": [(name, "state feedback", f"qube-{name}", "driver") for name in QUBES],
     "realaigym_pendubot": [
-        *((f"sys-id {name}", "none", f"double_pendulum-C1-sysid-{name}", "model_1_0") for name in SYS_IDS),
+        *(
+            (f"sys-id {name}", "none", f"double_pendulum-C1-sysid-{name}", "model_1_0")
+            for name in SYS_IDS
+        ),
         ("pendubot 1", "iLQR and LQR", "double_pendulum-pendubot-ilqr_tvlqr_lqr-01", "model_1_0"),
         ("pendubot 2", "MC-PILCO", "double_pendulum-pendubot-mcpilco-01", "model_1_0"),
     ],
@@ -50,11 +55,14 @@ FILES: Mapping[str, list[tuple[str, str, str, str]]] = {
     "simple_pendulum_ak80": [
         (name, law, f"simple_pendulum-{name}", "")
         for name, law in (
-            ("ddp", "DDP"), ("direct_collocation", "direct collocation"), ("energy_shaping", "energy shaping"),
-            ("gravity_compensation", "gravity compensation"), ("pd-system_identification", "PD"),
+            ("ddp", "DDP"),
+            ("direct_collocation", "direct collocation"),
+            ("energy_shaping", "energy shaping"),
+            ("gravity_compensation", "gravity compensation"),
+            ("pd-system_identification", "PD"),
         )
     ],
-}  # fmt: skip
+}
 # Rig -> variant of the twin -> quantities that say so
 VARIANTS = {"qube_servo": {"without the commutator": {"ripple": 0.0}}}
 
@@ -73,28 +81,47 @@ def of_record(rig: Rig, name: str, law: str, file: Path, published: str) -> Iter
         for variant, values in VARIANTS.get(rig.name, {}).items()
     }
     control = rig.set(published) if published else None
-    beside = None if control is None else (control.predictions([record])[0], control.fits([record])[0])
+    if control is None:
+        beside = None
+    else:
+        beside = (control.predictions([record])[0], control.fits([record])[0])
     for variant, sets in variants.items():
         told = [(one.predictions([record])[0], one.fits([record])[0]) for one in sets]
         for column, (figure, measured) in enumerate(told[0][0][1].items()):
-            values = [
-                math.inf if math.isinf(list(fits.values())[column]) else size(made[figure])
-                for (made, _, _), fits in told
-            ]
+            values = []
+            for (made, _, _), fits in told:
+                values.append(
+                    math.inf if math.isinf(list(fits.values())[column]) else size(made[figure])
+                )
             fit = float(list(told[0][1].values())[column])
             public = math.nan
             if beside is not None and not variant:
                 fell = math.isinf(list(beside[1].values())[column])
-                public = math.inf if fell else size(beside[0][0][figure])
+                if fell:
+                    public = math.inf
+                else:
+                    public = size(beside[0][0][figure])
             yield TwinFigure(
-                rig=rig.name, record=name, law=law, figure=f"{figure} rms", unit=rig.units[figure],
-                machine=size(measured), twin=values[0], low=min(values), high=max(values), runs=len(sets), fit=fit,
-                published=public, variant=variant,
-            )  # fmt: skip
+                rig=rig.name,
+                record=name,
+                law=law,
+                figure=f"{figure} rms",
+                unit=rig.units[figure],
+                machine=size(measured),
+                twin=values[0],
+                low=min(values),
+                high=max(values),
+                runs=len(sets),
+                fit=fit,
+                published=public,
+                variant=variant,
+            )
 
 
 def of_emps() -> Iterator[TwinFigure]:
-    """Yield the tracking errors of the program, also with other instants of the reference's samples."""
+    """Yield the tracking errors of the program, also with other instants of the reference's
+    samples.
+    """
     rig, program = smc.rig("emps"), emps.program()
     values = list(program.values)
     variants = {
@@ -106,9 +133,18 @@ def of_emps() -> Iterator[TwinFigure]:
         told = emps.tracking(rig, None if other is None else TimeSeries(program.times, other))
         for (figure, machine), twin in zip(EMPS_RECORD.items(), told, strict=True):
             yield TwinFigure(
-                rig="emps", record="program of 24.8 s", law="cascade", figure=figure, unit="mm", machine=machine,
-                twin=1e3 * twin, low=1e3 * twin, high=1e3 * twin, runs=1, variant=variant,
-            )  # fmt: skip
+                rig="emps",
+                record="program of 24.8 s",
+                law="cascade",
+                figure=figure,
+                unit="mm",
+                machine=machine,
+                twin=1e3 * twin,
+                low=1e3 * twin,
+                high=1e3 * twin,
+                runs=1,
+                variant=variant,
+            )
 
 
 def of_qube_servo_3() -> Iterator[TwinFigure]:
@@ -128,46 +164,84 @@ def of_qube_servo_3() -> Iterator[TwinFigure]:
     common = {"rig": rig.name, "law": "none", "runs": len(sets)}
     rms = [size(values) for values in arms]
     yield TwinFigure(
-        record="step of 1 V", figure="theta rms", unit="rad", machine=size(step["theta"]), twin=rms[0], low=min(rms),
-        high=max(rms), fit=fits[0], published=size(arm(public)), **common,
-    )  # fmt: skip
+        record="step of 1 V",
+        figure="theta rms",
+        unit="rad",
+        machine=size(step["theta"]),
+        twin=rms[0],
+        low=min(rms),
+        high=max(rms),
+        fit=fits[0],
+        published=size(arm(public)),
+        **common,
+    )
     told, published = np.transpose([quanser.falls(one) for one in sets]), quanser.falls(public)
-    for (figure, (unit, machine)), twins, of_public in zip(FALLS.items(), told.tolist(), published, strict=True):
+    for (figure, (unit, machine)), twins, of_public in zip(
+        FALLS.items(), told.tolist(), published, strict=True
+    ):
         yield TwinFigure(
-            record="ten free falls", figure=figure, unit=unit, machine=machine, twin=twins[0], low=min(twins),
-            high=max(twins), published=of_public, **common,
-        )  # fmt: skip
+            record="ten free falls",
+            figure=figure,
+            unit=unit,
+            machine=machine,
+            twin=twins[0],
+            low=min(twins),
+            high=max(twins),
+            published=of_public,
+            **common,
+        )
 
 
 def of_stepper(told: Told) -> Iterator[TwinFigure | Order]:
-    """Yield the figures of all laws, and the order of laws in all sets, without parts of the twin too."""
+    """Yield the figures of all laws, and the order of laws in all sets, without parts of the twin
+    too.
+    """
     about, rig = told.prediction, smc.rig("stepper_furuta")
     for condition in about.conditions:
         for law in about.order:
             for figure in about.shown:
                 if not len(values := told.of(law, condition, figure)):
                     continue
-                known = about.recorded[condition] if law == about.fitted_on else {}
+                if law == about.fitted_on:
+                    known = about.recorded[condition]
+                else:
+                    known = {}
                 middle, low, high = percentiles(values)
                 yield TwinFigure(
-                    rig=rig.name, record=f"{condition}, {law.replace('_', ' ')}", law=law.replace("_", " "),
-                    figure=figure.replace("_", " "), unit=about.units[figure], machine=known.get(figure, math.nan),
-                    twin=middle, low=low, high=high, runs=len(values),
-                )  # fmt: skip
+                    rig=rig.name,
+                    record=f"{condition}, {law.replace('_', ' ')}",
+                    law=law.replace("_", " "),
+                    figure=figure.replace("_", " "),
+                    unit=about.units[figure],
+                    machine=known.get(figure, math.nan),
+                    twin=middle,
+                    low=low,
+                    high=high,
+                    runs=len(values),
+                )
     for without in ("", *about.left_out):
         for condition in about.conditions if not without else list(about.conditions)[:1]:
             count, sets = told.ordered(condition, without)
             yield Order(
-                rig=rig.name, condition=condition, figure=about.rank.replace("_", " "),
-                laws=tuple(law.replace("_", " ") for law in about.order), ordered=count, sets=sets,
-                tau=told.correlation(condition, without), variant=f"without {without}" * bool(without),
-            )  # fmt: skip
+                rig=rig.name,
+                condition=condition,
+                figure=about.rank.replace("_", " "),
+                laws=tuple(law.replace("_", " ") for law in about.order),
+                ordered=count,
+                sets=sets,
+                tau=told.correlation(condition, without),
+                variant=f"without {without}" * bool(without),
+            )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--seeds", type=int, default=4, help="of each law on each set of the stepper")
+    parser.add_argument(
+        "--seeds", type=int, default=4, help="of each law on each set of the stepper"
+    )
     parser.add_argument("--write", action="store_true", help="replace the rows of the package")
     given = parser.parse_args()
     rows: list[TwinFigure | Order] = []
@@ -190,9 +264,13 @@ def main() -> None:
     for row in rows:
         if isinstance(row, TwinFigure):
             told = f"{row.machine:9.4g} {row.twin:9.4g} ({row.low:.4g} to {row.high:.4g}) {row.published:9.4g}"
-            print(f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {told} {row.use} {row.variant}")
+            print(
+                f"{row.rig:21} {row.record:26} {row.law:18} {row.figure:16} {told} {row.use} {row.variant}"
+            )
         else:
-            print(f"{row.rig:21} {row.condition}: {row.ordered} of {row.sets}, tau {row.tau:.2f} {row.variant}")
+            print(
+                f"{row.rig:21} {row.condition}: {row.ordered} of {row.sets}, tau {row.tau:.2f} {row.variant}"
+            )
     if given.write:
         twin_figures.FILE.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 

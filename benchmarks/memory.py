@@ -2,7 +2,8 @@
 
     python benchmarks/memory.py [RUNS]         100,000 of 20 ms unless told otherwise
 
-The peak of a run whose traces are taken one by one, as `smc.stream` gives them, must stay below 1.5 GB.
+The peak of a run whose traces are taken one by one, as `smc.stream` gives them, must stay below 1.5
+GB.
 """
 
 import resource
@@ -16,20 +17,31 @@ LIMIT = 1500  # MB
 
 def peak() -> float:
     """The most memory that this process has held, MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024) / 1e6
+    return (
+        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        * (1 if sys.platform == "darwin" else 1024)
+        / 1e6
+    )
 
 
 def main() -> None:
     """Run, and say what it took."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
+    if len(sys.argv) > 1:
+        count = int(sys.argv[1])
+    else:
+        count = 100_000
     base = smc.Scenario(plant="duffing", law="super_twisting", duration=0.02)
     smc.run(base)
-    many = [smc.Scenario(plant="duffing", law="super_twisting", duration=0.02, seed=seed) for seed in range(count)]
+    many = []
+    for seed in range(count):
+        many.append(smc.Scenario(plant="duffing", law="super_twisting", duration=0.02, seed=seed))
     held, start = peak(), time.perf_counter()
     failed = sum(trace.failure is not None for _, trace in smc.stream(many))
     spent, most = time.perf_counter() - start, peak()
     print(f"{count} runs of 20 ms in {spent:.0f} s, {failed} failed")
-    print(f"{held:.0f} MB before, {most:.0f} MB at most, limit {LIMIT} MB: {'kept' if most < LIMIT else 'NOT KEPT'}")
+    print(
+        f"{held:.0f} MB before, {most:.0f} MB at most, limit {LIMIT} MB: {'kept' if most < LIMIT else 'NOT KEPT'}"
+    )
 
 
 if __name__ == "__main__":

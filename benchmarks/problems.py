@@ -3,17 +3,18 @@
     python benchmarks/problems.py measure laws visible.json
     python benchmarks/problems.py measure controls controls.json --number random --instances 24
     python benchmarks/problems.py measure controls seen.json --instances 15
-    python benchmarks/problems.py freeze visible.json controls.json seen.json  # writes the targets into the rules
+    python benchmarks/problems.py freeze visible.json controls.json seen.json  # writes the targets
+    into the rules
     python benchmarks/problems.py hold                     # do both controls hold on every problem of every suite?
-    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of the rules?
-    python benchmarks/problems.py measure laws hidden.json --number random
+    python benchmarks/problems.py repeat FOLDER [duffing/noise@1 ...]  # are the targets those of
+    the rules? python benchmarks/problems.py measure laws hidden.json --number random
     python benchmarks/problems.py agree visible.json hidden.json      # rank correlations of the boards
     python benchmarks/problems.py enter results                       # every general law, as `smc-mujoco enter` does
 
-`measure laws` runs every general law with its best shipped gains on every problem of the paper's plants, `measure
-controls` the controls on all problems; ten minutes of processor time each. With `--version 2`, `measure` and `freeze`
-are for the rules of flight, where levels come from no law. `measure` and `enter` go on where they were stopped.
-`smc-mujoco site` shows the results of `enter`.
+`measure laws` runs every general law with its best shipped gains on every problem of the paper's
+plants, `measure controls` the controls on all problems; ten minutes of processor time each. With
+`--version 2`, `measure` and `freeze` are for the rules of flight, where levels come from no law.
+`measure` and `enter` go on where they were stopped. `smc-mujoco site` shows the results of `enter`.
 """
 
 import argparse
@@ -39,8 +40,12 @@ INSTANCES = 7  # of each problem, for medians of laws
 MEASURES = "failed", "accuracy", "itae", "settling", "calm"
 CONTROLLED = 24  # of each problem, for the controls
 ATTACKED = 2  # instances against an adversary
-SEEN = 1.01  # of a target over the oracle's worst on visible instances: levels are written with three digits
-LATER = {"pendulum_network/mpc", "inverted_pendulum_network/mpc"}  # got shipped gains after the freeze of version 1
+# of a target over the oracle's worst on visible instances: levels are written with three digits
+SEEN = 1.01
+LATER = {
+    "pendulum_network/mpc",
+    "inverted_pendulum_network/mpc",
+}  # got shipped gains after the freeze of version 1
 MARGIN = 1.25  # of a target over the oracle's worst; 2 where no catalogue sets the levels
 NEAR = 0.1  # of the start: no target is easier, and a problem in which u = 0 ends there is left out
 MARK = "# From here on: `python benchmarks/problems.py freeze`, nothing by hand.\n"
@@ -50,32 +55,53 @@ Runs = dict[str, dict[str, np.ndarray]]  # problem -> law -> (instances, MEASURE
 
 def cells(*versions: int) -> list[str]:
     """List the problems of some versions; without any, of all."""
-    return [f"{cell}@{v}" for v in versions or map(int, problems.versions()) for cell in problems.cells(v)]
+    return [
+        f"{cell}@{v}"
+        for v in versions or map(int, problems.versions())
+        for cell in problems.cells(v)
+    ]
 
 
 def laws_of(kind: str, one: problems.Problem) -> dict[str, Law]:
     """Return the laws to run on a problem, by name."""
     if kind == "controls":
-        oracles = {f"oracle {w:g} {share:g}": controls.oracle_of(one.plant, w, share) for w, share in one.oracles}
+        oracles = {}
+        for w, share in one.oracles:
+            oracles[f"oracle {w:g} {share:g}"] = controls.oracle_of(one.plant, w, share)
         return {"zero": controls.zero(one.plant)} | oracles
     plant = find_plant(one.plant)
-    return {law: gain_sets.law(plant, law) for law in gain_sets.general() if gain_sets.in_set(plant, law, "tuned")}
+    return {
+        law: gain_sets.law(plant, law)
+        for law in gain_sets.general()
+        if gain_sets.in_set(plant, law, "tuned")
+    }
 
 
 def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[str]) -> None:
     """Run laws or controls on some problems, and write their measures."""
-    done: dict = json.loads(out.read_text()) if out.exists() else {"number": number, "runs": {}}
+    done: dict
+    if out.exists():
+        done = json.loads(out.read_text())
+    else:
+        done = {"number": number, "runs": {}}
     number, runs = done["number"], done["runs"]
     out.write_text(json.dumps(done))
     for name in (name for name in names if name not in runs):
         plant, condition, version = str(name).replace("@", "/").split("/")
-        text = (problems.RULES / f"{version}.toml").read_text(encoding="utf-8")  # as problem(), also where left out
-        one = problems.Problem(id=name, plant=plant, condition=condition, version=int(version), rules=text)
+        text = (problems.RULES / f"{version}.toml").read_text(
+            encoding="utf-8"
+        )  # as problem(), also where left out
+        one = problems.Problem(
+            id=name, plant=plant, condition=condition, version=int(version), rules=text
+        )
         attacked = "/worst" in name
         laws, count = laws_of(kind, one), min(instances, ATTACKED) if attacked else instances
         if not laws or (attacked and kind == "laws"):
             continue
-        scenarios = [s for law in laws.values() for s in one.scenarios(law, range(count), number)]
+        scenarios = []
+        for law in laws.values():
+            for s in one.scenarios(law, range(count), number):
+                scenarios.append(s)
         found = [[math.nan]] * len(scenarios)
         for i, trace in stream(scenarios):
             values = one.measures(trace)
@@ -88,28 +114,42 @@ def measure(kind: str, out: Path, number: str, instances: int, names: Sequence[s
 def read(path: Path) -> Runs:
     """Return what `measure` wrote."""
     runs = json.loads(path.read_text())["runs"]
-    return {name: {law: np.array(values) for law, values in laws.items()} for name, laws in runs.items()}
+    return {
+        name: {law: np.array(values) for law, values in laws.items()} for name, laws in runs.items()
+    }
 
 
-def levels(laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Mapping[str, Any]) -> list[float]:
-    """Return the levels of a measure in a problem, the hardest first, none harder than what the oracle reaches."""
+def levels(
+    laws: Mapping[str, np.ndarray], measure: str, worst: float, rules: Mapping[str, Any]
+) -> list[float]:
+    """Return the levels of a measure in a problem, the hardest first, none harder than what the
+    oracle reaches.
+    """
     if laws:
         medians = [np.median(values[:, MEASURES.index(measure)]) for values in laws.values()]
         chosen = np.quantile(medians, rules["quantiles"], method="higher")
-        chosen = np.minimum(chosen, max(filter(math.isfinite, medians)))  # laws of which half of the runs fail
+        chosen = np.minimum(
+            chosen, max(filter(math.isfinite, medians))
+        )  # laws of which half of the runs fail
     else:
         easiest = rules["easiest"][measure] * (worst if measure != "accuracy" else 1.0)
-        chosen = np.geomspace(worst, max(worst, min(easiest, rules.get("latest", {}).get(measure, math.inf))), 5)
+        chosen = np.geomspace(
+            worst, max(worst, min(easiest, rules.get("latest", {}).get(measure, math.inf))), 5
+        )
     chosen = np.maximum(chosen, worst)
     return chosen.tolist()
 
 
 def targets(
-    name: str, laws: Mapping[str, np.ndarray], runs: Mapping[str, np.ndarray], seen: Mapping[str, np.ndarray]
+    name: str,
+    laws: Mapping[str, np.ndarray],
+    runs: Mapping[str, np.ndarray],
+    seen: Mapping[str, np.ndarray],
 ) -> dict[str, Any] | None:
     """Return the targets of a problem and the oracle's bandwidth; None where a control forbids it.
 
-    `runs` are those of the controls on drawn instances, which get a margin, `seen` on the visible ones.
+    `runs` are those of the controls on drawn instances, which get a margin, `seen` on the visible
+    ones.
     """
     rules, best, margin = problems.rules(int(name.partition("@")[2])), None, MARGIN if laws else 2.0
     for label, oracle in runs.items():
@@ -117,7 +157,9 @@ def targets(
             continue
         setting = [float(word) for word in label.split()[1:]]
         columns = {m: MEASURES.index(m) for m in problems.MEASURES}
-        worst = {m: max(margin * oracle[:, i].max(), SEEN * seen[label][:, i].max()) for m, i in columns.items()}
+        worst = {}
+        for m, i in columns.items():
+            worst[m] = max(margin * oracle[:, i].max(), SEEN * seen[label][:, i].max())
         worst["accuracy"] = max(worst["accuracy"], 0.0 if laws else rules["hardest"])
         if not all(map(math.isfinite, worst.values())):
             continue
@@ -136,39 +178,62 @@ def targets(
 
 
 def repeat(folder: Path, names: Sequence[str], version: int) -> bool:
-    """Run all that the targets of a version's problems were frozen from. Return whether they are those of its rules."""
+    """Run all that the targets of a version's problems were frozen from.
+
+    Return whether they are those of its rules.
+    """
     rules = problems.rules(version)
     folder.mkdir(parents=True, exist_ok=True)
     measure("laws", folder / "laws.json", "", INSTANCES, names)
     measure("controls", folder / "controls.json", rules["frozen"]["number"], CONTROLLED, names)
     measure("controls", folder / "seen.json", "", rules["visible"], names)
-    visible, of_controls, seen = (read(folder / f"{kind}.json") for kind in ("laws", "controls", "seen"))
+    visible, of_controls, seen = (
+        read(folder / f"{kind}.json") for kind in ("laws", "controls", "seen")
+    )
     differ = 0
     for name in names:
         cell = name.partition("@")[0]
-        laws = {
-            law: runs for law, runs in visible.get(name, {}).items() if f"{cell.partition('/')[0]}/{law}" not in LATER
-        }
-        found, stored = targets(name, laws, of_controls[name], seen[name]), rules["targets"].get(cell)
+        laws = {}
+        for law, runs in visible.get(name, {}).items():
+            if f"{cell.partition('/')[0]}/{law}" not in LATER:
+                laws[law] = runs
+        found, stored = (
+            targets(name, laws, of_controls[name], seen[name]),
+            rules["targets"].get(cell),
+        )
         if found is not None:
             found |= {m: [float(f"{level:.3g}") for level in found[m]] for m in problems.MEASURES}
         differ += found != stored
-        print(name, "the same" if found == stored else f"differs: {found}, and in the rules {stored}", flush=True)
+        print(
+            name,
+            "the same" if found == stored else f"differs: {found}, and in the rules {stored}",
+            flush=True,
+        )
     return not differ
 
 
-def margins(one: problems.Problem, instances: str | Sequence[int], number: str) -> tuple[float, float, int]:
-    """Return by what factors both controls hold on instances of a problem, above 1 if they do, and their failures.
+def margins(
+    one: problems.Problem, instances: str | Sequence[int], number: str
+) -> tuple[float, float, int]:
+    """Return by what factors both controls hold on instances of a problem, above 1 if they do, and
+    their failures.
 
-    The oracle's is the least, over runs and measures, of the hardest level over the measure; that of u = 0 is its
-    least accuracy over the easiest level. A failure is a target that the oracle misses or u = 0 reaches.
+    The oracle's is the least, over runs and measures, of the hardest level over the measure; that
+    of u = 0 is its least accuracy over the easiest level. A failure is a target that the oracle
+    misses or u = 0 reaches.
     """
     oracle, zero, failures = math.inf, math.inf, 0
     for control, law in one.controls.items():
         for _, trace in stream(one.scenarios(law, instances, number)):
             values = one.measures(trace)
-            reached = [math.isfinite(t) for key, t in values.items() if key.rpartition("_")[2].isdigit()]
-            failures += sum(reached) if control == "zero" else reached.count(False)
+            reached = []
+            for key, t in values.items():
+                if key.rpartition("_")[2].isdigit():
+                    reached.append(math.isfinite(t))
+            if control == "zero":
+                failures += sum(reached)
+            else:
+                failures += reached.count(False)
             if control == "zero":
                 zero = min(zero, values["accuracy"] / one.targets["accuracy"][-1])
             else:
@@ -177,24 +242,39 @@ def margins(one: problems.Problem, instances: str | Sequence[int], number: str) 
 
 
 def hold(number: str, instances: int | None) -> bool:
-    """Print the margins of both controls on every problem of every suite, and return whether both hold on all."""
+    """Print the margins of both controls on every problem of every suite, and return whether both
+    hold on all.
+    """
     names = sorted({name for each in suite.suites() for name in suite.suite(each)})
     table: dict[str, dict[str, str]] = {}
     every, failing = [], []
     for name in names:
         one = problems.problem(name)
-        count = range(min(instances, ATTACKED) if "/worst" in name else instances) if instances else "visible"
+        if instances:
+            count = range(min(instances, ATTACKED) if "/worst" in name else instances)
+        else:
+            count = "visible"
         oracle, zero, failures = margins(one, count, number)
         every.append((oracle, zero, name))
-        failing += [f"{name}: {failures} targets"] if failures else []
+        if failures:
+            failing += [f"{name}: {failures} targets"]
+        else:
+            failing += []
         table.setdefault(one.plant, {})[one.condition] = f"{oracle:.2f}, {zero:.3g}"
         print(name, f"{oracle:.3f}", f"{zero:.3g}", failures, sep="\t", file=sys.stderr, flush=True)
     conditions = list(dict.fromkeys(name.replace("@", "/").split("/")[1] for name in names))
     print("", *conditions, sep=" | ")
     for plant, cells_of in table.items():
         print(plant, *(cells_of.get(condition, "–") for condition in conditions), sep=" | ")
-    print(f"{len(names)} problems, {len(failing)} where a control does not hold: {'; '.join(failing) or 'none'}")
-    print("least of the oracle:", *min(every)[::2], "; least of u = 0:", *min(every, key=lambda row: row[1])[1:])
+    print(
+        f"{len(names)} problems, {len(failing)} where a control does not hold: {'; '.join(failing) or 'none'}"
+    )
+    print(
+        "least of the oracle:",
+        *min(every)[::2],
+        "; least of u = 0:",
+        *min(every, key=lambda row: row[1])[1:],
+    )
     return not failing
 
 
@@ -206,11 +286,17 @@ def freeze(visible: Runs, of_controls: Runs, seen: Runs, number: str, version: i
         if (found := targets(name, visible.get(name, {}), of_controls[name], seen[name])) is None:
             left_out.append(name.partition("@")[0])
             continue
-        texts = [f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]" for m in problems.MEASURES]
-        lines.append(f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]} }}')
+        texts = []
+        for m in problems.MEASURES:
+            texts.append(f"{m} = [{', '.join(f'{level:.3g}' for level in found[m])}]")
+        lines.append(
+            f'"{name.partition("@")[0]}" = {{ {", ".join(texts)}, oracle = {found["oracle"]} }}'
+        )
     write_suites(left_out, version)
     text = path.read_text().partition(MARK)[0] + MARK
-    head = f'[frozen]\nnumber = "{number}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
+    head = (
+        f'[frozen]\nnumber = "{number}"  # of the controls\nleft_out = {json.dumps(left_out)}\n\n'
+    )
     path.write_text(text + head + "\n".join(lines) + "\n")
     print(f"{len(lines) - 1} problems with targets; left out: {', '.join(left_out) or 'none'}")
 
@@ -219,11 +305,23 @@ def write_suites(left_out: Sequence[str], version: int) -> None:
     """Write the lists of a version's suites, without the problems that are left out."""
     every = [name for name in cells(version) if name.partition("@")[0] not in left_out]
     lists = {
-        "smc-30@1": ("Those that the pattern of version 1 chooses, 3 of 5, see suite.py.", suite.pattern(1, 3)),
+        "smc-30@1": (
+            "Those that the pattern of version 1 chooses, 3 of 5, see suite.py.",
+            suite.pattern(1, 3),
+        ),
         "smc-50@1": ("All problems of the pattern's plants and conditions.", suite.pattern(1, 5)),
-        "smc-arm@1": ("The arm of two links.", [name for name in every if name.startswith("double_pendulum")]),
-        "smc-carts@1": ("A joint without an actuator.", [n for n in every if n.startswith(("cart_pole", "furuta"))]),
-        "smc-worst@1": ("The paper's plants against an adversary.", [name for name in every if "/worst" in name]),
+        "smc-arm@1": (
+            "The arm of two links.",
+            [name for name in every if name.startswith("double_pendulum")],
+        ),
+        "smc-carts@1": (
+            "A joint without an actuator.",
+            [n for n in every if n.startswith(("cart_pole", "furuta"))],
+        ),
+        "smc-worst@1": (
+            "The paper's plants against an adversary.",
+            [name for name in every if "/worst" in name],
+        ),
         "smc-flight@2": ("A quadrotor.", every),
     }
     for name, (words, chosen) in lists.items():
@@ -234,24 +332,33 @@ def write_suites(left_out: Sequence[str], version: int) -> None:
 
 
 def board(runs: Runs, names: Sequence[str], question: str) -> np.ndarray:
-    """Return the mean rank of each law's median over the problems of a board; equal medians share their rank."""
+    """Return the mean rank of each law's median over the problems of a board; equal medians share
+    their rank.
+    """
     measure = MEASURES.index(BOARDS[question])
     informing = [name for name in names if question in suite.boards(name)]
     everywhere = [law for law in runs[names[0]] if all(law in runs[name] for name in runs)]
-    ranks = [rankdata([np.median(runs[name][law][:, measure]) for law in everywhere]) for name in informing]
+    ranks = []
+    for name in informing:
+        ranks.append(rankdata([np.median(runs[name][law][:, measure]) for law in everywhere]))
     return np.mean(ranks, axis=0)
 
 
 def agree(visible: Runs, hidden: Runs) -> None:
-    """Print the rank correlations of boards, visible with hidden, and those of smc-30 with the problems left out."""
+    """Print the rank correlations of boards, visible with hidden, and those of smc-30 with the
+    problems left out.
+    """
     chosen, whole = suite.suite("smc-30@1"), suite.suite("smc-50@1")
     others = [name for name in whole if name not in chosen]
     print("board | visible with hidden, tau (rho) | with the problems left out, tau (rho)")
     for question in BOARDS:
         mine = board(visible, chosen, question)
-        cells = [(kendalltau(mine, other)[0], spearmanr(mine, other)[0]) for other in (
-            board(hidden, chosen, question), board(visible, others, question),
-        )]  # fmt: skip
+        cells = []
+        for other in (
+            board(hidden, chosen, question),
+            board(visible, others, question),
+        ):
+            cells.append((kendalltau(mine, other)[0], spearmanr(mine, other)[0]))
         print(question, *(f"{tau:.3f} ({rho:.3f})" for tau, rho in cells), sep=" | ")
 
 
@@ -264,21 +371,30 @@ def enter_all(out: Path) -> None:
 
 def parser() -> argparse.ArgumentParser:
     """Return the command line."""
-    made = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    made = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = made.add_subparsers(dest="command", required=True)
     measured = commands.add_parser("measure")
     measured.add_argument("kind", choices=("laws", "controls"))
     measured.add_argument("out", type=Path)
-    measured.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
+    measured.add_argument(
+        "--number", default="", help='"random", or 64 hex digits; none for visible instances'
+    )
     measured.add_argument("--instances", type=int, default=INSTANCES)
-    for name, files in (("freeze", ("visible", "controls", "seen")), ("agree", ("visible", "hidden"))):
+    for name, files in (
+        ("freeze", ("visible", "controls", "seen")),
+        ("agree", ("visible", "hidden")),
+    ):
         command = commands.add_parser(name)
         for file in files:
             command.add_argument(file, type=Path)
     for command in (measured, commands.choices["freeze"]):
         command.add_argument("--version", type=int, default=1, help="of the rules; default 1")
     held = commands.add_parser("hold")
-    held.add_argument("--number", default="", help='"random", or 64 hex digits; none for visible instances')
+    held.add_argument(
+        "--number", default="", help='"random", or 64 hex digits; none for visible instances'
+    )
     held.add_argument("--instances", type=int, help="of each problem; default: all visible ones")
     repeated = commands.add_parser("repeat")
     repeated.add_argument("folder", type=Path)

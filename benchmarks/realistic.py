@@ -1,10 +1,11 @@
-"""How fast realistic mechanisms run: steps per second on two threads, and beside bare mj_step of the same model.
+"""How fast realistic mechanisms run: steps per second on two threads, and beside bare mj_step of
+the same model.
 
     python benchmarks/realistic.py [--quick]
 
-Every one-joint plant with every part, and under every contact that it offers, while that is touched. Each number is the
-median over rounds; the ratio is that of rounds which alternate between the two sides. The target is 250,000 steps a
-second of simulations that step side by side.
+Every one-joint plant with every part, and under every contact that it offers, while that is
+touched. Each number is the median over rounds; the ratio is that of rounds which alternate between
+the two sides. The target is 250,000 steps a second of simulations that step side by side.
 """
 
 import dataclasses
@@ -34,7 +35,10 @@ PARTS = {
     "dc motor": {"actuator": smc.DCMotor()},
     "backlash": {"actuator": smc.Backlash(0.02)},
     "encoder": {"sensor": smc.Encoder(4096, dropout=0.1, delay=2e-3), "friction": smc.Viscous(0.1)},
-    "gust": {"disturbance": smc.signals.Gust(2.0, time=0.0, width=10.0), "friction": smc.Viscous(0.1)},
+    "gust": {
+        "disturbance": smc.signals.Gust(2.0, time=0.0, width=10.0),
+        "friction": smc.Viscous(0.1),
+    },
     "lugre, motor, backlash, encoder": {
         "friction": smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.01),
         "actuator": (smc.DCMotor(), smc.Backlash(0.02)),
@@ -52,18 +56,27 @@ def cases(plant: str) -> dict[str, smc.Scenario]:
     """Name -> scenario of a plant with one part, mechanism or contact."""
     offered = smc.plant(plant)
     fields = PARTS | {f"mechanism {name}": {"mechanism": name} for name in offered.mechanisms}
-    fields |= {f"contact {kind}": {"contact": kind} | STARTS.get(kind, {}).get(plant, {}) for kind in offered.contacts}
+    fields |= {
+        f"contact {kind}": {"contact": kind} | STARTS.get(kind, {}).get(plant, {})
+        for kind in offered.contacts
+    }
     gains = smc.paper.GAINS[plant]["observer_free"]
     plain = smc.Scenario(plant=plant, law=smc.law("observer_free", **gains))
     return {name: dataclasses.replace(plain, **given) for name, given in fields.items()}
 
 
 def measure(scenario: smc.Scenario) -> tuple[float, float]:
-    """Steps per second on two threads, and on one thread the time of the callback path over that of a bare mj_step."""
+    """Steps per second on two threads, and on one thread the time of the callback path over that of
+    a bare mj_step.
+    """
     steps = STEPS // 4
     together = stepping(batch_of(scenario, RUNS, THREADS), steps)
     together()
-    rate = RUNS * steps / statistics.median(seconds(together, time.perf_counter) for _ in range(ROUNDS))
+    rate = (
+        RUNS
+        * steps
+        / statistics.median(seconds(together, time.perf_counter) for _ in range(ROUNDS))
+    )
     alone = batch_of(scenario, 4)
     return rate, ratio(stepping(alone, steps), stepping(alone, steps, BARE))[2]
 
@@ -76,8 +89,13 @@ if __name__ == "__main__":
         for name, scenario in cases(plant).items():
             rate, over = measure(scenario)
             kept = "met" if rate >= TARGET else "[red]missed"
-            made = f"{name} ({len(parts(scenario))} parts)" if len(parts(scenario)) > 1 else name
+            if len(parts(scenario)) > 1:
+                made = f"{name} ({len(parts(scenario))} parts)"
+            else:
+                made = name
             table.add_row(plant, made, f"{rate:,.0f}", kept, f"{over:.2f}")
     console.print(table)
     load = ", ".join(f"{x:.1f}" for x in os.getloadavg())
-    console.print(f"mujoco {mujoco.__version__}, {os.cpu_count()} cores, load {load}, median of {ROUNDS} rounds")
+    console.print(
+        f"mujoco {mujoco.__version__}, {os.cpu_count()} cores, load {load}, median of {ROUNDS} rounds"
+    )

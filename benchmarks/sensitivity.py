@@ -1,11 +1,12 @@
-"""How good the indices of `smc.sensitivity` are: errors, sums and intervals on functions whose indices are known.
+"""How good the indices of `smc.sensitivity` are: errors, sums and intervals on functions whose
+indices are known.
 
     python benchmarks/sensitivity.py [POINTS ...]
 
-A row has, for a function and a number of points: the rms error of first-order and total indices, by the suite and by
-Saltelli's estimates (2010), as they come, without bounds; the largest sum of first and the least sum of total ones, of
-both; and how often a nominal 95 % interval holds an index above 0.02. 60 seeds. True indices are estimates from 65,536
-points. It takes some minutes.
+A row has, for a function and a number of points: the rms error of first-order and total indices, by
+the suite and by Saltelli's estimates (2010), as they come, without bounds; the largest sum of first
+and the least sum of total ones, of both; and how often a nominal 95 % interval holds an index above
+0.02. 60 seeds. True indices are estimates from 65,536 points. It takes some minutes.
 """
 
 import math

@@ -1,13 +1,15 @@
-"""How fast: the callback path beside bare mj_step, threads, networks, and other packages, all in one run.
+"""How fast: the callback path beside bare mj_step, threads, networks, and other packages, all in
+one run.
 
     make bench            or            python benchmarks/speed.py [--quick]
 
-Times are of the processor, so that other work on the machine counts little; those of two threads are elapsed. A ratio
-is the median over rounds that alternate between the two sides. A peer that is not installed is left out by name.
+Times are of the processor, so that other work on the machine counts little; those of two threads
+are elapsed. A ratio is the median over rounds that alternate between the two sides. A peer that is
+not installed is left out by name.
 
-MuJoCo's timers are off during a run, and its model has no scenery. So a step of a run is compared with two steps
-without a law: a plain mj_step, with timers and scenery, and a bare one without them, which shows what the callback
-takes.
+MuJoCo's timers are off during a run, and its model has no scenery. So a step of a run is compared
+with two steps without a law: a plain mj_step, with timers and scenery, and a bare one without them,
+which shows what the callback takes.
 """
 
 import contextlib
@@ -48,24 +50,34 @@ def seconds(action: Callable[[], object], clock: Callable[[], float]) -> float:
 
 
 def ratio(
-    one: Callable[[], object], other: Callable[[], object], clock: Callable[[], float] = time.process_time
+    one: Callable[[], object],
+    other: Callable[[], object],
+    clock: Callable[[], float] = time.process_time,
 ) -> tuple[float, float, float]:
     """Seconds of each, and the median over rounds of their ratio."""
     for action in (one, other):
         action()
     rounds = [(seconds(one, clock), seconds(other, clock)) for _ in range(ROUNDS)]
     ones, others = zip(*rounds, strict=True)
-    return statistics.median(ones), statistics.median(others), statistics.median(a / b for a, b in rounds)
+    return (
+        statistics.median(ones),
+        statistics.median(others),
+        statistics.median(a / b for a, b in rounds),
+    )
 
 
 def batch_of(scenario: smc.Scenario, runs: int, threads: int = 1) -> ScenarioBatch:
     """A batch of equal runs, ready to step."""
     with installed():
-        return ScenarioBatch([prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads)
+        return ScenarioBatch(
+            [prepare(dataclasses.replace(scenario, seed=seed)) for seed in range(runs)], threads
+        )
 
 
 def stepping(
-    batch: ScenarioBatch, steps: int, within: Callable[[], contextlib.AbstractContextManager] = installed
+    batch: ScenarioBatch,
+    steps: int,
+    within: Callable[[], contextlib.AbstractContextManager] = installed,
 ) -> Callable[[], None]:
     """Steps of a batch from its present state, with the callback or BARE."""
     start, records = batch.batch.state.copy(), batch.records.copy()
@@ -82,7 +94,10 @@ def stepping(
 
 
 def plain_batch(scenario: smc.Scenario, runs: int, threads: int = 1) -> Batch:
-    """A batch of a plant's whole model, with scenery. It is stepped outside of `installed`, with MuJoCo's timers."""
+    """A batch of a plant's whole model, with scenery.
+
+    It is stepped outside of `installed`, with MuJoCo's timers.
+    """
     first = scenario.resolved
     model = models.with_values(models.compile_model(first), first)
     batch = Batch(model, runs, threads)
@@ -104,17 +119,31 @@ def plain_steps(scenario: smc.Scenario, runs: int, steps: int) -> Callable[[], N
 
 def callback_against_mj_step(table: Table) -> None:
     """The same plant, stepped with the callback, plainly and bare, one thread."""
-    disturbed = {"noise": smc.Noise(position=0.01, velocity=0.05), "disturbance": smc.Sine(0.2, 5.0)}
-    for name, fields, targets in (("alone", {}, (1.08, 1.08)), ("with noise and disturbance", disturbed, (1.20, 1.10))):
+    disturbed = {
+        "noise": smc.Noise(position=0.01, velocity=0.05),
+        "disturbance": smc.Sine(0.2, 5.0),
+    }
+    for name, fields, targets in (
+        ("alone", {}, (1.08, 1.08)),
+        ("with noise and disturbance", disturbed, (1.20, 1.10)),
+    ):
         for integrator, target in zip(("Euler", "RK4"), targets, strict=True):
             scenario = dataclasses.replace(
-                smc.paper.scenario("inverted_pendulum", "super_twisting"), integrator=integrator, **fields
+                smc.paper.scenario("inverted_pendulum", "super_twisting"),
+                integrator=integrator,
+                **fields,
             )
             batch = batch_of(scenario, 16)
-            with_law, bare = stepping(batch, STEPS), stepping(batch, STEPS, BARE)  # both before the first step
+            with_law, bare = (
+                stepping(batch, STEPS),
+                stepping(batch, STEPS, BARE),
+            )  # both before the first step
             plain = plain_steps(scenario, 16, STEPS)
             per = 1e6 / (16 * STEPS)
-            for other, steps, goal in (("mj_step", plain, f"<= {target}"), ("bare mj_step", bare, "")):
+            for other, steps, goal in (
+                ("mj_step", plain, f"<= {target}"),
+                ("bare mj_step", bare, ""),
+            ):
                 a, b, r = ratio(with_law, steps)
                 row(table, f"callback / {other}, {integrator}, {name}", a * per, b * per, r, goal)
 
@@ -141,7 +170,9 @@ def networks(table: Table) -> None:
 
 
 def peers(table: Table) -> None:
-    """One simulation with a controller, as each package's users write it; microseconds per simulated step."""
+    """One simulation with a controller, as each package's users write it; microseconds per
+    simulated step.
+    """
     ours = batch_of(smc.paper.scenario("inverted_pendulum", "super_twisting"), 1)
     mine = stepping(ours, STEPS)
     for name, module, make in (
@@ -161,7 +192,9 @@ def peers(table: Table) -> None:
 
 
 def dm_control_steps() -> tuple[Callable[[], object], int]:
-    """dm_control's pendulum swing-up with a sliding-mode agent; it takes `n_sub_steps` physics steps a control step."""
+    """dm_control's pendulum swing-up with a sliding-mode agent; it takes `n_sub_steps` physics
+    steps a control step.
+    """
     from dm_control import suite
 
     environment = suite.load("pendulum", "swingup", task_kwargs={"time_limit": float("inf")})
@@ -194,7 +227,9 @@ def gymnasium_steps() -> tuple[Callable[[], object], int]:
 
 
 def opensmc_steps() -> tuple[Callable[[], object], int]:
-    """opensmc's own RK4 simulator: its classical law on its double integrator, the least work it has."""
+    """opensmc's own RK4 simulator: its classical law on its double integrator, the least work it
+    has.
+    """
     from opensmc.controllers import ClassicalSMC
     from opensmc.plants import DoubleIntegrator
     from opensmc.reaching import ConstantRate
@@ -212,10 +247,14 @@ def row(table: Table, what: str, a: float, b: float, r: float, target: str) -> N
 
 
 if __name__ == "__main__":
-    table = Table(title="microseconds per simulated step (per pendulum in networks)", title_justify="left")
+    table = Table(
+        title="microseconds per simulated step (per pendulum in networks)", title_justify="left"
+    )
     for head in ("comparison", "first", "second", "ratio", "target"):
         table.add_column(head, justify="left" if head == "comparison" else "right")
     for part in (callback_against_mj_step, threads, networks, peers):
         part(table)
     console.print(table)
-    console.print(f"mujoco {mujoco.__version__}, median of {ROUNDS} alternating rounds, one machine, one run")
+    console.print(
+        f"mujoco {mujoco.__version__}, median of {ROUNDS} alternating rounds, one machine, one run"
+    )

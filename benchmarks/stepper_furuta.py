@@ -1,18 +1,21 @@
-"""Parameter sets of the rig stepper_furuta: draws whose simulated recordings have the linear law's recorded figures.
+"""Parameter sets of the rig stepper_furuta: draws whose simulated recordings have the linear law's
+recorded figures.
 
     python benchmarks/stepper_furuta.py           # the search whose sets the rig has: 780 draws; prints the nearest
     python benchmarks/stepper_furuta.py second    # a later one: 400 draws, and 16 trials of 8 seeds
 
-Approximate Bayesian computation in two rounds. The machine is bursty, so its one recording of a condition is one draw
-from a distribution: each draw of the quantities is run once from its own seed, in both recorded conditions. The
-distance of its figures from the recorded ones is counted in the standard deviations that these figures have over seeds,
-so that a figure counts as much as it tells. The first round draws from the prior, the second about the nearest of it.
-The nearest of both are the ensemble. No figure of another law is looked at.
+Approximate Bayesian computation in two rounds. The machine is bursty, so its one recording of a
+condition is one draw from a distribution: each draw of the quantities is run once from its own
+seed, in both recorded conditions. The distance of its figures from the recorded ones is counted in
+the standard deviations that these figures have over seeds, so that a figure counts as much as it
+tells. The first round draws from the prior, the second about the nearest of it. The nearest of both
+are the ensemble. No figure of another law is looked at.
 
-Some are near by luck. So the second search, whose rule was fixed before it ran, and whose prior allows a larger error
-of the upright, runs the nearest again from new seeds. It accepts a set if no run falls, and if in the hold the recorded
-rms of alpha is within the 5 to 95 % of its seeds, and the median run rests for at least half of the time. On 2026-11-26
-it accepted one of 16, the rig's published set "second_search".
+Some are near by luck. So the second search, whose rule was fixed before it ran, and whose prior
+allows a larger error of the upright, runs the nearest again from new seeds. It accepts a set if no
+run falls, and if in the hold the recorded rms of alpha is within the 5 to 95 % of its seeds, and
+the median run rests for at least half of the time. On 2026-11-26 it accepted one of 16, the rig's
+published set "second_search".
 """
 
 import math
@@ -24,33 +27,63 @@ import smc_mujoco as smc
 from smc_mujoco.evidence.rigs.machines.stepper_furuta import NAMES, PREDICTION
 from smc_mujoco.evidence.rigs.predictions import percentiles
 
-SEEDS = {False: ({11: 230, 12: 130, 13: 180}, {14: 240}), True: ({21: 240}, {22: 160})}  # of rounds -> draws
+SEEDS = {
+    False: ({11: 230, 12: 130, 13: 180}, {14: 240}),
+    True: ({21: 240}, {22: 160}),
+}  # of rounds -> draws
 BATCH, NEAR, KEPT, TRIED, RUNS = 10, 24, 8, 16, 8
 INERTIA = 1.0215e-4  # kg m^2, of the pendulum by formula: ten percent to either side
 PRIOR = {  # ends; True for a logarithmic prior
-    "holding_torque": (0.08, 0.5, True), "arm_damping": (0.004, 0.04, True), "arm_friction": (0.0, 0.010, False),
-    "pivot_friction": (5e-5, 1.5e-4, False), "pivot_damping": (1e-6, 1.5e-4, True),
-    "upright_error": (-0.006, 0.006, False), "sensor_noise": (5e-5, 6e-4, True), "vibration": (2e-4, 8e-3, True),
+    "holding_torque": (0.08, 0.5, True),
+    "arm_damping": (0.004, 0.04, True),
+    "arm_friction": (0.0, 0.010, False),
+    "pivot_friction": (5e-5, 1.5e-4, False),
+    "pivot_damping": (1e-6, 1.5e-4, True),
+    "upright_error": (-0.006, 0.006, False),
+    "sensor_noise": (5e-5, 6e-4, True),
+    "vibration": (2e-4, 8e-3, True),
     "pendulum_inertia": (0.9 * INERTIA, 1.1 * INERTIA, True),
-}  # fmt: skip
+}
 WIDER = PRIOR | {  # of the second search
-    "arm_friction": (5e-4, 0.010, True), "pivot_friction": (5e-5, 2e-4, False), "pivot_damping": (1e-5, 4e-4, True),
+    "arm_friction": (5e-4, 0.010, True),
+    "pivot_friction": (5e-5, 2e-4, False),
+    "pivot_damping": (1e-5, 4e-4, True),
     "upright_error": (-0.02, 0.02, False),
-}  # fmt: skip
-SPREADS = {  # of figures over eight seeds, the mean over eight sets of an earlier search: of logarithms, but for LINEAR
+}
+# of figures over eight seeds, the mean over eight sets of an earlier search: of logarithms, but for
+# LINEAR
+SPREADS = {
     "hold": {
-        "alpha_rms": 0.466, "second_50": 0.967, "second_90": 1.03, "resting": 0.0916, "resting_90": 0.376,
-        "running": 0.789, "theta_std": 0.681, "ratio": 0.153, "gain": 0.12, "lag": 16.6, "phase": 1.93,
+        "alpha_rms": 0.466,
+        "second_50": 0.967,
+        "second_90": 1.03,
+        "resting": 0.0916,
+        "resting_90": 0.376,
+        "running": 0.789,
+        "theta_std": 0.681,
+        "ratio": 0.153,
+        "gain": 0.12,
+        "lag": 16.6,
+        "phase": 1.93,
         "centroid": 0.027,
     },
     "nudges": {
-        "alpha_rms": 0.157, "second_25": 0.91, "second_90": 0.155, "running": 0.151, "theta_std": 0.045,
-        "acceleration_rms": 0.152, "ratio": 0.0518, "gain": 0.0933, "lag": 5.31, "phase": 0.507, "centroid":
-        0.0419,
+        "alpha_rms": 0.157,
+        "second_25": 0.91,
+        "second_90": 0.155,
+        "running": 0.151,
+        "theta_std": 0.045,
+        "acceleration_rms": 0.152,
+        "ratio": 0.0518,
+        "gain": 0.0933,
+        "lag": 5.31,
+        "phase": 0.507,
+        "centroid": 0.0419,
     },
-}  # fmt: skip
+}
 LINEAR = {"lag", "phase", "resting"}  # degrees, and the share of time
-KERNEL = 0.5  # of the spread of the nearest, in shares of the prior: how far the second round goes about them
+# of the spread of the nearest, in shares of the prior: how far the second round goes about them
+KERNEL = 0.5
 
 
 def quantities(shares, prior):
@@ -65,9 +98,9 @@ def quantities(shares, prior):
 def about(nearest, random):
     """Return a draw about one of the nearest, (NEAR, Q), within the prior."""
     while True:
-        shares = nearest[random.integers(len(nearest))] + KERNEL * nearest.std(axis=0) * random.standard_normal(
-            len(PRIOR)
-        )
+        shares = nearest[random.integers(len(nearest))] + KERNEL * nearest.std(
+            axis=0
+        ) * random.standard_normal(len(PRIOR))
         if ((shares >= 0.0) & (shares <= 1.0)).all():
             return shares
 
@@ -78,18 +111,25 @@ def distance(figures):
     for condition, spreads in SPREADS.items():
         found, recorded = figures[condition], PREDICTION.recorded[condition]
         for name, spread in spreads.items():
-            off = found[name] - recorded[name] if name in LINEAR else math.log(max(found[name], 1e-3) / recorded[name])
+            if name in LINEAR:
+                off = found[name] - recorded[name]
+            else:
+                off = math.log(max(found[name], 1e-3) / recorded[name])
             apart.append(off / spread)
     squares = float(np.mean(np.square(apart)))
-    return math.sqrt(squares) if math.isfinite(squares) else math.inf
+    if math.isfinite(squares):
+        return math.sqrt(squares)
+    return math.inf
 
 
 def recordings(pairs, condition):
     """Return the figures of a simulated recording for each pair of quantities and a seed."""
     rig, fields = smc.rig("stepper_furuta"), PREDICTION.conditions[condition]
-    scenarios = [
-        rig.with_values(one, "drawn").scenario(x0=PREDICTION.start(seed), seed=seed, **fields) for one, seed in pairs
-    ]
+    scenarios = []
+    for one, seed in pairs:
+        scenarios.append(
+            rig.with_values(one, "drawn").scenario(x0=PREDICTION.start(seed), seed=seed, **fields)
+        )
     return [PREDICTION.figures(trace) for trace in smc.run(scenarios)]
 
 
@@ -100,7 +140,10 @@ def explored(rounds, draw, prior):
         random = np.random.default_rng(seed)
         for first in range(0, draws, BATCH):
             drawn = [draw(random) for _ in range(BATCH)]
-            pairs = [(quantities(one, prior), number) for number, one in enumerate(drawn, 100_000 * seed + first)]
+            pairs = [
+                (quantities(one, prior), number)
+                for number, one in enumerate(drawn, 100_000 * seed + first)
+            ]
             runs = {name: recordings(pairs, name) for name in PREDICTION.conditions}
             for i, one in enumerate(drawn):
                 figures = {name: its[i] for name, its in runs.items()}
@@ -111,7 +154,9 @@ def explored(rounds, draw, prior):
 
 
 def accepted(one, number):
-    """Return how far the medians of a set's runs are from the recorded figures; inf if it is refused."""
+    """Return how far the medians of a set's runs are from the recorded figures; inf if it is
+    refused.
+    """
     pairs = [(one, 1_000 * number + i) for i in range(RUNS)]
     runs = {"hold": recordings(pairs, "hold")}
     _, low, high = percentiles(np.array([run["alpha_rms"] for run in runs["hold"]]))
@@ -123,7 +168,9 @@ def accepted(one, number):
     runs["nudges"] = recordings(pairs, "nudges")
     if any(map(PREDICTION.fallen, runs["nudges"])):
         return math.inf
-    medians = {name: {key: np.nanmedian([run[key] for run in its]) for key in its[0]} for name, its in runs.items()}
+    medians = {}
+    for name, its in runs.items():
+        medians[name] = {key: np.nanmedian([run[key] for run in its]) for key in its[0]}
     return distance(medians)
 
 
@@ -132,7 +179,10 @@ def main(second):
     first = explored(rounds[0], lambda random: random.random(len(prior)), prior)
     nearest = np.array([shares for _, shares in first[:NEAR]])
     both = [*first, *explored(rounds[1], lambda random: about(nearest, random), prior)]
-    found = [(apart, quantities(shares, prior)) for apart, shares in sorted(both, key=lambda each: each[0])]
+    found = [
+        (apart, quantities(shares, prior))
+        for apart, shares in sorted(both, key=lambda each: each[0])
+    ]
     if second:
         found = [(accepted(one, number), one) for number, (_, one) in enumerate(found[:TRIED], 1)]
     for apart, one in sorted(found, key=lambda each: each[0])[:KEPT]:

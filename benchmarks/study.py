@@ -1,12 +1,13 @@
-"""What a study costs beside the simulation alone: 4,400 runs of 10 s at 1 ms, against plain mj_step.
+"""What a study costs beside the simulation alone: 4,400 runs of 10 s at 1 ms, against plain
+mj_step.
 
     python benchmarks/study.py [--quick]
 
-5 plants x 4 laws x 11 conditions x 20 seeds; --quick takes 2 of the seeds. The study is all that `smc.study` does:
-looking up what is there, running with laws, noise and delays, scoring, writing parts and table. Plain is mj_step of the
-same plants, as often and on as many threads, without a controller. Both take turns, a slice of the grid at a time, so
-that what else the machine does falls on both. Compiling the laws, once a process, is left out. The targets are 1.3 and
-1.5 GB.
+5 plants x 4 laws x 11 conditions x 20 seeds; --quick takes 2 of the seeds. The study is all that
+`smc.study` does: looking up what is there, running with laws, noise and delays, scoring, writing
+parts and table. Plain is mj_step of the same plants, as often and on as many threads, without a
+controller. Both take turns, a slice of the grid at a time, so that what else the machine does falls
+on both. Compiling the laws, once a process, is left out. The targets are 1.3 and 1.5 GB.
 """
 
 import resource
@@ -30,7 +31,17 @@ from smc_mujoco.studies.study import study
 
 QUICK = "--quick" in sys.argv
 # All at the control period of 1 ms, with the plant's plain equation.
-CONDITIONS = ["nominal", "noise", "sine", "constant", "step", "pulse", "process_noise", "delay_10ms", "heavy"]
+CONDITIONS = [
+    "nominal",
+    "noise",
+    "sine",
+    "constant",
+    "step",
+    "pulse",
+    "process_noise",
+    "delay_10ms",
+    "heavy",
+]
 CONDITIONS += ["jump_mild", "differenced_5ms_noise"]
 SEEDS = range(2) if QUICK else range(20)
 SLICE = 2 if QUICK else 5  # seeds
@@ -41,7 +52,11 @@ console = Console()
 def slices() -> list[list[smc.Scenario]]:
     """The grid in slices of one plant and some seeds."""
     parts = [SEEDS[i : i + SLICE] for i in range(0, len(SEEDS), SLICE)]
-    return [grid([plant], paper.LAWS, CONDITIONS, seeds, "study") for seeds in parts for plant in paper.PLANTS]
+    return [
+        grid([plant], paper.LAWS, CONDITIONS, seeds, "study")
+        for seeds in parts
+        for plant in paper.PLANTS
+    ]
 
 
 def plain(scenarios: Sequence[smc.Scenario], threads: int) -> float:
@@ -76,7 +91,9 @@ def main() -> None:
         studied += time.perf_counter() - start
     finally:
         shutil.rmtree(out)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (
+        1 if sys.platform == "darwin" else 1024
+    )
     told = f"{len(table)} runs of 10 s, {threads} threads: study {studied:.1f} s, plain mj_step {simulated:.1f} s"
     console.print(told, highlight=False)
     for what, value, most, unit in (
@@ -84,7 +101,9 @@ def main() -> None:
         ("peak", peak / 1e9, MEMORY / 1e9, " GB"),
     ):
         verdict = "held" if value <= most else "missed"
-        console.print(f"{what} {value:.2f}{unit}, target <= {most:g}{unit}: {verdict}", highlight=False)
+        console.print(
+            f"{what} {value:.2f}{unit}, target <= {most:g}{unit}: {verdict}", highlight=False
+        )
 
 
 if __name__ == "__main__":

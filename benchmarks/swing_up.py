@@ -1,14 +1,17 @@
-"""The trajectories of the boards' entries, found again: smc_mujoco/benchmark/realaigym/trajectories.
+"""The trajectories of the boards' entries, found again:
+smc_mujoco/benchmark/realaigym/trajectories.
 
     python benchmarks/swing_up.py acrobot              # optimise, then write the file; a minute
-    python benchmarks/swing_up.py acrobot --starts 12  # also tell what other starts of the search lead to
+    python benchmarks/swing_up.py acrobot --starts 12  # also tell what other starts of the search
+    lead to
     python benchmarks/swing_up.py --gains              # how k, phi and the filter were chosen, on other machines
     python benchmarks/swing_up.py acrobot --resets     # gains for the board of 2025 by random search; three minutes
 
-The trajectory has the best version-2 score that was found: direct multiple shooting with RK4, u linear between NODES
-points, both ends at rest with u = 0, |u| <= 6 N m, by scipy's SLSQP from a random arc. The search knows the model and
-the score, and nothing of the robustness test. The feedback is that of a Riccati equation along the trajectory, with
-Q = diag(1, 1, 0.1, 0.1) and R = 1: the first weights that were tried.
+The trajectory has the best version-2 score that was found: direct multiple shooting with RK4, u
+linear between NODES points, both ends at rest with u = 0, |u| <= 6 N m, by scipy's SLSQP from a
+random arc. The search knows the model and the score, and nothing of the robustness test. The
+feedback is that of a Riccati equation along the trajectory, with Q = diag(1, 1, 0.1, 0.1) and R =
+1: the first weights that were tried.
 """
 
 import argparse
@@ -39,9 +42,14 @@ BEND, SMALL = 1e-5, 1e-3  # weight of u's second differences; J, rounds |dq tau|
 Q, R = np.diag([1.0, 1.0, 0.1, 0.1]), 1.0
 PARAMETERS = tuple(MODEL_1_1.values())
 RANGES = {  # of the gains on the board of 2025, beside m
-    "A": (0.3, 3.0), "c": (3.0, 40.0), "K": (20.0, 300.0), "phi": (0.02, 1.0), "w": (0.05, 2.0), "v_s": (0.05, 10.0),
+    "A": (0.3, 3.0),
+    "c": (3.0, 40.0),
+    "K": (20.0, 300.0),
+    "phi": (0.02, 1.0),
+    "w": (0.05, 2.0),
+    "v_s": (0.05, 10.0),
     "level": (1.0, 1000.0),
-}  # fmt: skip
+}
 UPRIGHT = np.array([math.pi, 0.0, 0.0, 0.0])
 
 
@@ -67,7 +75,9 @@ def segment(x, u0, u1, h, driven):
 
 @njit
 def gaps(z, u, h, driven):
-    """The gap between each segment's end and the next state, (N, 4), and its slopes by z, both u and h, (N, 4, 7)."""
+    """The gap between each segment's end and the next state, (N, 4), and its slopes by z, both u
+    and h, (N, 4, 7).
+    """
     count, e = len(u) - 1, 1e-6
     gap, slopes = np.empty((count, 4)), np.empty((count, 4, 7))
     for k in range(count):
@@ -78,7 +88,11 @@ def gaps(z, u, h, driven):
                 x, a, b, step = z[k].copy(), u[k], u[k + 1], h
                 if i < 4:
                     x[i] += sign * e
-                a, b, step = a + sign * e * (i == 4), b + sign * e * (i == 5), step + sign * e * (i == 6)
+                a, b, step = (
+                    a + sign * e * (i == 4),
+                    b + sign * e * (i == 5),
+                    step + sign * e * (i == 6),
+                )
                 ends.append(segment(x, a, b, step, driven))
             slopes[k, :, i] = (ends[0] - ends[1]) / (2 * e)
     return gap, slopes
@@ -152,22 +166,39 @@ def optimised(w, driven, bend, most):
 
     low, high = np.full(len(w), -np.inf), np.full(len(w), np.inf)
     low[4 * (count + 1) : -1], high[4 * (count + 1) : -1] = -TORQUE_LIMIT, TORQUE_LIMIT
-    for at, value in ((slice(0, 4), 0.0), (slice(4 * count, 4 * count + 4), UPRIGHT), (4 * (count + 1), 0.0), (-2, 0)):
+    for at, value in (
+        (slice(0, 4), 0.0),
+        (slice(4 * count, 4 * count + 4), UPRIGHT),
+        (4 * (count + 1), 0.0),
+        (-2, 0),
+    ):
         low[at] = high[at] = value
     low[-1], high[-1] = 0.3 / count, 4.0 / count
     return minimize(
-        loss, w, (count, driven, bend), "SLSQP", jac=True, bounds=list(zip(low, high, strict=True)),
-        constraints={"type": "eq", "fun": gap, "jac": gap_slopes}, options={"maxiter": most, "ftol": 1e-7},
-    )  # fmt: skip
+        loss,
+        w,
+        (count, driven, bend),
+        "SLSQP",
+        jac=True,
+        bounds=list(zip(low, high, strict=True)),
+        constraints={"type": "eq", "fun": gap, "jac": gap_slopes},
+        options={"maxiter": most, "ftol": 1e-7},
+    )
 
 
 def arc(seed):
     """A first guess: a random arc from hanging to upright."""
     rng = np.random.default_rng(1000 + seed)
-    h, rng, part = rng.uniform(0.8, 2.2) / COARSE, np.random.default_rng(seed), np.linspace(0, 1, COARSE + 1)
+    h, rng, part = (
+        rng.uniform(0.8, 2.2) / COARSE,
+        np.random.default_rng(seed),
+        np.linspace(0, 1, COARSE + 1),
+    )
     z, wave = np.zeros((COARSE + 1, 4)), np.sin(2 * np.pi * part) * np.sin(np.pi * part)
     z[:, 0] = np.pi * part**2 * (3 - 2 * part) + rng.normal() * wave
-    z[:, 1] = 1.5 * rng.normal() * np.sin(2 * np.pi * part + rng.uniform(0, 6)) * np.sin(np.pi * part)
+    z[:, 1] = (
+        1.5 * rng.normal() * np.sin(2 * np.pi * part + rng.uniform(0, 6)) * np.sin(np.pi * part)
+    )
     z[:, 2:] = np.gradient(z[:, :2], h, axis=0)
     z[0, 2:] = z[-1, 2:] = 0.0
     return np.concatenate([z.ravel(), np.zeros(COARSE + 1), [h]])
@@ -194,7 +225,9 @@ def trajectory(robot, seed):
 def linear(x, u, driven):
     """A (4, 4) and b (4,) of the motion linearised at a state."""
     e = 1e-6
-    A = np.column_stack([(slope(x + d, u, driven) - slope(x - d, u, driven)) / (2 * e) for d in e * np.eye(4)])
+    A = np.column_stack(
+        [(slope(x + d, u, driven) - slope(x - d, u, driven)) / (2 * e) for d in e * np.eye(4)]
+    )
     return A, (slope(x, u + e, driven) - slope(x, u - e, driven)) / (2 * e)
 
 
@@ -226,12 +259,23 @@ def write(robot, seed):
     z, u, h, score, gap = trajectory(robot, seed)
     driven, free = DRIVEN[robot], 1 - DRIVEN[robot]
     z, u = np.round(z, 9), np.round(u, 9)
-    rates, s = np.array([slope(x, a, driven) for x, a in zip(z, u, strict=True)]), surface(z, u, h, driven)
+    rates, s = (
+        np.array([slope(x, a, driven) for x, a in zip(z, u, strict=True)]),
+        surface(z, u, h, driven),
+    )
     columns = {
-        "x": z[:, driven], "v": z[:, 2 + driven], "a": rates[:, 2 + driven], "q": z[:, free], "dq": z[:, 2 + free],
-        "ddq": rates[:, 2 + free], "u": u, "s_x": s[:, driven], "s_v": s[:, 2 + driven], "s_q": s[:, free],
+        "x": z[:, driven],
+        "v": z[:, 2 + driven],
+        "a": rates[:, 2 + driven],
+        "q": z[:, free],
+        "dq": z[:, 2 + free],
+        "ddq": rates[:, 2 + free],
+        "u": u,
+        "s_x": s[:, driven],
+        "s_v": s[:, 2 + driven],
+        "s_q": s[:, free],
         "s_dq": s[:, 2 + free],
-    }  # fmt: skip
+    }
     about = (
         f"found by benchmarks/swing_up.py {robot}, start {seed}, smc_mujoco {__version__}: x is the driven joint, "
         "q the free one, s_* the row b'P/R; SI units, nodes `step` seconds apart"
@@ -247,12 +291,17 @@ def write(robot, seed):
 
 
 def machines(count=80):
-    """Machines that differ in everything at once, mildly: on these, and not on the board's, gains are chosen."""
+    """Machines that differ in everything at once, mildly: on these, and not on the board's, gains
+    are chosen.
+    """
     rng, found = np.random.default_rng(7), []
     for seed in range(count):
-        changed = {name: MODEL_1_1[name] * rng.uniform(0.94, 1.06) for name in ("r1", "r2", "I1", "I2")}
+        changed = {}
+        for name in ("r1", "r2", "I1", "I2"):
+            changed[name] = MODEL_1_1[name] * rng.uniform(0.94, 1.06)
         changed |= {
-            name: rng.uniform(0.0, most) for name, most in (("b1", 0.01), ("b2", 0.01), ("cf1", 0.02), ("cf2", 0.02))
+            name: rng.uniform(0.0, most)
+            for name, most in (("b1", 0.01), ("b2", 0.01), ("cf1", 0.02), ("cf2", 0.02))
         }
         pulses = tuple((rng.uniform(0.3, 8.0), 0.07, rng.uniform(-3.0, 3.0)) for _ in range(3))
         found.append(
@@ -269,18 +318,26 @@ def choose():
     cases = machines()
     for k, phi, window in itertools.product((6.0, 9.0, 12.0), (3.0, 6.0), (3, 5, 9, 15)):
         shares = []
-        for robot, law in (("acrobot", entries.acrobot_swing_up), ("pendubot", entries.pendubot_swing_up)):
+        for robot, law in (
+            ("acrobot", entries.acrobot_swing_up),
+            ("pendubot", entries.pendubot_swing_up),
+        ):
             velocity = estimator("savitzky_golay", window=window, degree=2)
-            machine = Machine(dataclasses.replace(entries.entry(robot), law=law(k=k, phi=phi), velocity=velocity))
+            machine = Machine(
+                dataclasses.replace(entries.entry(robot), law=law(k=k, phi=phi), velocity=velocity)
+            )
             shares.append(np.mean([upright(machine.simulate(case)[0][-1]) for case in cases]))
-        print(f"k {k:g}, phi {phi:g}, window {window}: acrobot {shares[0]:.3f}, pendubot {shares[1]:.3f}", flush=True)
+        print(
+            f"k {k:g}, phi {phi:g}, window {window}: acrobot {shares[0]:.3f}, pendubot {shares[1]:.3f}",
+            flush=True,
+        )
 
 
 def search(robot, sets=900, seed=2):
     """Print the gains of the sliding swing-up with the best mean score on drawn resets.
 
-    The best 25 of all sets on the resets of seeds 100 to 103 are tried on seeds 100 to 115. Those that are shipped were
-    found so, after a first round of 400 sets on two seeds.
+    The best 25 of all sets on the resets of seeds 100 to 103 are tried on seeds 100 to 115. Those
+    that are shipped were found so, after a first round of 400 sets on two seeds.
     """
     rng, found = np.random.default_rng(seed), [(0.0, dict(swing_ups.GAINS[robot]))]
 
@@ -293,21 +350,33 @@ def search(robot, sets=900, seed=2):
             gains["m"] = rng.uniform(-0.5, 1.0)
         else:
             near = found[rng.integers(min(8, len(found)))][1]
-            gains = {name: float(np.clip(near[name] * math.exp(0.25 * rng.normal()), *RANGES[name])) for name in RANGES}
+            gains = {}
+            for name in RANGES:
+                gains[name] = float(
+                    np.clip(near[name] * math.exp(0.25 * rng.normal()), *RANGES[name])
+                )
             gains["m"] = near["m"] + 0.1 * rng.normal()
         found.append((score(gains, range(100, 104)), gains))
         found.sort(key=lambda one: -one[0])
-    best = max(((score(gains, range(100, 116)), gains) for _, gains in found[:25]), key=lambda one: one[0])
+    best = max(
+        ((score(gains, range(100, 116)), gains) for _, gains in found[:25]), key=lambda one: one[0]
+    )
     print(robot, f"{best[0]:.3f}", {name: float(f"{value:.4g}") for name, value in best[1].items()})
 
 
 def main():
     """Do what is asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("robots", nargs="*", choices=[*BEST, []], help="whose trajectory is found")
     parser.add_argument("--starts", type=int, default=0, help="tell the scores of this many starts")
-    parser.add_argument("--gains", action="store_true", help="compare gains on machines that the test does not have")
-    parser.add_argument("--resets", action="store_true", help="search for gains for the board of 2025 instead")
+    parser.add_argument(
+        "--gains", action="store_true", help="compare gains on machines that the test does not have"
+    )
+    parser.add_argument(
+        "--resets", action="store_true", help="search for gains for the board of 2025 instead"
+    )
     asked = parser.parse_args()
     for robot in asked.robots:
         if asked.resets:
@@ -315,7 +384,10 @@ def main():
             continue
         for seed in range(asked.starts):
             *_, h, score, gap = trajectory(robot, seed)
-            print(f"{robot}, start {seed}: {h * NODES:.2f} s, score about {score:.4f}, gap {gap:.0e}", flush=True)
+            print(
+                f"{robot}, start {seed}: {h * NODES:.2f} s, score about {score:.4f}, gap {gap:.0e}",
+                flush=True,
+            )
         write(robot, BEST[robot])
     if asked.gains:
         choose()

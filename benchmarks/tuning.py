@@ -2,8 +2,8 @@
 
     python benchmarks/tuning.py [CHECKOUT] [--rounds 3]
 
-The first run of each side compiles and is left out; then rounds alternate between the two. Without a checkout, the
-times of this one alone.
+The first run of each side compiles and is left out; then rounds alternate between the two. Without
+a checkout, the times of this one alone.
 """
 
 import argparse
@@ -47,14 +47,18 @@ def measured(checkout: Path) -> tuple[float, float]:
         file.write_text(COMPARISON.replace("OUT", repr(str(Path(folder) / "compared"))))
         environment = os.environ | {"PYTHONPATH": str(checkout)}
         command = [sys.executable, str(file)]
-        done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            command, env=environment, cwd=folder, capture_output=True, text=True, check=True
+        )
     tuning, whole = done.stdout.splitlines()[-1].split()
     return float(tuning), float(whole)
 
 
 def main() -> None:
     """Measure, and print medians and ratios."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("checkout", nargs="?", type=Path, help="of another version")
     parser.add_argument("--rounds", type=int, default=3)
     asked = parser.parse_args()
@@ -64,8 +68,14 @@ def main() -> None:
     rounds = [[measured(side) for side in sides] for _ in range(asked.rounds)]
     for i, name in enumerate(("tuning", "all")):
         seconds = [statistics.median(one[k][i] for one in rounds) for k in range(len(sides))]
-        ratios = [one[0][i] / one[1][i] for one in rounds] if asked.checkout else []
-        against = f", there {seconds[1]:.1f} s, ratio {statistics.median(ratios):.2f}" if ratios else ""
+        if asked.checkout:
+            ratios = [one[0][i] / one[1][i] for one in rounds]
+        else:
+            ratios = []
+        if ratios:
+            against = f", there {seconds[1]:.1f} s, ratio {statistics.median(ratios):.2f}"
+        else:
+            against = ""
         print(f"{name}: {seconds[0]:.1f} s here{against}", flush=True)
 
 

@@ -1,10 +1,11 @@
 """How much dry friction in its free shoulder does the acrobot's swing-up tolerate?
 
-This package's entry on RealAIGym's board: an optimised trajectory from hanging to upright under a Riccati law, with
-6 N m at the elbow. The law knows nothing of the friction, and has no motor in the joint where it acts.
+This package's entry on RealAIGym's board: an optimised trajectory from hanging to upright under a
+Riccati law, with 6 N m at the elbow. The law knows nothing of the friction, and has no motor in the
+joint where it acts.
 
-Look for: 1.2 s to the top. A little friction holds the machine where it leans, a fold of the elbow against the
-shoulder; more keeps it rocking about the top, which is not up by the board's rule.
+Look for: 1.2 s to the top. A little friction holds the machine where it leans, a fold of the elbow
+against the shoulder; more keeps it rocking about the top, which is not up by the board's rule.
 """
 
 import smc_mujoco as smc
@@ -32,7 +33,12 @@ def answer(runs):
 scene = smc.Scene(
     title="Acrobot with dry friction",
     conditions={
-        "friction": {"no friction": run(0.0), "0.01 N m": run(0.01), "0.02 N m": run(0.02), "0.08 N m": run(0.08)},
+        "friction": {
+            "no friction": run(0.0),
+            "0.01 N m": run(0.01),
+            "0.02 N m": run(0.02),
+            "0.08 N m": run(0.08),
+        },
     },
     answer=answer,
 )

@@ -1,7 +1,7 @@
 """How far is an arm thrown off its path by a blow on the forearm, and how soon is it back?
 
-While the arm sways, the forearm is hit from the side at 1 s: a half sine of 400 N in 20 ms, an impulse of 5 N s.
-Friction is that identified on a real Panda; no law sees the blow coming.
+While the arm sways, the forearm is hit from the side at 1 s: a half sine of 400 N in 20 ms, an
+impulse of 5 N s. Friction is that identified on a real Panda; no law sees the blow coming.
 
 Look for: the arrow at 1 s, which is the blow; and how far the tip is thrown, and how it comes back.
 """

@@ -1,17 +1,23 @@
 """How far does the tip of an arm sag when it picks up 2 kg that its law does not know of?
 
-The arm moves down to the left, picks up a steel ball at 1 s, and places it at the right at 3 s. From 1 s on gravity and
-inertia are other than the nominal model says. Friction is that identified on a real Panda.
+The arm moves down to the left, picks up a steel ball at 1 s, and places it at the right at 3 s.
+From 1 s on gravity and inertia are other than the nominal model says. Friction is that identified
+on a real Panda.
 
-Look for: the jump of the bars of joints 2 and 4 at 1 s, and the sag that a boundary layer leaves and an integral does
-not.
+Look for: the jump of the bars of joints 2 and 4 at 1 s, and the sag that a boundary layer leaves
+and an integral does not.
 """
 
 import arms
 
 import smc_mujoco as smc
 
-LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "passivity_based", "time_delay_sliding")
+LAWS = (
+    "computed_torque_sliding",
+    "super_twisting_computed_torque",
+    "passivity_based",
+    "time_delay_sliding",
+)
 
 
 def sag(trace):
@@ -31,7 +37,9 @@ def answer(runs):
 
 scene = smc.Scene(
     title="A payload of 2 kg is picked up",
-    conditions={"pick and place": {name: arms.scenario("payload", arms.gained(name)) for name in LAWS}},
+    conditions={
+        "pick and place": {name: arms.scenario("payload", arms.gained(name)) for name in LAWS}
+    },
     answer=answer,
 )
 

@@ -1,11 +1,12 @@
 """Can an arm press on a wall with 20 N while its tip slides along it, without a force sensor?
 
-Hybrid control: a sliding mode moves the joints in all directions but one, in which the tip presses open-loop, by the
-torques J' F. One of these laws knows the identified friction of the joints, one does not. The third law only follows
-the path, wanted 4 mm behind the wall's face: it presses with what the joints' errors happen to give.
+Hybrid control: a sliding mode moves the joints in all directions but one, in which the tip presses
+open-loop, by the torques J' F. One of these laws knows the identified friction of the joints, one
+does not. The third law only follows the path, wanted 4 mm behind the wall's face: it presses with
+what the joints' errors happen to give.
 
-Look for: the force in the last panel, which a path behind the wall meets least; a loss of contact as a bar below it;
-and how deep the tip is in the wall.
+Look for: the force in the last panel, which a path behind the wall meets least; a loss of contact
+as a bar below it; and how deep the tip is in the wall.
 """
 
 import arms

@@ -1,9 +1,10 @@
 """How much play in the gear does each law tolerate before it hammers?
 
-Between motor and joint lies a gap. To reverse, the rotor must cross it, and arrives with speed: every switching of the
-command becomes a blow on the other flank.
+Between motor and joint lies a gap. To reverse, the rotor must cross it, and arrives with speed:
+every switching of the command becomes a blow on the other flank.
 
-Look for: the limit cycle (ripple) of each law, and the blows of the flanks (peak reaction), far above max |u|.
+Look for: the limit cycle (ripple) of each law, and the blows of the flanks (peak reaction), far
+above max |u|.
 """
 
 import smc_mujoco as smc

@@ -1,18 +1,22 @@
 """Relay or super-twisting: which chatters less, and at which lag of the actuator does that change?
 
-Both laws tolerate the disturbance sin(t) N on a free mass: the relay k sgn(s) needs k > 1 N, super-twisting a rate of
-1 N/s. The actuator lags twice by the same time constant mu. The amplitude of the relay grows with mu, that of
-super-twisting with mu^2 (V. Utkin, "Discussion aspects of high-order sliding mode control", IEEE TAC 61(3):829, 2016;
-U. Perez-Ventura & L. Fridman, arXiv 1705.09711).
+Both laws tolerate the disturbance sin(t) N on a free mass: the relay k sgn(s) needs k > 1 N,
+super-twisting a rate of 1 N/s. The actuator lags twice by the same time constant mu. The amplitude
+of the relay grows with mu, that of super-twisting with mu^2 (V. Utkin, "Discussion aspects of
+high-order sliding mode control", IEEE TAC 61(3):829, 2016; U. Perez-Ventura & L. Fridman, arXiv
+1705.09711).
 
-Look for: the lines of the figure, predicted by harmonic balance, and the dots, run; where they cross.
+Look for: the lines of the figure, predicted by harmonic balance, and the dots, run; where they
+cross.
 """
 
 import smc_mujoco as smc
 
 LAWS = {
     "relay": smc.law("classical", k=1.1, c=0.01),
-    "super-twisting": smc.law("super_twisting", k1=1.5, k2=1.1, c=0.01),  # Levant's gains for a rate of 1 N/s
+    "super-twisting": smc.law(
+        "super_twisting", k1=1.5, k2=1.1, c=0.01
+    ),  # Levant's gains for a rate of 1 N/s
 }
 LAGS = (2, 5, 10, 20, 50, 100, 200, 300)  # ms, the sum of both
 
@@ -36,11 +40,15 @@ def amplitude(trace):
 
 scene = smc.Scene(
     title="Relay and super-twisting behind a lagging actuator",
-    conditions={f"{lag} ms": {label: scenario(law, lag) for label, law in LAWS.items()} for lag in LAGS},
+    conditions={
+        f"{lag} ms": {label: scenario(law, lag) for label, law in LAWS.items()} for lag in LAGS
+    },
     film="20 ms",
     figure="chattering",
     answers=("chattering_amplitude", "chattering_frequency"),
-    answer=lambda runs: f"the smaller amplitude of s, over the lag: {runs.least(amplitude, unit='m/s')}",
+    answer=lambda runs: (
+        f"the smaller amplitude of s, over the lag: {runs.least(amplitude, unit='m/s')}"
+    ),
 )
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 """What is left of each law's promise when a geared DC motor stands between command and joint?
 
-The amplifier turns u into the voltage whose stall torque is u. Speed takes torque away (back-EMF), the winding delays
-it, the supply and the current limit bound it, and cogging adds a ripple; a first-order lag stands beside it.
+The amplifier turns u into the voltage whose stall torque is u. Speed takes torque away (back-EMF),
+the winding delays it, the supply and the current limit bound it, and cogging adds a ripple; a
+first-order lag stands beside it.
 
-Look for: settling times under the weak supply, and chattering that the motor passes on or smooths away.
+Look for: settling times under the weak supply, and chattering that the motor passes on or smooths
+away.
 """
 
 import smc_mujoco as smc
@@ -20,7 +22,9 @@ def answer(runs):
 scene = smc.Scene(
     title="Inverted pendulum on a DC motor",
     conditions={
-        name: smc.paper.comparison("inverted_pendulum", duration=3.0, changes={"actuator": actuator})
+        name: smc.paper.comparison(
+            "inverted_pendulum", duration=3.0, changes={"actuator": actuator}
+        )
         for name, actuator in {
             "ideal": None,
             "24 V supply": smc.DCMotor(),

@@ -1,8 +1,10 @@
 """What does a real encoder, without a velocity sensor, leave of each law?
 
-Position comes in counts, late, seldom, or with readings lost; velocity is differentiated from it and filtered.
+Position comes in counts, late, seldom, or with readings lost; velocity is differentiated from it
+and filtered.
 
-Look for: chattering of the smooth law too, once a count is coarse, and the limit cycles of the others.
+Look for: chattering of the smooth law too, once a count is coarse, and the limit cycles of the
+others.
 """
 
 import smc_mujoco as smc

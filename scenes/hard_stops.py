@@ -1,9 +1,10 @@
 """A blow throws the pendulum against its stops: which law brings it back, and how hard does it hit?
 
-At t = 1 s an impulse of 2 N m s sends it off at 16 rad/s. The padded stops at 1 rad return 20 or 80 % of the speed.
+At t = 1 s an impulse of 2 N m s sends it off at 16 rad/s. The padded stops at 1 rad return 20 or 80
+% of the speed.
 
-Look for: how often each law is thrown from stop to stop, and the integral action of super-twisting that the blow winds
-up.
+Look for: how often each law is thrown from stop to stop, and the integral action of super-twisting
+that the blow winds up.
 """
 
 import smc_mujoco as smc

@@ -1,9 +1,11 @@
 """What does dry friction in the joint do to each law: does it stop short, or does it hunt?
 
-A smooth law pushes less the closer it gets, so friction F holds it where lambda tanh(k1 x) - m grav l sin x <= F; a
-switching law never stops pushing, and shakes the joint loose. LuGre friction sticks harder than it slides.
+A smooth law pushes less the closer it gets, so friction F holds it where lambda tanh(k1 x) - m grav
+l sin x <= F; a switching law never stops pushing, and shakes the joint loose. LuGre friction sticks
+harder than it slides.
 
-Look for: the steady error that grows with F, the limit cycle (ripple) where there is one, how long the joint sticks.
+Look for: the steady error that grows with F, the limit cycle (ripple) where there is one, how long
+the joint sticks.
 """
 
 import smc_mujoco as smc
@@ -20,7 +22,9 @@ def answer(runs):
 scene = smc.Scene(
     title="Inverted pendulum with joint friction",
     conditions={
-        name: smc.paper.comparison("inverted_pendulum", duration=5.0, changes={"friction": friction})
+        name: smc.paper.comparison(
+            "inverted_pendulum", duration=5.0, changes={"friction": friction}
+        )
         for name, friction in {
             "none": smc.Coulomb(0.0),
             "0.1 N m": smc.Coulomb(0.1),

@@ -1,7 +1,7 @@
 """Five pendulums hang so close that their bobs collide: which law settles without a clash?
 
-They hang in one row like a Newton's cradle, 3 cm apart, and start swung out to both sides. To stop at rest is not
-enough: a bob that arrives with speed passes it on to its neighbours.
+They hang in one row like a Newton's cradle, 3 cm apart, and start swung out to both sides. To stop
+at rest is not enough: a bob that arrives with speed passes it on to its neighbours.
 
 Look for: the hardest collision (peak reaction), and whether it costs settling time.
 """
@@ -27,7 +27,10 @@ scene = smc.Scene(
         name: smc.paper.comparison(
             "pendulum_network",
             duration=4.0,
-            changes={"contact": smc.Contact("bobs", restitution=e), "x0": (-0.8, -0.6, 0.0, 0.5, 0.7)},
+            changes={
+                "contact": smc.Contact("bobs", restitution=e),
+                "x0": (-0.8, -0.6, 0.0, 0.5, 0.7),
+            },
         )
         for name, e in {"rubber": 0.3, "steel": 0.95}.items()
     },

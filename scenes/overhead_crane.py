@@ -1,10 +1,11 @@
 """What does it cost to keep a crane's load from swinging while its trolley goes to x = 0?
 
-The hierarchical law (W. Wang et al. 2004) on S = a (x' + c1 x) + q' + c2 q with three weights a of the trolley against
-the rope's angle q, from x = 1 m, at rest.
+The hierarchical law (W. Wang et al. 2004) on S = a (x' + c1 x) + q' + c2 q with three weights a of
+the trolley against the rope's angle q, from x = 1 m, at rest.
 
-Look for: with a small a, the load hardly swings, and the trolley is late and goes too far. With a large a, the trolley
-is fast, and the load keeps swinging. In between, both come to rest together, in 3.4 s.
+Look for: with a small a, the load hardly swings, and the trolley is late and goes too far. With a
+large a, the trolley is fast, and the load keeps swinging. In between, both come to rest together,
+in 3.4 s.
 """
 
 import smc_mujoco as smc

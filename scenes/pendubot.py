@@ -1,10 +1,11 @@
 """How hard may the pendubot's shoulder be struck while it balances?
 
-This package's entry on RealAIGym's board swings the double pendulum up in 1.3 s, with 6 N m at the shoulder, and holds
-it by a Riccati law. At 4 s the shoulder is struck for 50 ms. The blow acts where the motor does.
+This package's entry on RealAIGym's board swings the double pendulum up in 1.3 s, with 6 N m at the
+shoulder, and holds it by a Riccati law. At 4 s the shoulder is struck for 50 ms. The blow acts
+where the motor does.
 
-Look for: the motor saturates at 0.3 N m s. The law forgives a blow as long as the motor can bring the arm back; one
-that is a little too hard sends the machine round and round.
+Look for: the motor saturates at 0.3 N m s. The law forgives a blow as long as the motor can bring
+the arm back; one that is a little too hard sends the machine round and round.
 """
 
 import smc_mujoco as smc

@@ -1,9 +1,9 @@
 """Do five coupled pendulums come to rest together when each has only its own controller?
 
-The paper's fourth comparison (figure 4, the mean angle): five hanging pendulums on one shaft, torsion springs between
-neighbours, the same law in each with nothing but its own angle and rate. It reports rapid synchronisation under the
-observer-free law and coupling-induced distortion under the classical one. The inverted network is the harder twin that
-the paper does not try.
+The paper's fourth comparison (figure 4, the mean angle): five hanging pendulums on one shaft,
+torsion springs between neighbours, the same law in each with nothing but its own angle and rate. It
+reports rapid synchronisation under the observer-free law and coupling-induced distortion under the
+classical one. The inverted network is the harder twin that the paper does not try.
 
 Look for: the spread between the largest and the smallest angle beside the mean.
 """

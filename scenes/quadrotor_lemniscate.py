@@ -1,22 +1,32 @@
-"""How closely does a drone follow a figure of eight, and how does its error grow as it flies faster?
+"""How closely does a drone follow a figure of eight, and how does its error grow as it flies
+faster?
 
-A Crazyflie flies a lemniscate of 2 m by 1 m, three laps of 6, 4 or 3 s each; in the fastest its acceleration reaches
-0.9 g. Drag and the lag of the rotors are in no law.
+A Crazyflie flies a lemniscate of 2 m by 1 m, three laps of 6, 4 or 3 s each; in the fastest its
+acceleration reaches 0.9 g. Drag and the lag of the rotors are in no law.
 
-Look for: the distance between the dark path and the flown one on the outer arcs, where drag and lag take most.
+Look for: the distance between the dark path and the flown one on the outer arcs, where drag and lag
+take most.
 """
 
 import smc_mujoco as smc
 
 DRONE = smc.plant("quadrotor")
-LAWS = ("cascaded_pid", "geometric", "quaternion_sliding", "adaptive_quaternion_sliding", "super_twisting_attitude")
+LAWS = (
+    "cascaded_pid",
+    "geometric",
+    "quaternion_sliding",
+    "adaptive_quaternion_sliding",
+    "super_twisting_attitude",
+)
 
 
 def lap(law, period):
     w = 6.2832 / period
     path = [smc.Sine(1.0, w), smc.Sine(0.5, 2.0 * w), smc.Constant(1.0), *[smc.Constant(0.0)] * 3]
     start = {"x0": DRONE.rest, "v0": (w, w, 0.0, 0.0, 0.0, 0.0)}
-    return smc.Scenario(plant=DRONE, law=law, model="nominal", reference=path, duration=3.0 * period, **start)
+    return smc.Scenario(
+        plant=DRONE, law=law, model="nominal", reference=path, duration=3.0 * period, **start
+    )
 
 
 def error(trace):
@@ -25,7 +35,9 @@ def error(trace):
 
 
 def answer(runs):
-    said = [f"{name}: from {runs[name].least(error)} to {runs[name].most(error)}" for name in runs.traces]
+    said = []
+    for name in runs.traces:
+        said.append(f"{name}: from {runs[name].least(error)} to {runs[name].most(error)}")
     return f"rms distance from the path after the first lap, in mm; {'; '.join(said)}"
 
 

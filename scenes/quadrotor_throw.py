@@ -1,16 +1,24 @@
 """Which law catches a drone that is thrown up with its rotors at rest?
 
-A Crazyflie leaves the hand at 1.5 m with 5 m/s upwards, upright, on its side or nearly upside down, and tumbling. Its
-rotors start in the air. The floor is not there, so that a law that needs much height is seen to need it.
+A Crazyflie leaves the hand at 1.5 m with 5 m/s upwards, upright, on its side or nearly upside down,
+and tumbling. Its rotors start in the air. The floor is not there, so that a law that needs much
+height is seen to need it.
 
-Look for: the turn to the upright, which takes the shorter way, and the height that is lost until then. An error of the
-attitude that vanishes at 180 degrees, as that of the geometric law, turns the body last.
+Look for: the turn to the upright, which takes the shorter way, and the height that is lost until
+then. An error of the attitude that vanishes at 180 degrees, as that of the geometric law, turns the
+body last.
 """
 
 import smc_mujoco as smc
 
 DRONE = smc.plant("quadrotor", lift=0.0)
-LAWS = ("cascaded_pid", "geometric", "quaternion_sliding", "adaptive_quaternion_sliding", "super_twisting_attitude")
+LAWS = (
+    "cascaded_pid",
+    "geometric",
+    "quaternion_sliding",
+    "adaptive_quaternion_sliding",
+    "super_twisting_attitude",
+)
 TURNS = {"upright": (0.3, 0.3, 0.5), "on its side": (1.6, 0.3, 0.5), "upside down": (2.9, 0.3, 0.5)}
 
 
@@ -19,7 +27,9 @@ def lowest(trace):
 
 
 def answer(runs):
-    said = [f"{name}: from {runs[name].least(lowest)} to {runs[name].most(lowest)}" for name in TURNS]
+    said = []
+    for name in TURNS:
+        said.append(f"{name}: from {runs[name].least(lowest)} to {runs[name].most(lowest)}")
     return f"lowest height in m, of the 1 m wanted; {'; '.join(said)}"
 
 
@@ -28,8 +38,12 @@ scene = smc.Scene(
     conditions={
         name: {
             law: smc.Scenario(
-                plant=DRONE, law=law, model="nominal", duration=4.0,
-                x0=(0.0, 0.0, 1.5, *turn), v0=(1.0, 0.5, 5.0, 3.0, 2.0, 1.0),
+                plant=DRONE,
+                law=law,
+                model="nominal",
+                duration=4.0,
+                x0=(0.0, 0.0, 1.5, *turn),
+                v0=(1.0, 0.5, 5.0, 3.0, 2.0, 1.0),
             )
             for law in LAWS
         }
@@ -37,7 +51,7 @@ scene = smc.Scene(
     },
     film="on its side",
     answer=answer,
-)  # fmt: skip
+)
 
 if __name__ == "__main__":
     smc.play(__file__)

@@ -1,12 +1,15 @@
 """Which numbers of the QUBE-Servo let its own controller balance it, as it does on the machine?
 
-One controller, three twins: the quantities identified from two public records, the published ones with m r^2/12 for the
-arm's inertia, and the published ones with m r^2/3. The arm follows a sine of the size of the records'.
+One controller, three twins: the quantities identified from two public records, the published ones
+with m r^2/12 for the arm's inertia, and the published ones with m r^2/3. The arm follows a sine of
+the size of the records'.
 
-Look for: the last one falls in a second, although the machine stands. The published arm of m r^2/12 stands too, but
-does not stick as the identified one does, whose fit on unused records is 94 / 93 / 87 %.
+Look for: the last one falls in a second, although the machine stands. The published arm of m r^2/12
+stands too, but does not stick as the identified one does, whose fit on unused records is 94 / 93 /
+87 %.
 
-The film of a recorded run beside its twin: smc-mujoco rig qube_servo FILE --sets driver --film run.mp4
+The film of a recorded run beside its twin: smc-mujoco rig qube_servo FILE --sets driver --film
+run.mp4
 """
 
 import smc_mujoco as smc

@@ -1,10 +1,12 @@
-"""Behind an actuator that lags by 50 ms: which laws of third order settle, with an acceleration that is estimated?
+"""Behind an actuator that lags by 50 ms: which laws of third order settle, with an acceleration
+that is estimated?
 
-The paper gives its law for any relative degree r, as -lambda tanh of x^(r-1) + ... + k1 x, and shows r = 2. A lag makes
-r = 3: the law needs x'', which Levant's differentiator gives, its L between g U / tau and twice that.
+The paper gives its law for any relative degree r, as -lambda tanh of x^(r-1) + ... + k1 x, and
+shows r = 2. A lag makes r = 3: the law needs x'', which Levant's differentiator gives, its L
+between g U / tau and twice that.
 
-Look for: whether the paper's form settles, beside the nested third-order law, a surface of third order under the
-classical law, and the second-order form that does not know of the lag.
+Look for: whether the paper's form settles, beside the nested third-order law, a surface of third
+order under the classical law, and the second-order form that does not know of the lag.
 """
 
 import smc_mujoco as smc

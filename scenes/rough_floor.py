@@ -1,9 +1,10 @@
 """Where does a block on a rough floor stop, and does it stick and slip on the way?
 
-The Duffing mass slides on a bed under its own weight: friction is a real contact, mu M grav, between block and lining.
-The springs push it off centre, the floor holds it where it stops.
+The Duffing mass slides on a bed under its own weight: friction is a real contact, mu M grav,
+between block and lining. The springs push it off centre, the floor holds it where it stops.
 
-Look for: the steady error of the smooth law, anywhere within what mu holds, beside the switching laws, which crawl on.
+Look for: the steady error of the smooth law, anywhere within what mu holds, beside the switching
+laws, which crawl on.
 """
 
 import smc_mujoco as smc

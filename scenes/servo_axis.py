@@ -1,10 +1,12 @@
 """Which law keeps a servo axis from sticking and slipping when it crawls at 1 mm/s?
 
-The axis of a published benchmark (95 kg, 20 N of dry friction), here with LuGre's friction, whose static force is half
-as large again (chosen). A soft PID waits for its integral to break the axis loose, shoots ahead, and waits again.
+The axis of a published benchmark (95 kg, 20 N of dry friction), here with LuGre's friction, whose
+static force is half as large again (chosen). A soft PID waits for its integral to break the axis
+loose, shoots ahead, and waits again.
 
-Look for: the staircase of the soft PID; the stiff one crawls evenly after its first step. The boundary layer lags by a
-third of a millimetre. Super-twisting follows within 0.1 um, at the price of a busy motor.
+Look for: the staircase of the soft PID; the stiff one crawls evenly after its first step. The
+boundary layer lags by a third of a millimetre. Super-twisting follows within 0.1 um, at the price
+of a busy motor.
 """
 
 import smc_mujoco as smc
@@ -15,7 +17,13 @@ STICKS = smc.hardware.LuGre(coulomb=20.3935, static=30.6, stribeck=0.005, stiffn
 
 def run(law, model="nominal"):
     return smc.Scenario(
-        plant=AXIS, law=law, model=model, friction=STICKS, x0=0.0, reference=smc.signals.Ramp(1e-3), u_max=350.0
+        plant=AXIS,
+        law=law,
+        model=model,
+        friction=STICKS,
+        x0=0.0,
+        reference=smc.signals.Ramp(1e-3),
+        u_max=350.0,
     )
 
 

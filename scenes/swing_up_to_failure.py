@@ -1,9 +1,12 @@
-"""From lying on the floor to upright: who gets up with which torque, and who falls back when the bob grows heavy?
+"""From lying on the floor to upright: who gets up with which torque, and who falls back when the
+bob grows heavy?
 
-Gravity asks for at most 2.5 N m. With 6 and with 3 N m the laws may get up. In the last condition the bob's mass is
-multiplied by 25.9 at t = 3 s, beside a disturbance of 0.2 N m: 6 N m then hold it only within 5 degrees of upright.
+Gravity asks for at most 2.5 N m. With 6 and with 3 N m the laws may get up. In the last condition
+the bob's mass is multiplied by 25.9 at t = 3 s, beside a disturbance of 0.2 N m: 6 N m then hold it
+only within 5 degrees of upright.
 
-Look for: who never leaves the floor, who overshoots onto the other side, who still stands at the end.
+Look for: who never leaves the floor, who overshoots onto the other side, who still stands at the
+end.
 """
 
 import smc_mujoco as smc
@@ -19,7 +22,9 @@ def answer(runs):
 scene = smc.Scene(
     title="Inverted pendulum, from the floor and back",
     conditions={
-        name: smc.paper.comparison("inverted_pendulum", duration=8.0, changes={"contact": "floor", "x0": 2.43} | more)
+        name: smc.paper.comparison(
+            "inverted_pendulum", duration=8.0, changes={"contact": "floor", "x0": 2.43} | more
+        )
         for name, more in {
             "6 N m": {"u_max": 6.0},
             "3 N m": {"u_max": 3.0},

@@ -1,7 +1,7 @@
 """Does Gaussian noise on both sensors matter to the observer-free law?
 
-The paper's figure 6. Standard deviations 0.01 m and 0.05 m/s. The paper reports that the system remains stable with
-small fluctuations. The rivals run beside it under the same conditions.
+The paper's figure 6. Standard deviations 0.01 m and 0.05 m/s. The paper reports that the system
+remains stable with small fluctuations. The rivals run beside it under the same conditions.
 
 Look for: the fluctuation of x is small; that of u is lam times the noise in s, and no small one.
 """
@@ -11,7 +11,9 @@ import smc_mujoco as smc
 
 def answer(runs):
     paper = runs.only("observer_free")
-    change = {name: paper.changes(name, "nominal", "noise") for name in ("settling_time", "ultimate_bound", "tv_rate")}
+    change = {}
+    for name in ("settling_time", "ultimate_bound", "tv_rate"):
+        change[name] = paper.changes(name, "nominal", "noise")
     return (
         f"from nominal to noise, settling time: {change['settling_time']}; ultimate bound: {change['ultimate_bound']}; "
         f"TV rate of u: {change['tv_rate']}, with noise the least: {runs['noise'].those().least('tv_rate')}"

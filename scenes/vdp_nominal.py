@@ -1,7 +1,7 @@
 """How does the observer-free law stop the Van der Pol oscillator when nothing disturbs it?
 
-The paper's figure 5, and the reference for vdp_noise and vdp_disturbance. The paper reports smooth and fast
-convergence without chattering. The rivals run beside it.
+The paper's figure 5, and the reference for vdp_noise and vdp_disturbance. The paper reports smooth
+and fast convergence without chattering. The rivals run beside it.
 
 Look for: a u without corners, and how much later x arrives than u leaves its bound.
 """

@@ -6,30 +6,31 @@
     trace = smc.run(scenario)
     print(smc.score(trace))
 
-A plant is a name of `smc.plants()`, or your own MJCF with the joints to control. `smc.which("arm.xml:shoulder,elbow",
-starts=smc.starts(x0=0.3))` tunes laws on it and says which to take.
+A plant is a name of `smc.plants()`, or your own MJCF with the joints to control.
+`smc.which("arm.xml:shoulder,elbow", starts=smc.starts(x0=0.3))` tunes laws on it and says which to
+take.
 
 The names by task, those of a first script first; `help(smc.run)` tells what a name does:
 
     Run and look: Scenario, run, Trace, load, score, figure, plot, film, show, view
     Laws: law, laws, law_function, Measurement, law_from
     Plants: plant, plants, plant_from, Channel
-    Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder, Backlash, DCMotor, Lag
-    Compare: compare, which, tune, margins, grid, study, leaderboard, Table
-    More to run and to look at: stream, scores, Scene, play, ScenarioError
-    Surfaces, estimators, policies: surface, surface_function, estimator, estimator_function, Law, policy
-    Machines: Plant, Contact, rig, rigs, identify
-    Signals and time: Signal, Push, Jump, Clock
-    Analyse: accuracy, basin, chattering, worst_case, sensitivity, Uncertainty
-    Audit: audit, claims, certify, report
+    Conditions: condition, starts, Noise, Constant, Step, Sine, Coulomb, Viscous, Encoder, Backlash,
+    DCMotor, Lag Compare: compare, which, tune, margins, grid, study, leaderboard, Table More to run
+    and to look at: stream, scores, Scene, play, ScenarioError Surfaces, estimators, policies:
+    surface, surface_function, estimator, estimator_function, Law, policy Machines: Plant, Contact,
+    rig, rigs, identify Signals and time: Signal, Push, Jump, Clock Analyse: accuracy, basin,
+    chattering, worst_case, sensitivity, Uncertainty Audit: audit, claims, certify, report
     Benchmark: problem, results
 
-What is needed less often is in modules: `smc.signals` (paths, gusts, series), `smc.hardware` (more friction, servos),
-`smc.design` (gains from theory), `smc.fidelity`, `smc.metrics` (of joints and tips), `smc.exchange` (laws from and to
-C and FMUs), `smc.envs` (environments for agents), `smc.errors` (warnings), `smc.boards` and `smc.paper`.
+What is needed less often is in modules: `smc.signals` (paths, gusts, series), `smc.hardware` (more
+friction, servos), `smc.design` (gains from theory), `smc.fidelity`, `smc.metrics` (of joints and
+tips), `smc.exchange` (laws from and to C and FMUs), `smc.envs` (environments for agents),
+`smc.errors` (warnings), `smc.boards` and `smc.paper`.
 
-`__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that importing the package costs
-nothing. Types that are only returned are in their modules, such as smc_mujoco.analysis.tuning.result.Tuned.
+`__init__.pyi` has the modules of the names. A name is loaded when it is first used, so that
+importing the package costs nothing. Types that are only returned are in their modules, such as
+smc_mujoco.analysis.tuning.result.Tuned.
 """
 
 from smc_mujoco.common import lazy

@@ -1,4 +1,6 @@
-"""References and disturbances beyond those at the root: pulses, paths, gusts, wind, recorded series."""
+"""References and disturbances beyond those at the root: pulses, paths, gusts, wind, recorded
+series.
+"""
 
 from smc_mujoco.simulation.signals import (
     BandLimited,
@@ -11,10 +13,22 @@ from smc_mujoco.simulation.signals import (
     Ramp,
     Relay,
     Wind,
-)  # fmt: skip
+)
 from smc_mujoco.simulation.time_series import Held, TimeSeries, Waypoints, cartesian_path
 
 __all__ = [
-    "BandLimited", "Dryden", "Gust", "Held", "Impulse", "MinimumJerk", "OrnsteinUhlenbeck", "Pulse", "Ramp", "Relay",
-    "TimeSeries", "Waypoints", "Wind", "cartesian_path",
-]  # fmt: skip
+    "BandLimited",
+    "Dryden",
+    "Gust",
+    "Held",
+    "Impulse",
+    "MinimumJerk",
+    "OrnsteinUhlenbeck",
+    "Pulse",
+    "Ramp",
+    "Relay",
+    "TimeSeries",
+    "Waypoints",
+    "Wind",
+    "cartesian_path",
+]

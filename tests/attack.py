@@ -1,13 +1,15 @@
-"""The long attack on what the suite promises: any scenario, any call and any file ends well or in one sentence.
+"""The long attack on what the suite promises: any scenario, any call and any file ends well or in
+one sentence.
 
     make attack                                                       # all parts, 10 minutes, with new seeds
     python tests/attack.py calls --seed 7 --cases 25000               # one part
     python tests/attack.py calls --seed 7 --start 1234 --cases 1      # one case again, as the attack prints it
 
-Parts: `scenarios` (wild fields, run to a trace that is sound), `batches` (several together, the same bits as alone),
-`calls` (public names with what they do not take), `files` (damaged ones). Found is: an exception that is not ours, a
-sentence that is none, a trace with a number that was not computed, a crash, and a case that takes longer than LIMIT.
-Every case is made of its part, the seed and its number alone. Exit code 1 where something was found.
+Parts: `scenarios` (wild fields, run to a trace that is sound), `batches` (several together, the
+same bits as alone), `calls` (public names with what they do not take), `files` (damaged ones).
+Found is: an exception that is not ours, a sentence that is none, a trace with a number that was not
+computed, a crash, and a case that takes longer than LIMIT. Every case is made of its part, the seed
+and its number alone. Exit code 1 where something was found.
 """
 
 import argparse
@@ -46,13 +48,20 @@ from smc_mujoco.mechanisms.rotation import pose_errors
 from smc_mujoco.simulation.state import LOGGED
 
 START = 600.0  # s in which a process is ready, compiling included
-LIMIT = 60.0  # s a case may take; what computes on after a wrong-typed call is ended after LONG and counts as accepted
+# s a case may take; what computes on after a wrong-typed call is ended after LONG and counts as
+# accepted
+LIMIT = 60.0
 LONG = 2.0  # s
 SLICE = 10_000  # cases a process at most; each process compiles its laws again, for a minute
 MOST = 400  # physics steps times channels of a run that is played
 HERE = Path(__file__).parent
 SCRIPT = __file__  # what a child runs
-CASES = {"scenarios": 40_000, "batches": 2_000, "calls": 25_000, "files": 8_000}  # 10 minutes on two cores
+CASES = {
+    "scenarios": 40_000,
+    "batches": 2_000,
+    "calls": 25_000,
+    "files": 8_000,
+}  # 10 minutes on two cores
 
 
 class Found(AssertionError):
@@ -69,11 +78,16 @@ def sentence(text: str) -> None:
 
 
 def attempt(random: Random) -> smc.Scenario | None:
-    """A Scenario, one in three of a grid; None where it was refused in a sentence, or takes longer than a blink."""
+    """A Scenario, one in three of a grid; None where it was refused in a sentence, or takes longer
+    than a blink.
+    """
     try:
         fields = wild.fields(random)
         gridded = random.random() < 1 / 3
-        scenario = random.choice(wild.gridded(random, fields)) if gridded else smc.Scenario(**fields)
+        if gridded:
+            scenario = random.choice(wild.gridded(random, fields))
+        else:
+            scenario = smc.Scenario(**fields)
     except smc.ScenarioError as error:
         sentence(str(error))
         return None
@@ -81,9 +95,14 @@ def attempt(random: Random) -> smc.Scenario | None:
         if "unexpected keyword" not in str(error):
             raise
         return None
-    knots = [scenario.duration / d.dt for d in scenario.disturbance if isinstance(d, smc.signals.OrnsteinUhlenbeck)]
+    knots = []
+    for d in scenario.disturbance:
+        if isinstance(d, smc.signals.OrnsteinUhlenbeck):
+            knots.append(scenario.duration / d.dt)
     work = scenario.samples * scenario.steps * scenario.plant.n
-    return scenario if work <= MOST and max(knots, default=0.0) < 1e5 and scenario.readings < 10_000 else None
+    if work <= MOST and max(knots, default=0.0) < 1e5 and scenario.readings < 10_000:
+        return scenario
+    return None
 
 
 def ran(scenarios: Any) -> Any:
@@ -96,7 +115,9 @@ def ran(scenarios: Any) -> Any:
 
 
 def sound(trace: smc.Trace) -> None:
-    """Raise Found unless the trace has its shape, finite numbers up to where it says that it ends, then NaN."""
+    """Raise Found unless the trace has its shape, finite numbers up to where it says that it ends,
+    then NaN.
+    """
     scenario = trace.scenario
     samples, n, end = scenario.samples + 1, scenario.plant.n, scenario.samples + 1
     if (trace.diverged_at is None) != (trace.failure is None):
@@ -105,26 +126,39 @@ def sound(trace: smc.Trace) -> None:
         sentence(trace.failure)
         step = round(trace.diverged_at / scenario.resolved.physics_step)
         end = -(-step // scenario.steps)
-        if not math.isclose(trace.diverged_at, step * scenario.resolved.physics_step, abs_tol=1e-12):
+        if not math.isclose(
+            trace.diverged_at, step * scenario.resolved.physics_step, abs_tol=1e-12
+        ):
             raise Found(f"ends between steps, at {trace.diverged_at!r}")
         if not 0 <= step <= scenario.samples * scenario.steps:
             raise Found(f"ends outside the run, at step {step}")
         if f"at t = {trace.diverged_at:.6g} s" not in trace.failure:
             raise Found(f"does not say when: {trace.failure}")
-    if trace.t.shape != (samples,) or not np.allclose(trace.t, np.arange(samples) * scenario.control_period, 1e-14):
+    if trace.t.shape != (samples,) or not np.allclose(
+        trace.t, np.arange(samples) * scenario.control_period, 1e-14
+    ):
         raise Found("wrong times")
     for name in LOGGED:
         array = getattr(trace, name)
         if array.shape != (samples, n) or array.dtype != np.float64 or array.flags.writeable:
-            raise Found(f"{name} has shape {array.shape}, type {array.dtype}, writeable {array.flags.writeable}")
+            raise Found(
+                f"{name} has shape {array.shape}, type {array.dtype}, writeable {array.flags.writeable}"
+            )
         if not np.isfinite(array[:end]).all() or not np.isnan(array[end:]).all():
-            raise Found(f"{name} is not finite up to sample {end} and NaN from there: {array[:, 0].tolist()}")
+            raise Found(
+                f"{name} is not finite up to sample {end} and NaN from there: {array[:, 0].tolist()}"
+            )
     for name in ("u", "applied"):
         if not np.all(np.abs(getattr(trace, name)[:end]) <= scenario.resolved.u_max):
             raise Found(f"{name} beyond u_max")
     x0 = np.array(scenario.resolved.x0)
-    exact = slice(None, 3 if scenario.plant.pose else None)  # a rotation vector may have another with the same attitude
-    turned = pose_errors(trace.x[:1], x0[None])[0, 3:] if scenario.plant.pose and np.abs(x0).max() < 1e3 else 0.0
+    exact = slice(
+        None, 3 if scenario.plant.pose else None
+    )  # a rotation vector may have another with the same attitude
+    if scenario.plant.pose and np.abs(x0).max() < 1e3:
+        turned = pose_errors(trace.x[:1], x0[None])[0, 3:]
+    else:
+        turned = 0.0
     begins = np.array_equal(trace.x[0, exact], x0[exact]) and np.abs(turned).max() < 1e-9
     if end and not (begins and tuple(trace.v[0]) == scenario.resolved.v0):
         raise Found("does not begin at its start")
@@ -137,14 +171,19 @@ def scenarios(random: Random) -> str:
     if scenario is None or trace is None:
         return "refused"
     sound(trace)
-    if random.random() < 0.1 and scenario.law.name in smc.laws():  # whose code a file can bring back
+    if (
+        random.random() < 0.1 and scenario.law.name in smc.laws()
+    ):  # whose code a file can bring back
         same(trace, smc.load(trace.save("trace.npz")))
     return "ended early" if trace.failure else "ran"
 
 
 def same(trace: smc.Trace, other: smc.Trace) -> None:
     """Raise Found where two traces differ in a bit, or in a word."""
-    if other.scenario != trace.scenario or (other.diverged_at, other.failure) != (trace.diverged_at, trace.failure):
+    if other.scenario != trace.scenario or (other.diverged_at, other.failure) != (
+        trace.diverged_at,
+        trace.failure,
+    ):
         raise Found(f"{trace!r} and {other!r} differ")
     for name in ("t", *LOGGED):
         if getattr(trace, name).tobytes() != getattr(other, name).tobytes():
@@ -153,8 +192,15 @@ def same(trace: smc.Trace, other: smc.Trace) -> None:
 
 def batches(random: Random) -> str:
     """Several wild scenarios together: the same bits as alone."""
-    many = [scenario for scenario in (attempt(random) for _ in range(random.randint(3, 8))) if scenario is not None]
-    many += [dataclasses.replace(s, seed=random.randrange(9)) for s in many for _ in range(random.randrange(3))]
+    many = []
+    for scenario in (attempt(random) for _ in range(random.randint(3, 8))):
+        if scenario is not None:
+            many.append(scenario)
+    many += [
+        dataclasses.replace(s, seed=random.randrange(9))
+        for s in many
+        for _ in range(random.randrange(3))
+    ]
     alone = [ran(scenario) for scenario in many]
     many, alone = [s for s, t in zip(many, alone, strict=True) if t], [t for t in alone if t]
     if not many:
@@ -169,26 +215,94 @@ def batches(random: Random) -> str:
 
 
 SANE: dict[str, Any] = {  # what an argument of this name is, of a public call that is right
-    **{"plant": "duffing", "of": "duffing", "law": "classical", "plants": ["duffing"], "laws": ["classical"]},
-    **{"conditions": ["nominal"], "condition": "nominal", "law_name": "classical", "seeds": 1, "duration": 0.02},
-    **{"points": (2, 2), "kinds": ["delay"], "budget": 8, "gains": "tuned", "kind": "none", "channels": ["shoulder"]},
-    **{"labels": ["a"], "title": "a", "size": (320, 180), "fps": 10.0, "span": (0.0, 0.1), "time": 0.0, "out": "out"},
-    **{"mechanism": "springs", "i": 0, "step": 0, "seed": 0, "factors": {}, "numbers": "double", "act": print},
-    **{"times": [0.0, 1.0], "values": [0.0, 1.0], "column": None, "only": [1], "quick": True, "metrics": ["itae"]},
-    **{"threads": 1, "low": 0.0, "high": 5.0, "name": "classical", "scene": "none such", "resolution": 0.1},
+    **{
+        "plant": "duffing",
+        "of": "duffing",
+        "law": "classical",
+        "plants": ["duffing"],
+        "laws": ["classical"],
+    },
+    **{
+        "conditions": ["nominal"],
+        "condition": "nominal",
+        "law_name": "classical",
+        "seeds": 1,
+        "duration": 0.02,
+    },
+    **{
+        "points": (2, 2),
+        "kinds": ["delay"],
+        "budget": 8,
+        "gains": "tuned",
+        "kind": "none",
+        "channels": ["shoulder"],
+    },
+    **{
+        "labels": ["a"],
+        "title": "a",
+        "size": (320, 180),
+        "fps": 10.0,
+        "span": (0.0, 0.1),
+        "time": 0.0,
+        "out": "out",
+    },
+    **{
+        "mechanism": "springs",
+        "i": 0,
+        "step": 0,
+        "seed": 0,
+        "factors": {},
+        "numbers": "double",
+        "act": print,
+    },
+    **{
+        "times": [0.0, 1.0],
+        "values": [0.0, 1.0],
+        "column": None,
+        "only": [1],
+        "quick": True,
+        "metrics": ["itae"],
+    },
+    **{
+        "threads": 1,
+        "low": 0.0,
+        "high": 5.0,
+        "name": "classical",
+        "scene": "none such",
+        "resolution": 0.1,
+    },
 }
 OWN: dict[str, dict[str, Any]] = {  # where the argument of a call is another than its name says
     **{name: {"path": path} for name, path in {"film": "a.mp4"}.items()},
-    **{"load": {"path": "trace.npz"}, "Table.read": {"path": "out"}, "plant_from": {"path": "arm.xml"}},
-    **{"TimeSeries.from_csv": {"path": "a.csv"}, "Trace.export": {"path": "a.csv"}, "plant": {"name": "duffing"}},
+    **{
+        "load": {"path": "trace.npz"},
+        "Table.read": {"path": "out"},
+        "plant_from": {"path": "arm.xml"},
+    },
+    **{
+        "TimeSeries.from_csv": {"path": "a.csv"},
+        "Trace.export": {"path": "a.csv"},
+        "plant": {"name": "duffing"},
+    },
     **{
         "surface": {"name": "linear"},
         "estimator": {"name": "measured"},
         "law_from_c": {"source": "law.c", "name": None},
     },
-    **{"law_function": {"gains": {"k": 1.0}, "function": None}, "surface_function": {"gains": {}, "function": None}},
-    **{"estimator_function": {"gains": {}, "function": None}, "Table.column": {"name": "itae"}, "Law": {"gains": {}}},
-    **{"Scene": {"conditions": {}}, "Claim.checks": {"gains": "tuned"}, "Channel": {"actuator": None}},
+    **{
+        "law_function": {"gains": {"k": 1.0}, "function": None},
+        "surface_function": {"gains": {}, "function": None},
+    },
+    **{
+        "estimator_function": {"gains": {}, "function": None},
+        "Table.column": {"name": "itae"},
+        "Law": {"gains": {}},
+    },
+    **{
+        "Scene": {"conditions": {}},
+        "Claim.checks": {"gains": "tuned"},
+        "Channel": {"actuator": None},
+    },
 }
 
 
@@ -201,22 +315,41 @@ class World:
         self.trace.save("trace.npz")
         self.trace.export("a.csv")
         self.table = smc.study(
-            smc.grid(["duffing"], ["classical", "none"], ["nominal", "noise"], 2, duration=0.2), "out"
+            smc.grid(["duffing"], ["classical", "none"], ["nominal", "noise"], 2, duration=0.2),
+            "out",
         )
         Path("arm.xml").write_text(wild.ARM)
         Path("law.c").write_text(smc.exchange.law_to_c("classical"))
-        self.tuned = smc.tune("duffing", "classical", budget=1, objective=Objective(duration=0.2), searches=1)
+        self.tuned = smc.tune(
+            "duffing", "classical", budget=1, objective=Objective(duration=0.2), searches=1
+        )
         self.tuned.save("tuned.json")
         self.sane = SANE | {
-            "scenarios": [self.scenario], "trace": self.trace, "traces": self.trace, "table": self.table,
-        }  # fmt: skip
+            "scenarios": [self.scenario],
+            "trace": self.trace,
+            "traces": self.trace,
+            "table": self.table,
+        }
         self.sane |= {"path": "a", "conditions_": None, "environment": self.trace.scenario.plant}
         self.calls = dict(self._calls())
 
     def _calls(self) -> Iterator[tuple[str, Callable]]:
         """Name -> what to call, of all that is public."""
-        held = [self.scenario, self.trace, self.table, self.tuned, self.scenario.plant, smc.Coulomb(0.1), smc.Lag(0.1)]
-        held += [smc.Encoder(), smc.Sine(1.0, 1.0), smc.signals.TimeSeries([0, 1], [0, 1]), smc.Contact("none")]
+        held = [
+            self.scenario,
+            self.trace,
+            self.table,
+            self.tuned,
+            self.scenario.plant,
+            smc.Coulomb(0.1),
+            smc.Lag(0.1),
+        ]
+        held += [
+            smc.Encoder(),
+            smc.Sine(1.0, 1.0),
+            smc.signals.TimeSeries([0, 1], [0, 1]),
+            smc.Contact("none"),
+        ]
         held += [smc.Scene(title="a", conditions={"b": {"c": self.scenario}})]
         instances = {type(one): one for one in held}
         for name in sorted(one for one in dir(smc) if not one.startswith("_")):
@@ -224,13 +357,26 @@ class World:
             if inspect.ismodule(value):
                 shelf = {inner: getattr(value, inner) for inner in getattr(value, "__all__", ())}
                 for inner, function in (vars(value) | shelf).items():
-                    if inspect.isfunction(function) and not inner.startswith("_") and hasattr(function, "explains"):
+                    if (
+                        inspect.isfunction(function)
+                        and not inner.startswith("_")
+                        and hasattr(function, "explains")
+                    ):
                         yield f"{name}.{inner}", function
-            elif callable(value) and not (isinstance(value, type) and issubclass(value, BaseException | list)):
+            elif callable(value) and not (
+                isinstance(value, type) and issubclass(value, BaseException | list)
+            ):
                 yield name, value
             for method, there in vars(value).items() if isinstance(value, type) else ():
-                function = there.__func__ if isinstance(there, classmethod | staticmethod) else there
-                if not method.startswith("_") and inspect.isfunction(function) and hasattr(function, "explains"):
+                if isinstance(there, classmethod | staticmethod):
+                    function = there.__func__
+                else:
+                    function = there
+                if (
+                    not method.startswith("_")
+                    and inspect.isfunction(function)
+                    and hasattr(function, "explains")
+                ):
                     bound = getattr(instances.get(value, value), method)
                     if not isinstance(there, staticmethod | classmethod) and value not in instances:
                         continue  # nothing at hand to call it on
@@ -280,7 +426,9 @@ def alarm(seconds: float) -> Iterator[None]:
 
 
 def calls(random: Random) -> str:
-    """A public name, called with one or two arguments of any type, one too few, or one that it does not know."""
+    """A public name, called with one or two arguments of any type, one too few, or one that it does
+    not know.
+    """
     name = random.choice(sorted(world().calls))
     call = world().calls[name]
     named = world().right(name, call)
@@ -294,7 +442,10 @@ def calls(random: Random) -> str:
     if named and random.random() < 0.05:
         del named[random.choice(sorted(named))]
     parameters = inspect.signature(call).parameters
-    placed = [named.pop(p.name) for p in parameters.values() if p.kind is p.POSITIONAL_ONLY and p.name in named]
+    placed = []
+    for p in parameters.values():
+        if p.kind is p.POSITIONAL_ONLY and p.name in named:
+            placed.append(named.pop(p.name))
     told = f"smc.{name}({', '.join(f'{key}={shown(held)}' for key, held in named.items())})"
     try:
         with alarm(LONG):
@@ -304,9 +455,15 @@ def calls(random: Random) -> str:
     except smc.ScenarioError as error:
         sentence(str(error))
         return "refused"
-    except (TypeError, AttributeError):  # Python's own words for a wrong type, or a name that the call does not have
+    except (
+        TypeError,
+        AttributeError,
+    ):  # Python's own words for a wrong type, or a name that the call does not have
         return "refused"
-    except (ZeroDivisionError, ValueError) as error:  # of an argument's own code: a wild value's, or an array's truth
+    except (
+        ZeroDivisionError,
+        ValueError,
+    ) as error:  # of an argument's own code: a wild value's, or an array's truth
         if str(error) != "awkward" and "truth value of an" not in str(error):
             raise Found(f"{_where(error)} from {told}: {_first(error)}") from None
         return "refused"
@@ -338,7 +495,25 @@ def _first(error: BaseException) -> str:
 
 # files
 
-ABSURD = [None, True, 0, -1, 1e308, 10**30, 0.5, "", "x", "\ud800", [], [[]], {}, {"x": 1}, "NaN", math.nan, math.inf]
+ABSURD = [
+    None,
+    True,
+    0,
+    -1,
+    1e308,
+    10**30,
+    0.5,
+    "",
+    "x",
+    "\ud800",
+    [],
+    [[]],
+    {},
+    {"x": 1},
+    "NaN",
+    math.nan,
+    math.inf,
+]
 
 
 def grown(random: Random, node: Any) -> Any:
@@ -368,7 +543,11 @@ def damaged(random: Random, data: bytes) -> bytes:
         case 2:
             return data[:at] + data[at + random.randint(1, 40) :]
         case 3:
-            return data[:at] + random.choice([b"nan", b"1e999", b"null", b"[", b"-", b"\0", b",,"]) + data[at + 1 :]
+            return (
+                data[:at]
+                + random.choice([b"nan", b"1e999", b"null", b"[", b"-", b"\0", b",,"])
+                + data[at + 1 :]
+            )
     many = bytearray(data)
     for _ in range(random.randint(1, 4)):
         many[random.randrange(len(many))] ^= 1 << random.randrange(8)
@@ -382,10 +561,13 @@ def files(random: Random) -> str:
     world()
     kind = random.choice(["trace", "about", "tuned", "json", "table", "csv"])
     source, read = {
-        "trace": ("trace.npz", smc.load), "about": ("trace.npz", smc.load), "tuned": ("tuned.json", tuned.load),
-        "json": ("tuned.json", tuned.load), "table": ("out/results.parquet", smc.Table.read),
+        "trace": ("trace.npz", smc.load),
+        "about": ("trace.npz", smc.load),
+        "tuned": ("tuned.json", tuned.load),
+        "json": ("tuned.json", tuned.load),
+        "table": ("out/results.parquet", smc.Table.read),
         "csv": ("a.csv", smc.signals.TimeSeries.from_csv),
-    }[kind]  # fmt: skip
+    }[kind]
     place = Path(f"damaged{Path(source).suffix}")
     data = Path(source).read_bytes()
     if kind == "json":
@@ -398,7 +580,10 @@ def files(random: Random) -> str:
     elif kind == "trace" and random.random() < 0.5:  # whole, but of other arrays
         with np.load(source) as file:
             arrays = dict(file)
-        odd = [array for array in wild.ARRAYS if array is not np.ma.masked and array.dtype != object]
+        odd = []
+        for array in wild.ARRAYS:
+            if array is not np.ma.masked and array.dtype != object:
+                odd.append(array)
         arrays[random.choice(sorted(arrays))] = random.choice(odd)
         np.savez(place, **arrays)
     else:
@@ -420,7 +605,12 @@ def files(random: Random) -> str:
 
 # running them
 
-PARTS: dict[str, Callable[[Random], str]] = {"scenarios": scenarios, "batches": batches, "calls": calls, "files": files}
+PARTS: dict[str, Callable[[Random], str]] = {
+    "scenarios": scenarios,
+    "batches": batches,
+    "calls": calls,
+    "files": files,
+}
 
 
 def case(part: str, seed: int, i: int) -> tuple[str, str]:
@@ -448,10 +638,15 @@ def child(part: str, seed: int, start: int, cases: int) -> None:
 
 
 def slice_of(part: str, seed: int, start: int, cases: int) -> Iterator[tuple[int, str, str]]:
-    """(case, how it ended, what was found) of a slice, each process begun again after the case that ended it."""
+    """(case, how it ended, what was found) of a slice, each process begun again after the case that
+    ended it.
+    """
     end = start + cases
     while start < end:
-        with tempfile.TemporaryDirectory(prefix="attack") as folder, tempfile.TemporaryFile() as errors:
+        with (
+            tempfile.TemporaryDirectory(prefix="attack") as folder,
+            tempfile.TemporaryFile() as errors,
+        ):
             command = [sys.executable, SCRIPT, part, "--seed", str(seed), "--start", str(start)]
             process = subprocess.Popen(
                 [*command, "--cases", str(end - start), "--child"],
@@ -471,7 +666,10 @@ def slice_of(part: str, seed: int, start: int, cases: int) -> Iterator[tuple[int
                 process.kill()
             if start < end:
                 errors.seek(0)
-                told = [text.strip() for text in errors.read().decode(errors="replace").splitlines() if text.strip()]
+                told = []
+                for text in errors.read().decode(errors="replace").splitlines():
+                    if text.strip():
+                        told.append(text.strip())
                 why = f"the process ended with code {process.returncode}: {' | '.join(told[-12:])}"
                 yield start, "found", f"takes longer than {LIMIT:g} s" if hung else why
                 start += 1
@@ -494,7 +692,9 @@ def attacked(part: str, seed: int, start: int, cases: int, jobs: int) -> int:
     """Run a part in slices, print what was found; how many."""
     begun, ends, kinds = time.monotonic(), Counter(), Counter()
     size = min(SLICE, -(-cases // jobs))
-    slices = [(first, min(size, start + cases - first)) for first in range(start, start + cases, size)]
+    slices = []
+    for first in range(start, start + cases, size):
+        slices.append((first, min(size, start + cases - first)))
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for results in pool.map(lambda piece: list(slice_of(part, seed, *piece)), slices):
             for i, end, why in results:
@@ -507,13 +707,18 @@ def attacked(part: str, seed: int, start: int, cases: int, jobs: int) -> int:
                         print(f"  {why}\n    {again}", flush=True)
     told = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
     seconds = time.monotonic() - begun
-    print(f"{part}: seed {seed}, {sum(ends.values())} cases from {start}, {seconds:.0f} s: {told}", flush=True)
+    print(
+        f"{part}: seed {seed}, {sum(ends.values())} cases from {start}, {seconds:.0f} s: {told}",
+        flush=True,
+    )
     return ends["found"]
 
 
 def main() -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0] if __doc__ else None)
+    parser = argparse.ArgumentParser(
+        description=__doc__.split("\n", maxsplit=1)[0] if __doc__ else None
+    )
     parser.add_argument("part", nargs="?", choices=[*PARTS, "all"], default="all")
     parser.add_argument("--seed", type=int, help="default: a new one")
     parser.add_argument("--start", type=int, default=0, help="the first case")
@@ -521,13 +726,25 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--child", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
-    seed = random.SystemRandom().randrange(10**6) if given.seed is None else given.seed
+    if given.seed is None:
+        seed = random.SystemRandom().randrange(10**6)
+    else:
+        seed = given.seed
     if given.child:
         child(given.part, seed, given.start, given.cases)
         return 0
-    parts = list(PARTS) if given.part == "all" else [given.part]
+    if given.part == "all":
+        parts = list(PARTS)
+    else:
+        parts = [given.part]
     print(f"seed {seed}; a case may take {LIMIT:g} s", flush=True)
-    return int(sum(attacked(part, seed, given.start, given.cases or CASES[part], given.jobs) for part in parts) > 0)
+    return int(
+        sum(
+            attacked(part, seed, given.start, given.cases or CASES[part], given.jobs)
+            for part in parts
+        )
+        > 0
+    )
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
-"""What the tests share: this package's plugin, also where it is not installed, and pytest's for testing plugins.
+"""What the tests share: this package's plugin, also where it is not installed, and pytest's for
+testing plugins.
 
     pytest --quick            # the first case of each test, in files that are marked quick; without the slow ones
     pytest -m "not slow"      # all but the tests of over 0.3 s that run no line which faster ones do not
 
-Compiled code is kept in one folder, so that all workers, all child processes, and copies of the package that tests
-install elsewhere compile a function once. Bytecode is kept too: otherwise each worker would compile all tests again.
+Compiled code is kept in one folder, so that all workers, all child processes, and copies of the
+package that tests install elsewhere compile a function once. Bytecode is kept too: otherwise each
+worker would compile all tests again.
 """
 
 import gc
@@ -32,13 +34,21 @@ sys.dont_write_bytecode = False
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     """Load the plugin, unless its entry point has: then, with its options, before they are read."""
-    if not pluginmanager.hasplugin("smc_mujoco") and not pluginmanager.hasplugin("smc_mujoco.testing.plugin"):
+    if not pluginmanager.hasplugin("smc_mujoco") and not pluginmanager.hasplugin(
+        "smc_mujoco.testing.plugin"
+    ):
         pluginmanager.register(importlib.import_module("smc_mujoco.testing.plugin"), "smc_mujoco")
-    parser.addoption("--quick", action="store_true", help="only the first case of each test, in files marked quick")
+    parser.addoption(
+        "--quick",
+        action="store_true",
+        help="only the first case of each test, in files marked quick",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Take no record of a case for unused where only first cases run: syrupy tells tests apart, not their cases."""
+    """Take no record of a case for unused where only first cases run: syrupy tells tests apart, not
+    their cases.
+    """
     config.option.disable_unused_snapshots |= config.getoption("quick")
 
 
@@ -48,14 +58,18 @@ def pytest_collection() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exclude the present objects from garbage collection, which would take half a second each time to visit them."""
+    """Exclude the present objects from garbage collection, which would take half a second each time
+    to visit them.
+    """
     gc.enable()
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)  # a thirtieth of the time is in the 700 objects of the default
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out files that are not marked quick before their import, where quick tests are asked for."""
+    """Leave out files that are not marked quick before their import, where quick tests are asked
+    for.
+    """
     if not config.getoption("quick") or collection_path.suffix != ".py":
         return None
     return "pytest.mark.quick" not in collection_path.read_text(encoding="utf-8") or None
@@ -65,7 +79,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Keep the first case of each quick test that is not slow, where quick tests are asked for."""
     if not config.getoption("quick"):
         return
-    quick = [item for item in items if item.get_closest_marker("quick") and not item.get_closest_marker("slow")]
+    quick = []
+    for item in items:
+        if item.get_closest_marker("quick") and not item.get_closest_marker("slow"):
+            quick.append(item)
     first = set({item.nodeid.split("[")[0]: item for item in reversed(quick)}.values())
     config.hook.pytest_deselected(items=[item for item in items if item not in first])
     items[:] = [item for item in items if item in first]
@@ -73,7 +90,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture
 def refused() -> Callable[..., str]:
-    """A function that checks that a call is refused in one sentence, which names what was given and ends in a cure."""
+    """A function that checks that a call is refused in one sentence, which names what was given and
+    ends in a cure.
+    """
     from smc_mujoco.common.errors import ScenarioError
 
     def check(call: Callable[[], object], *parts: object) -> str:
@@ -98,10 +117,14 @@ def coarse_grid(monkeypatch):
     """
     monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_FREQUENCIES", 23)
     monkeypatch.setattr("smc_mujoco.analysis.chattering.GRID_AMPLITUDES", 14)
-    monkeypatch.setattr("smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6)))
+    monkeypatch.setattr(
+        "smc_mujoco.analysis.gains_for.SPEEDS", tuple(10.0 ** (0.4 * k - 1.0) for k in range(6))
+    )
 
 
 @pytest.fixture
 def present_objects_frozen():
-    """Exclude the present objects from a test's own `gc.collect`, which takes half a second with them."""
+    """Exclude the present objects from a test's own `gc.collect`, which takes half a second with
+    them.
+    """
     gc.freeze()

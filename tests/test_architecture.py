@@ -1,4 +1,6 @@
-"""How the house is built: imports point one way, light ones come first, and one file adds one thing."""
+"""How the house is built: imports point one way, light ones come first, and one file adds one
+thing.
+"""
 
 import ast
 import functools
@@ -17,19 +19,51 @@ pytestmark = pytest.mark.quick
 PACKAGE = Path(smc.__file__).parent
 ROOT = PACKAGE.parent
 CATALOGUES = {
-    "laws": "control/laws", "surfaces": "control/surfaces", "estimators": "control/estimators",
-    "plants": "mechanisms/plants", "joint_laws": "control/joint_laws",
-}  # fmt: skip
+    "laws": "control/laws",
+    "surfaces": "control/surfaces",
+    "estimators": "control/estimators",
+    "plants": "mechanisms/plants",
+    "joint_laws": "control/joint_laws",
+}
 # The rooms of the package, each of which imports from itself and from those before it.
 ROOMS = (
-    "common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw", "studies", "envs", "testing", "cli",
-    "exchange", "evidence", "benchmark",
-)  # fmt: skip
+    "common",
+    "mechanisms",
+    "control",
+    "simulation",
+    "metrics",
+    "analysis",
+    "draw",
+    "studies",
+    "envs",
+    "testing",
+    "cli",
+    "exchange",
+    "evidence",
+    "benchmark",
+)
 ANNEXES = ROOMS[-3:]
-HEAVY = {"numpy", "mujoco", "numba", "scipy", "matplotlib", "mediapy", "dm_control", "PIL", "rich", "typer"}
+HEAVY = {
+    "numpy",
+    "mujoco",
+    "numba",
+    "scipy",
+    "matplotlib",
+    "mediapy",
+    "dm_control",
+    "PIL",
+    "rich",
+    "typer",
+}
 
 STUB = ast.parse((PACKAGE / "__init__.pyi").read_text())
-SHELVES = {"signals", "hardware", "errors", "design", "fidelity"}  # modules of public names, which anything may import
+SHELVES = {
+    "signals",
+    "hardware",
+    "errors",
+    "design",
+    "fidelity",
+}  # modules of public names, which anything may import
 PUBLIC = {*smc._SHELF.origins, *smc._SHELF.modules}
 
 FILES = sorted(path for path in PACKAGE.rglob("*.py"))
@@ -69,8 +103,13 @@ def imported(path: Path) -> set[str]:
 
 
 def module(name: str) -> str:
-    """The module of a dotted name, which may be that of something in it; a package stands for its __init__."""
-    while not (PACKAGE / f"{name.replace('.', '/')}.py").exists() and not (PACKAGE / name.replace(".", "/")).is_dir():
+    """The module of a dotted name, which may be that of something in it; a package stands for its
+    __init__.
+    """
+    while (
+        not (PACKAGE / f"{name.replace('.', '/')}.py").exists()
+        and not (PACKAGE / name.replace(".", "/")).is_dir()
+    ):
         name = name.rpartition(".")[0]
     return name
 
@@ -97,7 +136,9 @@ def test_a_file_imports_from_its_own_room_and_those_below():
     for path in (path for path in FILES if path.parent != PACKAGE):
         room = path.relative_to(PACKAGE).parts[0]
         below = ROOMS[: ROOMS.index(room) + 1]
-        above[label(path)] = [name for name in sorted(imported(path)) if name.split(".")[0] not in below]
+        above[label(path)] = [
+            name for name in sorted(imported(path)) if name.split(".")[0] not in below
+        ]
     assert {name: found for name, found in above.items() if found} == {}
 
 
@@ -129,10 +170,14 @@ main(["compare", "duffing", "--law", "pid", "--seeds", "1", "--duration", "0.1",
 
 
 def test_no_modules_import_each_other_in_a_circle():
-    names = {
-        path: ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__") for path in FILES
+    names = {}
+    for path in FILES:
+        names[path] = ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(
+            ".__init__"
+        )
+    graph = {
+        name: {module(other) for other in imported(path)} - {name} for path, name in names.items()
     }
-    graph = {name: {module(other) for other in imported(path)} - {name} for path, name in names.items()}
     while leaves := [name for name, others in graph.items() if not others & set(graph)]:
         for name in leaves:
             del graph[name]
@@ -144,7 +189,11 @@ def test_no_modules_import_each_other_in_a_circle():
 
 @pytest.mark.parametrize(
     ("name", "needed"),
-    [("smc_mujoco", set()), ("smc_mujoco.common.gl", set()), ("smc_mujoco.cli.main", {"rich", "typer", "numpy"})],
+    [
+        ("smc_mujoco", set()),
+        ("smc_mujoco.common.gl", set()),
+        ("smc_mujoco.cli.main", {"rich", "typer", "numpy"}),
+    ],
 )
 def test_an_import_brings_nothing_heavy_that_it_does_not_need(name, needed):
     loaded = set(python("-c", f"import {name}, sys; print(*sys.modules)").stdout.split())
@@ -160,7 +209,9 @@ smc.score(trace), smc.figure(trace), smc.film
 smc.compare("pid", "duffing", "nominal", seeds=1, duration=0.1, out="compared", progress=False)
 print(*{module.__file__ for name, module in sys.modules.items() if name.startswith("smc_mujoco")})
 """
-    loaded = [Path(file) for file in python("-c", code, folder=tmp_path).stdout.splitlines()[-1].split()]
+    loaded = []
+    for file in python("-c", code, folder=tmp_path).stdout.splitlines()[-1].split():
+        loaded.append(Path(file))
     assert [label(file) for file in loaded if file.relative_to(PACKAGE).parts[0] in ANNEXES] == []
     assert sum(len(file.read_text().splitlines()) for file in loaded) <= 27_500
 
@@ -179,7 +230,11 @@ def test_no_room_hides_a_public_name():
 
 def test_types_and_run_time_agree_on_the_public_names():
     told = {n.targets[0].id for n in STUB.body if isinstance(n, ast.Assign)} | {
-        alias.asname for n in STUB.body if isinstance(n, ast.ImportFrom) for alias in n.names if alias.asname
+        alias.asname
+        for n in STUB.body
+        if isinstance(n, ast.ImportFrom)
+        for alias in n.names
+        if alias.asname
     }
     assert told == PUBLIC
 
@@ -225,7 +280,9 @@ RUN = {
     "plants": "smc.Scenario(plant='brand_new', law='classical', duration=0.01)",
 }
 
-LISTS = {name: f"smc.laws(kind={name.removesuffix('s').removesuffix('_law')!r})" for name in CATALOGUES}
+LISTS = {
+    name: f"smc.laws(kind={name.removesuffix('s').removesuffix('_law')!r})" for name in CATALOGUES
+}
 LISTS["plants"] = "smc.plants()"
 
 
@@ -233,10 +290,15 @@ def test_a_new_file_is_found_and_runs(tmp_path):
     code = "import importlib\n"
     for catalogue, room in CATALOGUES.items():
         (tmp_path / catalogue).mkdir()
-        name = "brand_new_joint" if catalogue == "joint_laws" else "brand_new"
+        if catalogue == "joint_laws":
+            name = "brand_new_joint"
+        else:
+            name = "brand_new"
         (tmp_path / catalogue / f"{name}.py").write_text(ENTRY[catalogue])
         name = f"smc_mujoco.{room.replace('/', '.')}"
-        code += f"importlib.import_module({name!r}).__path__.append({str(tmp_path / catalogue)!r})\n"
+        code += (
+            f"importlib.import_module({name!r}).__path__.append({str(tmp_path / catalogue)!r})\n"
+        )
     code += "import smc_mujoco as smc\n"
     for catalogue, run in RUN.items():
         code += f"""
@@ -253,19 +315,34 @@ assert again.scenario == trace.scenario
 
 
 def public(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.ClassDef]:
-    """Functions and classes at the top of a module, and the methods of the classes, that are not private."""
+    """Functions and classes at the top of a module, and the methods of the classes, that are not
+    private.
+    """
     for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             yield node
             if isinstance(node, ast.ClassDef):
-                yield from (n for n in node.body if isinstance(n, ast.FunctionDef) and not n.name.startswith("_"))
+                yield from (
+                    n
+                    for n in node.body
+                    if isinstance(n, ast.FunctionDef) and not n.name.startswith("_")
+                )
 
 
 def explained_elsewhere(path: Path, node: ast.FunctionDef | ast.ClassDef) -> bool:
-    """A catalogue's file explains itself at its top; a class its protocol's methods, overloads, a signal's formula."""
+    """A catalogue's file explains itself at its top; a class its protocol's methods, overloads, a
+    signal's formula.
+    """
     if path.parent.name in CATALOGUES or ast.unparse(node.body[0]) == "...":
         return True
-    return node.name in ("value", "bounds", "parameters", "edit", "fields", "structure")  # of a signal, of a part
+    return node.name in (
+        "value",
+        "bounds",
+        "parameters",
+        "edit",
+        "fields",
+        "structure",
+    )  # of a signal, of a part
 
 
 def test_everything_public_is_explained():
@@ -273,7 +350,9 @@ def test_everything_public_is_explained():
     for path in FILES:
         tree = parsed(path)
         bare = path.parent.name == "plants"
-        if (path.name != "__init__.py" or path.stat().st_size) and not (ast.get_docstring(tree) or bare):
+        if (path.name != "__init__.py" or path.stat().st_size) and not (
+            ast.get_docstring(tree) or bare
+        ):
             silent.append(label(path))
         for node in public(tree):
             if not ast.get_docstring(node) and not explained_elsewhere(path, node):
@@ -282,6 +361,8 @@ def test_everything_public_is_explained():
 
 
 def test_no_file_names_a_folder_of_one_machine():
-    folder = re.compile(r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users""")
+    folder = re.compile(
+        r"""(?<![\w.}/])/(?:home|root|Users|tmp|work|mnt|opt|var)/[\w.]+|[A-Z]:\\\\Users"""
+    )
     found = {label(path): folder.findall(path.read_text()) for path in TEXTS}
     assert {name: folders for name, folders in found.items() if folders} == {}

@@ -1,7 +1,8 @@
-"""What is declared of a field, an argument, a gain or a parameter is refused where it does not hold.
+"""What is declared of a field, an argument, a gain or a parameter is refused where it does not
+hold.
 
-Bad values are made from the declarations: of another type, NaN, infinite, just beyond each bound. The bounds themselves
-are recorded, so that a changed one is seen.
+Bad values are made from the declarations: of another type, NaN, infinite, just beyond each bound.
+The bounds themselves are recorded, so that a changed one is seen.
 """
 
 import dataclasses
@@ -32,9 +33,12 @@ pytestmark = pytest.mark.quick
 
 NO_NUMBERS = ["1", None, True, [], 1j]
 GIVEN = {  # what a class also needs, or two fields that depend on each other
-    "Scenario": {"plant": "duffing", "law": "classical"}, "Jump": {"factors": {}}, "Contact": {"kind": "stops"},
-    "Push": {"body": "bob"}, "BandLimited": {"high": 2.0},
-}  # fmt: skip
+    "Scenario": {"plant": "duffing", "law": "classical"},
+    "Jump": {"factors": {}},
+    "Contact": {"kind": "stops"},
+    "Push": {"body": "bob"},
+    "BandLimited": {"high": 2.0},
+}
 
 
 def below(x):
@@ -46,7 +50,10 @@ def beyond(x):
 
 
 def bad_numbers(one):
-    low = one.above if one.above >= one.low else below(one.low)
+    if one.above >= one.low:
+        low = one.above
+    else:
+        low = below(one.low)
     ends = [x for x in (low, beyond(one.high)) if math.isfinite(x)]
     return [*NO_NUMBERS, math.nan, -math.inf, *([] if one.infinite else [math.inf, 10**400]), *ends]
 
@@ -63,7 +70,10 @@ def bad_by_channel(one):
 
 
 def bad_ranges(one):
-    wrong = [value for value in bad(Number(above=one.above, low=one.low)) if isinstance(value, float)]
+    wrong = []
+    for value in bad(Number(above=one.above, low=one.low)):
+        if isinstance(value, float):
+            wrong.append(value)
     return ["ab", None, 1.0, [1.0], (1.0, 2.0, 3.0), (2.0, 1.0), *((value, 2.0) for value in wrong)]
 
 
@@ -74,12 +84,17 @@ def told_number(one):
 
 
 BAD = {  # of another kind, and just beyond each end
-    OrNone: lambda one: [value for value in bad(one.one) if value is not None], Number: bad_numbers,
-    Whole: lambda one: [*NO_NUMBERS, math.nan, 2.5, one.low - 1, one.high + 1] + [math.inf] * (not one.infinite),
+    OrNone: lambda one: [value for value in bad(one.one) if value is not None],
+    Number: bad_numbers,
+    Whole: lambda one: (
+        [*NO_NUMBERS, math.nan, 2.5, one.low - 1, one.high + 1] + [math.inf] * (not one.infinite)
+    ),
     OneOf: lambda one: [None, 3, "", "nobody", f"{one.names[0].upper()}?", [one.names[0]]],
-    Flag: lambda one: [None, 1, 0.0, "yes"], Each: bad_by_channel, Range: bad_ranges,
+    Flag: lambda one: [None, 1, 0.0, "yes"],
+    Each: bad_by_channel,
+    Range: bad_ranges,
     FilePath: lambda one: [None, 3, b"x", ["x"]],
-}  # fmt: skip
+}
 GOOD = {  # a plain value, and the ends themselves
     OrNone: lambda one: [*good(one.one), None],
     Number: good_numbers,
@@ -91,12 +106,15 @@ GOOD = {  # a plain value, and the ends themselves
     FilePath: lambda one: [Path("a"), Path("b/c")],
 }
 TOLD = {
-    OrNone: lambda one: f"{told(one.one)}, or None", Number: told_number,
+    OrNone: lambda one: f"{told(one.one)}, or None",
+    Number: told_number,
     Whole: lambda one: f"whole {one.low} to {one.high}" + " or inf" * one.infinite,
-    OneOf: lambda one: f"one of {', '.join(one.names)}", Flag: lambda one: "flag",
+    OneOf: lambda one: f"one of {', '.join(one.names)}",
+    Flag: lambda one: "flag",
     Each: lambda one: f"{told(one.one)}, or one for each channel",
-    Range: lambda one: f"range of {told(Number(above=one.above, low=one.low))}", FilePath: lambda one: "path",
-}  # fmt: skip
+    Range: lambda one: f"range of {told(Number(above=one.above, low=one.low))}",
+    FilePath: lambda one: "path",
+}
 
 
 def bad(one):
@@ -113,7 +131,9 @@ def told(one):
 
 def members(room):
     """Yield the classes and functions that a module defines, and its classes' methods."""
-    for one in [one for one in vars(room).values() if getattr(one, "__module__", "") == room.__name__]:
+    for one in [
+        one for one in vars(room).values() if getattr(one, "__module__", "") == room.__name__
+    ]:
         yield one
         if isinstance(one, type):
             yield from (method for method in vars(one).values() if inspect.isfunction(method))
@@ -131,7 +151,10 @@ def modules():
 
 def of_class(kind):
     """Field -> constraint. The other parameters of a signal are numbers."""
-    plain = [f.name for f in dataclasses.fields(kind) if f.type is float] if issubclass(kind, Signal) else []
+    if issubclass(kind, Signal):
+        plain = [f.name for f in dataclasses.fields(kind) if f.type is float]
+    else:
+        plain = []
     return dict.fromkeys(plain, Number()) | constraints.of_fields(kind)
 
 
@@ -139,37 +162,74 @@ FOUND = [one for room in modules() for one in members(room)]
 CLASSES = {
     one.__name__: one
     for one in FOUND
-    if isinstance(one, type) and dataclasses.is_dataclass(one) and of_class(one) and one is not Resolved
+    if isinstance(one, type)
+    and dataclasses.is_dataclass(one)
+    and of_class(one)
+    and one is not Resolved
 }
-DECLARING = [one for one in FOUND if inspect.isfunction(one) and constraints.of_parameters(inspect.unwrap(one))]
-FUNCTIONS = {f"{one.__module__[11:]}.{one.__qualname__}": one for one in DECLARING if hasattr(one, "__wrapped__")}
+DECLARING = [
+    one
+    for one in FOUND
+    if inspect.isfunction(one) and constraints.of_parameters(inspect.unwrap(one))
+]
+FUNCTIONS = {
+    f"{one.__module__[11:]}.{one.__qualname__}": one
+    for one in DECLARING
+    if hasattr(one, "__wrapped__")
+}
 COMPONENTS = {one.name: one for known in (laws, surfaces, estimators) for one in known().values()}
 
 
 def argued(call):
     """Parameter -> what a call needs beside the one that is tested: a good value, or anything."""
     declared = constraints.of_parameters(inspect.unwrap(call))
-    needed = [p for p in inspect.signature(call).parameters.values() if p.default is p.empty and p.kind < p.VAR_KEYWORD]
+    needed = []
+    for p in inspect.signature(call).parameters.values():
+        if p.default is p.empty and p.kind < p.VAR_KEYWORD:
+            needed.append(p)
     return {p.name: good(declared[p.name])[0] if p.name in declared else None for p in needed}
 
 
 def things():
-    """Yield the name of each thing, its constraint, and a function that makes something with a value for it."""
+    """Yield the name of each thing, its constraint, and a function that makes something with a
+    value for it.
+    """
     for name, kind in CLASSES.items():
-        required = [f for f in dataclasses.fields(kind) if f.init and f.default is f.default_factory is f.default]
-        plain = {f.name: good(one)[0] for f in required if (one := of_class(kind).get(f.name))} | GIVEN.get(name, {})
+        required = [
+            f
+            for f in dataclasses.fields(kind)
+            if f.init and f.default is f.default_factory is f.default
+        ]
+        plain = {
+            f.name: good(one)[0] for f in required if (one := of_class(kind).get(f.name))
+        } | GIVEN.get(name, {})
         for field, one in of_class(kind).items():
             yield f"{name}.{field}", field, one, lambda x, k=kind, f=field, p=plain: k(**p | {f: x})
     for name, call in FUNCTIONS.items():
         for parameter, one in constraints.of_parameters(inspect.unwrap(call)).items():
             made = argued(call)
-            yield f"{name}({parameter})", parameter, one, lambda x, c=call, f=parameter, p=made: c(**p | {f: x})
+            yield (
+                f"{name}({parameter})",
+                parameter,
+                one,
+                lambda x, c=call, f=parameter, p=made: c(**p | {f: x}),
+            )
     for name, component in COMPONENTS.items():
         for key, gain in component.gains.items():
-            yield f"{name}'s {key}", key, gain.constraint, lambda x, c=component, f=key: c.bind({f: x})
+            yield (
+                f"{name}'s {key}",
+                key,
+                gain.constraint,
+                lambda x, c=component, f=key: c.bind({f: x}),
+            )
     for name, plant in plants().items():
         for key in plant.parameters:
-            yield f"{name}'s {key}", key, plant.constraint(key), lambda x, n=name, f=key: smc.plant(n, **{f: x})
+            yield (
+                f"{name}'s {key}",
+                key,
+                plant.constraint(key),
+                lambda x, n=name, f=key: smc.plant(n, **{f: x}),
+            )
 
 
 THINGS = {name: rest for name, *rest in things()}
@@ -180,9 +240,18 @@ def test_what_is_declared_is_refused_in_a_sentence_with_name_value_and_cure(name
     thing, one, make = THINGS[name]
     for value in bad(one):
         sentence = refused(lambda value=value: make(value), thing)
-        items = value if isinstance(value, list | tuple) and len(value) == 2 else [value]
-        numbers = [f"{x:g}" for x in items if isinstance(x, int | float) and abs(x) < 1e308 and not isinstance(x, bool)]
-        assert any(text in sentence for text in (*map(shown, [value, *items]), *numbers)), (value, sentence)
+        if isinstance(value, list | tuple) and len(value) == 2:
+            items = value
+        else:
+            items = [value]
+        numbers = []
+        for x in items:
+            if isinstance(x, int | float) and abs(x) < 1e308 and not isinstance(x, bool):
+                numbers.append(f"{x:g}")
+        assert any(text in sentence for text in (*map(shown, [value, *items]), *numbers)), (
+            value,
+            sentence,
+        )
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -194,7 +263,9 @@ def test_a_bound_itself_is_taken(name):
 
 def test_whoever_declares_an_argument_refuses_it():
     made = {one.__init__ for one in CLASSES.values()}  # of data, which declare their fields
-    assert [one.__qualname__ for one in DECLARING if not hasattr(one, "__wrapped__") and one not in made] == []
+    assert [
+        one.__qualname__ for one in DECLARING if not hasattr(one, "__wrapped__") and one not in made
+    ] == []
     assert len(CLASSES) > 25
     assert len(FUNCTIONS) > 25
 
@@ -205,7 +276,11 @@ def test_the_declarations_are_those_recorded(snapshot):
         owner = re.split(rf"(?:\.|\(|'s ){thing}", name)[0]
         alike.setdefault((owner, told(one)), []).append(thing)
     known = recorded(__file__, dict.fromkeys(owner for owner, _ in alike))
-    lines = [f"{owner}({', '.join(names)}): {what}" for (owner, what), names in alike.items() if owner in known]
+    lines = [
+        f"{owner}({', '.join(names)}): {what}"
+        for (owner, what), names in alike.items()
+        if owner in known
+    ]
     assert "\n".join(lines) == snapshot
 
 

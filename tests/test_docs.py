@@ -1,4 +1,6 @@
-"""docs/ as a site: every page is in its contents, its reference names every public name, and its tutorial is true."""
+"""docs/ as a site: every page is in its contents, its reference names every public name, and its
+tutorial is true.
+"""
 
 import contextlib
 import importlib
@@ -47,7 +49,10 @@ def test_the_contents_name_every_page_once():
 
 def test_help_lists_every_public_name_once_and_those_of_a_first_script_first(known):
     tasks = known.tasks()
-    listed = [name for names in tasks.values() for name in names]
+    listed = []
+    for names in tasks.values():
+        for name in names:
+            listed.append(name)
     assert sorted(listed) == sorted(smc.__all__)
     assert sum(len(names) for names in list(tasks.values())[:5]) in range(35, 45)
     assert set(re.findall(r"`smc\.(\w+)`", smc.__doc__ or "")) == set(smc._SHELF.modules)
@@ -61,14 +66,19 @@ def test_the_reference_has_every_public_name_and_each_entry_once(known):
         assert {getattr(module, name) for name in module.__all__} <= {*map(pydoc.locate, named)}
     assert len(named) == len(set(named))
     for module, _, name in (path.rpartition(".") for path in named):
-        assert hasattr(importlib.import_module(module), name) or importlib.import_module(f"{module}.{name}")
+        assert hasattr(importlib.import_module(module), name) or importlib.import_module(
+            f"{module}.{name}"
+        )
 
 
 def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
     pages = "".join(path.read_text() for path in DOCS.glob("*.md"))
     assert [marker for marker in known.SHOWN if pages.count(marker) != 1] == []
     claims = [claim.id for claim in paper("gaber").claims.values() if claim.instead]
-    quoted = [[f"`{name}`" for name in names] for names in (smc.plants(), [m.name for m in metrics()], scene.scenes())]
+    quoted = [
+        [f"`{name}`" for name in names]
+        for names in (smc.plants(), [m.name for m in metrics()], scene.scenes())
+    ]
     tables = known.machines(), known.definitions(), known.questions(), known.instead()
     for lines, names in zip(tables, [*quoted, [f"{i}:" for i in claims]], strict=True):
         head, *rows = list(lines)
@@ -78,7 +88,9 @@ def test_each_marker_is_in_one_page_and_stands_for_a_row_of_each_thing(known):
     papers = [*shipped()]
     assert re.findall(r"^\| `(\w+)`", "\n".join(known.audits()), re.MULTILINE) == papers
     shown = "\n".join(known.decisions()).split("???")[1:]
-    assert [text.count("\n    | ") - 1 for text in shown] == [len(paper(name).claims) for name in papers]
+    assert [text.count("\n    | ") - 1 for text in shown] == [
+        len(paper(name).claims) for name in papers
+    ]
     laws = [*smc.laws(), *smc.laws(kind="joint")]
     assert sorted(re.findall(r"`(\w+)`", "".join(known.kinds()))) == sorted(laws)
 
@@ -104,14 +116,15 @@ def test_the_tutorial_s_comparison_prints_what_the_page_shows(tmp_path, monkeypa
     with beside(TUTORIAL, tmp_path), contextlib.redirect_stdout(io.StringIO()) as said:
         runpy.run_path("compare.py", run_name="__main__")
     (shown,) = blocks(TUTORIAL.read_text(), "text")
-    # Each comparison draws new noise, so the page's numbers do not come again; who wins in which metric does.
+    # Each comparison draws new noise, so the page's numbers do not come again; who wins in which
+    # metric does.
     wins = r"^(?:J|TV rate) on .*?: \S+ wins"
     told = [re.findall(wins, text, re.MULTILINE) for text in (said.getvalue(), shown)]
     assert told[0] == told[1]
     assert len(told[0]) == 2
-    sources = [
-        set(re.findall(r"^(\w+) .*\n(shipped|tuned here) ", text, re.MULTILINE)) for text in (said.getvalue(), shown)
-    ]
+    sources = []
+    for text in (said.getvalue(), shown):
+        sources.append(set(re.findall(r"^(\w+) .*\n(shipped|tuned here) ", text, re.MULTILINE)))
     assert sources[0] == sources[1]
     assert len(sources[0]) == 3
 
@@ -150,10 +163,10 @@ def test_the_plain_notation_becomes_latex(generator, plain, latex):
 
 
 def test_formulas_in_sentences_are_found_and_words_are_not(generator):
-    text = "With a gain k > 0, s = 0 lasts for |d| <= D; the author's law of 1993 needs 2 m, and dt^2."
-    expected = (
-        r"With a gain $k \gt  0$, $s = 0$ lasts for $\left| d \right| \le  D$; the author's law of 1993 needs 2 m, and "
+    text = (
+        "With a gain k > 0, s = 0 lasts for |d| <= D; the author's law of 1993 needs 2 m, and dt^2."
     )
+    expected = r"With a gain $k \gt  0$, $s = 0$ lasts for $\left| d \right| \le  D$; the author's law of 1993 needs 2 m, and "
     assert generator.notation.sentence(text) == expected + r"${\Delta t}^{2}$."
 
 
@@ -164,7 +177,11 @@ def test_a_page_says_what_each_gain_is_and_typesets_all_equations(generator, kin
 
 
 def check_page(generator, template):
-    assert {gain for gain, (meaning, unit) in generator.meanings(template).items() if not (meaning and unit)} == set()
+    assert {
+        gain
+        for gain, (meaning, unit) in generator.meanings(template).items()
+        if not (meaning and unit)
+    } == set()
     for clause in generator.notation.clauses(law_pages.entry(template).formula):
         latex = generator.notation.formula(clause, template.gains)
         assert latex.count("{") == latex.count("}")
@@ -173,7 +190,9 @@ def check_page(generator, template):
     text = generator.body(template)
     assert text.count("$") % 2 == 0
     assert [
-        part for part in text.split("$")[::2] if re.search(r"[<>]=|\^|\bde\b|\blam\b", part.partition("`")[0])
+        part
+        for part in text.split("$")[::2]
+        if re.search(r"[<>]=|\^|\bde\b|\blam\b", part.partition("`")[0])
     ] == []
 
 
@@ -181,7 +200,9 @@ def check_page(generator, template):
 def test_a_page_has_the_equation_and_the_units_of_a_plant(generator, name):
     plant = smc.plant(name)
     assert len(generator.units(plant)) == len(plant.parameters)
-    title, equations, rest = generator.equation(generator.described(generator.explained_by(plant) or plant))
+    title, equations, rest = generator.equation(
+        generator.described(generator.explained_by(plant) or plant)
+    )
     assert title
     assert "=" not in title
     assert any(re.search(r"= .*\bu(_i)? \+ d", equation) for equation in equations)
@@ -195,9 +216,19 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     command = "-m", "mkdocs", "build", "--strict", "-f", CONFIGURATION, "-d", tmp_path
     done = python(*command, NO_MKDOCS_2_WARNING="1")
     assert [line for line in done.stderr.splitlines() if not line.startswith("INFO")] == []
-    built = {path.relative_to(tmp_path).as_posix(): path.read_text() for path in tmp_path.rglob("*.html")}
-    pages = {f"{folder}/{name}" for folder, names in (("laws", smc.laws()), ("plants", smc.plants())) for name in names}
-    pages |= {name.removesuffix(".md") for name in [*NAV, *known.reference()]} | {"404", "surfaces", "estimators"}
+    built = {}
+    for path in tmp_path.rglob("*.html"):
+        built[path.relative_to(tmp_path).as_posix()] = path.read_text()
+    pages = {
+        f"{folder}/{name}"
+        for folder, names in (("laws", smc.laws()), ("plants", smc.plants()))
+        for name in names
+    }
+    pages |= {name.removesuffix(".md") for name in [*NAV, *known.reference()]} | {
+        "404",
+        "surfaces",
+        "estimators",
+    }
     notebooks = {f"notebooks/{path.stem}" for path in (DOCS / "notebooks").glob("*.ipynb")}
     pages |= notebooks
     for name in notebooks:
@@ -208,6 +239,10 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
         assert re.search(r'<div class="output"><table', built[f"{name}.html"]), name
     assert set(built) == {f"{name}.html" for name in pages}
     assert {name for name in pages if "/" in name and "<svg" not in built[f"{name}.html"]} == set()
-    assert {name for name, text in built.items() if "arithmatex" in text} == set()  # an equation that is not typeset
+    assert {
+        name for name, text in built.items() if "arithmatex" in text
+    } == set()  # an equation that is not typeset
     loaded = r"<(?:script|img|link|iframe)\b[^>]*(?:src|href)=\"?((?:https?:)?//[^\s\">]+)"
-    assert {name: found for name, text in built.items() if (found := re.findall(loaded, text))} == {}
+    assert {
+        name: found for name, text in built.items() if (found := re.findall(loaded, text))
+    } == {}

@@ -1,4 +1,6 @@
-"""An explanation has the numbers of the code: each sentence is made of a constant, and stands in the text."""
+"""An explanation has the numbers of the code: each sentence is made of a constant, and stands in
+the text.
+"""
 
 import importlib
 import inspect
@@ -33,7 +35,9 @@ def percent(share: float) -> str:
 
 def short(number: float) -> str:
     """A power of ten, such as 1e-3."""
-    return f"1e{round(math.log10(number))}" if math.log10(number) % 1.0 in (0.0, 1.0) else str(number)
+    if math.log10(number) % 1.0 in (0.0, 1.0):
+        return f"1e{round(math.log10(number))}"
+    return str(number)
 
 
 def part(share: float) -> str:
@@ -69,9 +73,12 @@ SAID = {
     ],
     region.basin: [f"V is {region.VELOCITY_RATIO:g} X per second"],
     search: [
-        {12: "twelve in a comparison"}[search.SEARCHES], f"A search has {search.BUDGET} evaluations for each gain",
-        f"An {part(search.SCREENED_SHARE)} screens", f"A {part(search.EVOLVED_SHARE)} evolves",
-        f"lower J by less than {percent(search.PATIENCE)}", f"differ by more than {percent(search.AGREEMENT)}",
+        {12: "twelve in a comparison"}[search.SEARCHES],
+        f"A search has {search.BUDGET} evaluations for each gain",
+        f"An {part(search.SCREENED_SHARE)} screens",
+        f"A {part(search.EVOLVED_SHARE)} evolves",
+        f"lower J by less than {percent(search.PATIENCE)}",
+        f"differ by more than {percent(search.AGREEMENT)}",
         f"rounded to {WORDS[search.GAIN_DIGITS]} digits",
     ],
     search_space: [f"10^-{search_space.HALF_WIDTH:g} .. 10^{search_space.HALF_WIDTH:g}"],
@@ -81,7 +88,9 @@ SAID = {
         f"w = h times 1 s^2 = {short(objective.Objective().weight)} s^3",
         f"costs {objective.Objective().weight * 2.0 / conditions.CONTROL_PERIOD:g} s^2",
     ],
-    gains_for.gains_for: [f"of {len(gains_for.SPEEDS)} from a {part(gains_for.SPEEDS[0])} to ten times"],
+    gains_for.gains_for: [
+        f"of {len(gains_for.SPEEDS)} from a {part(gains_for.SPEEDS[0])} to ten times"
+    ],
     apart: [f"are more than {percent(apart.MAX_CHANGE)} apart"],
     scaling: [f"by more than a factor of {scaling.TREND:g} from each"],
     scaling.Scaling: [f"its {percent(scaling.CONFIDENCE)} interval"],
@@ -113,8 +122,12 @@ SAID = {
     smc.Clock: [f"0 .. {signals.MAX_MISSED:g}"],
     smc.signals.TimeSeries.from_csv: [f"longer than {time_series.MAX_GAP_STEPS:g} median steps"],
     smc.signals.BandLimited: [f"N = {signals.SINUSOIDS}, phi_i uniform"],
-    smc.signals.OrnsteinUhlenbeck: [f"`dt` defaults to {1e3 * smc.signals.OrnsteinUhlenbeck(1.0, 1.0).dt:g} ms"],
-    smc.signals.Impulse: [f"as {1e3 * smc.signals.Impulse(1.0, 0.0).width:g} ms is for default steps"],
+    smc.signals.OrnsteinUhlenbeck: [
+        f"`dt` defaults to {1e3 * smc.signals.OrnsteinUhlenbeck(1.0, 1.0).dt:g} ms"
+    ],
+    smc.signals.Impulse: [
+        f"as {1e3 * smc.signals.Impulse(1.0, 0.0).width:g} ms is for default steps"
+    ],
     conventions: [
         f"settling band: |e| <= {percent(conventions.SETTLING_BAND)} of the scale",
         f"the last {percent(conventions.LAST_PART)} of the run",
@@ -134,19 +147,29 @@ SAID = {
         f"differs by more than {part(limit_cycle.MAX_CHANGE)} from the first",
     ],
     tip.tip_scores: [f"over the last {percent(1.0 - tip.FORCE_START)} of the run"],
-    tasks: [f"T(rms(w) / {tasks.RATE_MARGIN:g})", f"within {tasks.SWING_UP_SPREAD:g} rad of hanging"],
-    plugin.smc_golden._fixture_function: [f"within {percent(golden.RELATIVE)} of their recorded value"],
+    tasks: [
+        f"T(rms(w) / {tasks.RATE_MARGIN:g})",
+        f"within {tasks.SWING_UP_SPREAD:g} rad of hanging",
+    ],
+    plugin.smc_golden._fixture_function: [
+        f"within {percent(golden.RELATIVE)} of their recorded value"
+    ],
     ROOT / "docs" / "design.md": [f"fails at |x| or |v| beyond {short(controller.MAX_STATE)}"],
-}  # fmt: skip
+}
 
 
 def named(place) -> str:
-    return place.name if isinstance(place, Path) else getattr(place, "fget", place).__name__[-30:]
+    if isinstance(place, Path):
+        return place.name
+    return getattr(place, "fget", place).__name__[-30:]
 
 
 @pytest.mark.parametrize("place", SAID, ids=named)
 def test_an_explanation_has_the_numbers_of_the_code(place):
-    text = place.read_text(encoding="utf-8") if isinstance(place, Path) else inspect.getdoc(place) or ""
+    if isinstance(place, Path):
+        text = place.read_text(encoding="utf-8")
+    else:
+        text = inspect.getdoc(place) or ""
     text = " ".join(text.split())
     assert SAID[place]
     for sentence in SAID[place]:

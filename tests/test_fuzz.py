@@ -1,4 +1,6 @@
-"""A few cases of each part of the long attack, `attack.py`, which `make attack` runs by the thousand."""
+"""A few cases of each part of the long attack, `attack.py`, which `make attack` runs by the
+thousand.
+"""
 
 import re
 from random import Random
@@ -33,7 +35,8 @@ def test_wild_files_end_well_or_in_a_sentence(tmp_path, monkeypatch):
 # what the attack finds
 
 HANGS = """m = (c := __import__("ctypes")).create_string_buffer(64)
-        with attack.alarm(0.1): [c.PyDLL(None).pthread_mutex_lock(m) for _ in "12"]"""  # and hears no signal
+        # and hears no signal
+        with attack.alarm(0.1): [c.PyDLL(None).pthread_mutex_lock(m) for _ in "12"]"""
 
 
 @pytest.mark.slow

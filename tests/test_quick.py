@@ -10,7 +10,9 @@ ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.slow
-def test_records_of_cases_that_quick_leaves_out_are_kept_and_not_called_unused(pytester, monkeypatch):
+def test_records_of_cases_that_quick_leaves_out_are_kept_and_not_called_unused(
+    pytester, monkeypatch
+):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), *sys.path]))
     pytester.makeconftest((ROOT / "tests" / "conftest.py").read_text(encoding="utf-8"))
     pytester.makepyfile("""

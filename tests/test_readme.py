@@ -1,4 +1,6 @@
-"""What README and docs show works as it stands: code, commands, links, and the catalogues they name."""
+"""What README and docs show works as it stands: code, commands, links, and the catalogues they
+name.
+"""
 
 import contextlib
 import io
@@ -32,8 +34,13 @@ TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULT
 
 
 def commands(text: str) -> list[str]:
-    """Every line of shell, and every command in running text; comments and folders of programs cut off."""
-    lines = [line for block in blocks(text, "sh") for line in block.splitlines()]
+    """Every line of shell, and every command in running text; comments and folders of programs cut
+    off.
+    """
+    lines = []
+    for block in blocks(text, "sh"):
+        for line in block.splitlines():
+            lines.append(line)
     prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
     lines += re.findall(r"`((?:smc-mujoco|make|python) [^`]+)`", prose)
     found = [re.split(r"\s+#|\s+or:", line)[0].strip().removeprefix(".venv/bin/") for line in lines]
@@ -49,7 +56,9 @@ CODE = [
 ]
 LINES = [(page, line) for page in PAGES for line in commands(page.read_text())]
 ON_HOST = "../../actions/"  # pages of the repository's host, beside its files: badges
-LINKS = [(page, link) for page in PAGES for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text())]
+LINKS = [
+    (page, link) for page in PAGES for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text())
+]
 RELATIVE = [pair for pair in LINKS if "://" not in pair[1] and not pair[1].startswith(ON_HOST)]
 
 
@@ -69,7 +78,9 @@ def with_little(function: Callable, little: dict) -> Callable:
 
 
 def named(value: object) -> str:
-    return value.name if isinstance(value, Path) else str(value)[:40]
+    if isinstance(value, Path):
+        return value.name
+    return str(value)[:40]
 
 
 def rows(page: str, heading: str) -> set[str]:
@@ -88,13 +99,17 @@ def test_there_is_something_to_test():
 
 
 @pytest.mark.parametrize(("page", "i", "block"), CODE, ids=named)
-def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, block, tmp_path, monkeypatch):
+def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(
+    page, i, block, tmp_path, monkeypatch
+):
     if '.png", at=' in block and gl.missing():
         pytest.skip(gl.missing())
     if "dm_control_env" in block:
         dm_control_suite()
     if "import gymnasium" in block:
-        pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+        pytest.importorskip(
+            "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
+        )
     if "law_from_fmu" in block:
         pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'smc-mujoco[fmu]'")
         warnings.simplefilter("ignore", smc.errors.PlainLoopWarning)
@@ -107,7 +122,10 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     monkeypatch.setattr(sys, "argv", ["block.py", "--no-film"])  # read by a scene that plays itself
     Path("block.py").write_text(block)
     Path("examples").symlink_to(ROOT / "examples")
-    played = pytest.raises(SystemExit) if "smc.play(" in block else contextlib.nullcontext()
+    if "smc.play(" in block:
+        played = pytest.raises(SystemExit)
+    else:
+        played = contextlib.nullcontext()
     out = io.TextIOWrapper(io.BytesIO(), "utf-8")
     with beside(page, tmp_path), contextlib.redirect_stdout(out) as said, played as end:
         runpy.run_path("block.py", run_name="__main__")
@@ -115,7 +133,9 @@ def test_code_runs_as_it_stands_and_writes_the_files_that_it_names(page, i, bloc
     assert end is None or not end.value.code
     assert ("print(" in block or end is not None) == (said.read().strip() != "")
     wanted = set(re.findall(r'"([\w-]+\.(?:npz|csv|mat|svg|png|tex|c|fmu))"', block))
-    wanted |= set(re.findall(r'study\(.*"(\w+)"', block)) | ({"compared"} if "smc.compare(" in block else set())
+    wanted |= set(re.findall(r'study\(.*"(\w+)"', block)) | (
+        {"compared"} if "smc.compare(" in block else set()
+    )
     written = {path.name for path in tmp_path.iterdir()} - {"block.py", "examples", *titled(page)}
     assert wanted <= written
     assert bool(written) == bool(wanted or end)
@@ -131,25 +151,37 @@ def test_command_lines_name_commands_options_and_files_that_exist(page):
 
 def test_a_flag_of_a_command_is_off_unless_it_is_given():
     commands = typer.main.get_command(main.app).commands  # pyright: ignore[reportAttributeAccessIssue]
-    on = {
-        (name, *parameter.opts)
-        for name, command in commands.items()
-        for parameter in command.params
-        if getattr(parameter, "is_flag", False) and parameter.default and not parameter.secondary_opts
-    }
+    on = set()
+    for name, command in commands.items():
+        for parameter in command.params:
+            if (
+                getattr(parameter, "is_flag", False)
+                and parameter.default
+                and not parameter.secondary_opts
+            ):
+                on.add((name, *parameter.opts))
     assert on == set()
 
 
 def check_command(line: str, known: dict) -> None:
     word, *rest = shlex.split(line)[1:]
     assert word in known, line
-    options = {option for parameter in known[word].params for option in (*parameter.opts, *parameter.secondary_opts)}
-    unknown = [option for option in rest if option.startswith("-") and option.partition("=")[0] not in options]
+    options = {
+        option
+        for parameter in known[word].params
+        for option in (*parameter.opts, *parameter.secondary_opts)
+    }
+    unknown = []
+    for option in rest:
+        if option.startswith("-") and option.partition("=")[0] not in options:
+            unknown.append(option)
     assert unknown == [], line
     given = [argument for argument in rest if not argument.startswith("-")]
     of_template = {path.stem for path in (ROOT / "examples").glob("*/*/scenes/*.py")}
     if word == "run" and given and given[0] not in {"NAME", *of_template}:
-        assert isinstance(scene.read(scene.find(str(ROOT / given[0]) if "/" in given[0] else given[0])), smc.Scene)
+        assert isinstance(
+            scene.read(scene.find(str(ROOT / given[0]) if "/" in given[0] else given[0])), smc.Scene
+        )
     if word == "show":
         assert given[0] in results(Path(given[0]).parent)
 
@@ -157,7 +189,9 @@ def check_command(line: str, known: dict) -> None:
 def results(folder: Path) -> set[str]:
     """The traces that a run of a scene writes to its folder."""
     runs = scene.read(scene.find(folder.name)).runs()
-    return {(folder / f"{slug(condition)}-{slug(label)}.npz").as_posix() for condition, label, _ in runs}
+    return {
+        (folder / f"{slug(condition)}-{slug(label)}.npz").as_posix() for condition, label, _ in runs
+    }
 
 
 def test_labels_of_one_file_name_are_refused():
@@ -168,7 +202,9 @@ def test_labels_of_one_file_name_are_refused():
 
 def test_traces_are_named_as_these_tests_say(tmp_path):
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
-    assert show.save({"A b": {"c": trace}}, tmp_path) == [tmp_path / f"{slug('A b')}-{slug('c')}.npz"]
+    assert show.save({"A b": {"c": trace}}, tmp_path) == [
+        tmp_path / f"{slug('A b')}-{slug('c')}.npz"
+    ]
 
 
 def test_make_targets_exist():
@@ -177,11 +213,17 @@ def test_make_targets_exist():
 
 
 def test_files_that_command_lines_name_exist():
-    named = {
-        word for _, line in LINES for word in re.findall(r"[\w./-]+\.(?:py|lock|sh)\b", line) if "NAME" not in word
-    }
+    named = set()
+    for _, line in LINES:
+        for word in re.findall(r"[\w./-]+\.(?:py|lock|sh)\b", line):
+            if "NAME" not in word:
+                named.add(word)
     assert named >= {"scenes/inverted_pendulum.py", "requirements.lock"}
-    told = {name for page in PAGES for name in titled(page)}  # to be written by the reader
+    # to be written by the reader
+    told = set()
+    for page in PAGES:
+        for name in titled(page):
+            told.add(name)
     assert [name for name in named - told if not (ROOT / name).is_file()] == []
 
 
@@ -209,8 +251,14 @@ def test_folders_and_modules_that_contributing_lists_are_there():
     cells = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
     names = [name for cell in cells for name in re.findall(r"`([\w/]+)`", cell)]
     assert len(names) >= 11
-    places = [(ROOT / "smc_mujoco" / f"{name}.py", ROOT / "smc_mujoco" / name, ROOT / name) for name in names]
-    assert [name for name, paths in zip(names, places, strict=True) if not any(path.exists() for path in paths)] == []
+    places = []
+    for name in names:
+        places.append((ROOT / "smc_mujoco" / f"{name}.py", ROOT / "smc_mujoco" / name, ROOT / name))
+    assert [
+        name
+        for name, paths in zip(names, places, strict=True)
+        if not any(path.exists() for path in paths)
+    ] == []
 
 
 def test_the_python_that_readme_asks_for_is_the_one_that_the_package_asks_for():

@@ -12,7 +12,10 @@ pytestmark = pytest.mark.quick
 
 HOMES = (
     smc,
-    *(getattr(smc, name) for name in ("signals", "hardware", "design", "fidelity", "metrics", "exchange", "envs")),
+    *(
+        getattr(smc, name)
+        for name in ("signals", "hardware", "design", "fidelity", "metrics", "exchange", "envs")
+    ),
 )
 PUBLIC = {name: getattr(home, name) for home in HOMES for name in home.__all__}
 NAMES = [name for name, one in PUBLIC.items() if callable(one)]

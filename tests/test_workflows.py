@@ -1,4 +1,6 @@
-"""The workflows run what the Makefile and the pages say, and nothing else, so that neither can go stale alone."""
+"""The workflows run what the Makefile and the pages say, and nothing else, so that neither can go
+stale alone.
+"""
 
 import importlib.util
 import os
@@ -20,7 +22,9 @@ ACTION = ROOT / ".github" / "actions" / "enter" / "action.yml"
 HIDDEN = ROOT / ".github" / "workflows" / "hidden.yml"
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 PAGES = ("docs/install.md", "CONTRIBUTING.md", "docs/enter.md")
-TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+TARGETS = set(
+    re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+)
 SHARED = re.compile(r"sudo | --yes")  # what a machine needs that nobody sits at
 
 
@@ -29,7 +33,10 @@ def commands(page: str) -> set[str]:
     text = (ROOT / page).read_text(encoding="utf-8")
     blocks = "\n".join(re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL))
     lines = [line.partition("   #")[0].partition("  #")[0].strip() for line in blocks.splitlines()]
-    return {*lines, *re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))}
+    return {
+        *lines,
+        *re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)),
+    }
 
 
 KNOWN = set().union(*map(commands, PAGES))
@@ -39,7 +46,9 @@ def jobs(workflow: Path) -> dict:
     return yaml.safe_load(workflow.read_text(encoding="utf-8"))["jobs"]
 
 
-STEPS = [(file.name, step) for file in WORKFLOWS for job in jobs(file).values() for step in job["steps"]]
+STEPS = [
+    (file.name, step) for file in WORKFLOWS for job in jobs(file).values() for step in job["steps"]
+]
 RUN = [(name, step["run"]) for name, step in STEPS if "run" in step]
 
 
@@ -47,7 +56,9 @@ def written_out(command: str, workflow: str) -> list[str]:
     """A command for each package of the matrix that it names."""
     if "${{" not in command:
         return [command]
-    every = [job.get("strategy", {}) for job in jobs(ROOT / ".github/workflows" / workflow).values()]
+    every = []
+    for job in jobs(ROOT / ".github/workflows" / workflow).values():
+        every.append(job.get("strategy", {}))
     found = [one["matrix"]["package"] for one in every if one]
     return [command.replace("${{ matrix.package }}", one) for packages in found for one in packages]
 
@@ -57,16 +68,27 @@ def test_a_workflow_s_command_is_one_of_the_makefile_or_of_a_page():
         if command.startswith("make "):
             assert command.split()[1] in TARGETS, workflow
         else:
-            assert {SHARED.sub("", one) for one in written_out(command, workflow)} <= KNOWN, workflow
+            assert {SHARED.sub("", one) for one in written_out(command, workflow)} <= KNOWN, (
+                workflow
+            )
 
 
 def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_share():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     (promised,) = re.findall(r"^promised: (.*?) ##", makefile, re.MULTILINE)
-    assert (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()[-1].split()[-1] == "promised"
+    assert (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()[-1].split()[
+        -1
+    ] == "promised"
     of_push = [yaml.safe_load(file.read_text(encoding="utf-8")) for file in WORKFLOWS]
-    of_push = [data["jobs"] for data in of_push if "push" in data[True]]  # YAML 1.1 reads `on` as true
-    made = {step["run"] for named in of_push for job in named.values() for step in job["steps"] if "run" in step}
+    of_push = [
+        data["jobs"] for data in of_push if "push" in data[True]
+    ]  # YAML 1.1 reads `on` as true
+    made = set()
+    for named in of_push:
+        for job in named.values():
+            for step in job["steps"]:
+                if "run" in step:
+                    made.add(step["run"])
     targets = {command.split()[1] for command in made if command.startswith("make ")}
     assert targets == {*promised.split(), "slow"}  # the slow tests have a job of their own
 
@@ -74,7 +96,10 @@ def test_what_a_change_must_pass_is_one_list_which_ci_runs_and_the_workflows_sha
 def test_workflows_have_the_pythons_of_the_package():
     about = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     classified = re.findall(r"Python :: (3\.\d+)", about)
-    assert jobs(ROOT / ".github/workflows/tests.yml")["linux"]["strategy"]["matrix"]["python"] == classified
+    assert (
+        jobs(ROOT / ".github/workflows/tests.yml")["linux"]["strategy"]["matrix"]["python"]
+        == classified
+    )
 
 
 @pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
@@ -82,7 +107,10 @@ def test_a_workflow_may_read_and_no_more(workflow):
     data = yaml.safe_load(workflow.read_text(encoding="utf-8"))
     assert data["permissions"] == {"contents": "read"}
     for job in data["jobs"].values():
-        more = {"contents"} if job == jobs(HIDDEN)["write"] else set()
+        if job == jobs(HIDDEN)["write"]:
+            more = {"contents"}
+        else:
+            more = set()
         assert {*job.get("permissions", {})} <= {"pages", "id-token", "attestations", *more}
         for step in job["steps"]:
             if step.get("uses", "").startswith("actions/checkout"):
@@ -91,16 +119,28 @@ def test_a_workflow_may_read_and_no_more(workflow):
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
 def test_a_release_has_the_tag_of_its_version():
-    for tag, code in ((f"v{smc_mujoco.__version__}", 0), (smc_mujoco.__version__, 2), ("v9", 2), ("v0' || true '", 2)):
+    for tag, code in (
+        (f"v{smc_mujoco.__version__}", 0),
+        (smc_mujoco.__version__, 2),
+        ("v9", 2),
+        ("v0' || true '", 2),
+    ):
         environment = os.environ | {"TAG": tag}
         done = subprocess.run(
-            ["make", "tagged"], check=False, cwd=ROOT, env=environment, capture_output=True, text=True
+            ["make", "tagged"],
+            check=False,
+            cwd=ROOT,
+            env=environment,
+            capture_output=True,
+            text=True,
         )
         assert (done.returncode, f"the tag is '{tag}'" in done.stderr) == (code, code != 0)
 
 
 def test_a_stranger_s_code_meets_no_secret_that_it_could_tell_and_nothing_that_it_could_write():
-    """Pull requests get no secret; a job that may write has no checkout, so no code, and no secret but its token."""
+    """Pull requests get no secret; a job that may write has no checkout, so no code, and no secret
+    but its token.
+    """
     for workflow in WORKFLOWS:
         text = workflow.read_text(encoding="utf-8")
         events = yaml.safe_load(text)[True]
@@ -146,11 +186,16 @@ def test_a_change_brings_one_entry_and_nothing_else(paths, found, monkeypatch):
         ENTERED.changed("--output=x")
 
 
-@pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0 or not shutil.which("unshare"), reason="needs root")
+@pytest.mark.skipif(
+    not hasattr(os, "getuid") or os.getuid() != 0 or not shutil.which("unshare"),
+    reason="needs root",
+)
 def test_an_entry_runs_without_network_rights_and_environment(monkeypatch):
     monkeypatch.setenv("TOKEN", "a secret")
     command = ENTERED.alone(["sh", "-c", "cat /proc/net/dev /proc/self/status; env"])
-    seen = subprocess.run(command[command.index("unshare") :], check=True, capture_output=True, text=True).stdout
+    seen = subprocess.run(
+        command[command.index("unshare") :], check=True, capture_output=True, text=True
+    ).stdout
     assert re.findall(r"^ *(\w+):.*\d$", seen.partition("Name:")[0], re.MULTILINE) == ["lo"]
     assert "NoNewPrivs:\t1" in seen
     assert "a secret" not in seen
@@ -158,14 +203,18 @@ def test_an_entry_runs_without_network_rights_and_environment(monkeypatch):
 
 @pytest.mark.parametrize("name", ["soft_relay", "pd_in_c", "reader"])
 def test_no_code_that_could_read_the_number_runs_beside_it(name, monkeypatch, tmp_path):
-    """A process can read the environment of those that started it: in the job with the number only read laws run."""
+    """A process can read the environment of those that started it: in the job with the number only
+    read laws run.
+    """
     shutil.copytree(ROOT / "examples" / "entries", tmp_path / "entries")
     shutil.copytree(tmp_path / "entries" / "soft_relay", tmp_path / "entries" / "reader")
     with (tmp_path / "entries" / "reader" / "law.py").open("a", encoding="utf-8") as file:
         file.write("\nNUMBER = open('/proc/self/environ').read()\n")
     ran = list[list[str]]()
     monkeypatch.setattr(
-        subprocess, "run", lambda command, check: (ran.append(command), SimpleNamespace(returncode=9))[1]
+        subprocess,
+        "run",
+        lambda command, check: (ran.append(command), SimpleNamespace(returncode=9))[1],
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("NAME", name)
@@ -182,23 +231,35 @@ def test_the_action_enters_a_folder_with_the_suite_and_the_results_it_is_given(t
     action = yaml.safe_load(ACTION.read_text(encoding="utf-8"))
     *_, step = action["runs"]["steps"]
     assert "${{" not in step["run"]
-    given = {"folder": "my law; echo no", "suite": action["inputs"]["suite"]["default"], "against": against}
+    given = {
+        "folder": "my law; echo no",
+        "suite": action["inputs"]["suite"]["default"],
+        "against": against,
+    }
     program = tmp_path / "smc-mujoco"
     program.write_text('#!/bin/sh\nprintf "%s\\n" "$@"\n', encoding="utf-8")
     program.chmod(0o755)
-    read = {name: given[value.removeprefix("${{ inputs.").removesuffix(" }}")] for name, value in step["env"].items()}
+    read = {}
+    for name, value in step["env"].items():
+        read[name] = given[value.removeprefix("${{ inputs.").removesuffix(" }}")]
     environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", **read}
     out = subprocess.run(
         ["bash", "-c", step["run"]], env=environment, capture_output=True, text=True, check=True
     ).stdout
     assert out.splitlines() == [
-        "enter", given["folder"], "--suite", "smc-30@1", *["--against", against] * bool(against),
-    ]  # fmt: skip
+        "enter",
+        given["folder"],
+        "--suite",
+        "smc-30@1",
+        *["--against", against] * bool(against),
+    ]
 
 
 def test_every_action_of_others_is_pinned_to_a_commit():
     used = [step["uses"] for _, step in STEPS if "uses" in step]
     used += [
-        step["uses"] for step in yaml.safe_load(ACTION.read_text(encoding="utf-8"))["runs"]["steps"] if "uses" in step
+        step["uses"]
+        for step in yaml.safe_load(ACTION.read_text(encoding="utf-8"))["runs"]["steps"]
+        if "uses" in step
     ]
     assert all(re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", one) or one.startswith("./") for one in used)

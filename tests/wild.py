@@ -1,4 +1,6 @@
-"""Wild values and scenarios, each made of one random.Random: what the fuzz and the long attack throw."""
+"""Wild values and scenarios, each made of one random.Random: what the fuzz and the long attack
+throw.
+"""
 
 import datetime
 import decimal
@@ -45,36 +47,199 @@ def nested(depth: int) -> list:
     return value
 
 
-NUMBERS = [math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, 1e-320, 1e-300, 1e-16, 1e16, 1e200, -1e200, 1e306, 1e308]
-NUMBERS += [-1e308, 0, 1, -1, 2**31, 2**53, 2**63, 2**64, 10**400, -(10**400), 10**5000, 0.1, 0.5, 3, True, False]
-NUMBERS += [np.float32(0.1), np.float16(np.inf), np.int64(3), np.uint8(255), np.longdouble("1e4000"), np.bool_(True)]
-NUMBERS += [fractions.Fraction(1, 3), fractions.Fraction(10**400), decimal.Decimal("0.1"), 1j, np.complex128(1.0)]
-NUMBERS += [np.timedelta64(1, "s"), np.timedelta64("NaT", "s"), np.datetime64("2026-01-01"), datetime.timedelta(1)]
-TEXTS = ["", " ", "0", "1", "nan", "duffing", "classical", "x", "\0", "a\0b", "\ud800", "a\n b", "../../x", "/", "."]
+NUMBERS = [
+    math.nan,
+    math.inf,
+    -math.inf,
+    0.0,
+    -0.0,
+    5e-324,
+    1e-320,
+    1e-300,
+    1e-16,
+    1e16,
+    1e200,
+    -1e200,
+    1e306,
+    1e308,
+]
+NUMBERS += [
+    -1e308,
+    0,
+    1,
+    -1,
+    2**31,
+    2**53,
+    2**63,
+    2**64,
+    10**400,
+    -(10**400),
+    10**5000,
+    0.1,
+    0.5,
+    3,
+    True,
+    False,
+]
+NUMBERS += [
+    np.float32(0.1),
+    np.float16(np.inf),
+    np.int64(3),
+    np.uint8(255),
+    np.longdouble("1e4000"),
+    np.bool_(True),
+]
+NUMBERS += [
+    fractions.Fraction(1, 3),
+    fractions.Fraction(10**400),
+    decimal.Decimal("0.1"),
+    1j,
+    np.complex128(1.0),
+]
+NUMBERS += [
+    np.timedelta64(1, "s"),
+    np.timedelta64("NaT", "s"),
+    np.datetime64("2026-01-01"),
+    datetime.timedelta(1),
+]
+TEXTS = [
+    "",
+    " ",
+    "0",
+    "1",
+    "nan",
+    "duffing",
+    "classical",
+    "x",
+    "\0",
+    "a\0b",
+    "\ud800",
+    "a\n b",
+    "../../x",
+    "/",
+    ".",
+]
 TEXTS += [
-    "~", "é" * 300, "x" * 100_000, "\x1b[31m", "con", "a.npz", "%s{0}", "$x_1^", b"1", b"", b"a\0", bytearray(b"1"),
-]  # fmt: skip
-ARRAYS = [np.array(0.5), np.array([0.5]), np.zeros(0), np.zeros(2), np.zeros((2, 2)), np.array(["a"]), np.array(None)]
-ARRAYS += [np.array([None, 1], object), np.array([math.nan]), np.zeros(3, bool), np.ma.masked, np.zeros(1, "f4,i4")]
-SEVERAL = [(), [], {}, set(), frozenset(), [1.0], (1.0, 2.0), [math.nan], ["a"], [None], {"a": 1}, {1: 2}, {"a": None}]
-SEVERAL += [range(3), range(10**9), [[]], [[1]], {"M": 1.3}, {"mass": math.nan}, {1.0}, nested(3), nested(1000)]
-SEVERAL += [nested(50_000), [Shy()], {Shy: Shy()}, [1, "a"], [[1, 2], [3]], [1.0] * 1000, {"x": {}}, [True, False]]
-OTHERS = [None, ..., NotImplemented, int, float, str, object, object(), Shy(), Awkward(), Shy, print, len, math, smc]
-OTHERS += [lambda: 1, lambda *a, **k: None, lambda x: x, Path("a"), Path("a.npz"), ValueError("x"), type, slice(1)]
+    "~",
+    "é" * 300,
+    "x" * 100_000,
+    "\x1b[31m",
+    "con",
+    "a.npz",
+    "%s{0}",
+    "$x_1^",
+    b"1",
+    b"",
+    b"a\0",
+    bytearray(b"1"),
+]
+ARRAYS = [
+    np.array(0.5),
+    np.array([0.5]),
+    np.zeros(0),
+    np.zeros(2),
+    np.zeros((2, 2)),
+    np.array(["a"]),
+    np.array(None),
+]
+ARRAYS += [
+    np.array([None, 1], object),
+    np.array([math.nan]),
+    np.zeros(3, bool),
+    np.ma.masked,
+    np.zeros(1, "f4,i4"),
+]
+SEVERAL = [
+    (),
+    [],
+    {},
+    set(),
+    frozenset(),
+    [1.0],
+    (1.0, 2.0),
+    [math.nan],
+    ["a"],
+    [None],
+    {"a": 1},
+    {1: 2},
+    {"a": None},
+]
+SEVERAL += [
+    range(3),
+    range(10**9),
+    [[]],
+    [[1]],
+    {"M": 1.3},
+    {"mass": math.nan},
+    {1.0},
+    nested(3),
+    nested(1000),
+]
+SEVERAL += [
+    nested(50_000),
+    [Shy()],
+    {Shy: Shy()},
+    [1, "a"],
+    [[1, 2], [3]],
+    [1.0] * 1000,
+    {"x": {}},
+    [True, False],
+]
+OTHERS = [
+    None,
+    ...,
+    NotImplemented,
+    int,
+    float,
+    str,
+    object,
+    object(),
+    Shy(),
+    Awkward(),
+    Shy,
+    print,
+    len,
+    math,
+    smc,
+]
+OTHERS += [
+    lambda: 1,
+    lambda *a, **k: None,
+    lambda x: x,
+    Path("a"),
+    Path("a.npz"),
+    ValueError("x"),
+    type,
+    slice(1),
+]
 MADE: list[Callable[[], Any]] = [  # made again for each use
-    lambda: iter([]), lambda: iter([1.0, 2.0]), lambda: (x for x in ("a", "b")), lambda: zip([1], [2], strict=True),
-    lambda: smc.Constant(1.0), lambda: smc.Noise(0.1), lambda: smc.law("none"), lambda: smc.law("classical"),
-    lambda: smc.surface("linear"), lambda: smc.estimator("measured"), lambda: smc.plant("duffing"),
-    lambda: smc.Jump(0.0, {}), smc.Encoder, lambda: smc.Coulomb(0.1), lambda: smc.Lag(0.1),
-    lambda: smc.Contact("none"), lambda: smc.Scenario(plant="duffing", law="classical", duration=0.01),
-]  # fmt: skip
+    lambda: iter([]),
+    lambda: iter([1.0, 2.0]),
+    lambda: (x for x in ("a", "b")),
+    lambda: zip([1], [2], strict=True),
+    lambda: smc.Constant(1.0),
+    lambda: smc.Noise(0.1),
+    lambda: smc.law("none"),
+    lambda: smc.law("classical"),
+    lambda: smc.surface("linear"),
+    lambda: smc.estimator("measured"),
+    lambda: smc.plant("duffing"),
+    lambda: smc.Jump(0.0, {}),
+    smc.Encoder,
+    lambda: smc.Coulomb(0.1),
+    lambda: smc.Lag(0.1),
+    lambda: smc.Contact("none"),
+    lambda: smc.Scenario(plant="duffing", law="classical", duration=0.01),
+]
 FIXED = [NUMBERS, TEXTS, ARRAYS, SEVERAL, OTHERS]
 
 
 def value(random: Random) -> Any:
     """Any value that somebody may give."""
     kind = random.randrange(len(FIXED) + 1)
-    return random.choice(MADE)() if kind == len(FIXED) else random.choice(FIXED[kind])
+    if kind == len(FIXED):
+        return random.choice(MADE)()
+    return random.choice(FIXED[kind])
 
 
 def wide(random: Random) -> float:
@@ -83,14 +248,18 @@ def wide(random: Random) -> float:
         case 0 | 1 | 2:
             return random.uniform(-10.0, 10.0)
         case 3:
-            return random.choice([0.0, 1e-300, 1e-9, 1e9, 1e99, 1e154, 1e155, 1e300, -1e300, 1.7e308])
+            return random.choice(
+                [0.0, 1e-300, 1e-9, 1e9, 1e99, 1e154, 1e155, 1e300, -1e300, 1.7e308]
+            )
         case _:
             return random.choice([-1, 1]) * 10.0 ** random.uniform(-308, 308)
 
 
 def positive(random: Random) -> float:
     """A number from 0 on, often below 1."""
-    return abs(wide(random)) if random.random() < 1 / 3 else random.uniform(1e-3, 1.0)
+    if random.random() < 1 / 3:
+        return abs(wide(random))
+    return random.uniform(1e-3, 1.0)
 
 
 def few(random: Random, items: Sequence, most: int) -> list:
@@ -98,7 +267,9 @@ def few(random: Random, items: Sequence, most: int) -> list:
     return random.sample(items, random.randint(0, min(most, len(items))))
 
 
-def changed(random: Random, kind: type, required: Sequence[str], optional: Sequence[str] = ()) -> Any:
+def changed(
+    random: Random, kind: type, required: Sequence[str], optional: Sequence[str] = ()
+) -> Any:
     """An instance with wild numbers; those of `optional` now and then."""
     names = [*required, *few(random, optional, 3)]
     return kind(**{name: random.choice([positive, positive, wide])(random) for name in names})
@@ -128,7 +299,9 @@ def signal(random: Random) -> smc.Signal:
         case 0:
             return smc.signals.Gust(wide(random), random.uniform(0.0, 0.03), positive(random))
         case 1:
-            return smc.signals.BandLimited(positive(random), random.uniform(0.0, 1.0), 1.0 + 100.0 * positive(random))
+            return smc.signals.BandLimited(
+                positive(random), random.uniform(0.0, 1.0), 1.0 + 100.0 * positive(random)
+            )
         case 2:
             return smc.signals.OrnsteinUhlenbeck(
                 positive(random), positive(random), random.choice([1e-3, positive(random)])
@@ -141,14 +314,23 @@ def plant(random: Random) -> smc.Plant:
     """A plant, of networks 2 to 4 channels, some parameters wild; now and then a user's own."""
     if random.random() < 0.1:
         Path("arm.xml").write_text(ARM)
-        channels = random.choice([["shoulder"], ["shoulder", "elbow"], {"shoulder": smc.Channel(partner="elbow")}])
+        channels = random.choice(
+            [["shoulder"], ["shoulder", "elbow"], {"shoulder": smc.Channel(partner="elbow")}]
+        )
         return smc.plant_from("arm.xml", channels)
     name = random.choice(smc.plants())
     plain = smc.plant(name)
     least, most = plain.sizes
-    parameters: dict[str, float] = {} if most == 1 else {"n": random.randint(least, min(most, max(least, 4)))}
+    parameters: dict[str, float]
+    if most == 1:
+        parameters = {}
+    else:
+        parameters = {"n": random.randint(least, min(most, max(least, 4)))}
     for key in few(random, sorted(plain.parameters), 2):
-        parameters[key] = positive(random) if key in plain.positive else wide(random)
+        if key in plain.positive:
+            parameters[key] = positive(random)
+        else:
+            parameters[key] = wide(random)
     return smc.plant(name, **parameters)
 
 
@@ -156,7 +338,9 @@ def component(random: Random, find: Callable[..., Any], names: Sequence[str]) ->
     """A law, surface or estimator, some gains wild."""
     name = random.choice(names)
     keys = few(random, sorted(find(name).gains), 3)
-    return find(name, **{key: positive(random) if key in ("lam", "phi") else wide(random) for key in keys})
+    return find(
+        name, **{key: positive(random) if key in ("lam", "phi") else wide(random) for key in keys}
+    )
 
 
 @smc.law_function(gains={"k": 2.0})
@@ -187,8 +371,14 @@ def law(random: Random) -> Any:
 
 def factors(random: Random, plant: Any) -> dict[str, float]:
     """Factors on parameters that the plant has, now and then on one that it lacks."""
-    known = [*plant.parameters, "mass"] if isinstance(plant, smc.Plant) and random.random() < 0.98 else ["mass", "no"]
-    return {key: random.choice([random.uniform(0.1, 10.0), positive(random)]) for key in few(random, known, 2)}
+    if isinstance(plant, smc.Plant) and random.random() < 0.98:
+        known = [*plant.parameters, "mass"]
+    else:
+        known = ["mass", "no"]
+    return {
+        key: random.choice([random.uniform(0.1, 10.0), positive(random)])
+        for key in few(random, known, 2)
+    }
 
 
 def friction(random: Random) -> list:
@@ -196,22 +386,37 @@ def friction(random: Random) -> list:
     kinds = [
         lambda: smc.Viscous(positive(random)),
         lambda: smc.Coulomb(positive(random)),
-        lambda: changed(random, smc.hardware.LuGre, ["coulomb", "static", "stribeck"], ["stiffness", "damping"]),
+        lambda: changed(
+            random, smc.hardware.LuGre, ["coulomb", "static", "stribeck"], ["stiffness", "damping"]
+        ),
         lambda: changed(random, smc.hardware.Sigmoid, ["p1", "p2"], ["hold", "stiffness"]),
-        lambda: random.choice([smc.hardware.servo("mx106", "m6").friction, smc.hardware.servo("mx64", "m1").friction]),
+        lambda: random.choice(
+            [smc.hardware.servo("mx106", "m6").friction, smc.hardware.servo("mx64", "m1").friction]
+        ),
     ]
     return [random.choice(kinds)() for _ in range(random.randint(0, 2))]
 
 
 def actuator(random: Random) -> list:
     """What stands between command and joint."""
-    motor = ["resistance", "inductance", "torque_constant", "gear", "rotor_inertia", "cogging", "poles", "voltage"]
+    motor = [
+        "resistance",
+        "inductance",
+        "torque_constant",
+        "gear",
+        "rotor_inertia",
+        "cogging",
+        "poles",
+        "voltage",
+    ]
     kinds = [
         lambda: smc.Lag(positive(random)),
         lambda: smc.hardware.RateLimit(positive(random)),
         lambda: changed(random, smc.DCMotor, [], motor),
         lambda: changed(random, smc.Backlash, ["gap"], ["rotor_inertia", "rotor_damping"]),
-        lambda: changed(random, smc.hardware.Stepper, [], ["teeth", "torque", "gear", "ramp", "queue", "refill"]),
+        lambda: changed(
+            random, smc.hardware.Stepper, [], ["teeth", "torque", "gear", "ramp", "queue", "refill"]
+        ),
     ]
     return [random.choice(kinds)() for _ in range(random.randint(0, 2))]
 
@@ -219,34 +424,62 @@ def actuator(random: Random) -> list:
 def fields(random: Random) -> dict[str, Any]:
     """The arguments of a Scenario; one in forty is not sane."""
     step, held = random.choice([1e-3, 5e-4, 2e-3, 1e-4, 1 / 3000, 0.01]), random.randint(1, 4)
-    where = value(random) if random.random() < 1 / 40 else plant(random)
+    if random.random() < 1 / 40:
+        where = value(random)
+    else:
+        where = plant(random)
     n = where.n if isinstance(where, smc.Plant) else 1
-    offered = [*where.contacts, "none"] if isinstance(where, smc.Plant) else ["none"]
-    builds = [*where.mechanisms, "equation"] if isinstance(where, smc.Plant) else ["equation"]
+    if isinstance(where, smc.Plant):
+        offered = [*where.contacts, "none"]
+    else:
+        offered = ["none"]
+    if isinstance(where, smc.Plant):
+        builds = [*where.mechanisms, "equation"]
+    else:
+        builds = ["equation"]
 
     def state() -> Any:
         return random.choice([None, random.uniform(-3, 3), [wide(random) for _ in range(n)]])
 
     sane: dict[str, Callable[[], Any]] = {
-        "control_period": lambda: held * step, "physics_step": lambda: random.choice([None, step]),
-        "u_max": lambda: random.choice([random.uniform(0.1, 100.0), math.inf, 1e-300, 1e10, 2e10, 1e308]), "x0": state,
-        "v0": state, "reference": lambda: smooth(random),
-        "disturbance": lambda: random.choice([None, signal(random), [signal(random) for _ in range(2)]]),
+        "control_period": lambda: held * step,
+        "physics_step": lambda: random.choice([None, step]),
+        "u_max": lambda: random.choice(
+            [random.uniform(0.1, 100.0), math.inf, 1e-300, 1e10, 2e10, 1e308]
+        ),
+        "x0": state,
+        "v0": state,
+        "reference": lambda: smooth(random),
+        "disturbance": lambda: random.choice(
+            [None, signal(random), [signal(random) for _ in range(2)]]
+        ),
         "noise": lambda: random.choice([None, smc.Noise(positive(random), positive(random))]),
         "input_delay": lambda: random.randint(0, 6) * step,
         "velocity": lambda: component(random, smc.estimator, smc.laws(kind="estimator")),
-        "surface": lambda: random.choice([None, component(random, smc.surface, smc.laws(kind="surface"))]),
-        "model": lambda: random.choice([None, "none", "nominal"]), "mismatch": lambda: factors(random, where),
+        "surface": lambda: random.choice(
+            [None, component(random, smc.surface, smc.laws(kind="surface"))]
+        ),
+        "model": lambda: random.choice([None, "none", "nominal"]),
+        "mismatch": lambda: factors(random, where),
         "jump": lambda: smc.Jump(random.uniform(0.0, 0.03), factors(random, where)),
         "seed": lambda: random.randrange(2**53),
         "integrator": lambda: random.choice([None, "RK4", "Euler", "implicitfast", "implicit"]),
-        "friction": lambda: friction(random), "actuator": lambda: actuator(random),
-        "sensor": lambda: changed(random, smc.Encoder, [], ["counts", "bias", "dropout", "period", "delay"]),
-        "contact": lambda: random.choice(offered), "mechanism": lambda: random.choice(builds),
-    }  # fmt: skip
+        "friction": lambda: friction(random),
+        "actuator": lambda: actuator(random),
+        "sensor": lambda: changed(
+            random, smc.Encoder, [], ["counts", "bias", "dropout", "period", "delay"]
+        ),
+        "contact": lambda: random.choice(offered),
+        "mechanism": lambda: random.choice(builds),
+    }
     names = {*few(random, sorted(sane), random.choice([2, 5, len(sane)])), "law", "duration"}
     sane |= {"law": lambda: law(random), "duration": lambda: random.uniform(1e-3, 0.03)}
-    found = {name: value(random) if random.random() < 1 / 40 else sane[name]() for name in sorted(names)}
+    found = {}
+    for name in sorted(names):
+        if random.random() < 1 / 40:
+            found[name] = value(random)
+        else:
+            found[name] = sane[name]()
     if random.random() < 1 / 200:
         found[random.choice(["sed", "lawn", "x_0", "", "controlperiod"])] = value(random)
     return {"plant": where} | found
@@ -264,18 +497,35 @@ def starts(random: Random, n: int) -> Any:
 
 
 def gridded(random: Random, fields: dict[str, Any]) -> list[smc.Scenario]:
-    """The fields as a user's condition, by itself, with one of the suite's or as text, on a grid of two seeds."""
-    left = {name: held for name, held in fields.items() if name not in ("plant", "law", "duration", "model", "surface")}
+    """The fields as a user's condition, by itself, with one of the suite's or as text, on a grid of
+    two seeds.
+    """
+    left = {}
+    for name, held in fields.items():
+        if name not in ("plant", "law", "duration", "model", "surface"):
+            left[name] = held
     seeds = [0, left.pop("seed", 7)]
     ours = random.choice(sorted(NAMED))
-    mine = smc.condition("wild", **left) if left else find_condition(ours)
+    if left:
+        mine = smc.condition("wild", **left)
+    else:
+        mine = find_condition(ours)
     around = starts(random, fields["plant"].n if isinstance(fields["plant"], smc.Plant) else 1)
     way = random.randrange(3)
-    condition = mine + find_condition(ours) if way == 0 and left else mine
+    if way == 0 and left:
+        condition = mine + find_condition(ours)
+    else:
+        condition = mine
 
     def grid(of: Any) -> list[smc.Scenario]:
         return smc.grid(
-            [fields["plant"]], [fields["law"]], of, seeds, gains="default", duration=fields["duration"], starts=around
+            [fields["plant"]],
+            [fields["law"]],
+            of,
+            seeds,
+            gains="default",
+            duration=fields["duration"],
+            starts=around,
         )
 
     made = grid(condition)

@@ -1,8 +1,10 @@
-"""The clips that README and the pages show: laws side by side, a few seconds, as animated WebP in videos/gallery.
+"""The clips that README and the pages show: laws side by side, a few seconds, as animated WebP in
+videos/gallery.
 
 make gallery          or          python videos/gallery.py
 
-A test makes some of their pictures anew, so that a clip which the code would no longer make fails it.
+A test makes some of their pictures anew, so that a clip which the code would no longer make fails
+it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +18,9 @@ FOLDER = Path(__file__).parent / "gallery"
 
 
 class Clip(NamedTuple):
-    """What a clip shows: the paper's four laws with the study's gains, or `laws` with their published ones."""
+    """What a clip shows: the paper's four laws with the study's gains, or `laws` with their
+    published ones.
+    """
 
     plant: str
     title: str
@@ -28,9 +32,13 @@ class Clip(NamedTuple):
     def frames(self) -> Frames:
         """Return the pictures of the clip."""
         changes = dict(self.changes)
-        runs = [smc.Scenario(plant=self.plant, law=law, duration=self.seconds, **changes) for law in self.laws]
+        runs = []
+        for law in self.laws:
+            runs.append(smc.Scenario(plant=self.plant, law=law, duration=self.seconds, **changes))
         if not self.laws:
-            runs = smc.paper.comparison(self.plant, self.condition, duration=self.seconds, changes=changes).values()
+            runs = smc.paper.comparison(
+                self.plant, self.condition, duration=self.seconds, changes=changes
+            ).values()
         return smc.film(smc.run(runs), title=self.title, fps=20.0)
 
 
@@ -41,7 +49,12 @@ BLOW = {
 }
 W = 2.0  # rad/s, of a figure of eight
 EIGHT = {
-    "reference": [smc.Sine(0.6, W), smc.Sine(0.3, 2.0 * W), smc.Constant(1.0), *[smc.Constant(0.0)] * 3],
+    "reference": [
+        smc.Sine(0.6, W),
+        smc.Sine(0.3, 2.0 * W),
+        smc.Constant(1.0),
+        *[smc.Constant(0.0)] * 3,
+    ],
     "x0": (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
     "disturbance": smc.signals.Wind(x=5.0, time=1.5, width=1.0),
 }
@@ -50,7 +63,9 @@ CLIPS = {  # name of the clip's file -> what it shows
     "van_der_pol": Clip("van_der_pol", "Van der Pol under measurement noise", 2.0, "noise"),
     "duffing": Clip("duffing", "Duffing", 3.0),
     "pendulum_network": Clip("pendulum_network", "Five coupled pendulums", 2.0),
-    "hard_stops": Clip("inverted_pendulum", "A blow, rubber stops, and friction in the joint", 2.2, changes=BLOW),
+    "hard_stops": Clip(
+        "inverted_pendulum", "A blow, rubber stops, and friction in the joint", 2.2, changes=BLOW
+    ),
     "quadrotor": Clip(
         "quadrotor",
         "A drone on a figure of eight, in a gust",

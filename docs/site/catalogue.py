@@ -1,7 +1,9 @@
-"""The pages of laws, plants, surfaces and estimators, each written from its own file when the site is built.
+"""The pages of laws, plants, surfaces and estimators, each written from its own file when the site
+is built.
 
-A page of a law has its formula, its figure, its properties and gains, what is known of it, its source and its C form; a
-page of a plant its equation, picture, figure, parameters, obstacles, builds and MJCF.
+A page of a law has its formula, its figure, its properties and gains, what is known of it, its
+source and its C form; a page of a plant its equation, picture, figure, parameters, obstacles,
+builds and MJCF.
 """
 
 import contextlib
@@ -38,7 +40,9 @@ HEADER_END = "#endif\n\n"  # of smc_law.h, before the law
 KEY = "".join(
     f'<span style="--key: {colour}">{words}</span>'
     for words, colour in zip(
-        ("undisturbed", "with measurement noise and d = 0.2 sin 5t"), figures.CONDITIONS.values(), strict=True
+        ("undisturbed", "with measurement noise and d = 0.2 sin 5t"),
+        figures.CONDITIONS.values(),
+        strict=True,
     )
 )
 
@@ -54,20 +58,28 @@ class Page:
 
 def pages() -> dict[str, dict[str, list[Page]]]:
     """Return the pages by section and group; those of laws by family."""
-    wanted = [(figures.law_figure, (name, plant)) for name, t in laws().items() for plant in figures.shown_on(t)]
-    wanted += [(draw, (name,)) for draw in (figures.plant_figure, figures.still) for name in plants()]
+    wanted = []
+    for name, t in laws().items():
+        for plant in figures.shown_on(t):
+            wanted.append((figures.law_figure, (name, plant)))
+    wanted += [
+        (draw, (name,)) for draw in (figures.plant_figure, figures.still) for name in plants()
+    ]
     drawn = figures.figures(wanted)
-    grouped = {
-        style.in_words(family): [_law_page(laws()[name], drawn) for name in names]
-        for family, names in families().items()
-    }
+    grouped = {}
+    for family, names in families().items():
+        grouped[style.in_words(family)] = [_law_page(laws()[name], drawn) for name in names]
     return {
         "Plants": {"": [_plant_page(plant, drawn) for plant in plants().values()]},
         "Laws": grouped,
         "Surfaces and estimators": {
             "": [
                 Page("surfaces", "Surfaces", _listing("Surfaces", SURFACES, surfaces())),
-                Page("estimators", "Velocity estimators", _listing("Velocity estimators", ESTIMATORS, estimators())),
+                Page(
+                    "estimators",
+                    "Velocity estimators",
+                    _listing("Velocity estimators", ESTIMATORS, estimators()),
+                ),
             ]
         },
     }
@@ -86,13 +98,17 @@ def files(drawn_stills: Mapping[str, bytes]) -> dict[str, bytes]:
 
 def stills() -> dict[str, bytes]:
     """Return plant -> its picture, from the cache."""
-    return {key[1]: found for key, found in figures.figures([(figures.still, (name,)) for name in plants()]).items()}
+    return {
+        key[1]: found
+        for key, found in figures.figures([(figures.still, (name,)) for name in plants()]).items()
+    }
 
 
 def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
     parts, name = entry(template), template.name
     shown = "".join(
-        _figure(drawn["law_figure", name, plant], f"{_link_up(plant)}") for plant in figures.shown_on(template)
+        _figure(drawn["law_figure", name, plant], f"{_link_up(plant)}")
+        for plant in figures.shown_on(template)
     )
     text = [
         f"# {parts.title}",
@@ -110,19 +126,26 @@ def _law_page(template: Template, drawn: Mapping[tuple[str, ...], bytes]) -> Pag
         f"## Source\n\n{_prose(parts.source, None)}" * bool(parts.source),
         _c_form(name),
     ]
-    return Page(f"laws/{name}", style.law_name(name), _front(parts.formula) + "\n\n".join(filter(None, text)) + "\n")
+    return Page(
+        f"laws/{name}",
+        style.law_name(name),
+        _front(parts.formula) + "\n\n".join(filter(None, text)) + "\n",
+    )
 
 
 def _symbols(formula: str) -> str:
     """Return where the symbols of a formula are explained, and what its brackets mean."""
-    brackets = (
-        r" $\lfloor s \rceil^p$ is $\left| s \right|^p \, \mathrm{sgn}(s)$." if re.search(r"\]\^", formula) else ""
-    )
+    if re.search(r"\]\^", formula):
+        brackets = r" $\lfloor s \rceil^p$ is $\left| s \right|^p \, \mathrm{sgn}(s)$."
+    else:
+        brackets = ""
     return f"$e$ is the error, $s$ the sliding variable: see [the mathematics](../mathematics.md).{brackets}"
 
 
 def _front(description: str) -> str:
-    return f"---\ndescription: {description!r}\n---\n\n" if "'" not in description else ""
+    if "'" not in description:
+        return f"---\ndescription: {description!r}\n---\n\n"
+    return ""
 
 
 def _link_up(plant: str) -> str:
@@ -136,14 +159,18 @@ def _figure(svg: bytes, caption: str) -> str:
 def _display(formula: str, names) -> str:
     """Return a formula as displayed equations, one a clause."""
     lines = "".join(
-        f"<div markdown>$\\displaystyle {notation.formula(c, names)}$</div>" for c in notation.clauses(formula)
+        f"<div markdown>$\\displaystyle {notation.formula(c, names)}$</div>"
+        for c in notation.clauses(formula)
     )
     return f'<div class="formula" markdown>{lines}</div>'
 
 
 def _call(template: Template) -> str:
     gains = "".join(f", {name}={gain.default:g}" for name, gain in list(template.gains.items())[:2])
-    plant = template.plants[0] if template.plants else "duffing"
+    if template.plants:
+        plant = template.plants[0]
+    else:
+        plant = "duffing"
     call = f'law = smc.law("{template.name}"{gains})'
     return f'import smc_mujoco as smc\n\n{call}\ntrace = smc.run(smc.Scenario(plant="{plant}", law=law))'.replace(
         "=inf", '=float("inf")'
@@ -157,8 +184,14 @@ def _gain_table(template: Template) -> str:
     said, rows = meanings(template), []
     for name, gain in template.gains.items():
         meaning, unit = said[name]
-        allowed = "> 0" if gain.positive else "≥ 0" if gain.nonnegative else "any"
-        default = "∞" if gain.default == float("inf") else f"{gain.default:g}"
+        if gain.positive:
+            allowed = "> 0"
+        else:
+            allowed = "≥ 0" if gain.nonnegative else "any"
+        if gain.default == float("inf"):
+            default = "∞"
+        else:
+            default = f"{gain.default:g}"
         tuned = "no" if gain.held else "yes"
         rows.append(
             f"| ${notation.symbol(name)}$ `{name}` | {meaning} | {_unit(unit)} | {default} | {allowed} | {tuned} |"
@@ -209,7 +242,11 @@ def _names(part: str, gains) -> list[str]:
     """Return the gains that a part of `Gains: ...` begins with."""
     names, rest = [], part
     while word := re.match(r"(?:,? and |, )?(\w+)(?:\s*\[[^\]]*\])?", rest):
-        if word[1] not in gains or word[1] in names or (names and not word[0].startswith((",", " and"))):
+        if (
+            word[1] not in gains
+            or word[1] in names
+            or (names and not word[0].startswith((",", " and")))
+        ):
             break
         names.append(word[1])
         rest = rest[word.end() :]
@@ -222,9 +259,17 @@ def _unit(text: str) -> str:
 
 
 def _properties(template: Template) -> str:
-    arrives = {"s": "$s = 0$ after a finite time", "e": "$e = 0$ after a finite time", "": "not in finite time"}
-    measured = ", ".join(f"`y.{field}`" for field in Measurement._fields if field in reads(template))
-    conditions = "; ".join(notation.sentence(words, template.gains) for words in template.conditions)
+    arrives = {
+        "s": "$s = 0$ after a finite time",
+        "e": "$e = 0$ after a finite time",
+        "": "not in finite time",
+    }
+    measured = ", ".join(
+        f"`y.{field}`" for field in Measurement._fields if field in reads(template)
+    )
+    conditions = "; ".join(
+        notation.sentence(words, template.gains) for words in template.conditions
+    )
     degree = template.relative_degree
     rows = {
         "relative degree": f"{degree}: acts on {notation.sentence(DEGREES[degree])}",
@@ -233,9 +278,14 @@ def _properties(template: Template) -> str:
         "conditions on the gains": conditions or "none on the gains alone",
         "gains to choose": ", ".join(f"`{gain}`" for gain in searched(template)) or "none",
         "measures": measured or "nothing",
-        "nominal model": "needed" if template.requires_model else 'optional, with `model="nominal"`',
-        "plants": ", ".join(f"`{plant}`" for plant in template.plants) or "all with an actuator at each joint",
-        "found by": ", ".join(f"`--needs {need}`" for need, one in PROPERTIES.items() if one.holds(template))
+        "nominal model": "needed"
+        if template.requires_model
+        else 'optional, with `model="nominal"`',
+        "plants": ", ".join(f"`{plant}`" for plant in template.plants)
+        or "all with an actuator at each joint",
+        "found by": ", ".join(
+            f"`--needs {need}`" for need, one in PROPERTIES.items() if one.holds(template)
+        )
         or "its name",
     }
     lines = "\n".join(f"| {what} | {words} |" for what, words in rows.items())
@@ -265,7 +315,9 @@ def _paragraphs(text: str, names, formula: str) -> Iterator[str]:
 def _without_head(text: str, formula: str) -> str:
     """Return a paragraph without `Name: formula.` at its beginning."""
     found = text.find(formula)
-    return text[found + len(formula) :].lstrip(". ") if found >= 0 and formula else "" if text.endswith(":") else text
+    if found >= 0 and formula:
+        return text[found + len(formula) :].lstrip(". ")
+    return "" if text.endswith(":") else text
 
 
 def _block(paragraph: str, names) -> str:
@@ -278,12 +330,20 @@ def _block(paragraph: str, names) -> str:
 
 def _prose(text: str, names) -> str:
     """Return sentences as Markdown; laws and plants that they name in backquotes are links."""
-    text = notation.sentence(text, names) if names is not None else text.replace("+-", "±").replace("<", "&lt;")
+    if names is not None:
+        text = notation.sentence(text, names)
+    else:
+        text = text.replace("+-", "±").replace("<", "&lt;")
 
     def linked(found: re.Match) -> str:
         name = found[1]
-        folder = "laws" if name in laws() else "plants" if name in plants() else ""
-        return f"[`{name}`](../{folder}/{name}.md)" if folder else found[0]
+        if name in laws():
+            folder = "laws"
+        else:
+            folder = "plants" if name in plants() else ""
+        if folder:
+            return f"[`{name}`](../{folder}/{name}.md)"
+        return found[0]
 
     return re.sub(r"`(\w+)`", linked, text)
 
@@ -292,8 +352,9 @@ def _c_form(name: str) -> str:
     """Return the law in C99, without the header that all exported laws share."""
     code = law_to_c(law(name)).rpartition(HEADER_END)[2].strip()
     made = f"`smc-mujoco export {name}.c` writes this law as one file, with [the header](../c.md) at its top."
-    return f'## In C {{ data-search-exclude }}\n\n{made}\n\n??? note "The law in C99"\n\n' + _indented(
-        f"```c\n{code}\n```"
+    return (
+        f'## In C {{ data-search-exclude }}\n\n{made}\n\n??? note "The law in C99"\n\n'
+        + _indented(f"```c\n{code}\n```")
     )
 
 
@@ -307,10 +368,16 @@ def _listing(title: str, intro: str, templates: Mapping[str, Template]) -> str:
     for name, template in templates.items():
         parsed = entry(template)
         words = re.search(r"[a-z]{4,}", parsed.formula) and "=" not in parsed.formula
-        formula = parsed.formula if words else _display(parsed.formula, template.gains)
+        if words:
+            formula = parsed.formula
+        else:
+            formula = _display(parsed.formula, template.gains)
         parts += [f"## {parsed.title or style.in_words(name)}", f"`{name}`", formula]
         parts += [_gain_table(template).removeprefix("## Gains\n\n").partition("\n\n")[0]]
-        parts += [body(template).replace("](../", "]("), _prose(parsed.source, None).replace("](../", "](")]
+        parts += [
+            body(template).replace("](../", "]("),
+            _prose(parsed.source, None).replace("](../", "]("),
+        ]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
@@ -327,13 +394,20 @@ def _plant_page(plant: Plant, drawn: Mapping[tuple[str, ...], bytes]) -> Page:
         f'<span style="--key: {colour}">{style.law_name(each)}</span>'
         for each, colour in zip(laws_shown, labels, strict=True)
     )
-    picture = f'![{title}]({name}.webp){{ loading=lazy width="1280" height="720" }}' * bool(drawn["still", name])
-    numbers = f"## Numbers and source\n\n{_prose(' '.join(' '.join(source).split()), None)}" if source else ""
+    picture = f'![{title}]({name}.webp){{ loading=lazy width="1280" height="720" }}' * bool(
+        drawn["still", name]
+    )
+    if source:
+        numbers = f"## Numbers and source\n\n{_prose(' '.join(' '.join(source).split()), None)}"
+    else:
+        numbers = ""
     more = ""
     if "\n\n" in "".join(source):  # paragraphs after the source
         first, _, rest = "".join(source).partition("\n\n")
         numbers = f"## Numbers and source\n\n{_prose(' '.join(first.split()), None)}"
-        more = "\n\n".join(_prose(" ".join(p.split()), plant.parameters) for p in rest.split("\n\n"))
+        more = "\n\n".join(
+            _prose(" ".join(p.split()), plant.parameters) for p in rest.split("\n\n")
+        )
     text = [
         f"# {title}",
         f"`{name}`",
@@ -372,17 +446,21 @@ def described(plant: Plant) -> str:
 
 
 def explained_by(plant: Plant) -> Plant | None:
-    """Return the plant whose module has the equation and parameters of this one, named as NAME.py, if there is one."""
+    """Return the plant whose module has the equation and parameters of this one, named as NAME.py,
+    if there is one.
+    """
     doc = described(plant)
     named = [name for name in re.findall(r"\b(\w+)\.py\b", doc) if name in plants()]
-    return plants()[named[0]] if named and not equation(doc)[1] else None
+    if named and not equation(doc)[1]:
+        return plants()[named[0]]
+    return None
 
 
 def equation(doc: str) -> tuple[str, list[str], str]:
     """Return a plant's title, its equations, and the rest of its docstring.
 
-    The equations stand in the first sentence, as in `Title: M x'' = u + d. Sentences ...`, or below it as an indented
-    block; there is none if another module has them.
+    The equations stand in the first sentence, as in `Title: M x'' = u + d. Sentences ...`, or below
+    it as an indented block; there is none if another module has them.
     """
     first, _, others = doc.strip().partition("\n\n")
     title, _, rest = first.partition(": ")
@@ -393,12 +471,17 @@ def equation(doc: str) -> tuple[str, list[str], str]:
         return title, [], f"{rest}\n\n{others}"
     words, rest = re.fullmatch(r"((?:[^=,]+, )*)(.*)", " ".join(rest.split())).groups()  # pyright: ignore
     end = re.search(r"\.\s|\.$|, |(?<=d)\s+\(", rest)
-    formula, more = (rest[: end.start()], rest[end.end() :].rstrip(".").removesuffix(")")) if end else (rest, "")
+    if end:
+        formula, more = (rest[: end.start()], rest[end.end() :].rstrip(".").removesuffix(")"))
+    else:
+        formula, more = (rest, "")
     return title, [formula], f"{words.rstrip(', ') or more}.\n\n{others}"
 
 
 def _joined(block: str) -> list[str]:
-    """Return the equations of an indented block; a line that is indented further continues the one before."""
+    """Return the equations of an indented block; a line that is indented further continues the one
+    before.
+    """
     found: list[str] = []
     for line in block.splitlines():
         if line.startswith("     ") and found:
@@ -416,7 +499,9 @@ def _equation(text: str, names) -> str:
     rows = [notation.clauses(row.strip()[1:-1].strip()) for row in right.split("\n")]
     if len(rows) == 1:
         rows = [[entry] for entry in rows[0]]
-    latex = r" \\ ".join(" & ".join(notation.formula(entry.strip(), names) for entry in row) for row in rows)
+    latex = r" \\ ".join(
+        " & ".join(notation.formula(entry.strip(), names) for entry in row) for row in rows
+    )
     return (
         f'<div class="formula" markdown><div markdown>${notation.formula(left, names)} = '
         rf"\begin{{pmatrix}} {latex} \end{{pmatrix}}$</div></div>"
@@ -426,27 +511,40 @@ def _equation(text: str, names) -> str:
 def _capital(text: str, plant: Plant) -> str:
     """Return a text that begins with a capital letter, unless with a symbol."""
     first = text.split(" ", maxsplit=1)[0]
-    return text if (len(first) == 1 and first != "a") or first in plant.parameters else capital(text)
+    if (len(first) == 1 and first != "a") or first in plant.parameters:
+        return text
+    return capital(text)
 
 
 def units(plant: Plant) -> list[str]:
-    """Return the unit of each parameter, from the comment beside or above them in the module that has them."""
+    """Return the unit of each parameter, from the comment beside or above them in the module that
+    has them.
+    """
     named = explained_by(plant) or plant
-    alike = (one for one in plants().values() if one.parameters == named.parameters)  # one may have another's
-    sources = (inspect.getsource(sys.modules[one.build.__module__]).splitlines() for one in (named, *alike))
+    alike = (
+        one for one in plants().values() if one.parameters == named.parameters
+    )  # one may have another's
+    sources = (
+        inspect.getsource(sys.modules[one.build.__module__]).splitlines() for one in (named, *alike)
+    )
     has = re.compile(r"(?:^[A-Z\d_]+ = |^ +parameters=)\{").search
     lines, at = next((lines, i) for lines in sources for i, line in enumerate(lines) if has(line))
-    above = list(itertools.takewhile(lambda line: line.strip().startswith("#"), reversed(lines[:at])))
-    comment = lines[at].partition("#")[2] or " ".join(line.partition("#")[2] for line in reversed(above))
+    above = list(
+        itertools.takewhile(lambda line: line.strip().startswith("#"), reversed(lines[:at]))
+    )
+    comment = lines[at].partition("#")[2] or " ".join(
+        line.partition("#")[2] for line in reversed(above)
+    )
     return [unit.strip() for unit in comment.split(",") if unit.strip()]
 
 
 def _parameters(plant: Plant) -> str:
-    rows = [
-        f"| `{name}` | ${notation.symbol(name)}$ | {value:g} | {_unit(unit)} |"
-        for (name, value), unit in zip(plant.parameters.items(), units(plant), strict=True)
-    ]
-    return "## Parameters\n\n| name | symbol | value | unit |\n|---|---|---|---|\n" + "\n".join(rows)
+    rows = []
+    for (name, value), unit in zip(plant.parameters.items(), units(plant), strict=True):
+        rows.append(f"| `{name}` | ${notation.symbol(name)}$ | {value:g} | {_unit(unit)} |")
+    return "## Parameters\n\n| name | symbol | value | unit |\n|---|---|---|---|\n" + "\n".join(
+        rows
+    )
 
 
 def _shape(plant: Plant) -> str:
@@ -454,7 +552,9 @@ def _shape(plant: Plant) -> str:
     start = ", ".join(f"{x:g} {unit}" for x, unit in zip(plant.x0, plant.units, strict=True))
     rows = {
         "joints": f"{plant.n}" + f", of which {plant.free} without an actuator" * bool(plant.free),
-        "size": f"`n` from {plant.sizes[0]} to {plant.sizes[1]}" if plant.sizes[1] > plant.n else "",
+        "size": f"`n` from {plant.sizes[0]} to {plant.sizes[1]}"
+        if plant.sizes[1] > plant.n
+        else "",
         "start": start,
         "obstacles, `contact=`": ", ".join(f'`"{name}"`' for name in plant.contacts),
         "builds, `mechanism=`": ", ".join(f'`"{name}"`' for name in plant.mechanisms),
@@ -471,8 +571,12 @@ def _shape(plant: Plant) -> str:
 
 def _mjcf(module) -> str:
     (name,) = set(re.findall(r'"(\w+\.xml)"', inspect.getsource(module)))
-    words = "One pendulum; the network composes `n` of them." if "compose(" in inspect.getsource(module) else ""
+    if "compose(" in inspect.getsource(module):
+        words = "One pendulum; the network composes `n` of them."
+    else:
+        words = ""
     code = model_path(name).read_text(encoding="utf-8").strip()
-    return f'## MJCF {{ data-search-exclude }}\n\n{words}\n\n??? note "models/{name}"\n\n' + _indented(
-        f"```xml\n{code}\n```"
+    return (
+        f'## MJCF {{ data-search-exclude }}\n\n{words}\n\n??? note "models/{name}"\n\n'
+        + _indented(f"```xml\n{code}\n```")
     )

@@ -1,7 +1,8 @@
 """Figures of the catalogue's pages, kept from one build to the next in .cache/site.
 
-A figure is drawn again if anything changes that it may depend on: the rooms of the package up to draw, the
-models, this file. SVGs are written into the pages, so that their ink is that of the page, light or dark.
+A figure is drawn again if anything changes that it may depend on: the rooms of the package up to
+draw, the models, this file. SVGs are written into the pages, so that their ink is that of the page,
+light or dark.
 """
 
 import hashlib
@@ -16,16 +17,29 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".cache" / "site"
 PLANTS = ("inverted_pendulum", "van_der_pol", "duffing")
-CONDITIONS = {"nominal": "#2E86C1", "noise + sine": "#D35400"}  # condition -> colour, seen on white and on slate
+CONDITIONS = {
+    "nominal": "#2E86C1",
+    "noise + sine": "#D35400",
+}  # condition -> colour, seen on white and on slate
 FLIGHT_LAWS = "geometric", "quaternion_sliding", "cascaded_pid"
-ARM_LAWS = ("computed_torque_sliding", "super_twisting_computed_torque", "passivity_based", "time_delay_sliding")
+ARM_LAWS = (
+    "computed_torque_sliding",
+    "super_twisting_computed_torque",
+    "passivity_based",
+    "time_delay_sliding",
+)
 PAPER_LAWS = ("observer_free", "classical", "adaptive", "super_twisting")
 # Rooms of the package that figures may depend on: those up to draw, as imports point down
 ROOMS = ("common", "mechanisms", "control", "simulation", "metrics", "analysis", "draw")
 DURATION = 4.0  # s, chosen: most laws settle in 2
 PAGE_COLOURS = {  # colour of smc_mujoco.draw.style -> that of the page, lighter or not
-    "INK": "", "DISTURBANCE": "", "MUTED": "--light", "RULE": "--lighter", "BAND": "--lightest", "GRID": "--lightest",
-}  # fmt: skip
+    "INK": "",
+    "DISTURBANCE": "",
+    "MUTED": "--light",
+    "RULE": "--lighter",
+    "BAND": "--lightest",
+    "GRID": "--lightest",
+}
 WIDTH, HEIGHT = 3.5, 3.5  # inches of a figure
 
 
@@ -71,7 +85,8 @@ def still(plant: str) -> bytes:
 
 
 def plant_laws(plant: str) -> tuple[str, ...]:
-    """Return the paper's laws if they can drive every joint of the plant, else the laws for it; without any, `none`.
+    """Return the paper's laws if they can drive every joint of the plant, else the laws for it;
+    without any, `none`.
 
     For an arm these are laws of many joints, for a free body laws of flight.
     """
@@ -82,16 +97,23 @@ def plant_laws(plant: str) -> tuple[str, ...]:
         return FLIGHT_LAWS
     if smc.plant(plant).rest:
         return ARM_LAWS
-    return PAPER_LAWS if set(PAPER_LAWS) <= set(known) else tuple(name for name in known if name != "none") or ("none",)
+    if set(PAPER_LAWS) <= set(known):
+        return PAPER_LAWS
+    return tuple(name for name in known if name != "none") or ("none",)
 
 
 def _case(plant: str, law: str, condition: str):
-    """Return the scenario of a figure: tuned gains if there are any; a pendulum that swings up begins at rest."""
+    """Return the scenario of a figure: tuned gains if there are any; a pendulum that swings up
+    begins at rest.
+    """
     import smc_mujoco as smc
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.simulation.grid import case
 
-    changes = {"x0": 3.1, "u_max": 1.2} if law == "swing_up" else {}
+    if law == "swing_up":
+        changes = {"x0": 3.1, "u_max": 1.2}
+    else:
+        changes = {}
     try:
         return case(plant, law, condition, DURATION, changes=changes)
     except ScenarioError:
@@ -110,11 +132,16 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
 
     traces = [finite(trace) for trace in traces]
     shown = []
-    for panel in (panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)):
-        lanes = [
-            (panel._replace(traces=[trace]), [colour]) for trace, colour in zip(panel.traces, colours, strict=True)
-        ]
-        shown += lanes if panel.quantity == "u" and panels.crowded(panel) else [(panel, colours)]
+    for panel in (
+        panel for quantity in ("x", "u") for panel in panels.over_groups(traces, quantity)
+    ):
+        lanes = []
+        for trace, colour in zip(panel.traces, colours, strict=True):
+            lanes.append((panel._replace(traces=[trace]), [colour]))
+        if panel.quantity == "u" and panels.crowded(panel):
+            shown += lanes
+        else:
+            shown += [(panel, colours)]
     with style.page():
         import matplotlib
 
@@ -128,11 +155,18 @@ def _svg(traces: Sequence, colours: Sequence[str]) -> bytes:
         axes[-1].set_xlabel("time (s)")
         figure.align_ylabels(axes)
         file = io.BytesIO()
-        figure.savefig(file, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+        figure.savefig(
+            file, format="svg", transparent=True, metadata={"Date": None, "Creator": None}
+        )
     text = file.getvalue().decode()
     text = text[text.index("<svg") :]
     for old, new in PAGE_COLOURS.items():
-        text = re.sub(rf"{getattr(style, old)}\b", f"var(--md-default-fg-color{new})", text, flags=re.IGNORECASE)
+        text = re.sub(
+            rf"{getattr(style, old)}\b",
+            f"var(--md-default-fg-color{new})",
+            text,
+            flags=re.IGNORECASE,
+        )
     text = re.sub(rf"{style.PAPER}\b", "var(--md-default-bg-color)", text, flags=re.IGNORECASE)
     text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
     text = re.sub(r' d="[^"]+"', _rounded, text)
@@ -159,14 +193,17 @@ def _version(also: Iterable[Path]) -> str:
 
 def _draw(name: str, draw: Callable[..., bytes], arguments: tuple[str, ...]) -> tuple[str, bytes]:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # figures show what a condition does, whatever a law asks for
+        warnings.simplefilter(
+            "ignore"
+        )  # figures show what a condition does, whatever a law asks for
         return name, draw(*arguments)
 
 
 def figures(
     wanted: Iterable[tuple[Callable[..., bytes], tuple[str, ...]]], also: Iterable[Path] = ()
 ) -> dict[tuple[str, ...], bytes]:
-    """Return (function's name, its arguments ...) -> the figure; what is not in the cache is drawn on all cores.
+    """Return (function's name, its arguments ...) -> the figure; what is not in the cache is drawn
+    on all cores.
 
     Args:
       wanted: functions and their arguments.
@@ -187,7 +224,10 @@ def figures(
                 if not old.name.endswith(version):
                     old.unlink()
         with ProcessPoolExecutor(os.cpu_count()) as pool:
-            futures = [(key, path, pool.submit(_draw, path.name, draw, key[1:])) for key, path, draw in jobs]
+            futures = [
+                (key, path, pool.submit(_draw, path.name, draw, key[1:]))
+                for key, path, draw in jobs
+            ]
             for key, path, future in futures:
                 found[key] = future.result()[1]
                 part = path.with_suffix(f".{os.getpid()}")

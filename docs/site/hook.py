@@ -1,5 +1,8 @@
-"""What the site adds to docs/: README's first screen, films, notebooks, the C header, pages of laws and plants, tables
-of metrics, scenes and claims, equations."""
+"""What the site adds to docs/:
+
+README's first screen, films, notebooks, the C header, pages of laws and plants, tables of metrics,
+scenes and claims, equations.
+"""
 
 import re
 import sys
@@ -22,7 +25,9 @@ import notebooks  # noqa: E402
 from mathml import font, typeset  # noqa: E402
 
 PAGES: list[catalogue.Page] = []  # of this build
-BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5} | dict.fromkeys(known.reference(), 0.3)  # in search
+BOOST = {"mathematics.md": 2.0, "run_study.md": 1.5} | dict.fromkeys(
+    known.reference(), 0.3
+)  # in search
 
 
 def on_config(config):
@@ -53,7 +58,11 @@ def on_files(files, config):
     for path, content in (notebooks.pages() | known.reference()).items():
         files.append(File.generated(config, path, content=content))
     for name in ("site.css", "iframe-worker.js"):
-        files.append(File.generated(config, f"assets/{name}", abs_src_path=str(ROOT / "docs" / "site" / name)))
+        files.append(
+            File.generated(
+                config, f"assets/{name}", abs_src_path=str(ROOT / "docs" / "site" / name)
+            )
+        )
     files.append(File.generated(config, "assets/stix-two-math.ttf", content=font()))
     for path, picture in catalogue.files(catalogue.stills()).items():
         files.append(File.generated(config, path, content=picture))
@@ -61,17 +70,24 @@ def on_files(files, config):
 
 
 def on_page_markdown(markdown, page, config, files):
-    """Put README's first screen and the package's tables where the page asks for them, link names, and weigh the page
-    for the search."""
+    """Put README's first screen and the package's tables where the page asks for them, link names,
+    and weigh the page for the search.
+    """
     if boost := BOOST.get(page.file.src_uri):
         page.meta["search"] = {"boost": boost}
-    first, _, _ = (ROOT / "README.md").read_text(encoding="utf-8").partition("\n<!-- end of the first screen -->")
+    first, _, _ = (
+        (ROOT / "README.md")
+        .read_text(encoding="utf-8")
+        .partition("\n<!-- end of the first screen -->")
+    )
     markdown = known.filled(markdown.replace(HERE, first.replace("](docs/", "](")))
     for place in (f"{GALLERY}/", HEADER):
         markdown = markdown.replace(f"](../{place}", f"]({place}")
     if page.file.src_uri == notebooks.LISTED:
         markdown = markdown.replace(".ipynb)", ".md)")
-    return linked(markdown) if page.file.src_uri == CATALOGUE else markdown
+    if page.file.src_uri == CATALOGUE:
+        return linked(markdown)
+    return markdown
 
 
 def linked(markdown: str) -> str:
@@ -82,7 +98,9 @@ def linked(markdown: str) -> str:
         if not line.startswith("|"):
             return line
         return re.sub(
-            r"`(\w+)`", lambda found: f"[{found[0]}]({paths[found[1]]})" if found[1] in paths else found[0], line
+            r"`(\w+)`",
+            lambda found: f"[{found[0]}]({paths[found[1]]})" if found[1] in paths else found[0],
+            line,
         )
 
     return "\n".join(map(link, markdown.split("\n")))

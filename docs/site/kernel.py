@@ -1,8 +1,10 @@
-"""Run the cells of a notebook in IPython, as a notebook's kernel does, and write what each shows as JSON.
+"""Run the cells of a notebook in IPython, as a notebook's kernel does, and write what each shows as
+JSON.
 
 python kernel.py NOTEBOOK FILE [BEFORE [AFTER]]    # BEFORE and AFTER are code that runs first and last
 
-FILE gets a list for each cell: its outputs, MIME type -> content, pictures in base64. What is printed is text/plain.
+FILE gets a list for each cell: its outputs, MIME type -> content, pictures in base64. What is
+printed is text/plain.
 """
 
 import base64
@@ -24,22 +26,35 @@ def main() -> None:
     notebook, file, *more = sys.argv[1:]
     cells = json.loads(Path(notebook).read_text("utf-8"))["cells"]
     before, after = [*more, "", ""][:2]
-    config = Config(InteractiveShell={"ipython_dir": str(Path.cwd())}, HistoryManager={"enabled": False})
+    config = Config(
+        InteractiveShell={"ipython_dir": str(Path.cwd())}, HistoryManager={"enabled": False}
+    )
     shell = ZMQInteractiveShell.instance(config=config)
     _shown(shell, before)
-    shown = [_shown(shell, "".join(cell["source"])) for cell in cells if cell["cell_type"] == "code"]
+    shown = []
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            shown.append(_shown(shell, "".join(cell["source"])))
     _shown(shell, after)
     Path(file).write_text(json.dumps(shown))
 
 
 def _shown(shell: InteractiveShell, code: str) -> list[dict[str, str]]:
-    """Run a cell and return its outputs, without those that are updated while it runs: progress bars."""
-    with shell.display_trap, capture_output() as caught:  # run_cell would set its own hook in place of the capture
+    """Run a cell and return its outputs, without those that are updated while it runs: progress
+    bars.
+    """
+    with (
+        shell.display_trap,
+        capture_output() as caught,
+    ):  # run_cell would set its own hook in place of the capture
         done = shell.run_cell(code)
     sys.stderr.write(caught.stderr)
     if not done.success:
         sys.exit(caught.stdout)
-    printed = [{"text/plain": caught.stdout}] if caught.stdout else []
+    if caught.stdout:
+        printed = [{"text/plain": caught.stdout}]
+    else:
+        printed = []
     return printed + [
         {kind: _text(content) for kind, content in output.data.items()}
         for output in caught.outputs
@@ -48,7 +63,9 @@ def _shown(shell: InteractiveShell, code: str) -> list[dict[str, str]]:
 
 
 def _text(content: str | bytes) -> str:
-    return base64.b64encode(content).decode() if isinstance(content, bytes) else content
+    if isinstance(content, bytes):
+        return base64.b64encode(content).decode()
+    return content
 
 
 if __name__ == "__main__":

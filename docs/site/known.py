@@ -1,4 +1,6 @@
-"""What pages show that the package knows, written into them when the site is built: a marker in a page -> its text."""
+"""What pages show that the package knows, written into them when the site is built: a marker in a
+page -> its text.
+"""
 
 import inspect
 import json
@@ -19,14 +21,23 @@ from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.metrics.catalogue import metrics
 from smc_mujoco.studies import scene
 
-AUDITS = json.loads((Path(__file__).parent / "verdicts.json").read_text(encoding="utf-8"))  # see test_full_verdicts.py
-TASKS = re.compile(r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE)  # of the package's docstring
+AUDITS = json.loads(
+    (Path(__file__).parent / "verdicts.json").read_text(encoding="utf-8")
+)  # see test_full_verdicts.py
+TASKS = re.compile(
+    r"^    ([A-Z][a-z ,]+): ((?:.|\n {8})+)$", re.MULTILINE
+)  # of the package's docstring
 
 SHELVES = {  # module of public names -> title of its page
-    "signals": "References and disturbances", "hardware": "Real mechanisms", "design": "Gains from theory",
-    "fidelity": "Fidelity", "metrics": "Scores of joints and tips", "exchange": "Laws from and to C and FMUs",
-    "envs": "Environments for agents", "errors": "Warnings",
-}  # fmt: skip
+    "signals": "References and disturbances",
+    "hardware": "Real mechanisms",
+    "design": "Gains from theory",
+    "fidelity": "Fidelity",
+    "metrics": "Scores of joints and tips",
+    "exchange": "Laws from and to C and FMUs",
+    "envs": "Environments for agents",
+    "errors": "Warnings",
+}
 OTHERS = {  # title -> names of modules that are no public names
     "Types that are returned": """
     studies.compare.Compared
@@ -72,17 +83,26 @@ def tasks() -> dict[str, list[str]]:
 def entries() -> dict[str, list[str]]:
     """Return title -> the names on a page of the reference, with their modules."""
     origins = smc._SHELF.origins  # pyright: ignore[reportAttributeAccessIssue] private
-    found = {task: [f"{origins[name]}.{name}" for name in its if name in origins] for task, its in tasks().items()}
-    shelves = {
-        title: [_path(getattr(getattr(smc, shelf), name)) for name in getattr(smc, shelf).__all__]
-        for shelf, title in SHELVES.items()
-    }
-    return found | shelves | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
+    found = {}
+    for task, its in tasks().items():
+        found[task] = [f"{origins[name]}.{name}" for name in its if name in origins]
+    shelves = {}
+    for shelf, title in SHELVES.items():
+        shelves[title] = [
+            _path(getattr(getattr(smc, shelf), name)) for name in getattr(smc, shelf).__all__
+        ]
+    return (
+        found
+        | shelves
+        | {title: [f"smc_mujoco.{name}" for name in its.split()] for title, its in OTHERS.items()}
+    )
 
 
 def _path(thing: Any) -> str:
     """Return the full name of a function, class or module."""
-    return thing.__name__ if inspect.ismodule(thing) else f"{thing.__module__}.{thing.__qualname__}"
+    if inspect.ismodule(thing):
+        return thing.__name__
+    return f"{thing.__module__}.{thing.__qualname__}"
 
 
 def reference() -> dict[str, str]:
@@ -128,15 +148,21 @@ def definitions() -> Iterator[str]:
 
 
 def instead() -> Iterator[str]:
-    """Yield a table of what holds instead of each claim of Gaber's paper that does not hold everywhere."""
+    """Yield a table of what holds instead of each claim of Gaber's paper that does not hold
+    everywhere.
+    """
     yield "| claim | instead | shown by |\n|---|---|---|"
     for claim in paper("gaber").claims.values():
         if claim.instead:
-            yield _row(f"{claim.id}: {_plain(claim.text)}", _plain(claim.instead), f"`{claim.shown_by}`")
+            yield _row(
+                f"{claim.id}: {_plain(claim.text)}", _plain(claim.instead), f"`{claim.shown_by}`"
+            )
 
 
 def audits() -> Iterator[str]:
-    """Yield a table of the audits: what was read, and how many sentences of the paper have each verdict."""
+    """Yield a table of the audits: what was read, and how many sentences of the paper have each
+    verdict.
+    """
     kinds = VERDICTS[:-1]
     heads = "audit", "read", *(MARKS[kind] for kind in kinds), "derived", "questions"
     yield f"{_row(*heads)}\n|{'---|' * len(heads)}"
@@ -144,12 +170,17 @@ def audits() -> Iterator[str]:
         about = paper(name)
         whose = {id: claim.whose for id, claim in about.claims.items()}
         own = [verdict for id, (verdict, _) in shown.items() if whose[id] == PAPER]
-        counts = [*map(own.count, kinds), *(list(whose.values()).count(kind) for kind in (DERIVED, OURS))]
+        counts = [
+            *map(own.count, kinds),
+            *(list(whose.values()).count(kind) for kind in (DERIVED, OURS)),
+        ]
         yield _row(f"`{name}`", about.read, *(str(count) if count else "" for count in counts))
 
 
 def decisions() -> Iterator[str]:
-    """Yield each audit's claims with their verdicts and the checks that decide, in a box that opens."""
+    """Yield each audit's claims with their verdicts and the checks that decide, in a box that
+    opens.
+    """
     for name, shown in AUDITS.items():
         about = paper(name)
         yield f'\n??? note "{about.authors}: {about.title}"\n'

@@ -1,7 +1,7 @@
 """LaTeX as MathML, which browsers typeset by themselves: a page with equations asks for no script.
 
-Their font is STIX Two Math, as the package ziamath ships it: systems without a font for mathematics, such as most of
-Linux, would set them badly.
+Their font is STIX Two Math, as the package ziamath ships it: systems without a font for
+mathematics, such as most of Linux, would set them badly.
 """
 
 import functools
@@ -15,14 +15,20 @@ from fontTools import subset
 from fontTools.ttLib import TTFont
 from latex2mathml.converter import convert
 
-PRIMED = re.compile(r"<msup>(<mi>[^<]*</mi>|<mrow>(?:(?!<msup>).)*?</mrow>)<mi>(&#x0203[234];|&#x02057;)</mi></msup>")
-FUNCTION = re.compile(r"\\(sin|cos|tanh|cosh|max|min)(?![A-Za-z])((?:[_^](?:\w|\{\w+\}))*)\s*(?P<bracket>\(?)")
+PRIMED = re.compile(
+    r"<msup>(<mi>[^<]*</mi>|<mrow>(?:(?!<msup>).)*?</mrow>)<mi>(&#x0203[234];|&#x02057;)</mi></msup>"
+)
+FUNCTION = re.compile(
+    r"\\(sin|cos|tanh|cosh|max|min)(?![A-Za-z])((?:[_^](?:\w|\{\w+\}))*)\s*(?P<bracket>\(?)"
+)
 MATH = re.compile(r'<(span|div) class="arithmatex">\s*\\([(\[])(.*?)\\[)\]]\s*</\1>', re.DOTALL)
-# a minus after a relation, a comma or an opening bracket is a sign; else it would have the space of a difference
+# a minus after a relation, a comma or an opening bracket is a sign; else it would have the space of
+# a difference
 SIGN = re.compile(
     r"(<mo[^>]*>(?:&#x0003D;|&#x0226[45];|&#x0003[CE];|&#x02192;|&#x0002C;|&#x00028;)</mo>)<mo>&#x02212;</mo>"
 )
-LETTERS = [  # Unicode ranges that equations use: Latin, Greek, punctuation, operators, arrows, brackets, italics
+# Unicode ranges that equations use: Latin, Greek, punctuation, operators, arrows, brackets, italics
+LETTERS = [
     (0x20, 0x7E), (0xA0, 0xFF), (0x2C6, 0x2DC), (0x300, 0x308), (0x391, 0x3F5), (0x2010, 0x2057), (0x210E, 0x210F),
     (0x2190, 0x21D4), (0x2200, 0x22EF), (0x2308, 0x230B), (0x23B0, 0x23E1), (0x1D434, 0x1D467), (0x1D6E2, 0x1D71B),
 ]  # fmt: skip
@@ -35,7 +41,9 @@ def font() -> bytes:
     assert spec is not None
     assert spec.origin is not None
     whole = TTFont(Path(spec.origin).parent / "fonts" / "STIXTwoMath-Regular.ttf")
-    cut = subset.Subsetter(subset.Options(layout_features=["ssty", "mark", "mkmk", "dtls"], notdef_outline=True))
+    cut = subset.Subsetter(
+        subset.Options(layout_features=["ssty", "mark", "mkmk", "dtls"], notdef_outline=True)
+    )
     cut.populate(unicodes=[code for first, last in LETTERS for code in range(first, last + 1)])
     cut.subset(whole)
     file = io.BytesIO()
@@ -54,14 +62,18 @@ REPAIRS = [  # pattern, replacement: what browsers space or raise wrongly
 @functools.cache
 def mathml(latex: str, block: bool = False) -> str:
     """Return LaTeX as MathML; a long equation is in an element that scrolls."""
-    latex = latex.replace(r"\lvert", r"\left|").replace(r"\rvert", r"\right|")  # else there is space before the second
+    latex = latex.replace(r"\lvert", r"\left|").replace(
+        r"\rvert", r"\right|"
+    )  # else there is space before the second
     latex = FUNCTION.sub(lambda f: rf"\,\mathrm{{{f[1]}}}{f[2]}" + (f["bracket"] or r"\,"), latex)
     text = convert(latex, display="block" if block else "inline")
     for pattern, replacement in REPAIRS:
         text = pattern.sub(replacement, text)
     if block:
         return f'<div class="equation">{text}</div>'
-    return f'<span class="long equation">{text}</span>' if len(latex) > LONG else text
+    if len(latex) > LONG:
+        return f'<span class="long equation">{text}</span>'
+    return text
 
 
 def typeset(page: str) -> str:

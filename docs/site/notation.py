@@ -1,8 +1,10 @@
-"""The plain notation of docstrings as LaTeX: `u = -k1 [s]^(1/2) + w`, also in the middle of a sentence.
+"""The plain notation of docstrings as LaTeX:
 
-What the notation means: `k1` is k with index 1, `w_max` has a word as index, `x_(i+1)` an expression; `de` is e'; the
-field's brackets in `[s]^p` mean |s|^p sgn(s); `a / b` with spaces is a fraction, `a/b` is not; `d^` has a hat, `w+` is
-the next value, `u_` the last one.
+`u = -k1 [s]^(1/2) + w`, also in the middle of a sentence.
+
+What the notation means: `k1` is k with index 1, `w_max` has a word as index, `x_(i+1)` an
+expression; `de` is e'; the field's brackets in `[s]^p` mean |s|^p sgn(s); `a / b` with spaces is a
+fraction, `a/b` is not; `d^` has a hat, `w+` is the next value, `u_` the last one.
 """
 
 import re
@@ -10,19 +12,69 @@ from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 GREEK = {
-    "lam": r"\lambda", "gamma": r"\gamma", "phi": r"\varphi", "eps": r"\varepsilon", "sigma": r"\sigma", "mu": r"\mu",
-    "tau": r"\tau", "alpha": r"\alpha", "beta": r"\beta", "delta": r"\delta", "pi": r"\pi",
-}  # fmt: skip
-FUNCTIONS = ("sgn", "sat", "tanh", "atanh", "sech", "sqrt", "min", "max", "sup", "exp", "ln", "cos", "sin")
+    "lam": r"\lambda",
+    "gamma": r"\gamma",
+    "phi": r"\varphi",
+    "eps": r"\varepsilon",
+    "sigma": r"\sigma",
+    "mu": r"\mu",
+    "tau": r"\tau",
+    "alpha": r"\alpha",
+    "beta": r"\beta",
+    "delta": r"\delta",
+    "pi": r"\pi",
+}
+FUNCTIONS = (
+    "sgn",
+    "sat",
+    "tanh",
+    "atanh",
+    "sech",
+    "sqrt",
+    "min",
+    "max",
+    "sup",
+    "exp",
+    "ln",
+    "cos",
+    "sin",
+)
 SYMBOLS = {  # names of several letters
-    "de": "e'", "dt": r"\Delta t", "dq": "q'", "ds": r"\delta s", "eq": r"v_{\mathrm{eq}}", "inf": r"\infty",
-    "grav": r"\mathrm{grav}", "int": r"\int", "gq": "g_q", "fq": "f_q", "bq": "b_q", "kp": "k_p", "ki": "k_i",
-    "kd": "k_d", "kc": "k_c", "tt": "t_t", "cf": "c_f", "cfq": "c_{fq}", "Jp": "J_p", "Jc": "J_c", "Ir": "I_r",
-}  # fmt: skip
+    "de": "e'",
+    "dt": r"\Delta t",
+    "dq": "q'",
+    "ds": r"\delta s",
+    "eq": r"v_{\mathrm{eq}}",
+    "inf": r"\infty",
+    "grav": r"\mathrm{grav}",
+    "int": r"\int",
+    "gq": "g_q",
+    "fq": "f_q",
+    "bq": "b_q",
+    "kp": "k_p",
+    "ki": "k_i",
+    "kd": "k_d",
+    "kc": "k_c",
+    "tt": "t_t",
+    "cf": "c_f",
+    "cfq": "c_{fq}",
+    "Jp": "J_p",
+    "Jc": "J_c",
+    "Ir": "I_r",
+}
 OPERATORS = {
-    "<=": r"\le ", ">=": r"\ge ", "+-": r"\pm ", "->": r"\to ", ">>": r"\gg ", "~": r"\approx ", "..": r"\dots ",
-    "+=": r"\mathrel{+}= ", "<": r"\lt ", ">": r"\gt ", "%": r"\%",
-}  # fmt: skip
+    "<=": r"\le ",
+    ">=": r"\ge ",
+    "+-": r"\pm ",
+    "->": r"\to ",
+    ">>": r"\gg ",
+    "~": r"\approx ",
+    "..": r"\dots ",
+    "+=": r"\mathrel{+}= ",
+    "<": r"\lt ",
+    ">": r"\gt ",
+    "%": r"\%",
+}
 OPEN, CLOSE = {"(": ")", "[": "]", "{": "}"}, {")": "(", "]": "[", "}": "{"}
 ARTICLES = ("a", "A", "I")
 TOKEN = re.compile(
@@ -66,13 +118,22 @@ def is_symbol(token: Token, after: Token | None, gains: Collection[str]) -> bool
         return False
     text = token.text
     if text in ARTICLES and not token.mark:
-        if after is None or after.kind not in ("name", "word", "code") or not after.space or after.text in FUNCTIONS:
+        if (
+            after is None
+            or after.kind not in ("name", "word", "code")
+            or not after.space
+            or after.text in FUNCTIONS
+        ):
             return True
         return text in gains and is_symbol(after, None, gains)
     known = text in gains or text in GREEK or text in FUNCTIONS or text in SYMBOLS
     head = text.partition("_")[0].rstrip("0123456789")
     return (
-        known or len(head) == 1 or head in GREEK or head in FUNCTIONS or (len(head) == 2 and token.mark.startswith("'"))
+        known
+        or len(head) == 1
+        or head in GREEK
+        or head in FUNCTIONS
+        or (len(head) == 2 and token.mark.startswith("'"))
     )
 
 
@@ -98,7 +159,11 @@ def sentence(text: str, gains: Collection[str] = ()) -> str:
     for i, token in enumerate(found):
         after = found[i + 1] if i + 1 < len(found) else None
         ends = token.text in (",", ";") and (after is None or after.space != "")  # of a clause
-        math = token.kind in ("number", "operator") and token.text not in ".:!?\"'&" and not (ends and not _open(run))
+        math = (
+            token.kind in ("number", "operator")
+            and token.text not in ".:!?\"'&"
+            and not (ends and not _open(run))
+        )
         before = found[i - 1] if i else None
         if not _is_unit(before, token, after) and (math or is_symbol(token, after, gains)):
             run.append(token)
@@ -109,7 +174,9 @@ def sentence(text: str, gains: Collection[str] = ()) -> str:
 
 
 def _is_unit(before: Token | None, token: Token, after: Token | None) -> bool:
-    """Return whether a letter is a unit: after a number or the word "in", with a space; so is the m of N m."""
+    """Return whether a letter is a unit: after a number or the word "in", with a space; so is the m
+    of N m.
+    """
     if token.text not in ("m", "N", "s") or token.mark or before is None or not token.space:
         return False
     if (before.text, token.text) == ("N", "m"):
@@ -160,7 +227,9 @@ def _unmatched(run: list[Token]) -> int | None:
                 return i
             places.pop()
     bars = [i for i, token in enumerate(run) if token.text == "|"]
-    return places[-1] if places else bars[-1] if len(bars) % 2 else None
+    if places:
+        return places[-1]
+    return bars[-1] if len(bars) % 2 else None
 
 
 class Parser:
@@ -171,7 +240,9 @@ class Parser:
 
     def peek(self, ahead: int = 0) -> Token | None:
         at = self.at + ahead
-        return self.tokens[at] if at < len(self.tokens) else None
+        if at < len(self.tokens):
+            return self.tokens[at]
+        return None
 
     def take(self) -> Token:
         self.at += 1
@@ -197,7 +268,11 @@ class Parser:
             return rf"\mathrm{{{_escaped(token.text.strip('`'))}}}"
         if token.kind in ("word", "name"):
             words = [token]
-            while (more := self.peek()) and more.kind in ("word", "name") and not self.starts_factor(more):
+            while (
+                (more := self.peek())
+                and more.kind in ("word", "name")
+                and not self.starts_factor(more)
+            ):
                 words.append(self.take())
             text = "".join(word.space + _plain(word) for word in words).strip()
             return r"\;" * (self.at > len(words)) + rf"\text{{{text}}}\;"
@@ -210,13 +285,21 @@ class Parser:
             return True
         if token.text == "|":
             return True
-        return is_symbol(token, self.peek(1), self.gains) if self.peek() is token else token.kind == "name"
+        if self.peek() is token:
+            return is_symbol(token, self.peek(1), self.gains)
+        return token.kind == "name"
 
     def product(self) -> str:
         """Return factors side by side, and a fraction where a spaced slash follows them."""
         factors = [self.factor()]
         while token := self.peek():
-            if self.fractions and token.text == "/" and token.space and (after := self.peek(1)) and after.space:
+            if (
+                self.fractions
+                and token.text == "/"
+                and token.space
+                and (after := self.peek(1))
+                and after.space
+            ):
                 self.take()
                 over, under = self.bare(factors), self.bare([self.factor()])
                 factors = [rf"\frac{{{over}}}{{{under}}}"]
@@ -235,7 +318,9 @@ class Parser:
     def bare(self, factors: list[str]) -> str:
         """Return factors without the brackets around all of them."""
         text = "".join(_spaced(factors)).strip()
-        return text[1:-1].strip() if len(factors) == 1 and text.startswith("(") and _closes(text) else text
+        if len(factors) == 1 and text.startswith("(") and _closes(text):
+            return text[1:-1].strip()
+        return text
 
     def factor(self) -> str:
         """Return an atom with its exponent."""
@@ -250,7 +335,10 @@ class Parser:
                 self.take()
         elif token.kind == "number":
             mantissa, e, power = token.text.partition("e")
-            base = rf"{mantissa} \cdot 10^{{{power}}}" if e else mantissa
+            if e:
+                base = rf"{mantissa} \cdot 10^{{{power}}}"
+            else:
+                base = mantissa
         else:
             base = self.name(token)
         if (caret := self.peek()) and caret.text == "^":
@@ -271,8 +359,13 @@ class Parser:
         return f"{token.text}{inside}{end}"
 
     def exponent(self) -> str:
-        sign = self.take().text if (token := self.peek()) and token.text == "-" else ""
-        return sign + self.bare([self.factor()]) if self.peek() else sign
+        if (token := self.peek()) and token.text == "-":
+            sign = self.take().text
+        else:
+            sign = ""
+        if self.peek():
+            return sign + self.bare([self.factor()])
+        return sign
 
     def name(self, token: Token) -> str:
         """Return a symbol with its index and its mark, or a function with its argument."""
@@ -284,7 +377,11 @@ class Parser:
             if (caret := self.peek()) and caret.text == "^":
                 self.take()
                 name += rf"^{{{self.exponent()}}}"
-            return name + (self.group(self.take()) if (bracket := self.peek()) and bracket.text == "(" else r"\,")
+            return name + (
+                self.group(self.take())
+                if (bracket := self.peek()) and bracket.text == "("
+                else r"\,"
+            )
         return marked(symbol(text, self.index()), token.mark) + self.arguments()
 
     def index(self) -> str:
@@ -301,13 +398,17 @@ class Parser:
     def arguments(self) -> str:
         """Return what stands in brackets right after a name."""
         token = self.peek()
-        return self.group(self.take()) if token and token.text == "(" and not token.space else ""
+        if token and token.text == "(" and not token.space:
+            return self.group(self.take())
+        return ""
 
 
 def _spaced(factors: list[str]) -> Iterator[str]:
     """Yield factors with a thin space beside those of several letters, and between two numbers."""
     for before, factor in zip(["", *factors], factors, strict=False):
-        wide = r"\mathrm" in (factor[:7], before[:7]) or ((before[-1:] or "x").isdigit() and factor[:1].isdigit())
+        wide = r"\mathrm" in (factor[:7], before[:7]) or (
+            (before[-1:] or "x").isdigit() and factor[:1].isdigit()
+        )
         apart = before and wide and "/" not in (before, factor)
         yield (r"\," if apart else " ") + factor
 
@@ -339,10 +440,16 @@ def symbol(text: str, index: str = "") -> str:
         *(part if len(part) == 1 or part.isdigit() else rf"\mathrm{{{part}}}" for part in rest),
     ]
     below = [part for part in [*below, index, "-" * last] if part]
-    base = GREEK.get(letters) or SYMBOLS.get(letters) or (letters if len(letters) == 1 else rf"\mathrm{{{letters}}}")
+    base = (
+        GREEK.get(letters)
+        or SYMBOLS.get(letters)
+        or (letters if len(letters) == 1 else rf"\mathrm{{{letters}}}")
+    )
     base, indexed, first = base.partition("_")  # cf1 is c with index f, 1
     below = [first.strip("{}")] * bool(indexed) + below
-    return rf"{base}_{{{','.join(below)}}}" if below else base
+    if below:
+        return rf"{base}_{{{','.join(below)}}}"
+    return base
 
 
 def marked(base: str, mark: str) -> str:

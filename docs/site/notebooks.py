@@ -23,7 +23,9 @@ FILM = re.compile(r'src="data:video/mp4;base64,([^"]+)"')
 
 def names() -> list[str]:
     """Return the names of the notebooks, in the order of the page that lists them."""
-    return re.findall(r"\(notebooks/(\w+)\.ipynb\)", (ROOT / "docs" / LISTED).read_text(encoding="utf-8"))
+    return re.findall(
+        r"\(notebooks/(\w+)\.ipynb\)", (ROOT / "docs" / LISTED).read_text(encoding="utf-8")
+    )
 
 
 def outputs(name: str) -> bytes:
@@ -46,7 +48,9 @@ def pages() -> dict[str, str | bytes]:
 
 
 def _page(name: str, shown: list[list[dict[str, str]]]) -> tuple[list[str], dict[str, str | bytes]]:
-    """Return the parts of a notebook's page as Markdown, and path -> content of its pictures and films."""
+    """Return the parts of a notebook's page as Markdown, and path -> content of its pictures and
+    films.
+    """
     cells = json.loads((FOLDER / f"{name}.ipynb").read_text(encoding="utf-8"))["cells"]
     of_cell, files, parts = iter(shown), {}, []
     for cell in cells:
@@ -70,7 +74,8 @@ def _output(output: dict[str, str], stem: str, files: dict[str, str | bytes]) ->
     """Return what a cell shows as Markdown; a picture or film goes to `files`."""
     if picture := output.get("image/png"):
         files[f"notebooks/{stem}.png"] = base64.b64decode(picture)
-        return f"[![Figure]({stem}.png){{ .output loading=lazy }}]({stem}.png)"  # large when it is clicked
+        # large when it is clicked
+        return f"[![Figure]({stem}.png){{ .output loading=lazy }}]({stem}.png)"
     if html := output.get("text/html"):
         if film := FILM.search(html):
             files[f"notebooks/{stem}.mp4"] = base64.b64decode(film[1])

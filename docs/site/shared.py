@@ -1,4 +1,6 @@
-"""For the reference: where a docstring explains several names on one line, `x0, v0: ...`, each gets an entry."""
+"""For the reference: where a docstring explains several names on one line, `x0, v0: ...`, each gets
+an entry.
+"""
 
 import re
 

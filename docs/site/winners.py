@@ -1,4 +1,5 @@
-"""The picture of docs/winners.md: four comparisons of made-up laws A and B, decided by the package itself.
+"""The picture of docs/winners.md: four comparisons of made-up laws A and B, decided by the package
+itself.
 
 `python docs/site/winners.py` draws docs/winners.svg again.
 """
@@ -27,7 +28,9 @@ def cases() -> list[tuple[str, Comparison]]:
     for name, (spread, lead, step) in particular.items():
         a, b = np.exp(spread * drawn[len(made)]) * (1.0 - lead), np.ones(UNITS)
         sets = dict.fromkeys("AB", np.arange(UNITS))
-        made.append((name, Comparison({"A": a, "B": b}, halves={"A": a * (1 + step), "B": b}, sets=sets)))
+        made.append(
+            (name, Comparison({"A": a, "B": b}, halves={"A": a * (1 + step), "B": b}, sets=sets))
+        )
     return made
 
 
@@ -63,7 +66,9 @@ def draw(file: Path = FILE) -> None:
             ax.plot(100 * charged, rows, "o", ms=4, color="#0072B2")
             ax.text(58, -row + 0.12, name, va="bottom", color=style.MUTED)
             ax.text(58, -row + 0.06, verdict(comparison), va="top", color=style.INK, weight="bold")
-        ax.set(xlim=(-80, 145), ylim=(-3.5, 0.65), yticks=[], xlabel="lead of A over B in a run (%)")
+        ax.set(
+            xlim=(-80, 145), ylim=(-3.5, 0.65), yticks=[], xlabel="lead of A over B in a run (%)"
+        )
         ax.set_xticks([-75, -50, -25, 0, 25, 50])
         ax.spines["left"].set_visible(False)
         figure.savefig(file, metadata={"Date": None, "Creator": None})

@@ -1,8 +1,10 @@
-"""Tasks of a seven-joint arm, and laws of many joints with gains for them, which the scenes of arms share.
+"""Tasks of a seven-joint arm, and laws of many joints with gains for them, which the scenes of arms
+share.
 
-The arm is `panda` with the friction that was identified on a real one. The laws know neither that friction nor the
-payload. Gains come from the search of benchmarks/arm_study.py: for each law the same number of random draws, on the
-task "sway" with 1 kg of payload and a seed that no figure uses. GAINS has the best draws.
+The arm is `panda` with the friction that was identified on a real one. The laws know neither that
+friction nor the payload. Gains come from the search of benchmarks/arm_study.py: for each law the
+same number of random draws, on the task "sway" with 1 kg of payload and a seed that no figure uses.
+GAINS has the best draws.
 """
 
 import functools
@@ -23,8 +25,18 @@ from smc_mujoco.simulation.signals import Jump, Noise, Push
 from smc_mujoco.simulation.time_series import Waypoints, cartesian_path
 from smc_mujoco.simulation.trace import Trace
 
-NOISE = Noise(position=1e-5, velocity=1e-3)  # rad, rad/s: chosen, as of an encoder and a filtered difference
-SWAY = (0.3, 0.25, 0.3, 0.35, 0.4, 0.4, 0.5)  # rad: amplitude of each joint's sway, chosen for speeds up to 1 rad/s
+NOISE = Noise(
+    position=1e-5, velocity=1e-3
+)  # rad, rad/s: chosen, as of an encoder and a filtered difference
+SWAY = (
+    0.3,
+    0.25,
+    0.3,
+    0.35,
+    0.4,
+    0.4,
+    0.5,
+)  # rad: amplitude of each joint's sway, chosen for speeds up to 1 rad/s
 BEAT = 0.6  # s: time from one end of a sway to the other, chosen
 DRAWS = 32  # of gains for each law, in the search of benchmarks/arm_study.py
 PATH_BEFORE, PATH_BEHIND = 0.0005, 0.004  # m: distances of paths from the wall's face; chosen
@@ -32,11 +44,26 @@ PROBE = 0.012  # m: radius of the probe
 SPREAD = 0.05  # rad: largest distance of each joint's start from the task's own start; chosen
 BLOW = 1.0  # s: time of the blow in its task
 PRESS = 20.0  # N: wanted force of the tip on the wall; chosen
-WALL_POSE = (0.0, 0.3, 0.0, -2.0, 0.0, 3.1, math.pi / 4)  # rad: pose from which the path along the wall is solved
+WALL_POSE = (
+    0.0,
+    0.3,
+    0.0,
+    -2.0,
+    0.0,
+    3.1,
+    math.pi / 4,
+)  # rad: pose from which the path along the wall is solved
 
-BY_LIMIT = {"passivity_based": ("K", "k"), "observer_free_joint": ("lam",)}  # gains: factor times a motor's limit
-BY_INERTIA = {"time_delay_sliding": ("m",)}  # gains: factor times a joint's inertia in the ready pose
-OUTER = {f"{name}_computed_torque": name for name in ("adrc", "pd_observer", "lqi")}  # rivals without a sliding mode
+BY_LIMIT = {
+    "passivity_based": ("K", "k"),
+    "observer_free_joint": ("lam",),
+}  # gains: factor times a motor's limit
+BY_INERTIA = {
+    "time_delay_sliding": ("m",)
+}  # gains: factor times a joint's inertia in the ready pose
+OUTER = {
+    f"{name}_computed_torque": name for name in ("adrc", "pd_observer", "lqi")
+}  # rivals without a sliding mode
 GAINS: Mapping[str, Mapping[str, float]] = {  # law -> gain, or its factor, as the search found them
     "computed_torque_sliding": {"c": 36.0, "k": 67.0, "width": 0.4},
     "super_twisting_computed_torque": {"c": 16.0, "k1": 28.0, "k2": 340.0},
@@ -59,7 +86,9 @@ def arm() -> Plant:
 def inertia() -> tuple[float, ...]:
     """Return the inertia of each joint in the ready pose, kg m^2: the diagonal of M."""
     panda = arm()
-    M = panda.nominal.dynamics(np.array(panda.rest), np.zeros(panda.n), Values(**panda.parameters)).M  # pyright: ignore
+    M = panda.nominal.dynamics(
+        np.array(panda.rest), np.zeros(panda.n), Values(**panda.parameters)
+    ).M  # pyright: ignore
     return tuple(np.diag(M).tolist())
 
 
@@ -75,37 +104,63 @@ def gained(name: str, gains: Mapping[str, float] | None = None) -> Law:
         values[gain] = [values[gain] * limit for limit in arm().limits]  # pyright: ignore[reportArgumentType]
     for gain in BY_INERTIA.get(name, ()):
         values[gain] = [values[gain] * joint for joint in inertia()]  # pyright: ignore[reportArgumentType]
-    made = law(name, **values) if name not in OUTER else law(OUTER[name], **values).on_computed_torque()
-    return made if gains else made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
+    if name not in OUTER:
+        made = law(name, **values)
+    else:
+        made = law(OUTER[name], **values).on_computed_torque()
+    if gains:
+        return made
+    return made.sourced(SHIPPED, Search(rule="random draws", evaluations=DRAWS))
 
 
 def hybrid(friction: bool = False) -> Law:
-    """Return the law that presses on the wall, with computed_torque_sliding's gains and, if `friction`, the arm's."""
+    """Return the law that presses on the wall, with computed_torque_sliding's gains and, if
+    `friction`, the arm's.
+    """
     gains: dict[str, object] = {"force": PRESS, **GAINS["computed_torque_sliding"]}
     if friction:
         known = arm().friction
         gains |= {"f1": known.p1, "f2": known.p2, "f3": known.p3}
     made = law("hybrid_sliding", **gains).sourced(SHIPPED)  # pyright: ignore[reportArgumentType]
-    return made.named("hybrid_with_friction") if friction else made
+    if friction:
+        return made.named("hybrid_with_friction")
+    return made
 
 
 @functools.cache
 def sway() -> tuple[Waypoints, ...]:
-    """Return references that swing every joint back and forth with minimum jerk, from and to the ready pose."""
+    """Return references that swing every joint back and forth with minimum jerk, from and to the
+    ready pose.
+    """
     times = [BEAT * k for k in range(6)]
-    return tuple(Waypoints(times, [x, x + a, x - a, x + a, x - a, x]) for x, a in zip(arm().rest, SWAY, strict=True))
+    return tuple(
+        Waypoints(times, [x, x + a, x - a, x + a, x - a, x])
+        for x, a in zip(arm().rest, SWAY, strict=True)
+    )
 
 
 @functools.cache
 def pick_and_place() -> tuple[Waypoints, ...]:
-    """Return references on which the tip goes down to pick at 1 s, to the other side, and down to place at 3 s."""
-    points = [(0.40, -0.25, 0.45), (0.45, -0.25, 0.25), (0.45, 0.0, 0.50), (0.45, 0.25, 0.25), (0.40, 0.25, 0.45)]
-    return tuple(cartesian_path(arm(), [0.0, 1.0, 2.0, 3.0, 3.8], points, site="tip", x0=arm().rest))
+    """Return references on which the tip goes down to pick at 1 s, to the other side, and down to
+    place at 3 s.
+    """
+    points = [
+        (0.40, -0.25, 0.45),
+        (0.45, -0.25, 0.25),
+        (0.45, 0.0, 0.50),
+        (0.45, 0.25, 0.25),
+        (0.40, 0.25, 0.45),
+    ]
+    return tuple(
+        cartesian_path(arm(), [0.0, 1.0, 2.0, 3.0, 3.8], points, site="tip", x0=arm().rest)
+    )
 
 
 @functools.cache
 def wall_path(behind: float = -PATH_BEFORE) -> tuple[Waypoints, ...]:
-    """Return references on which the tip rests until 0.4 s, and then slides along the wall, `behind` its face, m."""
+    """Return references on which the tip rests until 0.4 s, and then slides along the wall,
+    `behind` its face, m.
+    """
     from smc_mujoco.mechanisms.plants.panda import WALL_DISTANCE
 
     x = WALL_DISTANCE - PROBE + behind
@@ -117,10 +172,11 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
     """Return the scenario of a task under a law.
 
     Args:
-      task: "sway"; "payload", a pick and place with 2 kg from 1 s on; "wall", where the tip slides on the wall and
-        presses; "behind", the same path but 4 mm behind the wall's face; or "blow", a sway with a blow at 1 s.
-      seed: of the noise and of the start, which is within SPREAD of the task's start. Seed 0 starts there, and so does
-        every seed at the wall, in front of which the tip must begin.
+      task: "sway"; "payload", a pick and place with 2 kg from 1 s on; "wall", where the tip slides
+        on the wall and presses; "behind", the same path but 4 mm behind the wall's face; or "blow",
+        a sway with a blow at 1 s.
+      seed: of the noise and of the start, which is within SPREAD of the task's start. Seed 0 starts
+        there, and so does every seed at the wall, in front of which the tip must begin.
       payload: kg that the arm carries from the start, unknown to the law.
     """
     panda, push = arm(), Push("link5", y=400.0, time=BLOW, width=0.02)
@@ -143,7 +199,8 @@ def scenario(task: str, law: Law, seed: int = 0, payload: float = 0.0) -> Scenar
         x0=tuple(start),
         seed=seed,
         noise=NOISE,
-        model="nominal",  # so that observer_free_joint compensates the gravity of the arm without payload
+        # so that observer_free_joint compensates the gravity of the arm without payload
+        model="nominal",
         mismatch={"payload": payload} if payload else {},
         friction=panda.friction,
         control_period=1e-3,
@@ -157,6 +214,8 @@ def off_path(trace: Trace, after: float = 0.0) -> np.ndarray:
 
 
 def back_within(trace: Trace, distance: float, after: float) -> float:
-    """Return the time from `after`, s, until the tip is within `distance`, m, of its path for good; inf for never."""
+    """Return the time from `after`, s, until the tip is within `distance`, m, of its path for good;
+    inf for never.
+    """
     distances = np.nan_to_num(off_path(trace, after), nan=math.inf)  # NaN after a failure
     return last_exit(trace.t[trace.t >= after], distances, distance)

@@ -1,8 +1,10 @@
-"""When a number of a run and of the same run again count as different: the rule by which all numbers are marked.
+"""When a number of a run and of the same run again count as different: the rule by which all
+numbers are marked.
 
-They do where they are more than 5 % apart, or where only some of the runs have the number, such as a limit cycle.
-Values below what matters in the problem count as equal. Under an integrator of first order half the step removes half
-of the error. So the value without it, 2 y' - y with y' that at half the step, counts as one more.
+They do where they are more than 5 % apart, or where only some of the runs have the number, such as
+a limit cycle. Values below what matters in the problem count as equal. Under an integrator of first
+order half the step removes half of the error. So the value without it, 2 y' - y with y' that at
+half the step, counts as one more.
 """
 
 import math
@@ -12,21 +14,29 @@ MAX_CHANGE = 0.05  # relative change of a number above which it is marked: chose
 
 
 def relative_range(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> float:
-    """Return the range of a number in several runs over its smallest magnitude; inf if only some of them have it.
+    """Return the range of a number in several runs over its smallest magnitude; inf if only some of
+    them have it.
 
-    Magnitudes up to `least` do not matter, see `paired_runs.floor`. NaN is a run without the number. With `first_order`
-    the first two values are of a run under an integrator of first order, and of the same run at half the step.
+    Magnitudes up to `least` do not matter, see `paired_runs.floor`. NaN is a run without the
+    number. With `first_order` the first two values are of a run under an integrator of first order,
+    and of the same run at half the step.
     """
     if first_order and all(map(math.isfinite, values[:2])):
-        values = [*values, 2.0 * values[1] - values[0]] if len(values) > 1 else values
+        if len(values) > 1:
+            values = [*values, 2.0 * values[1] - values[0]]
     missing = [math.isnan(value) for value in values]
     if any(missing):
         return 0.0 if all(missing) else math.inf
     beyond = [math.copysign(max(abs(value) - least, 0.0), value) for value in values]
     smallest, width = max(min(map(abs, values)), least), max(beyond) - min(beyond)
-    return 0.0 if not width > 0.0 else width / smallest if smallest else math.inf  # inf - inf is no change
+    # inf - inf is no change
+    if not width > 0.0:
+        return 0.0
+    return width / smallest if smallest else math.inf
 
 
 def apart(values: Sequence[float], least: float = 0.0, first_order: bool = False) -> bool:
-    """Return whether a number of a run and of the same run again are more than 5 % apart, see `relative_range`."""
+    """Return whether a number of a run and of the same run again are more than 5 % apart, see
+    `relative_range`.
+    """
     return relative_range(values, least, first_order) > MAX_CHANGE

@@ -1,20 +1,24 @@
 """Medians and shares of runs, with their uncertainty over seeds.
 
-Seeds are the sample. Conditions and plants are fixed blocks. A seed determines the initial state and the noise in all
-blocks, for every law, so the bootstrap draws whole seeds (A. C. Davison, D. V. Hinkley, Bootstrap Methods and Their
-Application, 1997, 3.8). inf stands for "never" or a failed run. It is the worst value, and two of them are equal.
+Seeds are the sample. Conditions and plants are fixed blocks. A seed determines the initial state
+and the noise in all blocks, for every law, so the bootstrap draws whole seeds (A. C. Davison, D. V.
+Hinkley, Bootstrap Methods and Their Application, 1997, 3.8). inf stands for "never" or a failed
+run. It is the worst value, and two of them are equal.
 
-Intervals are percentile bootstraps (B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13). Their
-ends are values of the sample, so inf is no problem. BCa needs the jackknife, which fails for the median (ch. 11). The
-percentiles are those of T. C. Hesterberg (The American Statistician 69(4), 2015), which are wider for few seeds. For a
-single block the ends are order statistics, whose coverage follows from the binomial distribution: 93 % or more with 6
-to 40 seeds, and 1 - 2^(1 - n) with fewer, the coverage of the sample's range.
+Intervals are percentile bootstraps (B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap,
+1993, ch. 13). Their ends are values of the sample, so inf is no problem. BCa needs the jackknife,
+which fails for the median (ch. 11). The percentiles are those of T. C. Hesterberg (The American
+Statistician 69(4), 2015), which are wider for few seeds. For a single block the ends are order
+statistics, whose coverage follows from the binomial distribution: 93 % or more with 6 to 40 seeds,
+and 1 - 2^(1 - n) with fewer, the coverage of the sample's range.
 
-Runs that share one of several sets of gains are drawn together, as one sample: the interval of 24 runs with three sets
-of gains has three samples. If all runs have the same gains, the seeds are the sample.
+Runs that share one of several sets of gains are drawn together, as one sample: the interval of 24
+runs with three sets of gains has three samples. If all runs have the same gains, the seeds are the
+sample.
 
-The median of several blocks is the median of their medians. Then a law with the lower median in every block also has
-the lower median overall, which the median of all runs together does not guarantee.
+The median of several blocks is the median of their medians. Then a law with the lower median in
+every block also has the lower median overall, which the median of all runs together does not
+guarantee.
 """
 
 import functools
@@ -26,8 +30,11 @@ from typing import NamedTuple
 import numpy as np
 
 LEVEL = 0.95  # of confidence, of every interval and verdict; chosen
-RESAMPLES = 1999  # chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
-MIN_INTERVAL_SAMPLES = 6  # with fewer, no interval of a median covers 95 %; their range is given instead
+# chosen, so that one more is a multiple of 1000 and percentiles are whole numbers of resamples
+RESAMPLES = 1999
+MIN_INTERVAL_SAMPLES = (
+    6  # with fewer, no interval of a median covers 95 %; their range is given instead
+)
 
 
 class Interval(NamedTuple):
@@ -40,30 +47,42 @@ class Interval(NamedTuple):
 
 
 def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Interval:
-    """Return the median of the blocks' medians, of values (blocks, n) that are NaN where there is no run.
+    """Return the median of the blocks' medians, of values (blocks, n) that are NaN where there is
+    no run.
 
-    An even number of values has two middle ones: the lower end resamples the lower, and the upper end the higher.
-    Every column has a run. `samples` has the sample of each column, see `ranking.linked`; None: each is its own.
+    An even number of values has two middle ones: the lower end resamples the lower, and the upper
+    end the higher. Every column has a run. `samples` has the sample of each column, see
+    `ranking.linked`; None: each is its own.
     """
     from scipy.special import ndtr, stdtrit
 
-    n = values.shape[1] if samples is None else max(samples) + 1
+    if samples is None:
+        n = values.shape[1]
+    else:
+        n = max(samples) + 1
     centre = float(middle(middle(values)))
     if n < 2:
         return Interval(centre, math.nan, math.nan, n)
-    drawn = draws(n) if samples is None else draws(n)[list(samples)]
+    if samples is None:
+        drawn = draws(n)
+    else:
+        drawn = draws(n)[list(samples)]
     lower, upper = np.empty((2, RESAMPLES, len(values)))
     for k, block in enumerate(values):
         order = np.argsort(block)[: (~np.isnan(block)).sum()]
         counts, ordered = drawn[order], block[order]
-        counts[:, ~counts.any(axis=0)] = 1  # a resample that draws no run of the block takes each of them once
+        counts[:, ~counts.any(axis=0)] = (
+            1  # a resample that draws no run of the block takes each of them once
+        )
         counted = 2 * np.cumsum(counts, axis=0, dtype=drawn.dtype)
         total = counted[-1] // 2
         lower[:, k] = ordered[(counted < total).sum(axis=0)]
         upper[:, k] = ordered[(counted <= total).sum(axis=0)]
     # T. C. Hesterberg's expanded percentile, with Student's t of n - 1 degrees of freedom
     tail = ndtr(-math.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + LEVEL) / 2))
-    at = max(1, math.floor(tail * (RESAMPLES + 1)))  # index of the resample at which the interval ends, from either end
+    at = max(
+        1, math.floor(tail * (RESAMPLES + 1))
+    )  # index of the resample at which the interval ends, from either end
     lower, upper = np.sort(middle(lower)), np.sort(middle(upper))
     return Interval(centre, float(lower[at - 1]), float(upper[RESAMPLES - at]), n)
 
@@ -71,21 +90,31 @@ def median_of(values: np.ndarray, samples: Sequence[int] | None = None) -> Inter
 def middle(values: np.ndarray) -> np.ndarray:
     """Return the median over the last axis, without NaN; NaN if all values are NaN."""
     ordered, n = np.sort(values, axis=-1), (~np.isnan(values)).sum(axis=-1, keepdims=True)
-    low, high = (np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2))
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(at, 0), axis=-1) for at in ((n - 1) // 2, n // 2)
+    )
     return ((low + high) / 2)[..., 0]
 
 
 def share_interval(share: float, n: int) -> Interval:
-    """Return a share of the runs of n seeds, with E. B. Wilson's interval (JASA 22, 1927): not empty for 0 and 1.
+    """Return a share of the runs of n seeds, with E.
 
-    The share within a seed lies in [0, 1], so its variance is at most p (1 - p). With n the number of seeds the
-    interval is as wide as that of n independent runs, however many runs a seed has and however alike they are. Its
-    coverage is 95 % as a mean over all shares, and for some near 0 and 1 only 83 %, with 6 seeds as with 40.
+    B. Wilson's interval (JASA 22, 1927): not empty for 0 and 1.
+
+    The share within a seed lies in [0, 1], so its variance is at most p (1 - p). With n the number
+    of seeds the interval is as wide as that of n independent runs, however many runs a seed has and
+    however alike they are. Its coverage is 95 % as a mean over all shares, and for some near 0 and
+    1 only 83 %, with 6 seeds as with 40.
     """
     z = NormalDist().inv_cdf((1 + LEVEL) / 2)
-    centre, half = share + z * z / (2 * n), z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
+    centre, half = (
+        share + z * z / (2 * n),
+        z * math.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2),
+    )
     low, high = ((centre + side * half) / (1 + z * z / n) for side in (-1, 1))
-    return Interval(share, max(min(low, share), 0.0), min(max(high, share), 1.0), n)  # rounding aside, it has it
+    return Interval(
+        share, max(min(low, share), 0.0), min(max(high, share), 1.0), n
+    )  # rounding aside, it has it
 
 
 @functools.lru_cache(maxsize=8)

@@ -1,15 +1,16 @@
 """Chattering, predicted before it is run: the limit cycle of a scenario by harmonic balance.
 
-A limit cycle e = a sin(omega t) solves N(a, omega) L(j omega) = 1. N is the first harmonic of what the law returns, and
-L the answer of the linearised mechanism (`harmonics`), without any integrator's error. Then the equation is solved
-again with the other harmonics of e, which follow from those of u. The solution is exact if the cycle is not locked to
-the control samples. `uncertainty` says how much such locking may change it.
+A limit cycle e = a sin(omega t) solves N(a, omega) L(j omega) = 1. N is the first harmonic of what
+the law returns, and L the answer of the linearised mechanism (`harmonics`), without any
+integrator's error. Then the equation is solved again with the other harmonics of e, which follow
+from those of u. The solution is exact if the cycle is not locked to the control samples.
+`uncertainty` says how much such locking may change it.
 
-The |N| of a law with a dead zone first rises with the amplitude, which gives two solutions. By Loeb's criterion the
-inner one is unstable: a run that starts within it comes to rest, and one that starts outside ends in the outer one.
-`threshold_x` is the amplitude of the inner one.
-Sources: A. Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous Control
-Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
+The |N| of a law with a dead zone first rises with the amplitude, which gives two solutions. By
+Loeb's criterion the inner one is unstable: a run that starts within it comes to rest, and one that
+starts outside ends in the outer one. `threshold_x` is the amplitude of the inner one. Sources: A.
+Gelb & W. E. Vander Velde, Multiple-Input Describing Functions, 1968; I. Boiko, Discontinuous
+Control Systems, 2009; U. Perez-Ventura & L. Fridman, arXiv 1705.09711, 2017.
 """
 
 import cmath
@@ -34,53 +35,84 @@ from smc_mujoco.mechanisms.named import jointed
 from smc_mujoco.simulation.scenario import Scenario
 
 MIN_FREQUENCY = 0.5  # Hz: slower oscillations do not count as chattering
-GRID_FREQUENCIES, GRID_AMPLITUDES = 59, 35  # cells of the coarse grid on which cycles are sought: chosen
-CUTS = 8  # parts of a coarse cell's sides: a cell of the finest grid is 11 % in amplitude, about 1.5 % in frequency
-CELL_MARGIN = 0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
-COARSE_SAMPLES = 60.618  # samples of a period on the grid; not whole, so that they move from period to period; chosen
+GRID_FREQUENCIES, GRID_AMPLITUDES = (
+    59,
+    35,
+)  # cells of the coarse grid on which cycles are sought: chosen
+# parts of a coarse cell's sides: a cell of the finest grid is 11 % in amplitude, about 1.5 % in
+# frequency
+CUTS = 8
+CELL_MARGIN = (
+    0.5  # of a cell's range of N L, by which N L may be outside that of the corners: chosen
+)
+# samples of a period on the grid; not whole, so that they move from period to period; chosen
+COARSE_SAMPLES = 60.618
 MAX_OTHER_CYCLES = 3  # stable ones beside the predicted; more are artefacts of the sampling: chosen
 COARSE_NOISE = 0.1  # error of the log of N L with few samples a period: chosen
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])  # of a cell, in order
 MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-12, 3.0  # rad or m, of the error
-SAME_CYCLE_TOLERANCE = 0.02  # of the logs of amplitude and omega, below which two cycles are one: chosen
-MAX_SHIFT = 1.0  # of these logs, from a cell to its cycle, or from that to the cycle with harmonics: chosen
-BALANCE_TOLERANCE = 0.01  # of the log of N L at a cycle: the places of the samples make N jump; chosen
-MAX_NYQUIST_SHARE = 2.0 / 3.0  # of half the sampling frequency: runs lock faster waves to two samples a period
+SAME_CYCLE_TOLERANCE = (
+    0.02  # of the logs of amplitude and omega, below which two cycles are one: chosen
+)
+MAX_SHIFT = (
+    1.0  # of these logs, from a cell to its cycle, or from that to the cycle with harmonics: chosen
+)
+BALANCE_TOLERANCE = (
+    0.01  # of the log of N L at a cycle: the places of the samples make N jump; chosen
+)
+MAX_NYQUIST_SHARE = (
+    2.0 / 3.0
+)  # of half the sampling frequency: runs lock faster waves to two samples a period
 SMALLEST = 1e-300  # for the log of 0
 MIN_GAIN_GROWTH = 3.0  # of a law that switches, from an amplitude to a thousandth of it: chosen
 CYCLE_TOLERANCE = 1e-4  # of the logs of amplitude and omega of a cycle: the last step of the search
-DERIVATIVE_STEP = 1e-3  # of the logs of amplitude and omega: smaller ones see jumps of the gain by the samples; chosen
+# of the logs of amplitude and omega: smaller ones see jumps of the gain by the samples; chosen
+DERIVATIVE_STEP = 1e-3
 STABILITY_STEP = 0.1  # relative, in Loeb's criterion: smaller ones see these jumps too; chosen
-# Factors on the ends of ranges. With them the ranges have the truth in 95 % of random loops: benchmarks/chattering.py.
+# Factors on the ends of ranges. With them the ranges have the truth in 95 % of random loops:
+# benchmarks/chattering.py.
 AMPLITUDE_FACTOR, FREQUENCY_FACTOR = 1.01, 1.01
 MAX_GAIN_DRIFT = 0.05  # relative: a law whose gain drifts more gets a remark; chosen
-RESONANCE_DAMPING = 0.01  # imaginary part of frequencies over the real one, so that resonances have a width; chosen
+RESONANCE_DAMPING = (
+    0.01  # imaginary part of frequencies over the real one, so that resonances have a width; chosen
+)
 PHASE_STEP = 0.005  # of the log of omega, along the curve of phase over frequency; chosen
 
 Balance = tuple[float, float]  # amplitude of e, rad or m, and omega, rad/s, where N L = 1
-Cell = tuple[np.ndarray, np.ndarray]  # the lowest and the highest logs of amplitude and omega, (2,) each
+Cell = tuple[
+    np.ndarray, np.ndarray
+]  # the lowest and the highest logs of amplitude and omega, (2,) each
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Chattering:
-    """A predicted limit cycle of one channel. If none is predicted, its numbers are NaN; the ranges may be known.
+    """A predicted limit cycle of one channel.
 
-    The two ranges are those of cycles that are locked to the samples, see `Loop.phases`. They are widened by factors
-    that were calibrated by exact integration: 95 % of random loops are within them. The largest amplitude includes the
-    change of s by one count of an encoder. If the balance has no solution but the law switches, a locked cycle is
-    possible, and these are its ranges.
+    If none is predicted, its numbers are NaN; the ranges may be known.
+
+    The two ranges are those of cycles that are locked to the samples, see `Loop.phases`. They are
+    widened by factors that were calibrated by exact integration: 95 % of random loops are within
+    them. The largest amplitude includes the change of s by one count of an encoder. If the balance
+    has no solution but the law switches, a locked cycle is possible, and these are its ranges.
     """
 
     amplitude: float = math.nan  # of the sliding variable s, half its range, in its unit
     amplitude_x: float = math.nan  # of the position, rad or m
     amplitude_u: float = math.nan  # of the command, half its range: N m, N or V
     frequency: float = math.nan  # Hz
-    power: float = math.nan  # mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s
-    threshold_x: float = 0.0  # amplitude of x, rad or m, of the largest unstable cycle within this one; 0 without one
-    third_harmonic: float = math.nan  # of s over its first; if large, the prediction is rough; NaN for two samples
+    power: float = (
+        math.nan
+    )  # mean square of s', (amplitude omega)^2 / 2 with the first harmonic of s
+    # amplitude of x, rad or m, of the largest unstable cycle within this one; 0 without one
+    threshold_x: float = 0.0
+    third_harmonic: float = (
+        math.nan
+    )  # of s over its first; if large, the prediction is rough; NaN for two samples
     amplitude_range: tuple[float, float] = (math.nan, math.nan)
     frequency_range: tuple[float, float] = (math.nan, math.nan)  # Hz
-    coupling: float = math.nan  # amplitude of another driven channel's x over amplitude_x; if large, prediction fails
+    coupling: float = (
+        math.nan
+    )  # amplitude of another driven channel's x over amplitude_x; if large, prediction fails
     gain: complex = complex(math.nan)  # N at the cycle
     response: complex = complex(math.nan)  # L at the cycle
     assumptions: tuple[str, ...] = ()  # what was left out or is doubtful, in sentences
@@ -90,14 +122,20 @@ class Chattering:
 
     @property
     def uncertainty(self) -> float:
-        """Largest relative distance of an end of the ranges from what is predicted; inf where only ranges are known."""
+        """Largest relative distance of an end of the ranges from what is predicted; inf where only
+        ranges are known.
+        """
         if not self:
-            return math.nan if math.isnan(self.amplitude_range[1]) else math.inf
+            if math.isnan(self.amplitude_range[1]):
+                return math.nan
+            return math.inf
         pairs = ((self.amplitude_range, self.amplitude), (self.frequency_range, self.frequency))
         return max(abs(end / value - 1.0) for ends, value in pairs for end in ends)
 
 
-def chattering(law: Scenario | Component | Template | str, channel: int = 0, **fields: object) -> Chattering:
+def chattering(
+    law: Scenario | Component | Template | str, channel: int = 0, **fields: object
+) -> Chattering:
     """Predict the limit cycle about rest of one driven channel.
 
     Args:
@@ -106,8 +144,8 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
       fields: of the Scenario, such as plant, actuator, input_delay, control_period.
 
     Returns:
-      The stable limit cycle. If there are several, the fastest, and of equally fast ones the smallest. The others are
-      in `assumptions`.
+      The stable limit cycle. If there are several, the fastest, and of equally fast ones the
+      smallest. The others are in `assumptions`.
 
     Raises:
       ScenarioError: a law that does not compile, a channel that is not driven, or as Scenario.
@@ -118,7 +156,9 @@ def chattering(law: Scenario | Component | Template | str, channel: int = 0, **f
 
 
 def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chattering:
-    """Return what `chattering` returns for a scenario; without the ranges of a predicted cycle it is faster."""
+    """Return what `chattering` returns for a scenario; without the ranges of a predicted cycle it
+    is faster.
+    """
     jointed(scenario.plant, "chattering")
     if channel not in range(scenario.plant.driven):
         raise ScenarioError(f"channel is {shown(channel)}: give 0 to {scenario.plant.driven - 1}")
@@ -126,7 +166,9 @@ def predict(scenario: Scenario, channel: int = 0, ranges: bool = True) -> Chatte
     stable, unstable = cycles(loop)
     assumptions = tuple(_assumptions(loop))
     if not stable:
-        return _locked_ranges(loop, assumptions) if switches(loop) else Chattering(assumptions=assumptions)
+        if switches(loop):
+            return _locked_ranges(loop, assumptions)
+        return Chattering(assumptions=assumptions)
     fastest = max(omega for _, omega in stable)
     one = min(one for one in stable if one[1] > fastest / (1.0 + SAME_CYCLE_TOLERANCE))
     assumptions += tuple(_other_cycles(loop, [other for other in stable if other is not one]))
@@ -145,23 +187,31 @@ def _other_cycles(loop: Loop, others: Sequence[Balance]) -> Iterator[str]:
 
 
 def _threshold(loop: Loop, one: Balance, unstable: Sequence[Balance]) -> float:
-    """Return the amplitude of x of the largest unstable cycle within a stable one in the same turn of L, or 0."""
+    """Return the amplitude of x of the largest unstable cycle within a stable one in the same turn
+    of L, or 0.
+    """
     smaller = [other for other in unstable if other[0] < one[0]]
     *turns, turn = _turns(loop, [*smaller, one])
-    return max((a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0), default=0.0)
+    return max(
+        (a for (a, _), other in zip(smaller, turns, strict=True) if round(other - turn) == 0),
+        default=0.0,
+    )
 
 
 def switches(loop: Loop) -> bool:
     """Return whether a law switches: whether its gain grows without bound towards small amplitudes."""
     omega = 0.1 * math.pi / loop.scenario.control_period
-    smaller, small = (abs(loop.gain(size * MIN_AMPLITUDE, omega, COARSE_SAMPLES)) for size in (1.0, 1e3))
+    smaller, small = (
+        abs(loop.gain(size * MIN_AMPLITUDE, omega, COARSE_SAMPLES)) for size in (1.0, 1e3)
+    )
     return smaller > MIN_GAIN_GROWTH * small
 
 
 def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
     """Return the ranges of a cycle of a law that switches, locked to the samples.
 
-    It then switches at most half a control period later than on average: the cycle with that delay more is a bound.
+    It then switches at most half a control period later than on average: the cycle with that delay
+    more is a bound.
     """
     control_period = loop.scenario.control_period
     later = loop.later(0.5 * control_period)
@@ -169,7 +219,9 @@ def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
     if not stable:
         return Chattering(assumptions=assumptions)
     wave = later.wave(*max(stable, key=lambda one: one[1]))
-    assumptions += ("the balance has no solution, but the law switches: a cycle locked to the samples is possible",)
+    assumptions += (
+        "the balance has no solution, but the law switches: a cycle locked to the samples is possible",
+    )
     return Chattering(
         amplitude_range=(0.0, AMPLITUDE_FACTOR * wave.s + loop.s_of_one_count),
         frequency_range=(wave.omega / FREQUENCY_FACTOR / math.tau, 0.5 / control_period),
@@ -178,21 +230,26 @@ def _locked_ranges(loop: Loop, assumptions: tuple[str, ...]) -> Chattering:
 
 
 def cycles(loop: Loop) -> tuple[list[Balance], list[Balance]]:
-    """Return the stable and the other solutions of N L = 1; two in one finest cell may both be missed."""
+    """Return the stable and the other solutions of N L = 1; two in one finest cell may both be
+    missed.
+    """
     balances: list[Balance] = []
     for cells in _starts(loop):
         one = next((balance for cell in cells if (balance := _balanced(loop, *cell))), None)
-        if one and all(np.abs(np.log(one) - np.log(other)).max() > SAME_CYCLE_TOLERANCE for other in balances):
+        if one and all(
+            np.abs(np.log(one) - np.log(other)).max() > SAME_CYCLE_TOLERANCE for other in balances
+        ):
             balances.append(one)
     stable = _stable(loop, balances) or _of_two_samples(loop)
     return stable, [one for one in balances if one not in stable]
 
 
 def _starts(loop: Loop) -> Iterator[list[Cell]]:
-    """Yield groups of neighbouring cells, of which one has a solution: their images under N L wind around 1.
+    """Yield groups of neighbouring cells, of which one has a solution: their images under N L wind
+    around 1.
 
-    Cells in which N L may be 1 are cut into four, down to the finest grid. With few samples N is rough: two neighbours
-    may wind without a solution, one to the left and the other to the right.
+    Cells in which N L may be 1 are cut into four, down to the finest grid. With few samples N is
+    rough: two neighbours may wind without a solution, one to the left and the other to the right.
     """
     from scipy.ndimage import label
 
@@ -211,7 +268,10 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         places = (cells[:, None] + side * CORNERS).reshape(-1, 2).tolist()
         return np.array([product(i, k) for i, k in places]).reshape(-1, len(CORNERS))
 
-    cells, side = CUTS * np.argwhere(np.ones(count)), CUTS  # each by the indices of its lowest omega and amplitude
+    cells, side = (
+        CUTS * np.argwhere(np.ones(count)),
+        CUTS,
+    )  # each by the indices of its lowest omega and amplitude
     while side > 1:
         cells = cells[_may_balance(at_corners(cells, side), side * step)]
         side //= 2
@@ -225,11 +285,16 @@ def _starts(loop: Loop) -> Iterator[list[Cell]]:
         turns = winding[tuple(cells.T)]
         for sign in (1.0, -1.0):
             if sign * turns.sum() >= 0.0:
-                yield [((start + step * one)[::-1], (start + step * (one + 1))[::-1]) for one in cells[turns == sign]]
+                yield [
+                    ((start + step * one)[::-1], (start + step * (one + 1))[::-1])
+                    for one in cells[turns == sign]
+                ]
 
 
 def _may_balance(products: np.ndarray, sides: np.ndarray) -> np.ndarray:
-    """Return whether N L may be 1 in cells, (K,), from its values at their corners, (K, 4), with a margin."""
+    """Return whether N L may be 1 in cells, (K,), from its values at their corners, (K, 4), with a
+    margin.
+    """
     sizes = np.log(np.maximum(np.abs(products), SMALLEST))
     margins = CELL_MARGIN * np.maximum(np.ptp(sizes, axis=1), max(sides[1], COARSE_NOISE))
     near = (sizes.min(axis=1) <= margins) & (sizes.max(axis=1) >= -margins)
@@ -250,11 +315,15 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
     def excess(z: np.ndarray) -> np.ndarray:
         inside = np.clip(z, least, largest)
         amplitude, omega = np.exp(inside).tolist()
-        product = cmath.log(loop.gain(amplitude, omega) * loop.response(omega) or math.exp(-MAX_SHIFT))
+        product = cmath.log(
+            loop.gain(amplitude, omega) * loop.response(omega) or math.exp(-MAX_SHIFT)
+        )
         return np.array([product.real, product.imag]) + (inside - z)
 
     def solved() -> Iterator[np.ndarray]:
-        yield root(excess, 0.5 * (low + high), options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP}).x
+        yield root(
+            excess, 0.5 * (low + high), options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP}
+        ).x
         yield _bisected(excess, low, high)
 
     for z in solved():
@@ -264,8 +333,12 @@ def _balanced(loop: Loop, low: np.ndarray, high: np.ndarray) -> Balance | None:
     return None
 
 
-def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return where log |N L| and arg N L are 0, in a cell or beside it: solved for amplitude and omega in turn."""
+def _bisected(
+    excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Return where log |N L| and arg N L are 0, in a cell or beside it: solved for amplitude and
+    omega in turn.
+    """
     from scipy.optimize import brentq
 
     z = 0.5 * (low + high)
@@ -284,11 +357,15 @@ def _bisected(excess: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high:
 
 
 def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
-    """Return the cycle nearest to `wave` of a law that acts `shift` rad earlier, or later if negative, or None."""
+    """Return the cycle nearest to `wave` of a law that acts `shift` rad earlier, or later if
+    negative, or None.
+    """
     later = loop.later(-shift / wave.omega)
     stable, _ = cycles(later)
     sign = math.copysign(1.0, shift)
-    beside = [one for one in stable if sign * math.log(one[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE]
+    beside = [
+        one for one in stable if sign * math.log(one[1] / wave.omega) >= -SAME_CYCLE_TOLERANCE
+    ]
     if not beside and shift > 0.0:
         beside = _of_two_samples(later)
     nearest = min(beside, key=lambda one: abs(one[1] - wave.omega), default=None)
@@ -296,7 +373,10 @@ def _nearest_cycle(loop: Loop, wave: Wave, shift: float) -> Wave | None:
 
 
 def _of_two_samples(loop: Loop) -> list[Balance]:
-    """Return the stable cycles of two samples a period. For them N L is real, so its magnitude decides."""
+    """Return the stable cycles of two samples a period.
+
+    For them N L is real, so its magnitude decides.
+    """
     from scipy.optimize import brentq
 
     fastest = math.pi / loop.scenario.control_period
@@ -316,13 +396,19 @@ def _of_two_samples(loop: Loop) -> list[Balance]:
 
 
 def _stable(loop: Loop, balances: Sequence[Balance]) -> list[Balance]:
-    """Return the cycles at which a larger oscillation decays (Loeb's criterion), but not a turn of L beyond a slower.
+    """Return the cycles at which a larger oscillation decays (Loeb's criterion), but not a turn of
+    L beyond a slower.
 
-    A delay gives a row of such cycles, with a turn of phase between them, of which only the slowest is stable.
+    A delay gives a row of such cycles, with a turn of phase between them, of which only the slowest
+    is stable.
     """
     decaying = sorted((one for one in balances if _decays(loop, *one)), key=lambda one: one[1])
     turns = _turns(loop, decaying)
-    return [one for k, one in enumerate(decaying) if all(round(turns[k] - before) >= 0 for before in turns[:k])]
+    return [
+        one
+        for k, one in enumerate(decaying)
+        if all(round(turns[k] - before) >= 0 for before in turns[:k])
+    ]
 
 
 def _decays(loop: Loop, amplitude: float, omega: float) -> bool:
@@ -339,13 +425,19 @@ def _turns(loop: Loop, balances: Sequence[Balance]) -> np.ndarray:
     omegas = [omega for _, omega in balances]
     if len(omegas) < 2:
         return np.zeros(len(omegas))
-    between = np.exp(np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP))
-    phases = np.unwrap([np.angle(loop.response(w * (1.0 - RESONANCE_DAMPING * 1j))) for w in between])
+    between = np.exp(
+        np.arange(math.log(0.9 * min(omegas)), math.log(1.1 * max(omegas)), PHASE_STEP)
+    )
+    phases = np.unwrap(
+        [np.angle(loop.response(w * (1.0 - RESONANCE_DAMPING * 1j))) for w in between]
+    )
     return np.interp(omegas, between, phases) / math.tau
 
 
 def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
-    """Return the cycle whose e has the harmonics that the mechanism lets through; the given one if there is none."""
+    """Return the cycle whose e has the harmonics that the mechanism lets through; the given one if
+    there is none.
+    """
     from scipy.optimize import root
 
     if math.isnan(wave.third):
@@ -358,7 +450,9 @@ def _with_harmonics(loop: Loop, wave: Wave) -> Wave:
     start = np.log([wave.amplitude, wave.omega])
     solved = root(excess, start, options={"xtol": CYCLE_TOLERANCE, "eps": DERIVATIVE_STEP})
     near = solved.success and np.abs(solved.x - start).max() < MAX_SHIFT
-    return loop.wave(*np.exp(solved.x).tolist()) if near else wave
+    if near:
+        return loop.wave(*np.exp(solved.x).tolist())
+    return wave
 
 
 def _prediction(
@@ -378,7 +472,9 @@ def _prediction(
         assumptions += (words,)
     if threshold:
         unit = loop.scenario.plant.units[loop.channel]
-        assumptions += (f"x has moved beyond {threshold:.2g} {unit}, an unstable cycle: smaller oscillations die out",)
+        assumptions += (
+            f"x has moved beyond {threshold:.2g} {unit}, an unstable cycle: smaller oscillations die out",
+        )
     if wave.drift > MAX_GAIN_DRIFT:
         assumptions += ("gains or memories of the law drift: the prediction is a snapshot",)
     sizes, omegas = [math.nan], [math.nan]
@@ -386,7 +482,9 @@ def _prediction(
         later, earlier = (_nearest_cycle(loop, sine, phase) for phase in loop.phases(*balance))
         waves = [one for one in (sine, later, earlier) if one]
         sizes = [one.s / sine.s * wave.s for one in waves] + [0.0] * (earlier is None)
-        omegas = [one.omega / sine.omega * wave.omega for one in waves] + [math.inf] * (earlier is None)
+        omegas = [one.omega / sine.omega * wave.omega for one in waves] + [math.inf] * (
+            earlier is None
+        )
     fastest, nyquist = max(omegas) * FREQUENCY_FACTOR / math.tau, 0.5 / loop.scenario.control_period
     return Chattering(
         amplitude=wave.s,
@@ -396,7 +494,10 @@ def _prediction(
         power=wave.rate**2 / 2.0,
         threshold_x=threshold,
         third_harmonic=wave.third,
-        amplitude_range=(min(sizes) / AMPLITUDE_FACTOR, max(sizes) * AMPLITUDE_FACTOR + loop.s_of_one_count),
+        amplitude_range=(
+            min(sizes) / AMPLITUDE_FACTOR,
+            max(sizes) * AMPLITUDE_FACTOR + loop.s_of_one_count,
+        ),
         frequency_range=(min(omegas) / FREQUENCY_FACTOR / math.tau, min(fastest, nyquist)),
         coupling=coupling,
         gain=wave.gain,
@@ -433,12 +534,29 @@ def save(
     changes: Sequence[StepChange],
     path: str | os.PathLike[str],
 ) -> Path:
-    """Write predicted cycles of scenarios, measured amplitudes of s and frequencies, and their changes, as JSON."""
-    rows = [
-        {"plant": one.plant.name, "law": one.law.name, "gains": dict(one.law.gains), **vars(cycle)}
-        | {"gain": [cycle.gain.real, cycle.gain.imag], "response": [cycle.response.real, cycle.response.imag]}
-        | {"uncertainty": cycle.uncertainty, "measured_amplitude": amplitude, "measured_frequency": frequency}
-        | {"half_step_changes": vars(change), "marked": change.marked}
-        for one, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True)
-    ]
+    """Write predicted cycles of scenarios, measured amplitudes of s and frequencies, and their
+    changes, as JSON.
+    """
+    rows = []
+    for one, cycle, (amplitude, frequency), change in zip(
+        scenarios, cycles, measured, changes, strict=True
+    ):
+        rows.append(
+            {
+                "plant": one.plant.name,
+                "law": one.law.name,
+                "gains": dict(one.law.gains),
+                **vars(cycle),
+            }
+            | {
+                "gain": [cycle.gain.real, cycle.gain.imag],
+                "response": [cycle.response.real, cycle.response.imag],
+            }
+            | {
+                "uncertainty": cycle.uncertainty,
+                "measured_amplitude": amplitude,
+                "measured_frequency": frequency,
+            }
+            | {"half_step_changes": vars(change), "marked": change.marked}
+        )
     return write_json(with_ending(path, ".json"), rows)

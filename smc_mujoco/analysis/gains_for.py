@@ -1,13 +1,16 @@
-"""Gains from a wanted amplitude: the largest gains whose chattering, at the upper end of its range, stays below it.
+"""Gains from a wanted amplitude: the largest gains whose chattering, at the upper end of its range,
+stays below it.
 
-All gains of a law follow from two numbers, its size q and its speed w. For the same mass, positions become q times as
-large, times 1/w as large, and forces q w^2 times as large. A gain with the unit F^a X^b T^c is multiplied by
+All gains of a law follow from two numbers, its size q and its speed w. For the same mass, positions
+become q times as large, times 1/w as large, and forces q w^2 times as large. A gain with the unit
+F^a X^b T^c is multiplied by
 
     (q w^2)^a q^b w^-c.
 
-So k1 and k2 of super-twisting are in the proportion of its theorem, k1 ~ sqrt(q), k2 ~ q. On a linear mechanism the
-limit cycle of a law that is q times as large is q times as large, and has the same frequency. A law that contains a
-number with a unit, such as the width 1 of tanh(s), has no such symmetry. So the size is searched.
+So k1 and k2 of super-twisting are in the proportion of its theorem, k1 ~ sqrt(q), k2 ~ q. On a
+linear mechanism the limit cycle of a law that is q times as large is q times as large, and has the
+same frequency. A law that contains a number with a unit, such as the width 1 of tanh(s), has no
+such symmetry. So the size is searched.
 """
 
 import dataclasses
@@ -44,7 +47,8 @@ class Design:
 
     law: Component
     chattering: Chattering
-    disturbance: float  # largest constant one in runs of 10 s, see `smc.margins`; NaN if not even 0 is tolerated
+    # largest constant one in runs of 10 s, see `smc.margins`; NaN if not even 0 is tolerated
+    disturbance: float
     size: float  # q, relative to the given gains
     speed: float  # w, relative to the given gains
 
@@ -60,16 +64,18 @@ def gains_for(
 ) -> Design:
     """Return the largest gains whose chattering stays below an amplitude, a frequency or both.
 
-    The amplitude decides the size of the law, to 0.1 %: the largest at which `amplitude_range` ends below it, the cycle
-    is no faster than the frequency, and no force among the gains exceeds u_max. A frequency also decides the speed, of
-    21 from a tenth to ten times that of the given gains: the one with the largest forces. Speeds whose cycle is too
-    fast at size 1 do not count, and one between the 21 may allow more.
+    The amplitude decides the size of the law, to 0.1 %: the largest at which `amplitude_range` ends
+    below it, the cycle is no faster than the frequency, and no force among the gains exceeds u_max.
+    A frequency also decides the speed, of 21 from a tenth to ten times that of the given gains: the
+    one with the largest forces. Speeds whose cycle is too fast at size 1 do not count, and one
+    between the 21 may allow more.
 
     Args:
       law: a law or its name. Its gains give the proportions.
       plant: a plant or its name.
       amplitude: largest amplitude of s, in its unit, at the upper end of its range.
-      frequency: highest predicted frequency of the limit cycle, Hz. Default: the speed of the law stays.
+      frequency: highest predicted frequency of the limit cycle, Hz. Default: the speed of the law
+        stays.
       channel: index of a driven channel.
       fields: other fields of the Scenario, such as actuator, input_delay, control_period, u_max.
 
@@ -77,15 +83,20 @@ def gains_for(
       ScenarioWarning: the law with these gains does not hold the plant.
 
     Raises:
-      ScenarioError: neither amplitude nor frequency, a gain of unknown unit, no gains in the range of the search
-        chatter so little, or those of the wanted amplitude oscillate faster than wanted.
+      ScenarioError: neither amplitude nor frequency, a gain of unknown unit, no gains in the range
+        of the search chatter so little, or those of the wanted amplitude oscillate faster than
+        wanted.
     """
     base = Scenario(law=law, plant=plant, **fields)  # type: ignore[arg-type]
     if amplitude is None and frequency is None:
-        raise ScenarioError("gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3")
+        raise ScenarioError(
+            "gains_for needs a wanted amplitude, a frequency or both: give amplitude=1e-3"
+        )
     if not base.law.uniform:
         cure = "give one number for each gain"
-        raise ScenarioError(f"gains_for needs gains that all channels share, not {base.law}: {cure}")
+        raise ScenarioError(
+            f"gains_for needs gains that all channels share, not {base.law}: {cure}"
+        )
     predictions = 0
     with bar(f"gains of {base.law.name} on {base.plant.name}") as progress_bar:
 
@@ -104,40 +115,60 @@ def gains_for(
             speeds = _forces(lambda w: cycle(1.0, w), amplitude, frequency, headroom)
         size, speed = 1.0, next(iter(speeds))
         if amplitude is not None:
-            size, speed = _largest(cycle, speeds, amplitude, math.inf if frequency is None else frequency, headroom)
+            size, speed = _largest(
+                cycle, speeds, amplitude, math.inf if frequency is None else frequency, headroom
+            )
         chosen = scaled(size, speed)
         predicted = predict(chosen, channel)
-        (tolerated,) = margins.margins_of([dataclasses.replace(chosen, duration=DURATION)], ["disturbance"])
+        (tolerated,) = margins.margins_of(
+            [dataclasses.replace(chosen, duration=DURATION)], ["disturbance"]
+        )
     if math.isnan(tolerated.value):
         words = f"{base.law.name} with these gains does not hold {base.plant.name}, even without a disturbance"
         warnings.warn(words, ScenarioWarning, users_stacklevel())
     law = chosen.law.sourced(source.TUNED, source.Search(rule=RULE, evaluations=predictions))
-    return Design(law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed)
+    return Design(
+        law=law, chattering=predicted, disturbance=tolerated.value, size=size, speed=speed
+    )
 
 
 def _forces(
     cycle: Callable[[float], Chattering], amplitude: float | None, frequency: float, headroom: float
 ) -> dict[float, float]:
-    """Return speed -> the forces that it allows, largest first, of SPEEDS whose frequency is at most the wanted one.
+    """Return speed -> the forces that it allows, largest first, of SPEEDS whose frequency is at
+    most the wanted one.
 
-    The frequency is that of size 1, and is not monotone in the speed. A speed without a limit cycle counts only below
-    the first speed with one: above it, the law has become too fast for the actuator.
+    The frequency is that of size 1, and is not monotone in the speed. A speed without a limit cycle
+    counts only below the first speed with one: above it, the law has become too fast for the
+    actuator.
     """
     speeds = [speed for speed in SPEEDS if speed**2 <= headroom * (1.0 + SIZE_TOLERANCE)]
     if not speeds:
         found = f"{1.0 / headroom:.3g} times what u_max allows, and the search makes them at most {SPEEDS[0] ** -2:g}"
-        raise ScenarioError(f"forces among the gains are {found} times smaller: give smaller gains, or a larger u_max")
+        raise ScenarioError(
+            f"forces among the gains are {found} times smaller: give smaller gains, or a larger u_max"
+        )
     cycles = {speed: cycle(speed) for speed in speeds}
     first = min((speed for speed, one in cycles.items() if one), default=math.inf)
-    slow = {speed: one for speed, one in cycles.items() if one.frequency <= frequency or (not one and speed < first)}
+    slow = {
+        speed: one
+        for speed, one in cycles.items()
+        if one.frequency <= frequency or (not one and speed < first)
+    }
     if not slow:
         lowest = min(one.frequency for one in cycles.values() if one)
         found = f"the law oscillates at {lowest:.3g} Hz at least, at whatever speed"
         raise ScenarioError(f"frequency is {frequency:g}, and {found}: give a larger one")
 
     def force(speed: float) -> float:
-        allowed = math.inf if amplitude is None or not slow[speed] else amplitude / slow[speed].amplitude_range[1]
-        size = 1.0 if amplitude is None else min(allowed, MAX_SIZE_RATIO)
+        if amplitude is None or not slow[speed]:
+            allowed = math.inf
+        else:
+            allowed = amplitude / slow[speed].amplitude_range[1]
+        if amplitude is None:
+            size = 1.0
+        else:
+            size = min(allowed, MAX_SIZE_RATIO)
         return min(size * speed**2, headroom)
 
     ordered = sorted(slow, key=lambda speed: (force(speed), speed), reverse=True)
@@ -151,21 +182,27 @@ def _largest(
     frequency: float,
     headroom: float,
 ) -> tuple[float, float]:
-    """Return the size and the speed with the largest forces within both bounds, given speeds as `_forces` does.
+    """Return the size and the speed with the largest forces within both bounds, given speeds as
+    `_forces` does.
 
-    The forces of a speed are known only with its size, so speeds are tried while they may allow larger ones.
+    The forces of a speed are known only with its size, so speeds are tried while they may allow
+    larger ones.
     """
     best, largest, refusals = (0.0, 0.0), 0.0, []
 
     def within(size: float, speed: float) -> float:
         one = cycle(size, speed)
-        return math.inf if one.frequency > frequency else one.amplitude_range[1]
+        if one.frequency > frequency:
+            return math.inf
+        return one.amplitude_range[1]
 
     for speed, allowed in speeds.items():
         if allowed <= largest:
             break
         try:
-            size = _largest_size(functools.partial(within, speed=speed), amplitude, headroom / speed**2)
+            size = _largest_size(
+                functools.partial(within, speed=speed), amplitude, headroom / speed**2
+            )
         except ScenarioError as error:
             refusals.append(error)
             continue
@@ -178,27 +215,42 @@ def _largest(
 
 def _scaled(law: Component, size: float, speed: float) -> Component:
     scales = {"F": size * speed**2, "X": size, "T": 1.0 / speed}
-    gains = {name: gain * search_space.unit_size(law, name, scales) for name, gain in law.gains.items()}
+    gains = {}
+    for name, gain in law.gains.items():
+        gains[name] = gain * search_space.unit_size(law, name, scales)
     return dataclasses.replace(law, gains=gains)
 
 
 def _force_headroom(base: Scenario) -> float:
-    """Return the factor by which the forces among the gains can grow, until the first reaches the actuator's limit."""
+    """Return the factor by which the forces among the gains can grow, until the first reaches the
+    actuator's limit.
+    """
     law, plant, u_max = base.law, base.plant, min(base.limits)
     rest, p, with_model = np.zeros(plant.n), plant.values({}), base.resolved.model != "none"
     accelerations = (u * abs(plant.nominal(rest, rest, i, p)[1]) for i, u in enumerate(base.limits))
     force = min(accelerations) if with_model else u_max
     limits = {name: force for name in law.gains if search_space.unit(law, name) == FORCE}
-    declared = law.template.gains if law.template else {}  # the force k / b of a gain k that is divided by b
-    limits |= {name: u_max * law.gains[gain.over] for name, gain in declared.items() if gain.over is not None}
-    sizes = [
-        limits[name] / abs(gain) for name, gain in law.gains.items() if name in limits and 0.0 < abs(gain) < math.inf
-    ]
+    # the force k / b of a gain k that is divided by b
+    if law.template:
+        declared = law.template.gains
+    else:
+        declared = {}
+    limits |= {
+        name: u_max * law.gains[gain.over]
+        for name, gain in declared.items()
+        if gain.over is not None
+    }
+    sizes = []
+    for name, gain in law.gains.items():
+        if name in limits and 0.0 < abs(gain) < math.inf:
+            sizes.append(limits[name] / abs(gain))
     return min(sizes, default=math.inf)
 
 
 def _largest_size(predicted: Callable[[float], float], wanted: float, limit: float) -> float:
-    """Return the largest size up to `limit` with at most the wanted amplitude; a lost cycle counts as too large."""
+    """Return the largest size up to `limit` with at most the wanted amplitude; a lost cycle counts
+    as too large.
+    """
     limit = min(limit, MAX_SIZE_RATIO)
     low, high, oscillates = 0.0, math.inf, False
 
@@ -221,7 +273,9 @@ def _largest_size(predicted: Callable[[float], float], wanted: float, limit: flo
             found = f"that of gains {MAX_SIZE_RATIO:g} times smaller is {amplitude:.3g}"
             if math.isinf(amplitude):
                 found = f"gains {MAX_SIZE_RATIO:g} times smaller oscillate faster than wanted"
-            raise ScenarioError(f"amplitude is {wanted:g}, and {found}: give a larger amplitude or frequency")
+            raise ScenarioError(
+                f"amplitude is {wanted:g}, and {found}: give a larger amplitude or frequency"
+            )
         amplitude = amplitude_at(high / SIZE_STEP)
     while low < limit and high == math.inf:
         amplitude_at(min(low * SIZE_STEP, limit))

@@ -1,9 +1,11 @@
-"""Harmonic balance: what a compiled law returns for a sinusoidal error, and how the mechanism answers a sinusoidal u.
+"""Harmonic balance: what a compiled law returns for a sinusoidal error, and how the mechanism
+answers a sinusoidal u.
 
-The response is that of MuJoCo's model, linearised about rest by finite differences, with drives, back-EMF, springs and
-joints without an actuator. The gain is that of the compiled law, with its estimator and its surface, at its control
-period, under an excitation: an error that oscillates for some periods. There is no approximation but that this error is
-a sine. Play between rotor and joint is a second nonlinear element, see `play`, and multiplies the gain.
+The response is that of MuJoCo's model, linearised about rest by finite differences, with drives,
+back-EMF, springs and joints without an actuator. The gain is that of the compiled law, with its
+estimator and its surface, at its control period, under an excitation: an error that oscillates for
+some periods. There is no approximation but that this error is a sine. Play between rotor and joint
+is a second nonlinear element, see `play`, and multiplies the gain.
 """
 
 import copy
@@ -35,28 +37,39 @@ DIFFERENCE_STEP = 1e-6  # SI units, of finite differences
 CHUNK_SAMPLES = 50_000  # samples for which a law is called at once
 MAX_SAMPLES = 10**9  # in a period, for a describing function
 MAX_SAMPLES_PER_PERIOD = 1000  # of an excitation: a law that would take more is called this often
-EXCITATION_SAMPLES = 3  # times the largest number in a period: about as many samples has an excitation
+EXCITATION_SAMPLES = (
+    3  # times the largest number in a period: about as many samples has an excitation
+)
 MIN_PERIODS, MAX_PERIODS = 12, 600  # of an excitation
 SETTLING_SHARE = 0.4  # of an excitation, while memories settle: left out
 REST_SAMPLES = 1000  # samples before an encoder's reading moves by one count, and as many after it
 MAX_HARMONICS = 31  # of u that pass through the mechanism: the peak of a triangle is right to 1.3 %
 NEGLIGIBLE_SHARE = 1e-9  # of the first harmonic, below which another one is left out
-HARMONIC_PASSES = 2  # passes of the harmonics through mechanism and law: a third changes amplitudes by less than 0.2 %
+# passes of the harmonics through mechanism and law: a third changes amplitudes by less than 0.2 %
+HARMONIC_PASSES = 2
 SAMPLE_POSITIONS = 16  # tried places of the first sample in its control period
 FIELDS = {name: i for i, name in enumerate(Measurement._fields)}
-T, DT, X, V, E, DE, F, G, A = (FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a"))
-LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq"))
+T, DT, X, V, E, DE, F, G, A = (
+    FIELDS[name] for name in ("t", "dt", "x", "v", "e", "de", "f", "g", "a")
+)
+LIMIT, MODEL, HAS_SURFACE, S, V_EQ = (
+    FIELDS[name] for name in ("limit", "model", "has_surface", "s", "v_eq")
+)
 Q, DQ, FQ, GQ = (FIELDS[name] for name in ("q", "dq", "fq", "gq"))
 FREE_MASS = 0.0, 1.0, 0.0, 0.0  # f and g at rest, and the derivatives of f with x and v
 
 
 @dataclasses.dataclass(frozen=True)
 class Wave:
-    """What a law returns for e = amplitude sin(omega t), plus the harmonics that the mechanism lets through."""
+    """What a law returns for e = amplitude sin(omega t), plus the harmonics that the mechanism lets
+    through.
+    """
 
     amplitude: float  # of the first harmonic of e, rad or m
     omega: float  # rad/s
-    gain: complex  # first harmonic of u over that of e, unit of u per rad or m, times the describing function of play
+    # first harmonic of u over that of e, unit of u per rad or m, times the describing function of
+    # play
+    gain: complex
     third: float  # third harmonic of s over the first
     s: float  # half the range of the sliding variable
     u: float  # half the range of u
@@ -74,18 +87,26 @@ class Loop:
             cure = "leave the clock out, or measure it in a run"
             raise ScenarioError(f"chattering is predicted for samples that are on time: {cure}")
         if s.stepper is not None:
-            raise ScenarioError("chattering is not predicted for a Stepper, whose queue is no lag: measure it in a run")
+            raise ScenarioError(
+                "chattering is not predicted for a Stepper, whose queue is no lag: measure it in a run"
+            )
         for joint, low, high in plant.ranges:
             if not low <= 0.0 <= high:
                 moves = f"joint {joint!r} of {plant.name} moves from {low:g} to {high:g}"
                 cure = "measure it in a run, with smc.score, or choose another plant"
                 raise ScenarioError(f"chattering is predicted about x = 0, and {moves}: {cure}")
-        free = channel + plant.driven  # the joint without an actuator that the channel moves, if there is one
-        self.joints = [channel, free] if free < plant.n else [channel]
+        free = (
+            channel + plant.driven
+        )  # the joint without an actuator that the channel moves, if there is one
+        if free < plant.n:
+            self.joints = [channel, free]
+        else:
+            self.joints = [channel]
         self.controller = Controller(s.velocity, s.surface, s.law.of_channel(channel))
         self._linearise_mechanism()
         self.nominal_models = [self._nominal_model(joint) for joint in self.joints]
-        # all amplitudes of a frequency share an answer and a clock, and the loops of `later` share them and the gains
+        # all amplitudes of a frequency share an answer and a clock, and the loops of `later` share
+        # them and the gains
         self._answer = functools.lru_cache(maxsize=1024)(self._solve)
         self.gain = functools.lru_cache(maxsize=10_000)(self._gain)
         self._clock = functools.lru_cache(maxsize=4)(self._clock_of)
@@ -97,7 +118,9 @@ class Loop:
         return made
 
     def _linearise_mechanism(self) -> None:
-        """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and gaps."""
+        """Linearise MuJoCo's model about rest at x = 0, without contacts, limits, dry friction and
+        gaps.
+        """
         s = self.scenario.resolved
         motor = next((part for part in s.actuator if isinstance(part, DCMotor)), None)
         ideal = dataclasses.replace(
@@ -121,46 +144,70 @@ class Loop:
                 mujoco.mj_setConst(model, mujoco.MjData(model))
             self.step = float(model.opt.timestep)
             data = mujoco.MjData(model)
-            data.qpos[:], data.qvel[:] = models.initial_state(model, dataclasses.replace(ideal, x0=0.0, v0=0.0))
+            data.qpos[:], data.qvel[:] = models.initial_state(
+                model, dataclasses.replace(ideal, x0=0.0, v0=0.0)
+            )
             self.a, b = transition(model, data, s.actuator)
-            self.b = b[:, drive_ids(model)[self.channel]] * math.prod(part.scale for part in s.actuator)
+            self.b = b[:, drive_ids(model)[self.channel]] * math.prod(
+                part.scale for part in s.actuator
+            )
             self.rows, self.nv = dof_ids(model), model.nv
-            self.gap = 0.0 if gear is None else self._joint_gap(gear, model, data)
+            if gear is None:
+                self.gap = 0.0
+            else:
+                self.gap = self._joint_gap(gear, model, data)
 
     def _nominal_model(self, joint: int) -> tuple[float, ...]:
         """Return nominal f and g of a joint at rest, and the derivatives of f with its x and v."""
         plant = self.scenario.resolved.plant
-        zeros, step, p = np.zeros(plant.n), np.eye(plant.n)[joint] * DIFFERENCE_STEP, copy.copy(plant.values({}))
+        zeros, step, p = (
+            np.zeros(plant.n),
+            np.eye(plant.n)[joint] * DIFFERENCE_STEP,
+            copy.copy(plant.values({})),
+        )
         f, g = plant.nominal(zeros, zeros, joint, p)
         fx, fv = (plant.nominal(x, v, joint, p)[0] for x, v in ((step, zeros), (zeros, step)))
         return f, g, (fx - f) / DIFFERENCE_STEP, (fv - f) / DIFFERENCE_STEP
 
     def response(self, omega: complex) -> complex:
         """Return the amplitude of x at control samples per unit of sampled and held u, rad or m."""
-        return complex(self._answer(omega)[self.rows[self.channel]] * np.exp(-1j * omega * self.delay))
+        return complex(
+            self._answer(omega)[self.rows[self.channel]] * np.exp(-1j * omega * self.delay)
+        )
 
     def coupling(self, omega: float) -> float:
-        """Return the largest amplitude of another driven channel under this one's u, over that of its own x."""
+        """Return the largest amplitude of another driven channel under this one's u, over that of
+        its own x.
+        """
         answer = np.abs(self._answer(omega)[self.rows[: self.scenario.plant.driven]])
         return float(np.delete(answer, self.channel).max(initial=0.0) / answer[self.channel])
 
     def _solve(self, omega: complex) -> np.ndarray:
-        """Return the state at samples per unit of held u, with u's images at omega + 2 pi m / control_period."""
+        """Return the state at samples per unit of held u, with u's images at omega + 2 pi m /
+        control_period.
+        """
         s = self.scenario.resolved
         count = round(s.control_period / self.step)
         z = np.exp(1j * (omega * self.step + math.tau * np.arange(count) / count))
         passed = sum(z**-i for i in range(count)) / count  # by the hold
         passed = passed * z ** -round(s.input_delay / self.step)
 
-        answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[:, :, 0]
+        answers = np.linalg.solve(z[:, None, None] * np.eye(len(self.a)) - self.a, self.b[:, None])[
+            :, :, 0
+        ]
         sensor_delay = s.sensor.delay if s.sensor else 0.0
         return passed @ answers * np.exp(-1j * omega * sensor_delay)
 
     @functools.cached_property
     def s_of_one_count(self) -> float:
-        """The largest |s| after the reading of x has moved by one count of the encoder at rest; 0 without one."""
+        """The largest |s| after the reading of x has moved by one count of the encoder at rest; 0
+        without one.
+        """
         s = self.scenario.resolved
-        count = 0.0 if s.sensor is None else s.sensor.quantum(s.plant.units[self.channel] == "rad")
+        if s.sensor is None:
+            count = 0.0
+        else:
+            count = s.sensor.quantum(s.plant.units[self.channel] == "rad")
         if not count:
             return 0.0
         x = np.where(np.arange(2 * REST_SAMPLES) < REST_SAMPLES, 0.0, count)
@@ -168,35 +215,51 @@ class Loop:
         return float(np.abs(sliding).max())
 
     def _controlled(self, h: float, motion: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s for x and v of the channel, and of the joint that it moves, every h seconds."""
+        """Return u and s for x and v of the channel, and of the joint that it moves, every h
+        seconds.
+        """
         s = self.scenario.resolved
         fixed = {DT: h, LIMIT: self.scenario.limits[self.channel], MODEL: s.model != "none"}
         return self.controller(0, fixed, motion, self.nominal_models, self.controller.memories())
 
-    def _gain(self, amplitude: float, omega: float, max_samples: float = MAX_SAMPLES_PER_PERIOD) -> complex:
-        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of play, see `Wave`."""
+    def _gain(
+        self, amplitude: float, omega: float, max_samples: float = MAX_SAMPLES_PER_PERIOD
+    ) -> complex:
+        """Return the first harmonic of u over that of e = amplitude sin(omega t), times that of
+        play, see `Wave`.
+        """
         _, u, _ = self._excited([amplitude], omega, max_samples)
-        return self._gain_of(_first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega)
+        return self._gain_of(
+            _first(u, self._clock(omega, max_samples, 0.0).against), amplitude, omega
+        )
 
     def phases(self, amplitude: float, omega: float) -> tuple[float, float]:
-        """Return the lowest and highest phase of a locked cycle's gain relative to `gain`, rad: one <= 0, one >= 0.
+        """Return the lowest and highest phase of a locked cycle's gain relative to `gain`, rad: one
+        <= 0, one >= 0.
 
-        `gain` is a mean over all positions of the samples in the period, but a cycle of a whole number of samples is
-        locked to one. A relay then switches up to half a control period earlier or later than in the mean.
+        `gain` is a mean over all positions of the samples in the period, but a cycle of a whole
+        number of samples is locked to one. A relay then switches up to half a control period
+        earlier or later than in the mean.
         """
         h = max(self.scenario.control_period, math.tau / omega / MAX_SAMPLES_PER_PERIOD)
-        locked = math.tau / h / (2 * max(round(math.pi / omega / h), 2))  # of an even number of samples, four or more
+        locked = (
+            math.tau / h / (2 * max(round(math.pi / omega / h), 2))
+        )  # of an even number of samples, four or more
         mean = self.gain(amplitude, 1.001 * locked)
         shifts = []
         for position in (np.arange(SAMPLE_POSITIONS) + 0.5) / SAMPLE_POSITIONS:
             angles, u, _ = self._excited([amplitude], locked, MAX_SAMPLES_PER_PERIOD, position)
-            shifts.append(float(np.angle(self._gain_of(_harmonic(u, angles), amplitude, locked) / mean)))
+            shifts.append(
+                float(np.angle(self._gain_of(_harmonic(u, angles), amplitude, locked) / mean))
+            )
         scale = omega / locked
         return scale * min(*shifts, 0.0), scale * max(*shifts, 0.0)
 
     def _gain_of(self, first: complex, amplitude: float, omega: float) -> complex:
         two_samples = math.isclose(self.scenario.control_period * omega, math.pi, rel_tol=1e-9)
-        images = 2.0 if two_samples else 1.0  # with two samples a period a wave and its image are the same
+        images = (
+            2.0 if two_samples else 1.0
+        )  # with two samples a period a wave and its image are the same
         return first / (1j * amplitude * images) * play(amplitude, self.gap)
 
     def _joint_gap(self, gear: Backlash, model: mujoco.MjModel, data: mujoco.MjData) -> float:
@@ -210,7 +273,9 @@ class Loop:
         return gear.gap * rotor * float(mobility[dof])
 
     def wave(self, amplitude: float, omega: float) -> Wave:
-        """Return what the law returns for e with this first harmonic, and the others that follow from u."""
+        """Return what the law returns for e with this first harmonic, and the others that follow
+        from u.
+        """
         angles, u, s = self._excited([amplitude], omega, MAX_SAMPLES_PER_PERIOD)
         harmonics: list[complex] = [amplitude]
         for _ in range(HARMONIC_PASSES):
@@ -229,23 +294,39 @@ class Loop:
             drift=abs(late - early) / (abs(first) or 1.0),
         )
 
-    def _harmonics_of_e(self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray) -> list[complex]:
-        """Return the harmonics of e: the given amplitude, then the mechanism's answer to the other harmonics of u."""
+    def _harmonics_of_e(
+        self, amplitude: float, omega: float, u: np.ndarray, angles: np.ndarray
+    ) -> list[complex]:
+        """Return the harmonics of e: the given amplitude, then the mechanism's answer to the other
+        harmonics of u.
+        """
         highest = min(MAX_HARMONICS, math.ceil(math.pi / self.scenario.control_period / omega) - 1)
-        powers = itertools.accumulate(itertools.repeat(np.exp(-1j * angles), max(highest, 1)), np.multiply)
+        powers = itertools.accumulate(
+            itertools.repeat(np.exp(-1j * angles), max(highest, 1)), np.multiply
+        )
         first = _first(u, next(powers))
-        rest = [self.response(n * omega) * _first(u, power) / 1j for n, power in enumerate(powers, 2)]
+        rest = []
+        for n, power in enumerate(powers, 2):
+            rest.append(self.response(n * omega) * _first(u, power) / 1j)
         # u is shifted in time until the answer to its first harmonic has the phase of e
-        shift = 1j * amplitude / (first * self.response(omega)) if first else 0j
-        return [amplitude, *(x * (shift / abs(shift)) ** n if shift else 0j for n, x in enumerate(rest, 2))]
+        if first:
+            shift = 1j * amplitude / (first * self.response(omega))
+        else:
+            shift = 0j
+        return [
+            amplitude,
+            *(x * (shift / abs(shift)) ** n if shift else 0j for n, x in enumerate(rest, 2)),
+        ]
 
     def _excited(
         self, amplitudes: Sequence[complex], omega: float, max_samples: float, position: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return omega t, u and s of the samples after memories have settled, for an error of these harmonics.
+        """Return omega t, u and s of the samples after memories have settled, for an error of these
+        harmonics.
 
-        The error is the sum of Re(amplitude_n exp(j n omega t)). It starts at its largest value, so that integrals of
-        odd functions of it have no mean. The first sample is at `position`, in control periods.
+        The error is the sum of Re(amplitude_n exp(j n omega t)). It starts at its largest value, so
+        that integrals of odd functions of it have no mean. The first sample is at `position`, in
+        control periods.
         """
         clock = self._clock(omega, max_samples, position)
         motion = []
@@ -268,7 +349,9 @@ class Loop:
     def _clock_of(self, omega: float, max_samples: float, position: float) -> "Clock":
         period = math.tau / omega
         h = max(self.scenario.resolved.control_period, period / max_samples)
-        periods = min(max(math.ceil(EXCITATION_SAMPLES * max_samples * h / period), MIN_PERIODS), MAX_PERIODS)
+        periods = min(
+            max(math.ceil(EXCITATION_SAMPLES * max_samples * h / period), MIN_PERIODS), MAX_PERIODS
+        )
         count = math.ceil(periods * period / h)
         first = int(SETTLING_SHARE * count)
         angles = omega * (h * np.arange(first, count) + h * position)
@@ -291,9 +374,13 @@ class Controller:
 
     def __init__(self, *parts: Component | None):
         try:
-            functions = [None if one is None else cfunctions.compile_component(one) for one in parts]
+            functions = []
+            for one in parts:
+                functions.append(None if one is None else cfunctions.compile_component(one))
         except NotCompilable as error:
-            raise ScenarioError(f"chattering is not predicted for a law that does not compile: {error}") from None
+            raise ScenarioError(
+                f"chattering is not predicted for a law that does not compile: {error}"
+            ) from None
         self.functions, self.parts = functions, parts  # the functions keep their addresses alive
         self.addresses = np.array([0 if one is None else one.address for one in functions])
         self.gains = [np.array([*(one.gains.values() if one else ()), 0.0]) for one in parts]
@@ -310,23 +397,34 @@ class Controller:
         models: Sequence[tuple[float, ...]],
         memories: list[np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return u and s, each (K,), for samples of a motion that begins at sample `first`; the memories change.
+        """Return u and s, each (K,), for samples of a motion that begins at sample `first`; the
+        memories change.
 
-        `fixed` has fields of a measurement with their values in all samples; `motion` has x and v of the channel, then
-        those of the joint that it moves, if any; `models` is as `Loop._nominal_model` returns it for these.
+        `fixed` has fields of a measurement with their values in all samples; `motion` has x and v
+        of the channel, then those of the joint that it moves, if any; `models` is as
+        `Loop._nominal_model` returns it for these.
         """
-        x, v, q, dq = motion if len(motion) == 4 else (*motion, np.empty(0), np.empty(0))
+        if len(motion) == 4:
+            x, v, q, dq = motion
+        else:
+            x, v, q, dq = (*motion, np.empty(0), np.empty(0))
         start, of_joint = np.zeros(len(FIELDS)), models[1] if len(motion) == 4 else (0.0,) * 4
         for field, value in fixed.items():
             start[field] = value
         out, y = np.empty((len(x), 2)), np.empty(len(FIELDS))
         (g0, g1, g2), (m0, m1, m2) = self.gains, memories
         model = np.array([models[0], of_joint])
-        done = _run(self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out)
+        done = _run(
+            self.addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out
+        )
         if done < 0:
-            raise ScenarioError("the law raised an exception in the harmonic balance: correct the law")
+            raise ScenarioError(
+                "the law raised an exception in the harmonic balance: correct the law"
+            )
         if done < len(x):
-            raise ScenarioError(f"the law returned {out[done, 0]:g} at x = {y[X]:g}, v = {y[V]:g}: correct the law")
+            raise ScenarioError(
+                f"the law returned {out[done, 0]:g} at x = {y[X]:g}, v = {y[V]:g}: correct the law"
+            )
         return out[:, 0], out[:, 1]
 
 
@@ -345,12 +443,16 @@ def transition(
 
 
 def _behind(drive: Actuator, block: np.ndarray, model: mujoco.MjModel) -> np.ndarray:
-    """Return the `rates` of a model behind a drive: the drive's outputs become states, and its inputs the commands.
+    """Return the `rates` of a model behind a drive: the drive's outputs become states, and its
+    inputs the commands.
 
     A motor's model has no inductance: the voltage V - gear k v becomes the state R i.
     """
     ids = drive_ids(model)
-    outputs, speeds = len(block) - model.nu + ids, model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]]
+    outputs, speeds = (
+        len(block) - model.nu + ids,
+        model.nv + model.jnt_dofadr[model.actuator_trnid[ids, 0]],
+    )
     made = np.pad(block, (0, model.nu))
     if isinstance(drive, DCMotor):
         made[:, speeds] += drive.constant * made[:, outputs]
@@ -366,7 +468,8 @@ def describing_function(
     omega: Positive,
     samples: Annotated[int, Whole(low=2, high=MAX_SAMPLES)] = 4_000_000,
 ) -> complex:
-    """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), in continuous time.
+    """Return N(a, omega) of a law: the first harmonic of u over that of e = a sin(omega t), in
+    continuous time.
 
     The law has no model and no bound on u. The second of two periods counts.
 
@@ -380,7 +483,8 @@ def describing_function(
       N, complex, unit of u per rad or m. For a relay k sign(e): 4 k / (pi a).
 
     Raises:
-      ScenarioError: a law that does not compile, or raises; an amplitude, omega or number of samples that is not > 0.
+      ScenarioError: a law that does not compile, or raises; an amplitude, omega or number of
+        samples that is not > 0.
     """
     h = math.tau / omega / samples
     resolved = Scenario(plant="duffing", law=law, model="none").resolved
@@ -396,12 +500,15 @@ def describing_function(
 
 
 def play(amplitude: float, gap: float) -> complex:
-    """Return the describing function of play: the force on the joint over that on a rotor without play, complex.
+    """Return the describing function of play: the force on the joint over that on a rotor without
+    play, complex.
 
-    Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor leaves its flank when
-    u changes its sign. It moves alone until the angle c with c - sin c = play m1 omega^2 / |u|. There it hits the other
-    flank and passes on to the joint the impulse 1 - cos c that it has from u. As x has the amplitude
-    |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone. `gap` is that of the play, times
+    Rotor m1 and joint m2 are free masses, with plastic impacts, under u = sin(omega t). The rotor
+    leaves its flank when u changes its sign. It moves alone until the angle c with c - sin c = play
+    m1 omega^2 / |u|. There it hits the other flank and passes on to the joint the impulse 1 - cos c
+    that it has from u. As x has the amplitude
+    |play(...) u| / ((m1 + m2) omega^2), c depends on amplitude over gap alone. `gap` is that of the
+      play, times
     m1 / (m1 + m2): how far the joint moves while the rotor crosses, rad or m.
     """
     if gap == 0.0:
@@ -426,7 +533,9 @@ def _harmonic(values: np.ndarray, angles: np.ndarray) -> complex:
 
 
 def _first(values: np.ndarray, against: np.ndarray) -> complex:
-    """Return the complex amplitude of sin(angle), given exp(-j angle): a Hann window of sum 1 rejects other waves."""
+    """Return the complex amplitude of sin(angle), given exp(-j angle): a Hann window of sum 1
+    rejects other waves.
+    """
     return complex(2j * ((_window(len(values)) * values) @ against))
 
 
@@ -437,7 +546,9 @@ def _window(count: int) -> np.ndarray:
 
 @cfunctions.cached
 def _run(addresses, g0, g1, g2, m0, m1, m2, start, first, x, v, q, dq, model, y, out):
-    """Call estimator, surface and law for each sample. Stop where u is not finite; y is then the measurement there.
+    """Call estimator, surface and law for each sample.
+
+    Stop where u is not finite; y is then the measurement there.
 
     Return the number of samples before that, or -1 if one of the three raised.
     """

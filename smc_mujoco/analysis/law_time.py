@@ -1,9 +1,11 @@
-"""Time that a law takes for a sample: its compiled code alone, on this machine, on what it measures in a run.
+"""Time that a law takes for a sample: its compiled code alone, on this machine, on what it measures
+in a run.
 
-Every sample of the run is given to several copies of the law at once, each with its own memory, so that a clock can
-tell tens of ns. The least time of each sample in a few rounds counts, as what else the machine does only adds to it.
-The 99 % quantile is thus over samples: for a law that iterates, the time of its hard ones. The code is warm: it and
-its memory are in the processor's caches. The law `pid` is timed in turn with it, on the same measurements.
+Every sample of the run is given to several copies of the law at once, each with its own memory, so
+that a clock can tell tens of ns. The least time of each sample in a few rounds counts, as what else
+the machine does only adds to it. The 99 % quantile is thus over samples: for a law that iterates,
+the time of its hard ones. The code is warm: it and its memory are in the processor's caches. The
+law `pid` is timed in turn with it, on the same measurements.
 """
 
 # pyright: reportCallIssue=false
@@ -23,7 +25,10 @@ from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 
 LONGEST = 2.0  # s of a run, with the approach and some rest of most; chosen
-COPIES, MOST_NUMBERS = 256, 32768  # of a law at once; numbers of their memories, which fit a processor's second cache
+COPIES, MOST_NUMBERS = (
+    256,
+    32768,
+)  # of a law at once; numbers of their memories, which fit a processor's second cache
 ROUNDS = 5
 
 
@@ -48,7 +53,9 @@ class _Listener:
 
 
 def law_time(scenario: Scenario) -> LawTime | None:
-    """Return the time of a scenario's law in channel 0; None if it is of many joints, does not compile, or fails."""
+    """Return the time of a scenario's law in channel 0; None if it is of many joints, does not
+    compile, or fails.
+    """
     of_channel = scenario.resolved.law
     if of_channel.joint:
         return None
@@ -58,7 +65,10 @@ def law_time(scenario: Scenario) -> LawTime | None:
         seen = _measured(scenario)
     except (NotCompilable, Failure):
         return None
-    rounds = [(_round(timed, seen), _round(reference, seen)) for _ in range(ROUNDS)]  # in turn, as loads come and go
+    # in turn, as loads come and go
+    rounds = []
+    for _ in range(ROUNDS):
+        rounds.append((_round(timed, seen), _round(reference, seen)))
     own, other = (np.min(each, axis=0) for each in zip(*rounds, strict=True))
     median, high = np.quantile(own, (0.5, 0.99)).tolist()
     return LawTime(median, high, median / float(np.median(other)))
@@ -66,7 +76,9 @@ def law_time(scenario: Scenario) -> LawTime | None:
 
 def _measured(scenario: Scenario) -> np.ndarray:
     """Return what the law measures in channel 0 in a run, (samples, fields of a Measurement)."""
-    trace: Any = run(dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST)))
+    trace: Any = run(
+        dataclasses.replace(scenario, duration=min(scenario.resolved.duration, LONGEST))
+    )
     controller, listener = Controller(trace.scenario), _Listener(trace.u)
     controller.law = listener  # pyright: ignore[reportAttributeAccessIssue]
     for k in np.flatnonzero(np.isfinite(trace.u).all(axis=1)).tolist():
@@ -78,8 +90,15 @@ def _measured(scenario: Scenario) -> np.ndarray:
 
 def _round(timed: Law, seen: np.ndarray) -> np.ndarray:
     """Return the time of a law at each sample, s, (samples,)."""
-    function, copies = cfunctions.compile_component(timed), max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1)))
-    gains, memory, out = np.array([*timed.gains.values(), 0.0]), np.zeros((copies, timed.memory + 1)), np.zeros(2)
+    function, copies = (
+        cfunctions.compile_component(timed),
+        max(1, min(COPIES, MOST_NUMBERS // max(timed.memory, 1))),
+    )
+    gains, memory, out = (
+        np.array([*timed.gains.values(), 0.0]),
+        np.zeros((copies, timed.memory + 1)),
+        np.zeros(2),
+    )
     own, stride = [a.ctypes.data for a in (gains, memory, out)], memory.strides[0]
     rows = [row.ctypes.data for row in seen]
     clock, spent = time.perf_counter_ns, np.empty(len(rows))

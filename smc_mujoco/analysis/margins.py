@@ -1,15 +1,18 @@
-"""Margins: the largest delay, disturbance, friction, mass ratio, noise and jitter that a law tolerates on a plant.
+"""Margins: the largest delay, disturbance, friction, mass ratio, noise and jitter that a law
+tolerates on a plant.
 
-A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its scale
-(`conventions`). As a run starts at the scale, its envelope has then shrunk, which the paper's claim on delay requires.
-The search tries up to nine levels from small to large. Then it halves the interval below the FIRST level that is not
-tolerated, until the margin is known to one control period (delay), an eighth of one (jitter) or 2 % (others). There
-may be tolerated levels above one that is not, and levels that are not between two that were tried. Noise is one
-realisation, seed 0, the same for every law. A disturbance acts on every channel, and both of its signs are tried.
+A run tolerates a level if it does not fail and its ultimate bound after 10 s is at most 5 % of its
+scale (`conventions`). As a run starts at the scale, its envelope has then shrunk, which the paper's
+claim on delay requires. The search tries up to nine levels from small to large. Then it halves the
+interval below the FIRST level that is not tolerated, until the margin is known to one control
+period (delay), an eighth of one (jitter) or 2 % (others). There may be tolerated levels above one
+that is not, and levels that are not between two that were tried. Noise is one realisation, seed 0,
+the same for every law. A disturbance acts on every channel, and both of its signs are tried.
 
-Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an amplitude that grows
-from 0, so it tolerates a little more. Theory also gives the constant force, or dry friction, that holds the plant at
-5 % of its scale; with friction it may stop closer to the reference.
+Linear theory gives the delay above which rest is unstable. A smooth law then oscillates with an
+amplitude that grows from 0, so it tolerates a little more. Theory also gives the constant force, or
+dry friction, that holds the plant at 5 % of its scale; with friction it may stop closer to the
+reference.
 
 All searches advance together, a batch of runs per round.
 """
@@ -43,15 +46,22 @@ from smc_mujoco.simulation.signals import Constant, Noise
 from smc_mujoco.simulation.trace import Trace, warn_of_broken
 
 TOLERATED_ERROR = 0.05  # of the scale: the audit's threshold for an ultimate bound
-VELOCITY_NOISE_RATIO = 5.0  # 1/s, noise of the velocity over that of the position: that of the study's sensor
+VELOCITY_NOISE_RATIO = (
+    5.0  # 1/s, noise of the velocity over that of the position: that of the study's sensor
+)
 MAX_FORCE = 6.0  # N or N m: the study's u_max; no actuator there holds a larger force
 MAX_MASS_RATIO, MAX_NOISE = 64.0, 2.048  # mass ratio; rad or m: chosen, far above tolerated levels
-FORCES, NOISES = (tuple(largest * 2.0 ** (i - 8) for i in range(9)) for largest in (MAX_FORCE, MAX_NOISE))
+FORCES, NOISES = (
+    tuple(largest * 2.0 ** (i - 8) for i in range(9)) for largest in (MAX_FORCE, MAX_NOISE)
+)
 MASS_RATIOS = tuple(np.geomspace(1.0, MAX_MASS_RATIO, 10)[1:].tolist())
 JITTERS = tuple(i / JITTER_SHARES for i in range(1, JITTER_SHARES))  # of the control period
 DELAYS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # s
 FINE, COARSE = 0.02, 0.1  # resolution of a full and of a quick search, of the level
-QUANTA = {FINE: 1, COARSE: 5}  # the same in quanta, for levels that are multiples of one, such as control periods
+QUANTA = {
+    FINE: 1,
+    COARSE: 5,
+}  # the same in quanta, for levels that are multiples of one, such as control periods
 QUICK_DURATION = 5.0  # s, of a quick search's runs
 EXPECTED_HALVINGS = 6  # of an interval between two levels, for the progress bar
 
@@ -65,8 +75,12 @@ Key = TypeVar("Key")
 class Search:
     """The search for the largest tolerated level below the first one that is not tolerated."""
 
-    levels: Sequence[float]  # tried first, from small to large, up to the first that is not tolerated
-    resolution: Callable[[float], float]  # largest tolerated level -> the interval at which the search ends
+    levels: Sequence[
+        float
+    ]  # tried first, from small to large, up to the first that is not tolerated
+    resolution: Callable[
+        [float], float
+    ]  # largest tolerated level -> the interval at which the search ends
     rounded: Callable[[float], float] = float  # level -> the nearest one that a run can have
     low: float = 0.0  # largest level known to be tolerated; at first the level without any effect
     high: float = math.inf  # smallest level known not to be tolerated; inf until there is one
@@ -91,8 +105,12 @@ class Search:
 def find_boundaries(
     searches: Mapping[Key, Search], tolerated: Callable[[list[tuple[Key, float]]], Iterable[bool]]
 ) -> None:
-    """Advance searches together until all are done; `tolerated` judges a level of each search that continues."""
-    while tried := [(key, level) for key, search in searches.items() if (level := search.next) is not None]:
+    """Advance searches together until all are done; `tolerated` judges a level of each search that
+    continues.
+    """
+    while tried := [
+        (key, level) for key, search in searches.items() if (level := search.next) is not None
+    ]:
         for (key, level), good in zip(tried, tolerated(tried), strict=True):
             setattr(searches[key], "low" if good else "high", level)
 
@@ -110,8 +128,12 @@ class Kind:
     put: Callable[[Scenario, float], Scenario]  # the scenario with a level
     none: float = 0.0  # the level without any effect
     signed: bool = False  # whether a level is tolerated only if its negative is, too
-    quantum: Callable[[Scenario], float] = lambda base: 0.0  # of which a level is a multiple; 0: any level
-    theory: Callable[[Scenario], float | None] = lambda base: None  # largest level by linear theory, if there is any
+    quantum: Callable[[Scenario], float] = lambda base: (
+        0.0
+    )  # of which a level is a multiple; 0: any level
+    theory: Callable[[Scenario], float | None] = lambda base: (
+        None
+    )  # largest level by linear theory, if there is any
 
     def scenarios(self, base: Scenario, level: float) -> list[Scenario]:
         """Return the scenarios that tell whether a level is tolerated."""
@@ -126,14 +148,32 @@ class Kind:
 
             step = QUANTA[resolution] * quantum
             levels = [rounded(level) for level in self.levels]
-            return Search(levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none)
+            return Search(
+                levels=levels, resolution=lambda low: step, rounded=rounded, low=self.none
+            )
         first = self.levels[0]
-        return Search(levels=self.levels, resolution=lambda low: resolution * max(low, first), low=self.none)
+        return Search(
+            levels=self.levels, resolution=lambda low: resolution * max(low, first), low=self.none
+        )
 
     def expected(self, base: Scenario) -> float | None:
-        """Return the largest level by linear theory; None if there is none for the law, the plant or the condition."""
-        changed = base.disturbance or base.friction or base.mismatch or base.jump or base.sensor or base.feedforward
-        if changed or not base.clock.regular or base.resolved.model != "none" or base.resolved.reference != REST:
+        """Return the largest level by linear theory; None if there is none for the law, the plant
+        or the condition.
+        """
+        changed = (
+            base.disturbance
+            or base.friction
+            or base.mismatch
+            or base.jump
+            or base.sensor
+            or base.feedforward
+        )
+        if (
+            changed
+            or not base.clock.regular
+            or base.resolved.model != "none"
+            or base.resolved.reference != REST
+        ):
             return None  # not in the theory
         try:
             return self.theory(base)
@@ -142,7 +182,9 @@ class Kind:
 
 
 def tolerates(trace: Trace) -> bool:
-    """Return whether a run did not fail and ended within 5 % of its scale, in every group of its channels."""
+    """Return whether a run did not fail and ended within 5 % of its scale, in every group of its
+    channels.
+    """
     if trace.failure is not None:
         return False
     bound = catalogue.CATALOGUE["ultimate_bound"].formula
@@ -151,8 +193,14 @@ def tolerates(trace: Trace) -> bool:
 
 def _critical_delay(base: Scenario) -> float | None:
     estimated = base.resolved.velocity.name != "measured"
-    lam_k1 = None if base.actuator or estimated else theory.linear_gains(base.law)  # not in the theory
-    return None if lam_k1 is None else theory.critical_delay(base.plant, *lam_k1, base.control_period)
+    # not in the theory
+    if base.actuator or estimated:
+        lam_k1 = None
+    else:
+        lam_k1 = theory.linear_gains(base.law)
+    if lam_k1 is None:
+        return None
+    return theory.critical_delay(base.plant, *lam_k1, base.control_period)
 
 
 def _tolerated_force(base: Scenario) -> float | None:
@@ -163,13 +211,20 @@ def _tolerated_force(base: Scenario) -> float | None:
 
 
 def _with_mass(base: Scenario, level: float) -> Scenario:
-    """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or by its own name."""
-    mass = base.plant.mass if base.plant.mass in base.mismatch else "mass"
+    """Return the scenario with `level` times the nominal mass; the mismatch may call it "mass" or
+    by its own name.
+    """
+    if base.plant.mass in base.mismatch:
+        mass = base.plant.mass
+    else:
+        mass = "mass"
     return dataclasses.replace(base, mismatch=dict(base.mismatch) | {mass: level})
 
 
 def _with_noise(base: Scenario, level: float) -> Scenario:
-    return dataclasses.replace(base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level))
+    return dataclasses.replace(
+        base, noise=Noise(position=level, velocity=VELOCITY_NOISE_RATIO * level)
+    )
 
 
 def _with_force(base: Scenario, level: float) -> Scenario:
@@ -190,9 +245,16 @@ MARGIN_KINDS: dict[str, Kind] = {
         theory=_critical_delay,
     ),
     "disturbance": Kind(
-        label="constant disturbance", unit="{u}", levels=FORCES, put=_with_force, signed=True, theory=_tolerated_force
+        label="constant disturbance",
+        unit="{u}",
+        levels=FORCES,
+        put=_with_force,
+        signed=True,
+        theory=_tolerated_force,
     ),
-    "friction": Kind(label="dry friction", unit="{u}", levels=FORCES, put=with_friction, theory=_tolerated_force),
+    "friction": Kind(
+        label="dry friction", unit="{u}", levels=FORCES, put=with_friction, theory=_tolerated_force
+    ),
     "mass": Kind(label="mass", unit="1", levels=MASS_RATIOS, put=_with_mass, none=1.0),
     "noise": Kind(label="position noise", unit="{x}", levels=NOISES, put=_with_noise),
     "jitter": Kind(
@@ -203,10 +265,19 @@ MARGIN_KINDS: dict[str, Kind] = {
         quantum=lambda base: JITTERS[0],
     ),
     "missed": Kind(
-        label="share of missed samples", unit="1", levels=tuple(i / 10 for i in range(1, 10)), put=_with_missed
+        label="share of missed samples",
+        unit="1",
+        levels=tuple(i / 10 for i in range(1, 10)),
+        put=_with_missed,
     ),
 }
-KINDS = ("delay", "disturbance", "friction", "mass", "noise")  # those of the report, and the default
+KINDS = (
+    "delay",
+    "disturbance",
+    "friction",
+    "mass",
+    "noise",
+)  # those of the report, and the default
 
 
 # margins of laws on plants
@@ -219,10 +290,14 @@ class Margin:
     plant: str  # its name
     law: str  # its name
     kind: str  # one of MARGIN_KINDS
-    value: float  # largest tolerated level below the first one tried that is not; NaN if not even the unchanged run is
+    # largest tolerated level below the first one tried that is not; NaN if not even the unchanged
+    # run is
+    value: float
     unit: str  # of value, resolution, searched and theory
     resolution: float  # a level that is not tolerated is at most this much larger
-    searched: float  # largest level of the search; if it is the value, all that were tried are tolerated
+    searched: (
+        float  # largest level of the search; if it is the value, all that were tried are tolerated
+    )
     theory: float | None  # the margin by linear theory
 
     @property
@@ -246,12 +321,14 @@ def margins(
 
     Args:
       plants, laws: names, or your own plants and laws, one or several.
-      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise", "jitter" and "missed"; the last two,
-        of the controller's clock, are left out by default.
+      kinds: one or several of "delay", "disturbance", "friction", "mass", "noise", "jitter" and
+        "missed"; the last two, of the controller's clock, are left out by default.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
-      quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first look.
+      quick: whether to make runs of 5 s and search to within 5 control periods or 10 %, for a first
+        look.
       threads: as in `run`.
-      report: called with the work done and the whole work, in simulated steps; the whole is an estimate until the end.
+      report: called with the work done and the whole work, in simulated steps; the whole is an
+        estimate until the end.
       condition: condition of the runs, such as "coulomb".
       starts: initial states, see `smc.starts`. Default: the plant's own x0.
 
@@ -260,16 +337,19 @@ def margins(
     """
     if isinstance(plants, Scenario):
         words = f"[{plants.plant.name!r}], [{plants.law.name!r}]"
-        raise ScenarioError(f"margins are of plants and laws, not of a scenario: call smc.margins({words})")
+        raise ScenarioError(
+            f"margins are of plants and laws, not of a scenario: call smc.margins({words})"
+        )
     duration = QUICK_DURATION if quick else DURATION
-    bases = [
-        case(plant, law, condition, duration, gains, starts=starts)
-        for plant in listed("plants", plants)
-        for law in listed_laws(laws)
-    ]
+    bases = []
+    for plant in listed("plants", plants):
+        for law in listed_laws(laws):
+            bases.append(case(plant, law, condition, duration, gains, starts=starts))
     for base in bases:
         if not any(base.resolved.x0):
-            raise ScenarioError(f"{base.plant.name} starts at 0, and a margin is a share of the start: {START_CURE}")
+            raise ScenarioError(
+                f"{base.plant.name} starts at 0, and a margin is a share of the start: {START_CURE}"
+            )
     return margins_of(bases, listed("kinds", kinds), COARSE if quick else FINE, threads, report)
 
 
@@ -281,18 +361,29 @@ def margins_of(
     report: Report = lambda done, whole: None,
 ) -> list[Margin]:
     """Return the margins of any scenarios, as `margins` does; the resolution is FINE or COARSE."""
-    cells = [(base, find("kind of margin", kind, MARGIN_KINDS)) for base in bases for kind in kinds]
+    cells = []
+    for base in bases:
+        for kind in kinds:
+            cells.append((base, find("kind of margin", kind, MARGIN_KINDS)))
     searches = [kind.search(base, resolution) for base, kind in cells]
     going = dict(enumerate(searches))
     done, broken = 0, {}
 
     def tolerated(groups: Sequence[Sequence[Scenario]]) -> list[bool]:
-        """Run groups of scenarios, and return whether all of a group are tolerated. Traces are not kept."""
+        """Run groups of scenarios, and return whether all of a group are tolerated.
+
+        Traces are not kept.
+        """
         nonlocal done
         scenarios = [one for group in groups for one in group]
-        owners = [k for k, group in enumerate(groups) for _ in group]
+        owners = []
+        for k, group in enumerate(groups):
+            for _ in group:
+                owners.append(k)
         now = sum(scenario.work for scenario in scenarios)
-        expected = sum(search.left * cells[i][0].work * (1 + cells[i][1].signed) for i, search in going.items())
+        expected = sum(
+            search.left * cells[i][0].work * (1 + cells[i][1].signed) for i, search in going.items()
+        )
         results = [True] * len(groups)
         for i, trace in stream(scenarios, threads, summed(report, done, done + max(now, expected))):
             results[owners[i]] &= tolerates(trace)
@@ -303,7 +394,10 @@ def margins_of(
 
     without = tolerated([[base] for base in bases])
     going = {i: search for i, search in going.items() if without[i // len(kinds)]}
-    find_boundaries(going, lambda tried: tolerated([cells[i][1].scenarios(cells[i][0], level) for i, level in tried]))
+    find_boundaries(
+        going,
+        lambda tried: tolerated([cells[i][1].scenarios(cells[i][0], level) for i, level in tried]),
+    )
     warn_of_broken(broken)
     return [
         Margin(
@@ -321,8 +415,13 @@ def margins_of(
 
 
 def save(margins: Sequence[Margin], path: str | os.PathLike[str]) -> Path:
-    """Write margins to a .json file that `load` reads. NaN and infinity are words there, see `files.plain`."""
-    return write_json(with_ending(path, ".json"), [dataclasses.asdict(margin) for margin in margins])
+    """Write margins to a .json file that `load` reads.
+
+    NaN and infinity are words there, see `files.plain`.
+    """
+    return write_json(
+        with_ending(path, ".json"), [dataclasses.asdict(margin) for margin in margins]
+    )
 
 
 def load(path: str | os.PathLike[str]) -> list[Margin]:

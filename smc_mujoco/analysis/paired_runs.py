@@ -1,4 +1,6 @@
-"""Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in which every law ran."""
+"""Paired runs: the runs of a table in groups, and in each the cells (plant, condition, seed) in
+which every law ran.
+"""
 
 import contextlib
 import json
@@ -23,14 +25,24 @@ EPS = 1e-4  # of the start: smaller errors are not told apart, as gains have fou
 ROUNDING = 1e-9  # in SI units: smaller metrics count as 0 where results are compared
 SETTLES = "settles"  # a name used like a metric's: whether the settling time is finite
 OBJECTIVE = "objective"  # a name used like a metric's: J on instances that no search has seen
-UNITS = {SETTLES: "", OBJECTIVE: "s^2"} | {metric.name: metric.unit for metric in metrics()}  # of what boards compare
+UNITS = {SETTLES: "", OBJECTIVE: "s^2"} | {
+    metric.name: metric.unit for metric in metrics()
+}  # of what boards compare
 GROUPS = ("plant", "condition")
-LAW_ENTRIES = ("law", "model", "surface", "velocity", "versions")  # of a description; they may differ within a cell
+LAW_ENTRIES = (
+    "law",
+    "model",
+    "surface",
+    "velocity",
+    "versions",
+)  # of a description; they may differ within a cell
 GAIN_ENTRIES = ("law", "surface", "velocity")  # those of them that have gains
 
 
 class Columns(Protocol):
-    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at, and every metric."""
+    """A table with a row per run and columns plant, law, condition, seed, failure, diverged_at, and
+    every metric.
+    """
 
     def column(self, name: str) -> np.ndarray:
         """Return the values of a column, with None or NaN for missing ones."""
@@ -44,24 +56,32 @@ class Columns(Protocol):
 def values(table: Columns, metric: str) -> np.ndarray:
     """Return a metric by row: inf for a failed run, NaN where it does not apply.
 
-    "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no successful run has it.
-    A limit cycle that a run does not have counts as one of amplitude 0, see `Metric.absent`.
+    "settles" is 0.0 for a run that settles, else 1.0. A metric does not apply to a plant if no
+    successful run has it. A limit cycle that a run does not have counts as one of amplitude 0, see
+    `Metric.absent`.
     """
-    name = "settling_time" if metric == SETTLES else metric
+    if metric == SETTLES:
+        name = "settling_time"
+    else:
+        name = metric
     scores = np.array(table.column(name), float)
     scores[np.isnan(scores)] = CATALOGUE[name].absent
     plants, missing = np.asarray(table.column("plant"), str), np.isnan(scores) & ~failed(table)
     without_metric = set(plants[missing]) - set(plants[~missing & ~failed(table)])
     scores[failed(table)] = np.inf
     scores[np.isin(plants, list(without_metric))] = np.nan
-    return np.isinf(scores).astype(float) if metric == SETTLES else scores
+    if metric == SETTLES:
+        return np.isinf(scores).astype(float)
+    return scores
 
 
 class ByRow(NamedTuple):
     """A metric of the rows of a table, each (rows,)."""
 
     values: np.ndarray  # see `values`
-    halves: np.ndarray  # y', the same at half the physics step: inf for a run that then failed, NaN for none
+    halves: (
+        np.ndarray
+    )  # y', the same at half the physics step: inf for a run that then failed, NaN for none
     trends: np.ndarray  # rho, see `metrics.catalogue.trends`; NaN for none
 
 
@@ -71,12 +91,18 @@ def by_row(table: Columns, metric: str) -> ByRow:
     halves = _from_json(table, "half_step", name, CATALOGUE[name].absent)
     halves = np.where(np.isnan(whole), np.nan, halves)
     if metric == SETTLES:
-        return ByRow(whole, np.where(np.isnan(halves), np.nan, np.isinf(halves)), np.full(whole.shape, np.nan))
+        return ByRow(
+            whole,
+            np.where(np.isnan(halves), np.nan, np.isinf(halves)),
+            np.full(whole.shape, np.nan),
+        )
     return ByRow(whole, halves, _from_json(table, "trends", name, np.nan))
 
 
 def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndarray:
-    """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run that failed."""
+    """Return a number by row from a column of JSON objects, NaN where there is none; {} is a run
+    that failed.
+    """
     try:
         texts = table.column(column)
     except ScenarioError:  # a table without the column
@@ -84,8 +110,13 @@ def _from_json(table: Columns, column: str, name: str, absent: float) -> np.ndar
     known: dict[str, float] = {}
     for text in {text for text in texts.tolist() if isinstance(text, str)}:
         numbers = from_json(text)
-        known[text] = float(numbers.get(name, absent)) if numbers else np.inf
-    return np.array([known[text] if isinstance(text, str) else np.nan for text in texts.tolist()], float)
+        if numbers:
+            known[text] = float(numbers.get(name, absent))
+        else:
+            known[text] = np.inf
+    return np.array(
+        [known[text] if isinstance(text, str) else np.nan for text in texts.tolist()], float
+    )
 
 
 def failed(table: Columns) -> np.ndarray:
@@ -100,15 +131,21 @@ def failures(table: Columns) -> list[str]:
     sentences = []
     for law in dict.fromkeys(laws[lost].tolist()):
         its, runs = how[lost & (laws == law)], counted(int((laws == law).sum()), "run")
-        sentences.append(f"{law} failed in {len(its)} of {runs}, the first: {one_line(its[0] or 'it diverged')}.")
+        sentences.append(
+            f"{law} failed in {len(its)} of {runs}, the first: {one_line(its[0] or 'it diverged')}."
+        )
     return sentences
 
 
 class Scores(NamedTuple):
-    """The scores of a group's laws in the blocks in which a metric applies, law -> (blocks, seeds); empty for none."""
+    """The scores of a group's laws in the blocks in which a metric applies, law -> (blocks, seeds);
+    empty for none.
+    """
 
     blocks: list[int]  # the numbers of these blocks in the group
-    values: dict[str, np.ndarray]  # NaN where not all laws ran, or every law did the same as with an earlier seed
+    values: dict[
+        str, np.ndarray
+    ]  # NaN where not all laws ran, or every law did the same as with an earlier seed
     outcomes: dict[str, np.ndarray]  # as `Group.outcome`
     sets: dict[str, np.ndarray]  # as `Group.sets`
     halves: dict[str, np.ndarray]  # as `ByRow.halves`
@@ -116,25 +153,40 @@ class Scores(NamedTuple):
 
 
 class Group:
-    """The runs on a plant, or in one condition on it. Arrays are (laws, blocks, seeds), -1 where there is no run."""
+    """The runs on a plant, or in one condition on it.
 
-    def __init__(self, name: Mapping[str, str], rows: np.ndarray, columns: Mapping[str, np.ndarray]):
+    Arrays are (laws, blocks, seeds), -1 where there is no run.
+    """
+
+    def __init__(
+        self, name: Mapping[str, str], rows: np.ndarray, columns: Mapping[str, np.ndarray]
+    ):
         self.name = name  # the plant that they share, or plant and condition, as column -> value
         laws, law = np.unique(columns["law"], return_inverse=True)
         keys = list(zip(columns["plant"].tolist(), columns["condition"].tolist(), strict=True))
-        self.laws, self.blocks = tuple(laws.tolist()), tuple(dict.fromkeys(keys))  # names; (plant, condition)
+        self.laws, self.blocks = (
+            tuple(laws.tolist()),
+            tuple(dict.fromkeys(keys)),
+        )  # names; (plant, condition)
         index = {key: i for i, key in enumerate(self.blocks)}
         numbers, seed = np.unique(columns["seed"], return_inverse=True)
         cells = law, np.array([index[key] for key in keys]), seed
-        # the run's row in the table; a number equal for runs that differ by rounding alone; one equal for equal gains
-        self.rows, self.outcome, self.sets = np.full((3, len(laws), len(self.blocks), len(numbers)), -1)
+        # the run's row in the table; a number equal for runs that differ by rounding alone; one
+        # equal for equal gains
+        self.rows, self.outcome, self.sets = np.full(
+            (3, len(laws), len(self.blocks), len(numbers)), -1
+        )
         if (twice := np.bincount(np.ravel_multi_index(cells, self.rows.shape)) > 1).any():
             a, b, c = np.unravel_index(int(np.argmax(twice)), self.rows.shape)
             cell = f"{laws[a]} on {', '.join(self.blocks[b])}, seed {numbers[c]}"
             raise ScenarioError(
                 f"the table has several runs of {cell}: give those of one set of gains and one duration"
             )
-        self.rows[cells], self.outcome[cells], self.sets[cells] = rows, columns["outcome"], columns["sets"]
+        self.rows[cells], self.outcome[cells], self.sets[cells] = (
+            rows,
+            columns["outcome"],
+            columns["sets"],
+        )
 
     @property
     def common(self) -> np.ndarray:
@@ -154,7 +206,9 @@ class Group:
         common = ~np.isnan(cube).any(axis=0)
         if not common.any():
             laws, where = ", ".join(self.laws), ", ".join(self.name.values())
-            raise ScenarioError(f"{laws} have no run of {where} in common: run them in the same conditions and seeds")
+            raise ScenarioError(
+                f"{laws} have no run of {where} in common: run them in the same conditions and seeds"
+            )
         common &= first_of_kind(self.outcome, self.common)
         cube[:, ~common] = np.nan
         blocks, seeds = np.flatnonzero(common.any(axis=1)), np.flatnonzero(common.any(axis=0))
@@ -164,7 +218,9 @@ class Group:
 
 
 def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
-    """Return the groups of a table, one for each plant, or for each plant and condition, in the order of its rows."""
+    """Return the groups of a table, one for each plant, or for each plant and condition, in the
+    order of its rows.
+    """
     if tuple(items_of("by", by)) not in (GROUPS[:1], GROUPS):
         raise ScenarioError(f"by is {shown(by)}: give ('plant',) or ('plant', 'condition')")
     columns = {name: np.asarray(table.column(name), str) for name in (*GROUPS, "law")}
@@ -182,7 +238,9 @@ def groups(table: Columns, by: Sequence[str]) -> Iterator[Group]:
 
 
 def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return a number for each row, equal for equal gains; refuse runs of a cell that differ in more than the law."""
+    """Return a number for each row, equal for equal gains; refuse runs of a cell that differ in
+    more than the law.
+    """
     try:
         texts = table.column("scenario")
     except ScenarioError:
@@ -194,13 +252,23 @@ def _checked_sets(table: Columns, columns: Mapping[str, np.ndarray]) -> np.ndarr
     for cell, law, text in zip(cells, columns["law"], texts, strict=True):
         conditions = json.loads(text)
         of_law = {name: conditions.pop(name, None) for name in LAW_ENTRIES}
-        sets.append(known_gains.setdefault(json.dumps({name: of_law[name] for name in GAIN_ENTRIES}), len(known_gains)))
-        conditions["plant"].get("mjcf", {}).pop("path", None)  # models are identified by their contents
+        sets.append(
+            known_gains.setdefault(
+                json.dumps({name: of_law[name] for name in GAIN_ENTRIES}), len(known_gains)
+            )
+        )
+        conditions["plant"].get("mjcf", {}).pop(
+            "path", None
+        )  # models are identified by their contents
         first_law, expected = first.setdefault(cell, (law, conditions))
-        if differing := [name for name in expected if expected[name] != conditions.get(name, expected[name])]:
+        if differing := [
+            name for name in expected if expected[name] != conditions.get(name, expected[name])
+        ]:
             what = f"{', '.join(differing)} of {first_law} and {law} differ"
             where = f"{cell[0]}, {cell[1]}, seed {cell[2]}"
-            raise ScenarioError(f"runs of {where} are not alike: {what}: give runs that differ only in the law")
+            raise ScenarioError(
+                f"runs of {where} are not alike: {what}: give runs that differ only in the law"
+            )
     return np.array(sets, np.int64)
 
 
@@ -210,16 +278,23 @@ def _outcomes(table: Columns) -> np.ndarray:
     for name in [*(metric.name for metric in metrics()), "diverged_at"]:
         with contextlib.suppress(ScenarioError):  # a metric that is newer than the table
             columns.append(np.array(table.column(name), float))
-    share, exponent = np.frexp(np.stack(columns, axis=1))  # to 20 binary digits, and below 1e-9 to 0
+    share, exponent = np.frexp(
+        np.stack(columns, axis=1)
+    )  # to 20 binary digits, and below 1e-9 to 0
     with np.errstate(over="ignore", invalid="ignore"):
         numbers = np.ascontiguousarray(np.ldexp(np.round(share * 2**20), exponent - 20))
     numbers[np.abs(numbers) < ROUNDING] = 0.0
     numbers[np.isnan(numbers)] = math.nan  # a single bit pattern
-    return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[1].ravel()
+    return np.unique(numbers.view(f"V{numbers.shape[1] * numbers.itemsize}"), return_inverse=True)[
+        1
+    ].ravel()
 
 
 def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
-    """Return a scenario of each block of a group. It is None if its plant is a user's and cannot be loaded here."""
+    """Return a scenario of each block of a group.
+
+    It is None if its plant is a user's and cannot be loaded here.
+    """
     scenarios: list[Scenario | None] = [None] * len(group.blocks)
     for k, rows in enumerate(group.rows.swapaxes(0, 1)):
         with contextlib.suppress(ScenarioError):
@@ -228,13 +303,17 @@ def scenarios(table: Columns, group: Group) -> list[Scenario | None]:
 
 
 def unit_of_x(plant: str, ran: Sequence[Scenario | None]) -> str:
-    """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not known."""
+    """Return the unit of positions on a plant, by its name or from runs on it; "" where it is not
+    known.
+    """
     known = [catalogue().get(plant), *(one.plant for one in ran if one)]
     return next((one.unit for one in known if one), "")
 
 
 def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[Source, ...]]:
-    """Return law -> sources of its gains in some rows, by default in all; {} for a table without these columns."""
+    """Return law -> sources of its gains in some rows, by default in all; {} for a table without
+    these columns.
+    """
     try:
         columns = [np.asarray(table.column(name)) for name in ("law", "source", "search")]
     except ScenarioError:
@@ -242,35 +321,60 @@ def sources(table: Columns, rows: np.ndarray | None = None) -> dict[str, tuple[S
     by_law: dict[str, list[Source]] = {}
     every = zip(*(column if rows is None else column[rows] for column in columns), strict=True)
     for law, kind, search in sorted(dict.fromkeys(every), key=str):
-        by_law.setdefault(law, []).append(restore({"kind": kind, "search": search and json.loads(search)}))
+        by_law.setdefault(law, []).append(
+            restore({"kind": kind, "search": search and json.loads(search)})
+        )
     return {law: tuple(known) for law, known in by_law.items()}
 
 
 def floor(scenario: Scenario | None, metric: str, eps: float = EPS) -> float:
-    """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where it is not known.
+    """Return q, the smallest value of a metric that matters in a problem, whatever the law; 0 where
+    it is not known.
 
-    With X0 the largest |x0| of a driven channel, of a free body from its rest, and T the duration it is, for
+    With X0 the largest |x0| of a driven channel, of a free body from its rest, and T the duration
+    it is, for
 
-    - an error of the last part, and a share of the start: the largest of half a count of the encoder, the standard
-      deviation of the noise and eps X0;
-    - another error: eps X0; an integral of errors: that of an error that is eps X0 throughout, and so on;
+    - an error of the last part, and a share of the start: the largest of half a count of the
+      encoder, the standard deviation of the noise and eps X0;
+    - another error: eps X0; an integral of errors: that of an error that is eps X0 throughout, and
+      so on;
     - a time: one control period; a rate: one event in the run; a ratio: eps;
-    - u and its variation: MIN_COMMAND_SHARE of the bound on u, because u of a joint that friction holds varies by less.
+    - u and its variation: MIN_COMMAND_SHARE of the bound on u, because u of a joint that friction
+      holds varies by less.
     """
     if scenario is None or metric == SETTLES:
         return 0.0
     entry = CATALOGUE[metric]
     driven, T = [group for group in channel_groups(scenario) if group.driven], scenario.duration
-    rest = scenario.plant.rest if scenario.plant.pose else (0.0,) * scenario.plant.n  # a free body may rest anywhere
+    # a free body may rest anywhere
+    if scenario.plant.pose:
+        rest = scenario.plant.rest
+    else:
+        rest = (0.0,) * scenario.plant.n
     off = [abs(x - r) for x, r in zip(scenario.resolved.x0, rest, strict=True)]
     start = max((off[i] for group in driven for i in group.channels), default=0.0)  # X0
     least = eps * start
-    counts = [scenario.sensor.quantum(group.unit == "rad") / 2 for group in driven] if scenario.sensor else []
+    if scenario.sensor:
+        counts = [scenario.sensor.quantum(group.unit == "rad") / 2 for group in driven]
+    else:
+        counts = []
     seen = max(scenario.noise.position, *counts, least)
-    u = MIN_COMMAND_SHARE * max((bound for bound in scenario.limits if math.isfinite(bound)), default=0.0)
+    u = MIN_COMMAND_SHARE * max(
+        (bound for bound in scenario.limits if math.isfinite(bound)), default=0.0
+    )
     by_unit = {
-        "s": scenario.control_period, "{x}": seen if entry.late else least, "%": 100.0 * seen / start if start else 0.0,
-        "{x} s": least * T, "{x} s^2": least * T**2 / 2, "({x})^2 s": least**2 * T,
-        "{u}": u, "{u}/s": u, "({u})^2 s": u**2 * T, "{force}": u, "1": eps, "1/s": 1 / T, "Hz": 1 / T,
-    }  # fmt: skip
+        "s": scenario.control_period,
+        "{x}": seen if entry.late else least,
+        "%": 100.0 * seen / start if start else 0.0,
+        "{x} s": least * T,
+        "{x} s^2": least * T**2 / 2,
+        "({x})^2 s": least**2 * T,
+        "{u}": u,
+        "{u}/s": u,
+        "({u})^2 s": u**2 * T,
+        "{force}": u,
+        "1": eps,
+        "1/s": 1 / T,
+        "Hz": 1 / T,
+    }
     return by_unit.get(entry.unit, 0.0)

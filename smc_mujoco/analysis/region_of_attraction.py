@@ -1,26 +1,32 @@
-"""Regions of attraction: from which initial states (x, v) a law brings a plant to rest at its reference.
+"""Regions of attraction: from which initial states (x, v) a law brings a plant to rest at its
+reference.
 
-All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn away has not converged.
+All channels of a network start from the same state. x is not wrapped: a pendulum at rest a turn
+away has not converged.
 
-The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in the band while
-|e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2 + (v/V)^2 is below
-(0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are run again, from the
-beginning, for 40 %, and those still undecided for the whole duration.
-- Early, a run converges if it is in the band throughout the last third of the run, and in the second half of this third
-  it is near, or its largest squared distance is a tenth smaller than in the first. Near the reference the
-  distance need not decrease, because a law that switches leaves a ripple. If a run starts near, it must decrease,
-  because a run that leaves slowly is near for long.
-- A run that failed does not converge. Early, nor does one that rests outside the band in that third: x, v and u change
-  by less than 1e-6 of X, V and u_max (of the largest |u|, if u has no bound).
-- At the end, a run converges if it is in the band throughout the last 20 % of the run, and in the second half of this
-  part it is near, or its largest squared distance is at most 5 % larger than in the first. It does not converge if it
-  is never in the band in that part, unless it still approaches: its largest squared distance falls by a tenth from each
-  of the last four fifths of the run to the next. Otherwise it is undecided. A run that leaves slowly, at 2.5 % a second
-  or less in runs of 10 s, counts as one that stays.
+The rule. X and V are the largest |x| and |v| of the grid, and e = x - r is the error. A run is in
+the band while
+|e| <= 2 % of X and |v| <= 2 % of V on every channel. It is near while its squared distance (e/X)^2
+  + (v/V)^2 is below
+(0.2 %)^2, a tenth of the band. Every state is run for 15 % of the duration. Undecided states are
+run again, from the beginning, for 40 %, and those still undecided for the whole duration.
+- Early, a run converges if it is in the band throughout the last third of the run, and in the
+  second half of this third it is near, or its largest squared distance is a tenth smaller than in
+  the first. Near the reference the distance need not decrease, because a law that switches leaves a
+  ripple. If a run starts near, it must decrease, because a run that leaves slowly is near for long.
+- A run that failed does not converge. Early, nor does one that rests outside the band in that
+  third: x, v and u change by less than 1e-6 of X, V and u_max (of the largest |u|, if u has no
+  bound).
+- At the end, a run converges if it is in the band throughout the last 20 % of the run, and in the
+  second half of this part it is near, or its largest squared distance is at most 5 % larger than in
+  the first. It does not converge if it is never in the band in that part, unless it still
+  approaches: its largest squared distance falls by a tenth from each of the last four fifths of the
+  run to the next. Otherwise it is undecided. A run that leaves slowly, at 2.5 % a second or less in
+  runs of 10 s, counts as one that stays.
 
-Early verdicts are no proofs, because a run that approaches in the band might leave later. Tests compare them with whole
-runs. `basin` integrates with implicitfast, four times as fast as RK4, with a difference of 1e-3 rad or m, less than a
-fiftieth of a cell.
+Early verdicts are no proofs, because a run that approaches in the band might leave later. Tests
+compare them with whole runs. `basin` integrates with implicitfast, four times as fast as RK4, with
+a difference of 1e-3 rad or m, less than a fiftieth of a cell.
 """
 
 import dataclasses
@@ -52,9 +58,15 @@ HORIZONS = (0.15, 0.4, 1.0)  # of the duration: chosen
 EARLY_PARTS = 3  # an early verdict considers the last of so many equal parts of a run
 BATCH_BYTES = 48 * 2**20  # of traces in memory at once, about
 REST_TOLERANCE = 1e-6  # of X, V and u_max: a run that changes less is at rest
-MAX_FINAL_RATIO, MAX_EARLY_RATIO = 1.05, 0.9  # of the squared distance (e/X)^2 + (v/V)^2, second half over first
+MAX_FINAL_RATIO, MAX_EARLY_RATIO = (
+    1.05,
+    0.9,
+)  # of the squared distance (e/X)^2 + (v/V)^2, second half over first
 NEAR_SQUARE = (0.1 * SETTLING_BAND) ** 2  # squared distance
-POSITION_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 2.0 * max(map(abs, plant.x0))}  # X, chosen
+POSITION_REACH = {
+    "rad": lambda plant: math.pi,
+    "m": lambda plant: 2.0 * max(map(abs, plant.x0)),
+}  # X, chosen
 VELOCITY_RATIO = 3.0  # 1/s, V over X: chosen, about the frequency of the study's plants
 MIN_SAMPLES = 10  # of the shortest runs: then each half of their last third has one
 CONVERGES, UNDECIDED, DOES_NOT = 1, 0, -1
@@ -69,7 +81,9 @@ class Basin:
     x: np.ndarray  # (nx,), positions of the grid, in the plant's unit
     v: np.ndarray  # (nv,), velocities of the grid, per second
     outcome: np.ndarray  # (nv, nx) int8: 1 converges, 0 undecided, -1 does not
-    decided_at: np.ndarray  # (nv, nx), duration of the run that decided, s; the whole duration if undecided
+    decided_at: (
+        np.ndarray
+    )  # (nv, nx), duration of the run that decided, s; the whole duration if undecided
     unit: str  # of x, "rad" or "m"
     duration: float  # s, of the longest runs
     source: str = NONE  # where the law's gains come from, a kind of `control.source`
@@ -82,7 +96,12 @@ class Basin:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        data = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
+        data = {}
+        for name, value in fields.items():
+            if isinstance(value, np.ndarray):
+                data[name] = value.tolist()
+            else:
+                data[name] = value
         return write_json(with_ending(path, ".json"), data, indent=None)
 
 
@@ -102,32 +121,44 @@ def basin(
 
     Args:
       plant, law: names, or your own plant and law.
-      points: numbers of positions and velocities of the default grid, -X .. X and -V .. V. X is half a turn, or twice
-        the plant's x0 on a rail; V is 3 X per second.
+      points: numbers of positions and velocities of the default grid, -X .. X and -V .. V. X is
+        half a turn, or twice the plant's x0 on a rail; V is 3 X per second.
       x, v: positions and velocities of the grid, in place of the default ones.
       gains: set of gains, one of `gain_sets.SETS`, or "default".
       duration: of the longest runs, s.
       threads: as in `run`.
-      report: called with the work done and the work that may be needed, in simulated steps; the latter shrinks as
-        states are decided.
+      report: called with the work done and the work that may be needed, in simulated steps; the
+        latter shrinks as states are decided.
       condition: condition of the runs, such as "coulomb".
 
     Raises:
-      ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or an empty grid.
+      ScenarioError: an unknown plant, law, set or condition, a condition whose reference moves, or
+        an empty grid.
     """
     plant = jointed(plant, "a region of attraction")
     base = case(plant, law, condition, duration, gains, changes={"integrator": "implicitfast"})
     if start := sorted({"x0", "v0"} & find_condition(condition).on(base.plant, duration).keys()):
-        raise ScenarioError(f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave it out")
+        raise ScenarioError(
+            f"condition {base.condition!r} sets {start[0]}, and a map starts everywhere: leave it out"
+        )
     reach = POSITION_REACH[base.plant.unit](base.plant)
     if not reach and (x is None or v is None):
-        raise ScenarioError(f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v")
+        raise ScenarioError(
+            f"{base.plant.name} starts at 0, which tells no reach: give positions x and velocities v"
+        )
     if len(counts := items_of("points", points)) != 2:
         raise ScenarioError(f"points is {shown(points)}: give two numbers of points, in x and v")
     nx, nv = (whole(f"points in {axis}", n, 2, 1000) for axis, n in zip("xv", counts, strict=True))
-    xs = np.linspace(-reach, reach, nx) if x is None else x
+    if x is None:
+        xs = np.linspace(-reach, reach, nx)
+    else:
+        xs = x
     return basin_of(
-        base, xs, np.linspace(-VELOCITY_RATIO * reach, VELOCITY_RATIO * reach, nv) if v is None else v, threads, report
+        base,
+        xs,
+        np.linspace(-VELOCITY_RATIO * reach, VELOCITY_RATIO * reach, nv) if v is None else v,
+        threads,
+        report,
     )
 
 
@@ -140,14 +171,20 @@ def basin_of(
 ) -> Basin:
     """Map the region of attraction of any scenario as `basin` does."""
     if base.plant.mixed:
-        words = "has channels in m and rad, which cannot start from the same state: map another plant"
+        words = (
+            "has channels in m and rad, which cannot start from the same state: map another plant"
+        )
         raise ScenarioError(f"{base.plant.name} {words}")
     if moving := [one for one in base.references if not isinstance(one, Constant)]:
-        raise ScenarioError(f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference")
+        raise ScenarioError(
+            f"a map shows what comes to rest, and {shown(moving[0])} moves: give a constant reference"
+        )
     shortest = math.ceil(MIN_SAMPLES / HORIZONS[0])
     if base.samples < shortest:
         cure = f"give at least {shortest * base.control_period:g} s"
-        raise ScenarioError(f"duration {base.duration:g} s is too short to tell what comes to rest: {cure}")
+        raise ScenarioError(
+            f"duration {base.duration:g} s is too short to tell what comes to rest: {cure}"
+        )
     x, v = _axis("x", x), _axis("v", v)
     outcome = np.full((v.size, x.size), UNDECIDED, np.int8)
     decided_at = np.full(outcome.shape, base.duration)
@@ -155,7 +192,10 @@ def basin_of(
     for i, horizon in enumerate(HORIZONS):
         shortened = dataclasses.replace(base, duration=horizon * base.duration)
         needed = done + len(undecided) * base.work * sum(HORIZONS[i:])
-        size, left = max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n))), []
+        size, left = (
+            max(32, int(BATCH_BYTES / (72 * (shortened.samples + 1) * shortened.plant.n))),
+            [],
+        )
         for begin in range(0, len(undecided), size):
             batch = undecided[begin : begin + size]
             cases = [dataclasses.replace(shortened, x0=x[k], v0=v[j]) for j, k in batch]
@@ -184,28 +224,47 @@ def basin_of(
 
 
 def verdict_of(trace: Trace, x: np.ndarray, v: np.ndarray, final: bool) -> int | None:
-    """Return what the module's rule says of a run, for a grid x, v: 1, 0 or -1, or None if it needs a longer run."""
+    """Return what the module's rule says of a run, for a grid x, v: 1, 0 or -1, or None if it needs
+    a longer run.
+    """
     if trace.failure is not None or trace.diverged_at is not None:
         return DOES_NOT
     x_reach, v_reach = np.abs(x).max() or 1.0, np.abs(v).max() or 1.0
     e = error(trace)
     distance = np.maximum(np.abs(e / x_reach), np.abs(trace.v / v_reach)).max(axis=1)
-    late = last_part(trace) if final else slice(-(distance.size // EARLY_PARTS), None)
+    if final:
+        late = last_part(trace)
+    else:
+        late = slice(-(distance.size // EARLY_PARTS), None)
     inside = distance[late] <= SETTLING_BAND
     squares = ((e / x_reach) ** 2 + (trace.v / v_reach) ** 2).sum(axis=1)
     start, square = squares[0], squares[late]
     middle = square.size // 2
     first_half, second_half = square[:middle].max(), square[middle:].max()
-    near = NEAR_SQUARE if final or start > NEAR_SQUARE else 0.0
+    if final or start > NEAR_SQUARE:
+        near = NEAR_SQUARE
+    else:
+        near = 0.0
     ratio = MAX_FINAL_RATIO if final else MAX_EARLY_RATIO
     stays = inside.all() and second_half <= max(ratio * first_half, near)
     if final or stays:
-        return CONVERGES if stays else UNDECIDED if inside.any() or _approaches(squares) else DOES_NOT
-    changes = np.stack([np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)])
+        if stays:
+            return CONVERGES
+        if inside.any() or _approaches(squares):
+            return UNDECIDED
+        return DOES_NOT
+    changes = np.stack(
+        [np.ptp(signal[late], axis=0).max() for signal in (trace.x, trace.v, trace.u)]
+    )
     u_max = float(np.max(trace.scenario.resolved.u_max))
-    u_reach = u_max if math.isfinite(u_max) else np.abs(trace.u).max()
+    if math.isfinite(u_max):
+        u_reach = u_max
+    else:
+        u_reach = np.abs(trace.u).max()
     rests = (changes <= REST_TOLERANCE * np.array([x_reach, v_reach, u_reach])).all()
-    return DOES_NOT if rests and not inside.any() else None
+    if rests and not inside.any():
+        return DOES_NOT
+    return None
 
 
 def _approaches(squares: np.ndarray) -> bool:

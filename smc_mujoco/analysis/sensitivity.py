@@ -1,8 +1,9 @@
-"""Sobol indices of a score over a class of uncertainty, the regions where runs fail, and the axis to improve.
+"""Sobol indices of a score over a class of uncertainty, the regions where runs fail, and the axis
+to improve.
 
-An index is estimated from Saltelli's design: points A and B, which are independent, and for each axis A with one
-column of B. Regions and the axis to improve are chosen by the runs at A; their numbers are those of the runs at B.
-`smc.sensitivity` describes the whole.
+An index is estimated from Saltelli's design: points A and B, which are independent, and for each
+axis A with one column of B. Regions and the axis to improve are chosen by the runs at A; their
+numbers are those of the runs at B. `smc.sensitivity` describes the whole.
 """
 
 import dataclasses
@@ -48,7 +49,9 @@ class Cut(NamedTuple):
 
 
 class Region(NamedTuple):
-    """Where runs fail: within cuts, and how often there and outside, in runs that did not choose the cuts."""
+    """Where runs fail: within cuts, and how often there and outside, in runs that did not choose
+    the cuts.
+    """
 
     cuts: tuple[Cut, ...]
     rate: Interval  # of failures within, Wilson's interval, with the number of runs
@@ -69,13 +72,26 @@ class Space:
     def __init__(self, scenario: Scenario, over: Uncertainty):
         self.members = members = Members([scenario], over)
         unit = scenario.plant.units[0]
-        errors = (over.position_noise, unit) if over.position_noise else (over.velocity_noise, f"{unit}/s")
+        if over.position_noise:
+            errors = (over.position_noise, unit)
+        else:
+            errors = (over.velocity_noise, f"{unit}/s")
         levels = [("disturbance", (over.disturbance, scenario.plant.efforts[0]))] * members.forced
         levels += [("noise", errors)] * (members.times > 0)
         drawn = bool(levels) or over.jitter > 0.0 or _random(scenario)
-        self.columns: tuple[Constant | None, ...] = (*members.constants, *(None for _ in levels), *([None] * drawn))
-        self.names = (*(one.name for one in members.constants), *(name for name, _ in levels), *([CHANCE] * drawn))
-        ends = [(*one.bounds, one.unit) for one in members.constants] + [(0.0, *level) for _, level in levels]
+        self.columns: tuple[Constant | None, ...] = (
+            *members.constants,
+            *(None for _ in levels),
+            *([None] * drawn),
+        )
+        self.names = (
+            *(one.name for one in members.constants),
+            *(name for name, _ in levels),
+            *([CHANCE] * drawn),
+        )
+        ends = [(*one.bounds, one.unit) for one in members.constants] + [
+            (0.0, *level) for _, level in levels
+        ]
         self.ends = [*ends, *([(math.nan, math.nan, "")] * drawn)]
 
     def scenario_at(self, shares: np.ndarray) -> Scenario:
@@ -83,15 +99,23 @@ class Space:
         known = dict(zip(self.names, shares.tolist(), strict=True))
         m, chance = len(self.members.constants), round(known.get(CHANCE, 0.0) * MAX_SEED)
         drawn = self.members.random(np.random.default_rng(chance))
-        member = Member(shares[:m], known.get("disturbance", 0.0) * drawn.force, known.get("noise", 0.0) * drawn.noise)
+        member = Member(
+            shares[:m],
+            known.get("disturbance", 0.0) * drawn.force,
+            known.get("noise", 0.0) * drawn.noise,
+        )
         scenario = self.members.scenario_of(member)
-        return dataclasses.replace(scenario, seed=chance) if CHANCE in known else scenario
+        if CHANCE in known:
+            return dataclasses.replace(scenario, seed=chance)
+        return scenario
 
     def value(self, axis: int, share: float) -> float:
         """Return the value of an axis at a share of its range."""
         low, high, _ = self.ends[axis]
         constant = self.columns[axis]
-        return low + share * (high - low) if constant is None else constant.value(share)
+        if constant is None:
+            return low + share * (high - low)
+        return constant.value(share)
 
     def column(self, axis: int, shares: np.ndarray) -> np.ndarray:
         """Return the values of an axis at points, (N,); for chance the shares."""
@@ -121,12 +145,19 @@ def _random(scenario: Scenario) -> bool:
     noise, sensor = scenario.noise, scenario.sensor
     disturbed = any(signal.random for signal in scenario.disturbance)
     return bool(
-        noise.position or noise.velocity or (sensor and sensor.dropout) or disturbed or not scenario.clock.regular
+        noise.position
+        or noise.velocity
+        or (sensor and sensor.dropout)
+        or disturbed
+        or not scenario.clock.regular
     )
 
 
 def designs(points: int, k: int, seed: int) -> np.ndarray:
-    """Return Saltelli's design, ((k + 2) points, k): A, B, then A with one column of B, for each column."""
+    """Return Saltelli's design, ((k + 2) points, k):
+
+    A, B, then A with one column of B, for each column.
+    """
     from scipy.stats import qmc
 
     drawn = qmc.Sobol(2 * k, rng=np.random.default_rng(seed)).random(points)
@@ -137,13 +168,16 @@ def designs(points: int, k: int, seed: int) -> np.ndarray:
     return np.concatenate([a, b, *mixed])
 
 
-def estimates(f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray) -> tuple[np.ndarray, np.ndarray]:  # scipy's
-    """Return the first-order and total indices of outputs, (s, k) each; (s, n) at A and at B, (k, s, n) mixed.
+def estimates(
+    f_A: np.ndarray, f_B: np.ndarray, f_AB: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:  # scipy's
+    """Return the first-order and total indices of outputs, (s, k) each; (s, n) at A and at B, (k,
+    s, n) mixed.
 
-    A total index is M. J. W. Jansen's (Computer Physics Communications 117:35, 1999). A first-order index is the
-    coefficient of B's outputs in the regression of mixed outputs on those at A and B, all of unit variance: a
-    correlation without what the two samples have in common by chance (G. Glen & K. Isaacs, Environmental Modelling &
-    Software 37:157, 2012).
+    A total index is M. J. W. Jansen's (Computer Physics Communications 117:35, 1999). A first-order
+    index is the coefficient of B's outputs in the regression of mixed outputs on those at A and B,
+    all of unit variance: a correlation without what the two samples have in common by chance (G.
+    Glen & K. Isaacs, Environmental Modelling & Software 37:157, 2012).
     """
     a, b, mixed = (_standardised(f) for f in (f_A, f_B, f_AB))
     common = (a * b).mean(-1)
@@ -161,7 +195,8 @@ def _standardised(f: np.ndarray) -> np.ndarray:
 
 
 def possible(first: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Return estimates, (k,) each, moved to where indices can be, as (2, k): 0 <= first <= total <= 1.
+    """Return estimates, (k,) each, moved to where indices can be, as (2, k): 0 <= first <= total <=
+    1.
 
     They are scaled where the first add up to more than 1, or the totals to less.
     """
@@ -184,7 +219,9 @@ def indices(
 
         def of(at: np.ndarray) -> np.ndarray:
             """Return both indices of each axis, (2, k), from some of the points."""
-            some = np.stack([parts[:, at]] * 2)  # twice: scipy fails on one axis of one output, and centres in place
+            some = np.stack(
+                [parts[:, at]] * 2
+            )  # twice: scipy fails on one axis of one output, and centres in place
             outputs = {"f_A": some[:, 0], "f_B": some[:, 1], "f_AB": some[:, 2:].swapaxes(0, 1)}
             found = sobol_indices(func=outputs, n=points, method=estimates)  # pyright: ignore[reportArgumentType]
             return possible(*np.reshape([found.first_order, found.total_order], (2, 2, k))[:, 0])
@@ -194,12 +231,16 @@ def indices(
         ends = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
         whole = np.array([of(np.arange(points)), *ends])  # (3, 2, k)
         first, total = (
-            [Interval(at, low, high, points) for at, low, high in whole[:, kind].T.tolist()] for kind in (0, 1)
+            [Interval(at, low, high, points) for at, low, high in whole[:, kind].T.tolist()]
+            for kind in (0, 1)
         )
     axes = []
     for i, name in enumerate(space.names):
         ordered = name != CHANCE and np.ptp(values) > 0.0
-        rank = float(np.asarray(spearmanr(shares[:, i], values))[0]) if ordered else math.nan
+        if ordered:
+            rank = float(np.asarray(spearmanr(shares[:, i], values))[0])
+        else:
+            rank = math.nan
         axes.append(Axis(name, *space.ends[i], first[i], total[i], rank))
     return axes
 
@@ -207,24 +248,39 @@ def indices(
 def _within(cuts: Sequence[Cut], shares: np.ndarray) -> np.ndarray:
     """Return which points lie within all cuts, (N,)."""
     sides = [(shares[:, cut.axis] > cut.share) == cut.above for cut in cuts]
-    return np.logical_and.reduce(sides) if sides else np.ones(len(shares), bool)
+    if sides:
+        return np.logical_and.reduce(sides)
+    return np.ones(len(shares), bool)
 
 
 def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region]:
-    """Return regions where runs fail, chosen by the first half of the points and told by the second."""
+    """Return regions where runs fail, chosen by the first half of the points and told by the
+    second.
+    """
     half, found = len(failed) // 2, []
     left = np.ones(len(failed), bool)  # not in a region yet
     axes = [i for i, name in enumerate(space.names) if name != CHANCE]
-    single = [(Cut(i, above, share),) for i in axes for above in (False, True) for share in CUTS]
-    pairs = [one + other for one, other in itertools.combinations(single, 2) if one[0].axis != other[0].axis]
+    single = []
+    for i in axes:
+        for above in (False, True):
+            for share in CUTS:
+                single.append((Cut(i, above, share),))
+    pairs = []
+    for one, other in itertools.combinations(single, 2):
+        if one[0].axis != other[0].axis:
+            pairs.append(one + other)
     while len(found) < MAX_REGIONS and failed[:half].any():
         chooses = left[:half]
         sides = {cuts: _within(cuts, shares[:half])[chooses] for cuts in (*single, *pairs)}
-        gains = {cuts: _gain(inside, failed[:half][chooses], len(cuts)) for cuts, inside in sides.items()}
+        gains = {
+            cuts: _gain(inside, failed[:half][chooses], len(cuts)) for cuts, inside in sides.items()
+        }
         cuts = max(gains, key=gains.__getitem__)
         told = _within(cuts, shares) & left
         told[:half] = False
-        if gains[cuts] <= math.log(len(gains)) or not _confirmed(failed[half:], told[half:], left[half:]):
+        if gains[cuts] <= math.log(len(gains)) or not _confirmed(
+            failed[half:], told[half:], left[half:]
+        ):
             break
         left &= ~_within(cuts, shares)
         rest = left.copy()
@@ -234,19 +290,28 @@ def regions(space: Space, shares: np.ndarray, failed: np.ndarray) -> list[Region
 
 
 def _confirmed(failed: np.ndarray, within: np.ndarray, left: np.ndarray) -> bool:
-    """Return whether more runs fail within a region than elsewhere, by R. A. Fisher's exact test."""
+    """Return whether more runs fail within a region than elsewhere, by R.
+
+    A. Fisher's exact test.
+    """
     from scipy.stats import fisher_exact
 
-    counts = [[int((failed & side).sum()), int((~failed & side).sum())] for side in (within, left & ~within)]
+    counts = []
+    for side in (within, left & ~within):
+        counts.append([int((failed & side).sum()), int((~failed & side).sum())])
     return float(np.asarray(fisher_exact(counts, "greater"))[1]) < 1.0 - LEVEL
 
 
 def _rate(failed: np.ndarray) -> Interval:
-    return share_interval(float(failed.mean()) if len(failed) else 0.0, max(1, len(failed)))._replace(n=len(failed))
+    return share_interval(
+        float(failed.mean()) if len(failed) else 0.0, max(1, len(failed))
+    )._replace(n=len(failed))
 
 
 def _gain(within: np.ndarray, failed: np.ndarray, cuts: int) -> float:
-    """Return how well a region where more fail explains failures: the gain in log likelihood less BIC's price."""
+    """Return how well a region where more fail explains failures: the gain in log likelihood less
+    BIC's price.
+    """
     n, inside = len(failed), int(within.sum())
     if min(inside, n - inside) < MIN_REGION_RUNS or failed[within].mean() <= failed[~within].mean():
         return 0.0
@@ -260,7 +325,8 @@ def _log_likelihood(failed: np.ndarray) -> float:
 
 
 def improvement(space: Space, shares: np.ndarray, values: np.ndarray) -> Improvement | None:
-    """Return the half of an axis with the best median, chosen by half of the points and told by the others.
+    """Return the half of an axis with the best median, chosen by half of the points and told by the
+    others.
 
     None if the others do not show that it is better (H. B. Mann & D. R. Whitney's test).
     """
@@ -268,10 +334,15 @@ def improvement(space: Space, shares: np.ndarray, values: np.ndarray) -> Improve
 
     half = len(values) // 2
     axes = [i for i, name in enumerate(space.names) if name != CHANCE]
-    halves = [Cut(i, above, BETTER_SHARE) for i in axes for above in (False, True)]
+    halves = []
+    for i in axes:
+        for above in (False, True):
+            halves.append(Cut(i, above, BETTER_SHARE))
     if not halves:
         return None
-    best = min(halves, key=lambda cut: float(np.median(values[:half][_within([cut], shares[:half])])))
+    best = min(
+        halves, key=lambda cut: float(np.median(values[:half][_within([cut], shares[:half])]))
+    )
     told, within = values[half:], _within([best], shares[half:])
     if not 0 < within.sum() < len(told):
         return None

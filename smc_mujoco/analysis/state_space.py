@@ -22,21 +22,24 @@ INSTANT_STEP = 1e-9  # s, physics step while rates are linearised
 FLAGS = mujoco.mjtDisableBit
 NONLINEAR_FLAGS = FLAGS.mjDSBL_CONTACT.value | FLAGS.mjDSBL_LIMIT.value
 NONLINEAR_FLAGS |= FLAGS.mjDSBL_FRICTIONLOSS.value | FLAGS.mjDSBL_CLAMPCTRL.value
-MAX_REST_ACCELERATION = 1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
+MAX_REST_ACCELERATION = (
+    1e-6  # rad/s^2 or m/s^2: a larger acceleration that no command cancels is no rest
+)
 
 
 def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     """Linearise a plant at rest as a `control.StateSpace`: x' = A x + B u, y = C x.
 
-    The states are the positions of its joints, then their velocities, the channels first in their order; u are the
-    commands of the driven channels, and y the positions of all channels. Those of a free body are errors of its pose,
-    and its u are the forces of its actuators. SI units. Drives are ideal; contacts, limits and dry friction are left
-    out. A and B are central differences of the accelerations that MuJoCo computes.
+    The states are the positions of its joints, then their velocities, the channels first in their
+    order; u are the commands of the driven channels, and y the positions of all channels. Those of
+    a free body are errors of its pose, and its u are the forces of its actuators. SI units. Drives
+    are ideal; contacts, limits and dry friction are left out. A and B are central differences of
+    the accelerations that MuJoCo computes.
 
     Args:
       plant: a Plant or its name.
-      x: position of all channels, rad or m; the commands that hold the plant there are part of the operating point.
-        Default: where the plant rests.
+      x: position of all channels, rad or m; the commands that hold the plant there are part of the
+        operating point. Default: where the plant rests.
 
     Raises:
       ScenarioError: no command holds the plant at rest there.
@@ -60,11 +63,29 @@ def state_space(plant: Plant | str, x: float | None = None) -> "StateSpace":
     n = len(order)
     a, b = block[:n, :n][np.ix_(order, order)], block[:n, n:][np.ix_(order, driven)]
     names = joint_names(plant)
-    labels = names if plant.pose else [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
-    states = [f"{kind}[{name}]" for kind in ("x", "v") for name in labels]
-    drives = [model.actuator(i).name for i in driven] if plant.pose else names[: plant.driven]
+    if plant.pose:
+        labels = names
+    else:
+        labels = [model.joint(int(model.dof_jntid[i])).name for i in order[: model.nv]]
+    states = []
+    for kind in ("x", "v"):
+        for name in labels:
+            states.append(f"{kind}[{name}]")
+    if plant.pose:
+        drives = [model.actuator(i).name for i in driven]
+    else:
+        drives = names[: plant.driven]
     inputs, outputs = [f"u[{name}]" for name in drives], [f"x[{name}]" for name in names]
-    return StateSpace(a, b, np.eye(plant.n, n), 0.0, states=states, inputs=inputs, outputs=outputs, name=plant.name)
+    return StateSpace(
+        a,
+        b,
+        np.eye(plant.n, n),
+        0.0,
+        states=states,
+        inputs=inputs,
+        outputs=outputs,
+        name=plant.name,
+    )
 
 
 def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: str) -> None:
@@ -79,7 +100,9 @@ def _hold(model: mujoco.MjModel, data: mujoco.MjData, driven: np.ndarray, name: 
 
 
 def rates(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Return d(rates) / d(positions, velocities, activations, commands) at `data`, square; rows of commands are 0."""
+    """Return d(rates) / d(positions, velocities, activations, commands) at `data`, square; rows of
+    commands are 0.
+    """
     nv, n, step = model.nv, 2 * model.nv + model.na, float(model.opt.timestep)
     point = data.qpos.copy(), data.qvel.copy(), data.act.copy(), data.ctrl.copy()
     model.opt.timestep = INSTANT_STEP  # the force of a drive is that at the end of a step

@@ -10,23 +10,35 @@ from smc_mujoco.common.errors import ScenarioError, printable
 from smc_mujoco.common.files import reading
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-Results = Annotated[Path, typer.Option("--results", metavar="FOLDER", help="Folder of the results.")]
+Results = Annotated[
+    Path, typer.Option("--results", metavar="FOLDER", help="Folder of the results.")
+]
 
 
 def enter(
-    folder: Annotated[str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")],
+    folder: Annotated[
+        str, typer.Argument(metavar="FOLDER", help="A law and entry.toml, or a law of the library.")
+    ],
     suite: Annotated[str, typer.Option(metavar="SUITE", help="Suite of problems.")] = "smc-30@1",
     hidden: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Hidden instances: a file with their number, 64 hex digits.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Hidden instances: a file with their number, 64 hex digits."
+        ),
     ] = None,
     results: Results = Path("results"),
-    instances: Annotated[int | None, typer.Option(min=1, help="Instances of each problem, in place of 15.")] = None,
+    instances: Annotated[
+        int | None, typer.Option(min=1, help="Instances of each problem, in place of 15.")
+    ] = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Run again, and compare with the result that is there.")
     ] = False,
     against: Annotated[
         Path | None,
-        typer.Option(metavar="RESULTS", help="Earlier results, a folder or .zip: say what changed; exit 1 if worse."),
+        typer.Option(
+            metavar="RESULTS",
+            help="Earlier results, a folder or .zip: say what changed; exit 1 if worse.",
+        ),
     ] = None,
 ) -> None:
     """Enter a law in a benchmark: run it on a suite of problems, and say where it stands.
@@ -42,11 +54,12 @@ def enter(
         [gains.all]
         k = 4.0
 
-    Divisions: "one set" of gains for all plants; "search", a set for each plant ([gains.duffing]) by this project's
-    search; "free", a set for each plant found in any way.
+    Divisions: "one set" of gains for all plants; "search", a set for each plant ([gains.duffing])
+    by this project's search; "free", a set for each plant found in any way.
 
-    The law runs in a process of its own, with bounds on time and memory. A law that is not checked runs twice, in
-    opposite orders, and is marked: it runs in Python, in C or in an FMU, or its file can do more than compute.
+    The law runs in a process of its own, with bounds on time and memory. A law that is not checked
+    runs twice, in opposite orders, and is marked: it runs in Python, in C or in an FMU, or its file
+    can do more than compute.
 
     Example: smc-mujoco enter entries/soft_relay && smc-mujoco site
     """
@@ -59,14 +72,20 @@ def enter(
     if hidden:
         with reading(hidden, "file with the number", "write 64 hex digits in it") as file:
             number = file.read_text(encoding="utf-8").strip()
-    earlier = None if against is None else load(against, hidden=bool(number))
+    if against is None:
+        earlier = None
+    else:
+        earlier = load(against, hidden=bool(number))
     target = entering.enter(folder, suite, number, results, instances, verify, progress=True)
     found = load(results / suite, hidden=bool(number))
     name = next(one.name for one in found.entries.values() if one.folder == target)
     about = found.entries[name].about
     for question, board in found.boards().items():
         mine = next(one for one in board.standings if one.entry == name)
-        place = f"place {mine.place} of {len(board.standings)}" if mine.place else "beside the others"
+        if mine.place:
+            place = f"place {mine.place} of {len(board.standings)}"
+        else:
+            place = "beside the others"
         terminal.print(f"{TITLES[question]}: {place}, {100 * mine.reached:.0f} % of the targets")
     for mark in about["marks"]:
         terminal.note(f"* {mark}")
@@ -82,12 +101,16 @@ def enter(
 def site(
     results: Results = Path("results"),
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder of the pages; none: the folder of the results, site.")
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Folder of the pages; none: the folder of the results, site."
+        ),
     ] = None,
 ) -> None:
     """Build static pages of all results: the boards of each suite, and a page for each entry.
 
-    The pages need no network and no server: open results/site/index.html, or copy the folder to any host.
+    The pages need no network and no server: open results/site/index.html, or copy the folder to any
+    host.
 
     Example: smc-mujoco site --results results --out public
     """
@@ -96,7 +119,9 @@ def site(
 
     terminal = Terminal()
     if not results.is_dir():
-        raise ScenarioError(f"no folder {str(results)!r}: enter a law first, with smc-mujoco enter FOLDER")
+        raise ScenarioError(
+            f"no folder {str(results)!r}: enter a law first, with smc-mujoco enter FOLDER"
+        )
     page, left_out = pages.build(results, results / "site" if out is None else out)
     for why in left_out:
         terminal.note(f"left out: {printable(why)}", wrap=True)

@@ -1,18 +1,22 @@
 """Controls of the problems: laws that are no entries.
 
-- zero: u = 0, or of a quadrotor its weight, so that it stays in the air. It must reach no target of any problem.
-- oracle: it is handed the state, and f and g of x'' = f + g u with the true parameters and with all other forces in f
-  (a scenario's model "true"). It must reach every target. With a = g limit - |f - r''| the acceleration that is left,
-  it goes to its goal on the parabola de^2 = 2 share a |e|, and near it as a critically damped pole of frequency w:
+- zero: u = 0, or of a quadrotor its weight, so that it stays in the air. It must reach no target of
+  any problem.
+- oracle: it is handed the state, and f and g of x'' = f + g u with the true parameters and with all
+  other forces in f (a scenario's model "true"). It must reach every target. With a = g limit - |f -
+  r''| the acceleration that is left,
+  it goes to its goal on the parabola de^2 = 2 share a |e|, and near it as a critically damped pole
+  of frequency w:
 
     u = (r'' - f - 2 w (de + h)) / g,   h = w e / 2 where |e| <= 2 share a / w^2,
                                         sgn(e) (sqrt(2 share a |e|) - share a / w) elsewhere
 
-  Source: a proximate time-optimal servo, G. F. Franklin, J. D. Powell & M. L. Workman, Digital Control of Dynamic
-  Systems, 2nd ed., Addison-Wesley 1990, section 11.3.
+  Source: a proximate time-optimal servo, G. F. Franklin, J. D. Powell & M. L. Workman, Digital
+  Control of Dynamic Systems, 2nd ed., Addison-Wesley 1990, section 11.3.
 
-  Where a joint without an actuator moves with it, near upright q'' = b (x'' - fall q) with b = gq / g, and x'' is the
-  state feedback that puts all four poles at -w (F. J. Ackermann, Regelungstechnik 20:297, 1972).
+  Where a joint without an actuator moves with it, near upright q'' = b (x'' - fall q) with b = gq /
+  g, and x'' is the state feedback that puts all four poles at -w (F. J. Ackermann, Regelungstechnik
+  20:297, 1972).
 
   That of flight is in oracle_flight.py.
 """
@@ -47,8 +51,13 @@ def oracle(y, gains, memory):
 
 @law_function(gains={"w": 4.0, "fall": 9.81}, positive=("w", "fall"), requires_model=True)
 def oracle_pair(y, gains, memory):
-    """Return u and the acceleration that a joint with an actuator is given, so that its partner stands, too."""
-    w, b = gains.w, y.gq / y.g  # the partner's acceleration is b times the joint's, and beside it that of its fall
+    """Return u and the acceleration that a joint with an actuator is given, so that its partner
+    stands, too.
+    """
+    w, b = (
+        gains.w,
+        y.gq / y.g,
+    )  # the partner's acceleration is b times the joint's, and beside it that of its fall
     a = -b * gains.fall
     k1, k2 = w**4 / a, 4.0 * w**3 / a
     k3, k4 = -(6.0 * w * w + k1 + a) / b, -(4.0 * w + k2) / b
@@ -68,10 +77,14 @@ ORACLES = oracle.function, oracle_pair.function, oracle_flight.function
 
 
 def oracle_of(plant: str, w: float, share: float) -> Law:
-    """Return the oracle for a plant; that of a pair of joints has no share, and that of flight a time in its place."""
+    """Return the oracle for a plant; that of a pair of joints has no share, and that of flight a
+    time in its place.
+    """
     if plant == "quadrotor":
         return oracle_flight(w=w, move=share)
-    return oracle_pair(w=w, fall=FALL[plant]) if plant in FALL else oracle(w=w, share=share)
+    if plant in FALL:
+        return oracle_pair(w=w, fall=FALL[plant])
+    return oracle(w=w, share=share)
 
 
 def zero(plant: str) -> Law:

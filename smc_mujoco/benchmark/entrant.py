@@ -24,7 +24,9 @@ MAX_FAILURES = 3  # that are told
 
 
 def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any]:
-    """Run an entry in this process as an order says, write its rows, and return what is known of its law."""
+    """Run an entry in this process as an order says, write its rows, and return what is known of
+    its law.
+    """
     say("reading its folder")
     entry, instances, failures = entries.read(order["folder"]), order["instances"], list[str]()
     about: dict[str, Any] = {}
@@ -49,11 +51,17 @@ def attempt(order: Mapping[str, Any], say: Callable[..., None]) -> dict[str, Any
             yield found
 
     runs.write(Path(order["rows"]), groups())
-    return about | {"seconds": spent / done, "failed": len(failures), "failures": failures[:MAX_FAILURES]}
+    return about | {
+        "seconds": spent / done,
+        "failed": len(failures),
+        "failures": failures[:MAX_FAILURES],
+    }
 
 
 def _about(entry: entries.Entry, scenario: Scenario, timed: bool) -> dict[str, Any]:
-    """Return why the code of a law is not checked, "" if it is, and its time a sample: s, and the ratio to pid's."""
+    """Return why the code of a law is not checked, "" if it is, and its time a sample: s, and the
+    ratio to pid's.
+    """
     why = entry.why_unread
     found = None
     if timed and not why:
@@ -63,14 +71,19 @@ def _about(entry: entries.Entry, scenario: Scenario, timed: bool) -> dict[str, A
     return {"why_unchecked": why, "sample": found and [found.median, found.high, found.ratio]}
 
 
-def tried(order: Mapping[str, Any], limit: float, reached: Callable[[int], None] = lambda done: None) -> dict[str, Any]:
-    """Run an entry in another process, and return its report; `limit` in s; `reached` hears how many runs are done.
+def tried(
+    order: Mapping[str, Any], limit: float, reached: Callable[[int], None] = lambda done: None
+) -> dict[str, Any]:
+    """Run an entry in another process, and return its report; `limit` in s; `reached` hears how
+    many runs are done.
 
     Args:
-      order: folder, problems, instances, number, timed, and rows, the path of the table that is written.
+      order: folder, problems, instances, number, timed, and rows, the path of the table that is
+        written.
 
     Raises:
-      ScenarioError: the entry crashes, hangs, fills the memory or cannot be run: one sentence with what and where.
+      ScenarioError: the entry crashes, hangs, fills the memory or cannot be run: one sentence with
+        what and where.
     """
     with scratch() as folder:
         count = folder / "count"
@@ -91,7 +104,9 @@ def tried(order: Mapping[str, Any], limit: float, reached: Callable[[int], None]
     if isinstance(failed := outcome[0], guard.Failed):
         if failed.fault or failed.code is not None:
             why = entries.read(order["folder"]).why_unread
-            raise ScenarioError(f"the entry failed while {failed.stage}: {failed}{why and f' ({why})'}") from failed
+            raise ScenarioError(
+                f"the entry failed while {failed.stage}: {failed}{why and f' ({why})'}"
+            ) from failed
         raise ScenarioError(
             f"the entry is not done with {failed.stage} within {limit:.0f} s: let its law end"
         ) from failed
@@ -99,11 +114,15 @@ def tried(order: Mapping[str, Any], limit: float, reached: Callable[[int], None]
 
 
 def same(first: Path, second: Path, problems: Sequence[str]) -> str:
-    """Return the first run that two tables answer differently, as "duffing/noise@1#03"; "" if all are equal."""
+    """Return the first run that two tables answer differently, as "duffing/noise@1#03"; "" if all
+    are equal.
+    """
     one, two = runs.Runs(first), runs.Runs(second)
     for name in problems:
         a, b = one.columns(name), two.columns(name)
-        differ = np.any([~np.isclose(a[column], b[column], 0.0, 0.0, equal_nan=True) for column in a], axis=0)
+        differ = np.any(
+            [~np.isclose(a[column], b[column], 0.0, 0.0, equal_nan=True) for column in a], axis=0
+        )
         if differ.any():
             return f"{name}#{a['instance'][differ.argmax()]:02d}"
     return ""

@@ -1,17 +1,20 @@
 """The oracle of flight: a control of the problems with a quadrotor, which is no entry.
 
-It is handed the state and the true plant: masses and inertias, also of a payload, and what the rotors are and lose. So
-it knows their speeds, and gives each the speed that it wants within a period, as far as the rotor's bounds let it. As
-the state has no noise, the acceleration of the last period and its change are known, too, with all forces in them,
-such as wind. It moves to its goal on a polynomial of degree 9 in the time `move`, at rest at both ends up to the fourth
-derivative, and from the plan p, the reference added, it takes the snap, the jerk along the thrust T b and the yaw of
+It is handed the state and the true plant: masses and inertias, also of a payload, and what the
+rotors are and lose. So it knows their speeds, and gives each the speed that it wants within a
+period, as far as the rotor's bounds let it. As the state has no noise, the acceleration of the last
+period and its change are known, too, with all forces in them, such as wind. It moves to its goal on
+a polynomial of degree 9 in the time `move`, at rest at both ends up to the fourth derivative, and
+from the plan p, the reference added, it takes the snap, the jerk along the thrust T b and the yaw
+of
 
     p'''' + 4 w (p''' - x''') + 6 w^2 (p'' - x'') + 4 w^3 (p' - x') + w^4 (p - x)       across b,
     p''' + 3 w (p'' - x'') + 3 w^2 (p' - x') + w^3 (p - x)                              along b,
     p'' + 2 w (p' - x') + w^2 (p - x)                                                  of the heading.
 
-m x''' = T' b + T b' and its derivative give T' and the angular acceleration; M and h of the plant then the torques.
-Source: D. Mellinger & V. Kumar, "Minimum snap trajectory generation and control for quadrotors", ICRA 2011.
+m x''' = T' b + T b' and its derivative give T' and the angular acceleration; M and h of the plant
+then the torques. Source: D. Mellinger & V. Kumar, "Minimum snap trajectory generation and control
+for quadrotors", ICRA 2011.
 """
 
 import dataclasses
@@ -30,13 +33,17 @@ from smc_mujoco.simulation.scenario import Scenario
 
 STEP = np.array([126.0, -420.0, 540.0, -315.0, 70.0])  # of s^5 .. s^9: from 0 to 1
 FILTER = 4.0  # of w, chosen: bandwidth of the filter of the other forces' change
-AHEAD = 0.01  # s, chosen: rotors are told the speed that brings them to the wanted one after this time
+AHEAD = (
+    0.01  # s, chosen: rotors are told the speed that brings them to the wanted one after this time
+)
 ALONG = 1.5  # of w, chosen: bandwidth along the thrust, which waits for no attitude
 LEAST = 0.2  # of the weight, of the thrust: chosen
 PLACES, SPINS = np.array(quadrotor.PLACES), np.array(quadrotor.SPINS)
 ROTORS = 4
 OF_BODY = "a", "c", "fmax"
-TOLD = [(name, 0.0) for name in (*(ROTOR.names or ()), *OF_BODY, "delay")]  # of the rotors; delay in periods
+TOLD = [
+    (name, 0.0) for name in (*(ROTOR.names or ()), *OF_BODY, "delay")
+]  # of the rotors; delay in periods
 
 
 @njit(error_model="numpy")
@@ -55,19 +62,34 @@ def _left(t, move):
 
 @njit(error_model="numpy")
 def _plan(y, gains, memory):
-    """Return the plan, (5, 6), and the state, (3, 6): error, its rate, acceleration; of the plan jerk and snap, too.
+    """Return the plan, (5, 6), and the state, (3, 6): error, its rate, acceleration; of the plan
+    jerk and snap, too.
 
-    The acceleration is that of the centre of mass. Also keep what the next sample needs: the error at the start, v (of
-    the heading the error), r'' and the next derivative of this sample.
+    The acceleration is that of the centre of mass. Also keep what the next sample needs: the error
+    at the start, v (of the heading the error), r'' and the next derivative of this sample.
     """
-    start, v, ddr, dddr, acceleration = memory[:, 0], memory[:, 1], memory[:, 2], memory[:, 3], np.zeros(6)
-    first, left, plan, now = memory[0, 7] == 0.0, _left(y.t, gains.move), np.zeros((5, 6)), np.zeros((3, 6))
+    start, v, ddr, dddr, acceleration = (
+        memory[:, 0],
+        memory[:, 1],
+        memory[:, 2],
+        memory[:, 3],
+        np.zeros(6),
+    )
+    first, left, plan, now = (
+        memory[0, 7] == 0.0,
+        _left(y.t, gains.move),
+        np.zeros((5, 6)),
+        np.zeros((3, 6)),
+    )
     if first:
         start[:], v[:], v[5], ddr[:] = y.e, y.v, y.e[5], y.ddr
     for i in range(6):
         read = y.v[i] if i < 5 else y.e[i]
         now[0, i], now[1, i], third = y.e[i], y.de[i], (y.ddr[i] - ddr[i]) / y.dt
-        acceleration[i] = y.ddr[i] if first else (read - v[i]) / y.dt
+        if first:
+            acceleration[i] = y.ddr[i]
+        else:
+            acceleration[i] = (read - v[i]) / y.dt
         for k in range(5):
             plan[k, i] = start[i] * left[k]
         plan[2, i] += y.ddr[i]
@@ -82,11 +104,16 @@ def _plan(y, gains, memory):
 
 @njit(error_model="numpy")
 def _jerk(gains, now, modelled, memory, dt):
-    """Return the jerk, (3,): that of the rotors' thrust, and through a filter that of all other forces."""
+    """Return the jerk, (3,): that of the rotors' thrust, and through a filter that of all other
+    forces.
+    """
     before, other, jerk = memory[:3, 4], memory[3:, 4], np.zeros(3)
     share = dt * FILTER * gains.w / (1.0 + dt * FILTER * gains.w)
     for i in range(3):
-        change = 0.0 if memory[0, 7] == 0.0 else (now[2, i] - before[i]) / dt
+        if memory[0, 7] == 0.0:
+            change = 0.0
+        else:
+            change = (now[2, i] - before[i]) / dt
         other[i] += share * (change - modelled[i] - other[i])
         jerk[i], before[i] = modelled[i] + other[i], now[2, i]
     return jerk
@@ -96,12 +123,17 @@ def _jerk(gains, now, modelled, memory, dt):
 def _thrust(gains, j, W):
     """Return the thrust of rotor j, and its slope over the speed."""
     whole = 1.0 - gains.fade if j == 0 else 1.0
-    return whole * (gains.linear + gains.square * W) * W, whole * (gains.linear + 2.0 * gains.square * W)
+    return whole * (gains.linear + gains.square * W) * W, whole * (
+        gains.linear + 2.0 * gains.square * W
+    )
 
 
 @njit(error_model="numpy")
 def _turn(gains, speeds, told, dt, first):
-    """Advance the speeds of the rotors to when this sample's command comes. Return their thrusts and rates, (2, 4)."""
+    """Advance the speeds of the rotors to when this sample's command comes.
+
+    Return their thrusts and rates, (2, 4).
+    """
     if first:
         speeds[:ROTORS] = gains.start
     for _ in range(int(gains.delay) if first else 1):
@@ -109,24 +141,35 @@ def _turn(gains, speeds, told, dt, first):
         for j in range(ROTORS):
             lifted += _thrust(gains, j, speeds[j])[0]
         for j in range(ROTORS):  # before the first command they are told to stop
-            goal = speed_for(gains, 0.0) * (1.0 - gains.sag * lifted) if first else told[j]
+            if first:
+                goal = speed_for(gains, 0.0) * (1.0 - gains.sag * lifted)
+            else:
+                goal = told[j]
             speeds[j] = spun(gains, speeds[j], goal, dt)[0]
     thrusts = np.zeros((2, ROTORS))
     for j in range(ROTORS):
         thrusts[0, j], slope = _thrust(gains, j, speeds[j])
-        thrusts[1, j] = 0.0 if first else slope * spun(gains, speeds[j], told[j], 0.0)[1]
+        if first:
+            thrusts[1, j] = 0.0
+        else:
+            thrusts[1, j] = slope * spun(gains, speeds[j], told[j], 0.0)[1]
     return thrusts
 
 
 @njit(error_model="numpy")
 def _shares(y, gains, T, torque, speeds, told, supply):
-    """Return the wrench, (6,), of the rotors' commands for a thrust and a torque at the end of the period.
+    """Return the wrench, (6,), of the rotors' commands for a thrust and a torque at the end of the
+    period.
 
     Write the speeds that they are told, which are less by what the supply lacks.
     """
     u, total, levers = np.zeros(6), 0.0, (gains.a, gains.a, gains.c)
     for j in range(ROTORS):
-        signs, wanted, whole = (PLACES[j, 1], -PLACES[j, 0], -SPINS[j]), T, 1.0 - gains.fade if j == 0 else 1.0
+        signs, wanted, whole = (
+            (PLACES[j, 1], -PLACES[j, 0], -SPINS[j]),
+            T,
+            1.0 - gains.fade if j == 0 else 1.0,
+        )
         for i in range(3):
             wanted += signs[i] * torque[i] / levers[i]
         goal = speed_for(gains, 0.25 * wanted / whole)
@@ -145,23 +188,45 @@ def _shares(y, gains, T, torque, speeds, told, supply):
     requires_model=True,
     plants=(FREE_BODY,),
     memory=8,
-    gains={name: Gain(default, Unit(), shared=True) for name, default in [("w", 12.0), ("move", 1.5), *TOLD]},
+    gains={
+        name: Gain(default, Unit(), shared=True)
+        for name, default in [("w", 12.0), ("move", 1.5), *TOLD]
+    },
 )
 def oracle_flight(y, gains, memory):
     """Return the force and torque, and the error from the plan."""
     w, along, m, first = gains.w, ALONG * gains.w, y.M[0, 0], memory[0, 7] == 0.0
     speeds, told = memory[:, 5], memory[:, 6]
     plan, now = _plan(y, gains, memory)
-    thrusts, off, attitude = _turn(gains, speeds, told, y.dt, first), plan[:3] - now, quaternion(y.x[3], y.x[4], y.x[5])
-    T, dT, p, q, r, momentum, drag = thrusts[0].sum(), thrusts[1].sum(), y.v[3], y.v[4], y.v[5], 0.0, 0.0
+    thrusts, off, attitude = (
+        _turn(gains, speeds, told, y.dt, first),
+        plan[:3] - now,
+        quaternion(y.x[3], y.x[4], y.x[5]),
+    )
+    T, dT, p, q, r, momentum, drag = (
+        thrusts[0].sum(),
+        thrusts[1].sum(),
+        y.v[3],
+        y.v[4],
+        y.v[5],
+        0.0,
+        0.0,
+    )
     now_jerk = _jerk(gains, now, turned(attitude, T * q / m, -T * p / m, dT / m), memory, y.dt)
     memory[0, 7] = 1.0
     snap, jerk, torque = np.zeros(3), np.zeros(3), np.zeros(3)
     for i in range(3):
         lag = 4.0 * (plan[3, i] - now_jerk[i])
-        snap[i] = plan[4, i] + w * (lag + w * (6.0 * off[2, i] + w * (4.0 * off[1, i] + w * off[0, i])))
-        jerk[i] = plan[3, i] + along * (3.0 * off[2, i] + along * (3.0 * off[1, i] + along * off[0, i]))
-    across, least = turned_back(attitude, snap[0], snap[1], snap[2]), LEAST * math.sqrt(inner(y.h, y.h))
+        snap[i] = plan[4, i] + w * (
+            lag + w * (6.0 * off[2, i] + w * (4.0 * off[1, i] + w * off[0, i]))
+        )
+        jerk[i] = plan[3, i] + along * (
+            3.0 * off[2, i] + along * (3.0 * off[1, i] + along * off[0, i])
+        )
+    across, least = (
+        turned_back(attitude, snap[0], snap[1], snap[2]),
+        LEAST * math.sqrt(inner(y.h, y.h)),
+    )
     now[2, 3] = r * q - (m * across[1] + 2.0 * dT * p) / max(T, least)
     now[2, 4] = (m * across[0] - 2.0 * dT * q) / max(T, least) - r * p
     now[2, 5] = plan[2, 5] + w * (2.0 * off[1, 5] + w * off[0, 5])
@@ -179,11 +244,15 @@ def oracle_flight(y, gains, memory):
 
 
 def knowing(scenario: Scenario) -> Scenario:
-    """Return a scenario whose law, the oracle of flight, is told all that is true of its plant, and the delay."""
+    """Return a scenario whose law, the oracle of flight, is told all that is true of its plant, and
+    the delay.
+    """
     plant, law = scenario.plant, scenario.law
     true = plant.values(scenario.factors(0))
     known = dict(zip(ROTOR.names or (), quadrotor.rotor(true, 0), strict=True))
-    known |= {name: getattr(true, name) for name in OF_BODY} | {"delay": float(scenario.delay_steps)}
+    known |= {name: getattr(true, name) for name in OF_BODY} | {
+        "delay": float(scenario.delay_steps)
+    }
     law = oracle_flight(**dict(law.gains) | known).named(law.name)
     plant = dataclasses.replace(plant, parameters=vars(true))
     return dataclasses.replace(scenario, plant=plant, law=law, mismatch={}, noise=None)

@@ -32,14 +32,19 @@ SHOWN = 5  # best and worst problems on an entry's page
 
 
 def build(results: Path, out: Path) -> tuple[Path, list[str]]:
-    """Write the pages of all results in a folder. Return the first page, and why results are left out.
+    """Write the pages of all results in a folder.
+
+    Return the first page, and why results are left out.
 
     Raises:
       ScenarioError: no results there, or a folder that cannot be written.
     """
     suites, refused = sound(results, hidden=False)
     if not suites:
-        why = str(refused[0]) if refused else "enter a law first, with smc-mujoco enter FOLDER"
+        if refused:
+            why = str(refused[0])
+        else:
+            why = "enter a law first, with smc-mujoco enter FOLDER"
         raise ScenarioError(f"no results in {str(results)!r}: {why}")
     kept, refused_hidden = sound(results, hidden=True)
     hidden, made = {found.suite: found for found in kept}, _environment()
@@ -50,14 +55,24 @@ def build(results: Path, out: Path) -> tuple[Path, list[str]]:
         for name in found.entries:
             page = out / found.suite / f"{slug(name)}.html"
             _write(page, made, "entry.jinja", found=found, name=name, up="../", title=name)
-    _write(out / "index.html", made, "index.jinja", suites=suites, left_out=left_out, up="", title="Results")
+    _write(
+        out / "index.html",
+        made,
+        "index.jinja",
+        suites=suites,
+        left_out=left_out,
+        up="",
+        title="Results",
+    )
     return out / "index.html", left_out
 
 
 def _write(path: Path, made: "Environment", template: str, **values: Any) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as file:
-        file.write_text(made.get_template(template).render(values), encoding="utf-8", errors="replace")
+        file.write_text(
+            made.get_template(template).render(values), encoding="utf-8", errors="replace"
+        )
 
 
 def _environment() -> "Environment":
@@ -67,9 +82,17 @@ def _environment() -> "Environment":
     made = html.environment(TEMPLATES)
     made.globals |= {
         "css": Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
-        "titles": TITLES, "words": WORDS, "measure": MEASURE, "asks": ASKS, "curves": curves, "scale": scale,
-        "extremes": extremes, "number": number, "slug": slug, "curve": CURVE,
-    }  # fmt: skip
+        "titles": TITLES,
+        "words": WORDS,
+        "measure": MEASURE,
+        "asks": ASKS,
+        "curves": curves,
+        "scale": scale,
+        "extremes": extremes,
+        "number": number,
+        "slug": slug,
+        "curve": CURVE,
+    }
     return made
 
 
@@ -89,12 +112,21 @@ def curves(found: Results, question: str, names: Sequence[str]) -> dict[str, str
 
 
 def extremes(found: Results, name: str) -> Mapping[str, list[tuple[str, str, int, float]]]:
-    """Return "best" and "worst" -> where an entry stands so: question, problem, place among the entries, median."""
+    """Return "best" and "worst" -> where an entry stands so: question, problem, place among the
+    entries, median.
+    """
     names = list(found.entries)
     rows = []
     for question in found.boards():
         ranks = found.ranks(question, names)[names.index(name)]
         for cell, rank in zip(found.on(question), ranks, strict=True):
-            rows.append((question, cell, int(np.ceil(rank)), found.entries[name].medians[cell][MEASURE[question]]))
+            rows.append(
+                (
+                    question,
+                    cell,
+                    int(np.ceil(rank)),
+                    found.entries[name].medians[cell][MEASURE[question]],
+                )
+            )
     rows.sort(key=lambda row: row[2])
     return {"best": rows[:SHOWN], "worst": rows[::-1][:SHOWN]}

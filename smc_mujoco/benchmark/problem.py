@@ -4,9 +4,9 @@
     traces = smc.run(problem.scenarios("super_twisting"))
     print([problem.measures(trace) for trace in traces])
 
-An ID is plant/condition@version. The version's rules, `rules/VERSION.toml`, have the duration, the bound on u, the
-ranges and the order of the draws, and the targets. Visible instances are drawn from the ID alone, hidden ones from the
-ID and a number of 256 bits that is told later.
+An ID is plant/condition@version. The version's rules, `rules/VERSION.toml`, have the duration, the
+bound on u, the ranges and the order of the draws, and the targets. Visible instances are drawn from
+the ID alone, hidden ones from the ID and a number of 256 bits that is told later.
 """
 
 import dataclasses
@@ -47,7 +47,9 @@ SIZES = "sigma", "amplitude", "x", "y", "z", "w20"  # fields of a disturbance th
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Instance:
-    """What distinguishes an instance of a problem from the others: a side and factors, see the rules."""
+    """What distinguishes an instance of a problem from the others: a side and factors, see the
+    rules.
+    """
 
     side: float
     start: float
@@ -86,7 +88,9 @@ class Problem:
 
     @functools.cached_property
     def _frozen(self) -> Mapping[str, Any]:
-        """The levels of each measure, and the oracle's bandwidth and share; {} before they are frozen."""
+        """The levels of each measure, and the oracle's bandwidth and share; {} before they are
+        frozen.
+        """
         return rules(self.version).get("targets", {}).get(f"{self.plant}/{self.condition}", {})
 
     @property
@@ -101,7 +105,9 @@ class Problem:
 
     @property
     def oracles(self) -> tuple[tuple[float, float], ...]:
-        """The bandwidths, rad/s, and shares, or times of its move, from which the oracle's are chosen."""
+        """The bandwidths, rad/s, and shares, or times of its move, from which the oracle's are
+        chosen.
+        """
         return tuple(itertools.product(self._values["bandwidths"], self._values["shares"]))
 
     @property
@@ -114,60 +120,100 @@ class Problem:
 
     @property
     def controls(self) -> dict[str, Law]:
-        """The laws of the controls: "zero", which reaches no target, and "oracle", which reaches all."""
-        return {"zero": controls.zero(self.plant), "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"])}
+        """The laws of the controls: "zero", which reaches no target, and "oracle", which reaches
+        all.
+        """
+        return {
+            "zero": controls.zero(self.plant),
+            "oracle": controls.oracle_of(self.plant, *self._frozen["oracle"]),
+        }
 
     def instance(self, index: int, number: str = "") -> Instance:
         """Return what an instance has drawn; `number` as in `scenarios`."""
         key = hashlib.sha256(f"{self.id}{_number(number)}".encode()).digest()[:16]
         index = whole("an instance", index, 0, MAX_INSTANCE)
-        words = np.random.Philox(key=int.from_bytes(key), counter=STEP * index).random_raw(DRAWS).tolist()
+        words = (
+            np.random.Philox(key=int.from_bytes(key), counter=STEP * index)
+            .random_raw(DRAWS)
+            .tolist()
+        )
         u = [(word >> 11) * 2.0**-53 for word in words]
         of = self._values
         start, mass, disturbance = (
-            low + (high - low) * u[i] for i, (low, high) in enumerate((of[name] for name in ("start", *FACTORS)), 1)
+            low + (high - low) * u[i]
+            for i, (low, high) in enumerate((of[name] for name in ("start", *FACTORS)), 1)
         )
         side = -1.0 if u[0] < 0.5 else 1.0
-        return Instance(side=side, start=start, mass=mass, disturbance=disturbance, seed=words[4] % 2**52)
+        return Instance(
+            side=side, start=start, mass=mass, disturbance=disturbance, seed=words[4] % 2**52
+        )
 
     def scenarios(
-        self, law: str | Law | Template, instances: str | Iterable[int] = "visible", number: str = ""
+        self,
+        law: str | Law | Template,
+        instances: str | Iterable[int] = "visible",
+        number: str = "",
     ) -> tuple[Scenario, ...]:
         """Return the scenarios of a law, one for each instance.
 
         Args:
-          law: a name, which gets its best shipped gains for the plant if there are some, or a law with its own gains.
+          law: a name, which gets its best shipped gains for the plant if there are some, or a law
+            with its own gains.
           instances: "visible", the first of the rules' number of them, or the instances themselves.
           number: "" for visible instances, or the 64 hex digits from which hidden ones are drawn.
 
         Raises:
-          ScenarioError: instances or a number that do not exist, or a law that the plant cannot have.
+          ScenarioError: instances or a number that do not exist, or a law that the plant cannot
+            have.
         """
         if isinstance(instances, str):
             find("kind of instances", instances, {"visible": None})
             instances = range(self._values["visible"])
         base = self._base(law)
-        return tuple(self._place(base, self.instance(i, number)) for i in items_of("instances", instances))
+        return tuple(
+            self._place(base, self.instance(i, number)) for i in items_of("instances", instances)
+        )
 
     def _base(self, law: str | Law | Template) -> Scenario:
         """Return the scenario before anything is drawn."""
         if isinstance(law, str) and law in known_laws():
             shipped = gain_sets.in_set(find_plant(self.plant), law, "tuned")
-            law = gain_sets.law(self.plant, law) if shipped else gain_sets.law(self.plant, law, "default")
+            if shipped:
+                law = gain_sets.law(self.plant, law)
+            else:
+                law = gain_sets.law(self.plant, law, "default")
         changes = {"u_max": self.u_max, "control_period": self._values["control_period"]}
         text = self._values.get("texts", {}).get(self.condition, "")
-        condition = "nominal" if self._attacked else f"{self.condition}: {text}" if text else self.condition
-        return case(self.plant, law, condition, self.duration, starts=Starts(spread=0.0), changes=changes)
+        if self._attacked:
+            condition = "nominal"
+        elif text:
+            condition = f"{self.condition}: {text}"
+        else:
+            condition = self.condition
+        return case(
+            self.plant, law, condition, self.duration, starts=Starts(spread=0.0), changes=changes
+        )
 
     def _place(self, base: Scenario, drawn: Instance) -> Scenario:
         """Return the scenario of an instance."""
-        plant, resolved, force = base.plant, base.resolved, drawn.disturbance * self._values.get("scale", 1.0)
-        mismatch = {name: value * (force if name in plant.added else 1.0) for name, value in base.mismatch.items()}
+        plant, resolved, force = (
+            base.plant,
+            base.resolved,
+            drawn.disturbance * self._values.get("scale", 1.0),
+        )
+        mismatch = {}
+        for name, value in base.mismatch.items():
+            mismatch[name] = value * (force if name in plant.added else 1.0)
         mismatch["mass"] = drawn.mass * mismatch.pop("mass", mismatch.pop(plant.mass, 1.0))
-        rest = plant.rest or (-0.0,) * plant.n  # to which a number is added without a change of a bit
+        rest = (
+            plant.rest or (-0.0,) * plant.n
+        )  # to which a number is added without a change of a bit
         scenario = dataclasses.replace(
             base,
-            x0=[r + drawn.side * drawn.start * (x - r) for x, r in zip(resolved.x0, rest, strict=True)],
+            x0=[
+                r + drawn.side * drawn.start * (x - r)
+                for x, r in zip(resolved.x0, rest, strict=True)
+            ],
             mismatch=mismatch,
             disturbance=[_scaled(signal, force) for signal in base.disturbance],
             seed=drawn.seed,
@@ -182,50 +228,73 @@ class Problem:
 
         within = Uncertainty(**self._values["conditions"][self.condition])
         return controls.told(
-            worst_case(scenario, within=within, budget=self._values["budget"], seed=scenario.seed).scenario
+            worst_case(
+                scenario, within=within, budget=self._values["budget"], seed=scenario.seed
+            ).scenario
         )
 
     def measures(self, trace: Trace) -> dict[str, float]:
-        """Return the measures of a run, and the time from which each target is reached and kept, s (NaN for never).
+        """Return the measures of a run, and the time from which each target is reached and kept, s
+        (NaN for never).
 
-        failed: 1 for a run that failed, whose other measures are infinite. accuracy, itae [s^2], settling [s] into 2 %
-        and calm [1/s], the variation of u per second over its bound, are of the whole trace; "accuracy_1" is the time
-        of the first target, the hardest. A level of calm counts from the time from which the easiest accuracy holds,
-        because effort counts only where the error does.
+        failed: 1 for a run that failed, whose other measures are infinite. accuracy, itae [s^2],
+        settling [s] into 2 % and calm [1/s], the variation of u per second over its bound, are of
+        the whole trace; "accuracy_1" is the time of the first target, the hardest. A level of calm
+        counts from the time from which the easiest accuracy holds, because effort counts only where
+        the error does.
         """
         if trace.failure is not None or trace.diverged_at is not None:
-            values = {"failed": 1.0} | dict.fromkeys(("accuracy", "itae", "settling", "calm"), math.inf)
+            values = {"failed": 1.0} | dict.fromkeys(
+                ("accuracy", "itae", "settling", "calm"), math.inf
+            )
             return values | dict.fromkeys(self._names(), math.nan)
         groups = conventions.by_group(trace).values()
         relative = [np.abs(conventions.error(part)) / conventions.scale(part) for part in groups]
         worst = np.max([conventions.row_max(error) for error in relative], axis=0)
         total = np.sum([error.sum(axis=1) for error in relative], axis=0)
         plant = trace.scenario.plant
-        bounds = mixer(plant)[:, -1] if plant.pose else np.array(trace.scenario.limits[: plant.driven])
-        commands = (trace.applied if plant.pose else trace.u)[:, : len(bounds)]  # of a free body, of its actuators
+        if plant.pose:
+            bounds = mixer(plant)[:, -1]
+        else:
+            bounds = np.array(trace.scenario.limits[: plant.driven])
+        commands = (trace.applied if plant.pose else trace.u)[
+            :, : len(bounds)
+        ]  # of a free body, of its actuators
         variation = np.abs(np.diff(commands, axis=0)).sum(axis=0) / bounds
         values = {
             "failed": 0.0,
-            "accuracy": max(float(worst[conventions.last_part(trace)].max()), self._values["floor"]),
+            "accuracy": max(
+                float(worst[conventions.last_part(trace)].max()), self._values["floor"]
+            ),
             "itae": float(np.trapezoid(trace.t * total, trace.t)),
             "settling": _kept(trace, worst, conventions.SETTLING_BAND),
             "calm": float(variation.max() / self.duration),
         }
         return values | self._times(trace, worst, values)
 
-    def _times(self, trace: Trace, worst: np.ndarray, values: Mapping[str, float]) -> dict[str, float]:
+    def _times(
+        self, trace: Trace, worst: np.ndarray, values: Mapping[str, float]
+    ) -> dict[str, float]:
         """Return the time of each target, by name."""
         reached = [_kept(trace, worst, level) for level in self.targets.get("accuracy", ())]
         times = dict(zip(self._names(), map(_or_never, reached), strict=False))
-        counted = {"settling": _or_never(values["settling"]), "calm": _or_never(reached[-1]) if reached else math.nan}
+        counted = {
+            "settling": _or_never(values["settling"]),
+            "calm": _or_never(reached[-1]) if reached else math.nan,
+        }
         for measure, time in counted.items():
             for i, level in enumerate(self.targets.get(measure, ()), 1):
-                times[f"{measure}_{i}"] = time if values[measure] <= level else math.nan
+                if values[measure] <= level:
+                    times[f"{measure}_{i}"] = time
+                else:
+                    times[f"{measure}_{i}"] = math.nan
         return times
 
     def _names(self) -> list[str]:
         """List the names of the targets' times."""
-        return [f"{name}_{i}" for name in MEASURES for i, _ in enumerate(self.targets.get(name, ()), 1)]
+        return [
+            f"{name}_{i}" for name in MEASURES for i, _ in enumerate(self.targets.get(name, ()), 1)
+        ]
 
 
 def problem(name: str) -> Problem:
@@ -234,9 +303,14 @@ def problem(name: str) -> Problem:
     Raises:
       ScenarioError: a text that is no such name, or an unknown version, plant or condition.
     """
-    parts = ID.fullmatch(name) if isinstance(name, str) else None
+    if isinstance(name, str):
+        parts = ID.fullmatch(name)
+    else:
+        parts = None
     if parts is None:
-        raise ScenarioError(f"problem {shown(name)} is no plant/condition@version: write it as duffing/noise@1")
+        raise ScenarioError(
+            f"problem {shown(name)} is no plant/condition@version: write it as duffing/noise@1"
+        )
     plant, condition, version = parts.groups()
     find("version of the rules", version, dict.fromkeys(versions()))
     of = rules(int(version))
@@ -245,8 +319,12 @@ def problem(name: str) -> Problem:
     conditions = [cell.partition("/")[2] for cell in known if cell.startswith(f"{plant}/")]
     find(f"condition of problems of {plant}", condition, dict.fromkeys(conditions))
     if f"{plant}/{condition}" in of.get("frozen", {}).get("left_out", ()):
-        raise ScenarioError(f"problem {name!r} is left out by rule, as a control forbids it: choose another")
-    return Problem(id=name, plant=plant, condition=condition, version=int(version), rules=_text(int(version)))
+        raise ScenarioError(
+            f"problem {name!r} is left out by rule, as a control forbids it: choose another"
+        )
+    return Problem(
+        id=name, plant=plant, condition=condition, version=int(version), rules=_text(int(version))
+    )
 
 
 def cells(version: int) -> list[str]:
@@ -254,7 +332,10 @@ def cells(version: int) -> list[str]:
     of = rules(version)
     plants = of.get("plants", [])
     each = [*((plant, of) for plant in plants), *of["more"].items()]
-    of_each = [f"{plant}/{condition}" for plant, fields in each for condition in fields["conditions"]]
+    of_each = []
+    for plant, fields in each:
+        for condition in fields["conditions"]:
+            of_each.append(f"{plant}/{condition}")
     return of_each + [f"{plant}/{condition}" for plant in plants for condition in _attacks(version)]
 
 
@@ -282,7 +363,9 @@ def rules(version: int) -> Mapping[str, Any]:
 def _number(number: object) -> str:
     """Return the number of hidden instances, or ""."""
     if not isinstance(number, str) or not NUMBER.fullmatch(number):
-        raise ScenarioError(f"the number of hidden instances is {shown(number)}: give 64 hex digits, 0-9 and a-f")
+        raise ScenarioError(
+            f"the number of hidden instances is {shown(number)}: give 64 hex digits, 0-9 and a-f"
+        )
     return number
 
 
@@ -293,9 +376,13 @@ def _scaled(signal: Any, factor: float) -> Any:
 
 
 def _kept(trace: Trace, error: np.ndarray, level: float) -> float:
-    """Return the time from which an error, (K + 1,), is kept below a level, s; inf if that is in the last fifth."""
+    """Return the time from which an error, (K + 1,), is kept below a level, s; inf if that is in
+    the last fifth.
+    """
     time = conventions.last_exit(trace.t, error, level)
-    return time if time <= trace.t[conventions.last_part(trace)][0] else math.inf
+    if time <= trace.t[conventions.last_part(trace)][0]:
+        return time
+    return math.inf
 
 
 def _or_never(time: float) -> float:

@@ -1,12 +1,14 @@
-"""Results: what entries did on a suite, read from a folder or an archive, ranked by question, and compared.
+"""Results: what entries did on a suite, read from a folder or an archive, ranked by question, and
+compared.
 
     found = smc.results("smc-30@1")           # of ./results, or a folder, or a .zip of one
     print(found.boards()["speed"])
     print(found.compare(smc.results("older.zip")))
 
-There is no single number. A board is a question: accuracy under forces, accuracy under sensors, speed, calm. An entry
-has the mean rank of its medians over the board's problems, with an interval over problems, and the share of the targets
-that it reaches and keeps. On hidden instances only checked laws have places.
+There is no single number. A board is a question: accuracy under forces, accuracy under sensors,
+speed, calm. An entry has the mean rank of its medians over the board's problems, with an interval
+over problems, and the share of the targets that it reaches and keeps. On hidden instances only
+checked laws have places.
 """
 
 import dataclasses
@@ -28,19 +30,42 @@ from smc_mujoco.benchmark.problem import problem
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.common.files import as_path, read_json, reading, slug
 
-MEASURE = {"forces": "accuracy", "sensors": "accuracy", "speed": "settling", "calm": "calm"}  # of each board
-TITLES = {"forces": "Accuracy under forces", "sensors": "Accuracy under sensors", "speed": "Speed", "calm": "Calm"}
-WORDS = {"accuracy": "largest error of the last fifth", "settling": "settling time", "calm": "variation of u"}
+MEASURE = {
+    "forces": "accuracy",
+    "sensors": "accuracy",
+    "speed": "settling",
+    "calm": "calm",
+}  # of each board
+TITLES = {
+    "forces": "Accuracy under forces",
+    "sensors": "Accuracy under sensors",
+    "speed": "Speed",
+    "calm": "Calm",
+}
+WORDS = {
+    "accuracy": "largest error of the last fifth",
+    "settling": "settling time",
+    "calm": "variation of u",
+}
 DRAWS, LEVEL = 4000, 90.0  # resamples of the problems; %, of the intervals
 CHANGE = 0.01  # a median that changes by less counts as the same; chosen
 MOMENTS = 81  # of a curve of targets
 MAX_UNPACKED = 4 * 10**9  # bytes of an archive; chosen
 CURE = "enter the law again"
 ABOUT: dict[str, Any] = {  # what a result says, and of which type
-    "suite": str, "instances": int, "entry": dict, "checked": bool, "marks": list, "sample": list | NoneType,
-    "hashes": dict, "versions": dict, "machine": str,
-}  # fmt: skip
-OF_ENTRY: dict[str, Any] = dict.fromkeys(("name", "source", "licence", "division", "digest"), str) | {"authors": list}
+    "suite": str,
+    "instances": int,
+    "entry": dict,
+    "checked": bool,
+    "marks": list,
+    "sample": list | NoneType,
+    "hashes": dict,
+    "versions": dict,
+    "machine": str,
+}
+OF_ENTRY: dict[str, Any] = dict.fromkeys(
+    ("name", "source", "licence", "division", "digest"), str
+) | {"authors": list}
 HASHES: dict[str, Any] = dict.fromkeys(("table", "rules", "suite"), str)
 
 
@@ -58,7 +83,9 @@ class Standing:
     """The place of an entry on a board."""
 
     entry: str
-    place: int | None  # None: beside the others, as its law is not checked and the instances are hidden
+    place: (
+        int | None
+    )  # None: beside the others, as its law is not checked and the instances are hidden
     rank: float  # the mean over the problems, 1 is best
     low: float  # ends of the interval over problems
     high: float
@@ -76,11 +103,12 @@ class Board:
 
     def __str__(self) -> str:
         head = f"{TITLES[self.question]}: {WORDS[MEASURE[self.question]]}, {len(self.problems)} problems"
-        lines = [
-            f"{one.place or '-':>3} {one.entry:<28} {one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}] "
-            f"{100 * one.reached:4.0f} %{' level' if one.level and one.place != 1 else ''}"
-            for one in self.standings
-        ]
+        lines = []
+        for one in self.standings:
+            lines.append(
+                f"{one.place or '-':>3} {one.entry:<28} {one.rank:5.1f} [{one.low:.1f}, {one.high:.1f}] "
+                f"{100 * one.reached:4.0f} %{' level' if one.level and one.place != 1 else ''}"
+            )
         return "\n".join([head, *lines])
 
 
@@ -104,7 +132,9 @@ class Result:
         with reading(self.table, "table of runs", CURE) as file:
             digest = hashlib.sha256(file.read_bytes()).hexdigest()
         if digest != self.about["hashes"]["table"]:
-            raise ScenarioError(f"{self.table} is not the table that its result was written for: {CURE}")
+            raise ScenarioError(
+                f"{self.table} is not the table that its result was written for: {CURE}"
+            )
         with reading(self.table, "table of runs", CURE):
             self.runs.check(self.problems, self.about["instances"])
 
@@ -120,16 +150,25 @@ class Result:
 
     @functools.cached_property
     def medians(self) -> dict[str, dict[str, float]]:
-        """Problem -> measure -> the median over its instances; calm counts where the easiest accuracy is kept."""
+        """Problem -> measure -> the median over its instances; calm counts where the easiest
+        accuracy is kept.
+        """
         return self.runs.medians()
 
     def targets(self, problems: Sequence[str], measure: str) -> np.ndarray:
-        """Return the times from which the targets of a measure are reached and kept, s, inf for never, (targets,)."""
+        """Return the times from which the targets of a measure are reached and kept, s, inf for
+        never, (targets,).
+        """
         times = []
         for name in problems:
             columns = self.runs.columns(name)
-            times += [columns[f"{measure}_{i}"] for i, _ in enumerate(problem(name).targets.get(measure, ()), 1)]
-        return np.nan_to_num(np.concatenate(times), nan=np.inf) if times else np.zeros(0)
+            times += [
+                columns[f"{measure}_{i}"]
+                for i, _ in enumerate(problem(name).targets.get(measure, ()), 1)
+            ]
+        if times:
+            return np.nan_to_num(np.concatenate(times), nan=np.inf)
+        return np.zeros(0)
 
 
 class Results:
@@ -139,22 +178,35 @@ class Results:
         self.suite, self.entries, self.hidden = name, dict(entries), hidden
         self.problems = suite.suite(name)
         informed = {cell: suite.boards(cell) for cell in self.problems}
-        self._informing = {question: tuple(c for c in informed if question in informed[c]) for question in MEASURE}
-        self._boards, self._curves = dict[str, Board](), dict[tuple[str, str], np.ndarray]()  # that were asked for
+        self._informing = {
+            question: tuple(c for c in informed if question in informed[c]) for question in MEASURE
+        }
+        self._boards, self._curves = (
+            dict[str, Board](),
+            dict[tuple[str, str], np.ndarray](),
+        )  # that were asked for
 
     def __repr__(self) -> str:
-        return f"results of {len(self.entries)} entries on {self.suite}" + ", hidden instances" * self.hidden
+        return (
+            f"results of {len(self.entries)} entries on {self.suite}"
+            + ", hidden instances" * self.hidden
+        )
 
     def on(self, question: str) -> tuple[str, ...]:
         """Return the problems that inform a board."""
         return self._informing[question]
 
     def ranks(self, question: str, names: Sequence[str]) -> np.ndarray:
-        """Return the ranks of entries on each problem of a board, (entries, problems); equal medians share a rank."""
+        """Return the ranks of entries on each problem of a board, (entries, problems); equal
+        medians share a rank.
+        """
         from scipy.stats import rankdata
 
         measure = MEASURE[question]
-        medians = [[self.entries[name].medians[cell][measure] for cell in self.on(question)] for name in names]
+        medians = [
+            [self.entries[name].medians[cell][measure] for cell in self.on(question)]
+            for name in names
+        ]
         return rankdata(np.array(medians), axis=0)
 
     def boards(self) -> dict[str, Board]:
@@ -170,13 +222,20 @@ class Results:
 
     def _made(self, question: str) -> Board:
         """Return the board of a question, from the runs."""
-        ranked = [name for name, one in self.entries.items() if one.about["checked"] or not self.hidden]
+        ranked = [
+            name for name, one in self.entries.items() if one.about["checked"] or not self.hidden
+        ]
         beside = [name for name in self.entries if name not in ranked]
-        standings = self._places(question, ranked) if ranked else []
+        if ranked:
+            standings = self._places(question, ranked)
+        else:
+            standings = []
         for name in beside:
             rank = float(self.ranks(question, [*ranked, name])[-1].mean())
             place = {"place": None, "low": np.nan, "high": np.nan, "level": False}
-            standings.append(Standing(entry=name, rank=rank, reached=self.reached(name, question), **place))
+            standings.append(
+                Standing(entry=name, rank=rank, reached=self.reached(name, question), **place)
+            )
         return Board(question=question, problems=self.on(question), standings=tuple(standings))
 
     def _places(self, question: str, names: Sequence[str]) -> list[Standing]:
@@ -207,28 +266,41 @@ class Results:
         return float(self.curve(entry, question)[1][-1])
 
     def curve(self, entry: str, question: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return times, s, and the share of a board's targets that are reached by then and kept, (MOMENTS,) each."""
+        """Return times, s, and the share of a board's targets that are reached by then and kept,
+        (MOMENTS,) each.
+        """
         moments = np.linspace(0.0, problem(self.problems[0]).duration, MOMENTS)
         if (entry, question) not in self._curves:
             times = np.sort(self.entries[entry].targets(self.on(question), MEASURE[question]))
-            self._curves[entry, question] = np.searchsorted(times, moments, side="right") / max(len(times), 1)
+            self._curves[entry, question] = np.searchsorted(times, moments, side="right") / max(
+                len(times), 1
+            )
         return moments, self._curves[entry, question]
 
     def compare(self, other: "Results") -> "Changes":
-        """Return what changed from other results on the suite to these, of the entries that both have."""
+        """Return what changed from other results on the suite to these, of the entries that both
+        have.
+        """
         if other.suite != self.suite:
-            raise ScenarioError(f"these are results on {self.suite}, the others on {other.suite}: give the same suite")
+            raise ScenarioError(
+                f"these are results on {self.suite}, the others on {other.suite}: give the same suite"
+            )
         both = [name for name in self.entries if name in other.entries]
         return Changes(
             changes=tuple(
-                _change(self, other, name, question) for name in both for question in MEASURE if self.on(question)
+                _change(self, other, name, question)
+                for name in both
+                for question in MEASURE
+                if self.on(question)
             )
         )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Change:
-    """How the medians of an entry on a board's problems changed: problem -> the new one over the old one."""
+    """How the medians of an entry on a board's problems changed: problem -> the new one over the
+    old one.
+    """
 
     entry: str
     question: str
@@ -242,7 +314,10 @@ class Change:
             if found:
                 where = pick(found, key=found.__getitem__)
                 ratio = found[where]
-                amount = f"{ratio:.3g} times" if ratio >= 2.0 else f"{100 * abs(ratio - 1):.2g} %"
+                if ratio >= 2.0:
+                    amount = f"{ratio:.3g} times"
+                else:
+                    amount = f"{100 * abs(ratio - 1):.2g} %"
                 told.append(f"{word} on {len(found)} of {self.count}, by up to {amount} ({where})")
         return f"{self.entry}, {TITLES[self.question].lower()}: {'; '.join(told) or 'the same'}"
 
@@ -267,7 +342,10 @@ def _change(new: Results, old: Results, name: str, question: str) -> Change:
     measure, ratios = MEASURE[question], {}
     for cell in new.on(question):
         now, before = (one.entries[name].medians[cell][measure] for one in (new, old))
-        ratios[cell] = 1.0 if now == before else (now / before if before else np.inf)
+        if now == before:
+            ratios[cell] = 1.0
+        else:
+            ratios[cell] = now / before if before else np.inf
     worse = {cell: ratio for cell, ratio in ratios.items() if ratio > 1.0 + CHANGE}
     better = {cell: ratio for cell, ratio in ratios.items() if ratio < 1.0 / (1.0 + CHANGE)}
     return Change(entry=name, question=question, worse=worse, better=better, count=len(ratios))
@@ -277,19 +355,25 @@ def results(source: str | os.PathLike[str] = "smc-30@1", hidden: bool = False) -
     """Return the results on a suite.
 
     Args:
-      source: a suite's name, whose results are in the folder "results"; or the folder of a suite's results, such as
-        "results/smc-30@1"; or a .zip of such a folder.
+      source: a suite's name, whose results are in the folder "results"; or the folder of a suite's
+        results, such as "results/smc-30@1"; or a .zip of such a folder.
       hidden: whether those on hidden instances, in place of the visible ones.
 
     Raises:
-      ScenarioError: no results there, results on several suites, or a table that was changed since it was written.
+      ScenarioError: no results there, results on several suites, or a table that was changed since
+        it was written.
     """
-    path = Path("results") / source if source in suite.suites() else as_path(source)
+    if source in suite.suites():
+        path = Path("results") / source
+    else:
+        path = as_path(source)
     found, refused = sound(_unpacked(path) if path.suffix == ".zip" else path, hidden)
     if refused:
         raise refused[0]
     if not found:
-        raise ScenarioError(f"no results at {shown(str(path))}: enter a law first, with smc-mujoco enter FOLDER")
+        raise ScenarioError(
+            f"no results at {shown(str(path))}: enter a law first, with smc-mujoco enter FOLDER"
+        )
     if len(found) > 1:
         names = " and ".join(one.suite for one in found)
         raise ScenarioError(f"{shown(str(path))} has results on {names}: give a folder of one")
@@ -301,8 +385,14 @@ def sound(folder: Path, hidden: bool) -> tuple[list[Results], list[ScenarioError
 
     Names that share a folder's name are one: the result stands that is in the folder of its name.
     """
-    wanted, of_suite, refused = HIDDEN[RESULT] if hidden else RESULT, dict[str, dict[str, Result]](), []
-    for place in sorted(Path(place) for place, _, files in os.walk(folder) if wanted in files):  # skips what vanishes
+    wanted, of_suite, refused = (
+        HIDDEN[RESULT] if hidden else RESULT,
+        dict[str, dict[str, Result]](),
+        [],
+    )
+    for place in sorted(
+        Path(place) for place, _, files in os.walk(folder) if wanted in files
+    ):  # skips what vanishes
         try:
             one = Result(place, hidden)
         except ScenarioError as error:
@@ -314,8 +404,13 @@ def sound(folder: Path, hidden: bool) -> tuple[list[Results], list[ScenarioError
             continue
         if one.folder.name == slug(one.name):
             its[slug(one.name)], one = one, first
-        refused.append(ScenarioError(f"{one.folder} is another result of {shown(one.name)}: remove it"))
-    made = [Results(name, {one.name: one for one in its.values()}, hidden) for name, its in sorted(of_suite.items())]
+        refused.append(
+            ScenarioError(f"{one.folder} is another result of {shown(one.name)}: remove it")
+        )
+    made = [
+        Results(name, {one.name: one for one in its.values()}, hidden)
+        for name, its in sorted(of_suite.items())
+    ]
     return made, refused
 
 
@@ -329,7 +424,9 @@ def _unpacked(path: Path) -> Path:
             with zipfile.ZipFile(file) as archive:
                 if sum(one.file_size for one in archive.infolist()) > MAX_UNPACKED:
                     raise ScenarioError(f"it unpacks to more than {MAX_UNPACKED / 1e9:g} GB")
-                _UNPACKED.append(TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True))
+                _UNPACKED.append(
+                    TemporaryDirectory(prefix="smc_mujoco-", ignore_cleanup_errors=True)
+                )
                 archive.extractall(_UNPACKED[-1].name)
         except zipfile.BadZipFile as error:
             raise ScenarioError(f"it is no archive: {error}") from None

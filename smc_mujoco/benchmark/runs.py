@@ -1,7 +1,8 @@
-"""The table of an entry's runs: a parquet file with a row a run and a row group a problem, which is read by itself.
+"""The table of an entry's runs: a parquet file with a row a run and a row group a problem, which is
+read by itself.
 
-Columns: `problem`, `instance`, the measures of `Problem.measures`, and the time of each target, s, NaN for never. The
-same runs give the same bytes.
+Columns: `problem`, `instance`, the measures of `Problem.measures`, and the time of each target, s,
+NaN for never. The same runs give the same bytes.
 """
 
 import math
@@ -26,8 +27,13 @@ COLUMNS = (*VALUES, *(f"{measure}_{i}" for measure in MEASURES for i in range(1,
 Row = dict[str, Any]
 
 
-def rows(one: Problem, scenarios: Sequence[Scenario], instances: Sequence[int], failures: list[str]) -> list[Row]:
-    """Run the scenarios of a problem's instances. Return their rows; add how runs failed to `failures`."""
+def rows(
+    one: Problem, scenarios: Sequence[Scenario], instances: Sequence[int], failures: list[str]
+) -> list[Row]:
+    """Run the scenarios of a problem's instances.
+
+    Return their rows; add how runs failed to `failures`.
+    """
     found: list[Row] = [{} for _ in scenarios]
     for i, trace in stream(scenarios):
         found[i] = {"problem": one.id, "instance": instances[i]} | one.measures(trace)
@@ -41,9 +47,15 @@ def write(path: Path, groups: Iterable[list[Row]]) -> None:
     """Write the rows of each problem as they come."""
     import pyarrow as pa
 
-    kinds = [("problem", pa.string()), ("instance", pa.int64()), *((name, pa.float64()) for name in COLUMNS)]
+    kinds = [
+        ("problem", pa.string()),
+        ("instance", pa.int64()),
+        *((name, pa.float64()) for name in COLUMNS),
+    ]
     schema = pa.schema(kinds)
-    filled = ([{name: row.get(name, math.nan) for name, _ in kinds} for row in group] for group in groups)
+    filled = (
+        [{name: row.get(name, math.nan) for name, _ in kinds} for row in group] for group in groups
+    )
     tables.write(path, schema, (pa.Table.from_pylist(group, schema=schema) for group in filled))
 
 
@@ -59,17 +71,24 @@ class Runs:
     def _problem(self, group: int) -> str:
         """Return the problem of a row group, from its statistics."""
         statistics = self.file.metadata.row_group(group).column(0).statistics
-        return statistics.min if statistics is not None else ""
+        if statistics is not None:
+            return statistics.min
+        return ""
 
     def __len__(self) -> int:
         return self.file.metadata.num_rows
 
     def check(self, problems: Sequence[str], instances: int) -> None:
         """Raise ScenarioError unless the table has every problem's instances and all columns."""
-        if missing := [name for name in ("instance", *COLUMNS) if name not in self.file.schema_arrow.names]:
+        if missing := [
+            name for name in ("instance", *COLUMNS) if name not in self.file.schema_arrow.names
+        ]:
             raise ScenarioError(f"it has no column {missing[0]!r}")
         for name in problems:
-            count = self.file.metadata.row_group(self.groups[name]).num_rows if name in self.groups else 0
+            if name in self.groups:
+                count = self.file.metadata.row_group(self.groups[name]).num_rows
+            else:
+                count = 0
             if count != instances:
                 raise ScenarioError(f"it has {count} runs of {name}, not {instances}")
 
@@ -81,8 +100,8 @@ class Runs:
     def medians(self) -> dict[str, dict[str, float]]:
         """Return problem -> measure -> median over its instances.
 
-        The variation of u, `calm`, counts as infinite in a run that does not keep the easiest accuracy, as who does
-        nothing is calm.
+        The variation of u, `calm`, counts as infinite in a run that does not keep the easiest
+        accuracy, as who does nothing is calm.
         """
         return {name: self._medians(name) for name in self.groups}
 
@@ -90,5 +109,7 @@ class Runs:
         """Return measure -> median over a problem's instances."""
         columns = dict(self.columns(name))
         if count := len(problem(name).targets.get("accuracy", ())):
-            columns["calm"] = np.where(np.isnan(columns[f"accuracy_{count}"]), np.inf, columns["calm"])
+            columns["calm"] = np.where(
+                np.isnan(columns[f"accuracy_{count}"]), np.inf, columns["calm"]
+            )
         return {value: float(np.median(columns[value])) for value in VALUES}

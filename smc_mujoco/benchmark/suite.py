@@ -1,8 +1,8 @@
 """Suites: lists of problems, by name; and boards, the questions that a problem informs.
 
-A file `suites/NAME.txt` has an ID a line. The suites `smc-30@1` and `smc-50@1` follow a pattern that knows no law: with
-plants and conditions counted from 0 in the order of the rules, a problem is in if (condition + 2 plant + version) mod 5
-is below 3, or 5.
+A file `suites/NAME.txt` has an ID a line. The suites `smc-30@1` and `smc-50@1` follow a pattern
+that knows no law: with plants and conditions counted from 0 in the order of the rules, a problem is
+in if (condition + 2 plant + version) mod 5 is below 3, or 5.
 """
 
 from pathlib import Path
@@ -36,11 +36,15 @@ def boards(name: str) -> tuple[str, ...]:
     """Return the questions that a problem informs, of "forces", "sensors", "speed" and "calm"."""
     one = problem(name)
     informing = rules(one.version)["boards"]
-    return tuple(board for board, conditions in informing.items() if {"*", one.condition} & {*conditions})
+    return tuple(
+        board for board, conditions in informing.items() if {"*", one.condition} & {*conditions}
+    )
 
 
 def pattern(version: int, share: int) -> tuple[str, ...]:
-    """Return the IDs that the pattern of a version chooses, `share` of 5 of its plants and conditions."""
+    """Return the IDs that the pattern of a version chooses, `share` of 5 of its plants and
+    conditions.
+    """
     of = rules(version)
     return tuple(
         f"{plant}/{condition}@{version}"

@@ -23,15 +23,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
 )
-GROUPS: dict[str, list[Callable[..., None]]] = {  # heading in the help -> commands; the annexes add theirs
+# heading in the help -> commands; the annexes add theirs
+GROUPS: dict[str, list[Callable[..., None]]] = {
     "Run and look": [catalogue.list_, runs.run, runs.show, runs.view],
     "Compare": [studies.compare, studies.which],
     "Tune and analyse": [
-        analysis.tune, analysis.margins, analysis.worst, analysis.sensitivity, analysis.basin, analysis.chatter,
+        analysis.tune,
+        analysis.margins,
+        analysis.worst,
+        analysis.sensitivity,
+        analysis.basin,
+        analysis.chatter,
     ],
-}  # fmt: skip
+}
 for annex in sorted(filter(annexes.installed, annexes.ANNEXES)):
-    for group, commands in annexes.module(f"smc_mujoco.{annex}.commands", "the command line").GROUPS.items():
+    for group, commands in annexes.module(
+        f"smc_mujoco.{annex}.commands", "the command line"
+    ).GROUPS.items():
         GROUPS.setdefault(group, []).extend(commands)
 for group, commands in GROUPS.items():
     for command in commands:
@@ -40,8 +48,15 @@ for group, commands in GROUPS.items():
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line. An error that the user can correct ends in one sentence and exit code 2."""
-    for name in ("stdin", "stdout", "stderr"):  # a closed stream; in this order each gets its own descriptor again
+    """Run the command line.
+
+    An error that the user can correct ends in one sentence and exit code 2.
+    """
+    for name in (
+        "stdin",
+        "stdout",
+        "stderr",
+    ):  # a closed stream; in this order each gets its own descriptor again
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
@@ -49,7 +64,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         stream.reconfigure(errors="replace")  # pyright: ignore[reportAttributeAccessIssue] Python made it a TextIOWrapper
     if not os.environ.get("COLUMNS", "80").strip("0"):
         del os.environ["COLUMNS"]  # a terminal without a width sets it to 0
-    if threading.current_thread() is threading.main_thread():  # ends as Ctrl-C does, and leaves no half-written files
+    if (
+        threading.current_thread() is threading.main_thread()
+    ):  # ends as Ctrl-C does, and leaves no half-written files
         signal.signal(signal.SIGTERM, _end)
     choose_gl()  # before a command imports mujoco, which fails if MUJOCO_GL does not name a backend
     warnings.showwarning = _showing_once()
@@ -89,7 +106,8 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
     """Define the options that come before a command."""

@@ -37,9 +37,11 @@ def perform(
     question: str,
     repeated: bool = True,
 ) -> None:
-    """Run a scene: print its question, scores and answer; write its traces, figures and film to the folder `out`.
+    """Run a scene: print its question, scores and answer; write its traces, figures and film to the
+    folder `out`.
 
-    Runs are `repeated` at half the physics step, and from a nudged start: what then differs is marked.
+    Runs are `repeated` at half the physics step, and from a nudged start: what then differs is
+    marked.
     """
     if question:
         terminal.note(f"{question}\n", "bold", wrap=True)
@@ -70,7 +72,10 @@ def perform(
         if filming:
             with clock("film"):
                 path, title = out / f"{slug(scene.film)}.mp4", _title(scene, scene.film)
-                runs, names = [*traces[scene.film].values()], [*map(style.label, traces[scene.film])]
+                runs, names = (
+                    [*traces[scene.film].values()],
+                    [*map(style.label, traces[scene.film])],
+                )
                 written += filmed(runs, path, names, title, terminal, scene.camera)
     finally:  # also if the film fails or is stopped
         terminal.print("wrote", style="dim")
@@ -79,13 +84,17 @@ def perform(
 
 
 def _title(scene: Scene, condition: str) -> str:
-    return f"{scene.title}, {condition}" if len(scene.conditions) > 1 else scene.title
+    if len(scene.conditions) > 1:
+        return f"{scene.title}, {condition}"
+    return scene.title
 
 
 def simulate(scene: Scene, threads: int | None, clock: Timer = contextlib.nullcontext) -> Traces:
     """Run all scenarios of the scene at once, with a progress bar."""
     with clock("compiling"):
-        runs = [(condition, label, prepare(scenario)) for condition, label, scenario in scene.runs()]
+        runs = [
+            (condition, label, prepare(scenario)) for condition, label, scenario in scene.runs()
+        ]
     with clock("simulating"):
         made = run([prepared for _, _, prepared in runs], threads, progress=True)
     traces: dict[str, dict[str, Trace]] = {}
@@ -110,15 +119,23 @@ def repeat(scene: Scene, threads: int | None) -> dict[str, dict[str, list[Trace]
     return made
 
 
-def other_answers(scene: Scene, traces: Traces, again: Mapping[str, tables.Again], answer: str) -> list[str]:
-    """Return the scene's answer at half the physics step and from nudged starts, where it says something else."""
+def other_answers(
+    scene: Scene, traces: Traces, again: Mapping[str, tables.Again], answer: str
+) -> list[str]:
+    """Return the scene's answer at half the physics step and from nudged starts, where it says
+    something else.
+    """
     said = []
-    for k, words in enumerate(("At half the physics step", f"From starts moved by {NUDGE:g} of themselves")):
-        runs = {
-            c: {label: again.get(c, {}).get(label, [t, t])[k] for label, t in its.items()} for c, its in traces.items()
-        }
+    for k, words in enumerate(
+        ("At half the physics step", f"From starts moved by {NUDGE:g} of themselves")
+    ):
+        runs = {}
+        for c, its in traces.items():
+            runs[c] = {label: again.get(c, {}).get(label, [t, t])[k] for label, t in its.items()}
         other = scene.sentence(runs)
-        order = k == 0 and any(first_order(trace.scenario) for its in runs.values() for trace in its.values())
+        order = k == 0 and any(
+            first_order(trace.scenario) for its in runs.values() for trace in its.values()
+        )
         if not same_answer(answer, other, order):
             said.append(f"{words}: {other}")
     return said
@@ -149,7 +166,10 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     from smc_mujoco.draw.page import files
 
     if scene.figure == "signals":
-        named = {condition: {style.label(label): t for label, t in runs.items()} for condition, runs in traces.items()}
+        named = {
+            condition: {style.label(label): t for label, t in runs.items()}
+            for condition, runs in traces.items()
+        }
         signals(named, out / "signals", scene.title)
         return files(out / "signals")
     if scene.figure == "chattering":
@@ -160,7 +180,12 @@ def figures(scene: Scene, traces: Traces, out: Path) -> list[Path]:
     written: list[Path] = []
     for condition, runs in traces.items():
         path = out / f"{slug(condition)}.svg"
-        figure(list(runs.values()), path, labels=[*map(style.label, runs)], title=_title(scene, condition))
+        figure(
+            list(runs.values()),
+            path,
+            labels=[*map(style.label, runs)],
+            title=_title(scene, condition),
+        )
         written += files(path)
     return written
 
@@ -173,7 +198,9 @@ def filmed(
     terminal: Terminal,
     camera: Camera | None = None,
 ) -> list[Path]:
-    """Film runs with a progress bar and return the file; if nothing can render, print why and return []."""
+    """Film runs with a progress bar and return the file; if nothing can render, print why and
+    return [].
+    """
     from smc_mujoco.draw.film import film as video
 
     if sentence := video.missing() or gl.note():

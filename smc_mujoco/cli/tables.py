@@ -31,19 +31,29 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.step_halving import StepChange
 
 T = TypeVar("T")
-Again = Mapping[str, Sequence[Trace]]  # label -> the same run at half the physics step, and from a nudged start
+Again = Mapping[
+    str, Sequence[Trace]
+]  # label -> the same run at half the physics step, and from a nudged start
 TIP_COLUMNS = {  # of a table of an arm's tip: heading -> score, unit, factor on its SI value
-    "largest\nerror": ("max_error", "mm", 1e3), "error at\nthe end": ("last_error", "mm", 1e3),
-    "mean\nforce": ("mean_force", "N", 1.0), "off the\nwanted": ("force_error", "%", 1.0),
-    "force\nvaries by": ("force_ripple", "N", 1.0), "touching": ("touching", "%", 1.0),
+    "largest\nerror": ("max_error", "mm", 1e3),
+    "error at\nthe end": ("last_error", "mm", 1e3),
+    "mean\nforce": ("mean_force", "N", 1.0),
+    "off the\nwanted": ("force_error", "%", 1.0),
+    "force\nvaries by": ("force_ripple", "N", 1.0),
+    "touching": ("touching", "%", 1.0),
     "deepest": ("depth", "mm", 1e3),
-}  # fmt: skip
+}
 
 # Columns of a table of scores: heading -> metric.
 SCORE_COLUMNS = {
-    "settles": "settling_time", "overshoot": "overshoot", "ultimate\nbound": "ultimate_bound", "ITAE": "itae",
-    "max |u|": "max_u", "TV rate": "tv_rate", "spread\nsettles": "spread_settling_time",
-}  # fmt: skip
+    "settles": "settling_time",
+    "overshoot": "overshoot",
+    "ultimate\nbound": "ultimate_bound",
+    "ITAE": "itae",
+    "max |u|": "max_u",
+    "TV rate": "tv_rate",
+    "spread\nsettles": "spread_settling_time",
+}
 FAILED = Text("failed", style="red")
 MAX_PRINTED_OVERSHOOT = 1000  # %, the largest that is printed as a number; chosen
 MAX_NAMED_JOINTS = 4  # in the heading of a group
@@ -57,31 +67,42 @@ def titled(title: str, *columns: Column | str, **options: Any) -> Table:
 
 def plain(*columns: Column | str, **options: Any) -> Table:
     """Return an empty table without rules or headings, with columns two spaces apart."""
-    return Table(*columns, **{"box": None, "padding": (0, 2, 0, 0), "pad_edge": False, "show_header": False} | options)
+    return Table(
+        *columns,
+        **{"box": None, "padding": (0, 2, 0, 0), "pad_edge": False, "show_header": False} | options,
+    )
 
 
 # scores of runs
 
 
 def scores(title: str, traces: Mapping[str, Trace], again: Again | None = None) -> list[Table]:
-    """Return a table for each group of channels, with a line for each run and a column for each metric.
+    """Return a table for each group of channels, with a line for each run and a column for each
+    metric.
 
-    Scores that differ from those of the same runs `again` are marked, with the smallest and the largest value.
+    Scores that differ from those of the same runs `again` are marked, with the smallest and the
+    largest value.
     """
     style.same_plant(list(traces.values()))
     scenario = next(iter(traces.values())).scenario
     values, tables = _several(metric_scores, traces, again), []
     for group, heading in headings(scenario).items():
-        units = {m.name: m.unit_for(group.unit, group.effort) for m in metrics() if m.applies_to(group)}
+        units = {}
+        for m in metrics():
+            if m.applies_to(group):
+                units[m.name] = m.unit_for(group.unit, group.effort)
         shown = {head: name for head, name in SCORE_COLUMNS.items() if name in units}
         heads = [Text(f"{head}\n").append(units[name], "dim") for head, name in shown.items()]
-        rows = {
-            label: [
-                _score([None if one is None else one[group.name][name] for one in its], name, traces[label].scenario)
+        rows = {}
+        for label, its in values.items():
+            rows[label] = [
+                _score(
+                    [None if one is None else one[group.name][name] for one in its],
+                    name,
+                    traces[label].scenario,
+                )
                 for name in shown.values()
             ]
-            for label, its in values.items()
-        }
         tables.append(_by_label(", ".join(filter(None, (title, heading))), heads, traces, rows))
     gains = {label: [trace.scenario.law.source] for label, trace in traces.items()}
     return _noted(tables, in_words(gains))
@@ -92,18 +113,23 @@ def _noted(tables: list[Table], *words: str) -> list[Table]:
     cells = (cell for table in tables for column in table.columns for cell in column.cells)
     marked = any(MARK in cell.plain for cell in cells if isinstance(cell, Text))
     for table in tables[-1:]:
-        table.caption, table.caption_justify = "; ".join(filter(None, (*words, SCORE_NOTE * marked))) or None, "left"
+        table.caption, table.caption_justify = (
+            "; ".join(filter(None, (*words, SCORE_NOTE * marked))) or None,
+            "left",
+        )
     return tables
 
 
 def _several(
     scored: Callable[[Trace], T], traces: Mapping[str, Trace], again: Again | None
 ) -> dict[str, list[T | None]]:
-    """Return label -> scores of a run and of its repetitions, None for one that failed; no label of which all did."""
+    """Return label -> scores of a run and of its repetitions, None for one that failed; no label of
+    which all did.
+    """
     runs = {label: (trace, *(again or {}).get(label, ())) for label, trace in traces.items()}
-    values = {
-        label: [None if one.diverged_at is not None else scored(one) for one in its] for label, its in runs.items()
-    }
+    values = {}
+    for label, its in runs.items():
+        values[label] = [None if one.diverged_at is not None else scored(one) for one in its]
     return {label: its for label, its in values.items() if its != [None] * len(its)}
 
 
@@ -115,27 +141,37 @@ def _score(values: Sequence[float | None], metric: str, scenario: Scenario) -> T
 
     def text(value: float) -> str:
         large = metric == "overshoot" and MAX_PRINTED_OVERSHOOT < value < math.inf
-        return f"> {MAX_PRINTED_OVERSHOOT}" if large else number(value)
+        if large:
+            return f"> {MAX_PRINTED_OVERSHOOT}"
+        return number(value)
 
     return _marked(values, text, scenario, floor(scenario, metric))
 
 
 def _marked(
-    values: Sequence[float | None], text: Callable[[float], str], scenario: Scenario, least: float = 0.0
+    values: Sequence[float | None],
+    text: Callable[[float], str],
+    scenario: Scenario,
+    least: float = 0.0,
 ) -> Text:
-    """Return a number as text; with its range, marked, if its values in the same run again are apart.
+    """Return a number as text; with its range, marked, if its values in the same run again are
+    apart.
 
     None is a run that failed, which counts as the largest value.
     """
 
     def size(value: float | None) -> float:
-        return math.inf if value is None else -math.inf if math.isnan(value) else value
+        if value is None:
+            return math.inf
+        return -math.inf if math.isnan(value) else value
 
     texts = {value: FAILED.plain if value is None else text(value) for value in values}
     low, high = (texts[end(values, key=size)] for end in (min, max))
     numbers = [math.inf if value is None else value for value in values]
     if low == high or not apart(numbers, least, first_order(scenario)):
-        return FAILED if values[0] is None else Text(texts[values[0]])
+        if values[0] is None:
+            return FAILED
+        return Text(texts[values[0]])
     return Text(f"{low}{MARK}").append(f"\nto {high}", "dim")
 
 
@@ -147,8 +183,9 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
     known = {name for its in values.values() for one in its if one for name in one}
     shown = {head: column for head, column in TIP_COLUMNS.items() if column[0] in known}
     heads = [Text(f"{head}\n").append(unit, "dim") for head, (_, unit, _) in shown.items()]
-    rows = {
-        label: [
+    rows = {}
+    for label, its in values.items():
+        rows[label] = [
             _marked(
                 [None if one is None else factor * one.get(name, math.nan) for one in its],
                 number,
@@ -156,8 +193,6 @@ def tips(title: str, traces: Mapping[str, Trace], again: Again | None = None) ->
             )
             for name, _, factor in shown.values()
         ]
-        for label, its in values.items()
-    }
     return _noted([_by_label(f"{title}, tip", heads, traces, rows)])
 
 
@@ -170,43 +205,60 @@ def headings(scenario: Scenario) -> dict[Group, str]:
     titles = {}
     for group in of_plant:
         n = len(group.channels)
-        listed = ", ".join(names[i] for i in group.channels) if n <= MAX_NAMED_JOINTS else f"{n} joints"
+        if n <= MAX_NAMED_JOINTS:
+            listed = ", ".join(names[i] for i in group.channels)
+        else:
+            listed = f"{n} joints"
         titles[group] = f"{'driven' if group.driven else 'free'}: {listed} ({group.unit})"
     return titles
 
 
 def answers(
-    names: Sequence[str], traces: Mapping[str, Mapping[str, Trace]], again: Mapping[str, Again] | None = None
+    names: Sequence[str],
+    traces: Mapping[str, Mapping[str, Trace]],
+    again: Mapping[str, Again] | None = None,
 ) -> list[Table]:
-    """Return a table for each metric that applies, or one table of them all if there is only one condition."""
+    """Return a table for each metric that applies, or one table of them all if there is only one
+    condition.
+    """
     scenarios = (trace.scenario for runs in traces.values() for trace in runs.values())
     plants = dict.fromkeys((scenario.plant, scenario.efforts[0]) for scenario in scenarios)
     shown = {}
     for name in names:
         if not all(CATALOGUE[name].refusal(plant) for plant, _ in plants):
-            units = dict.fromkeys(CATALOGUE[name].unit_for(plant.unit, effort) for plant, effort in plants)
+            units = dict.fromkeys(
+                CATALOGUE[name].unit_for(plant.unit, effort) for plant, effort in plants
+            )
             shown[f"{name} ({' or '.join(units)})"] = CATALOGUE[name]
     every = [(name, runs, (again or {}).get(name, {})) for name, runs in traces.items()]
-    columns = {head: [(name, metric, runs, others) for name, runs, others in every] for head, metric in shown.items()}
+    columns = {}
+    for head, metric in shown.items():
+        columns[head] = [(name, metric, runs, others) for name, runs, others in every]
     if len(traces) == 1:
         columns = {"": [(head, *column[1:]) for head, (column,) in columns.items()]}
     return _noted([_answer(head, of_metric) for head, of_metric in columns.items()])
 
 
 def _answer(title: str, columns: Sequence[tuple[str, Metric, Mapping[str, Trace], Again]]) -> Table:
-    """Return a table with a line for every label; each column has a heading, a metric and labelled runs, also again."""
+    """Return a table with a line for every label; each column has a heading, a metric and labelled
+    runs, also again.
+    """
     traces = {label: trace for _, _, runs, _ in columns for label, trace in runs.items()}
-    rows = {
-        label: [_cell(metric, runs.get(label), again.get(label, ())) for _, metric, runs, again in columns]
-        for label in traces
-    }
+    rows = {}
+    for label in traces:
+        rows[label] = [
+            _cell(metric, runs.get(label), again.get(label, ()))
+            for _, metric, runs, again in columns
+        ]
     table = _by_label(title, [Text(head) for head, *_ in columns], traces, rows, 30)
     table.min_width = len(title)  # a narrower table would break the title
     return table
 
 
 def _cell(metric: Metric, trace: Trace | None, again: Sequence[Trace] = ()) -> Text | str:
-    """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to its plant."""
+    """Return a metric of a run as text; "" if there is no run, or if the metric does not apply to
+    its plant.
+    """
     if trace is None or metric.refusal(trace.scenario.plant):
         return ""
     values = [None if one.diverged_at is not None else metric.of(one) for one in (trace, *again)]
@@ -220,25 +272,46 @@ def _by_label(
     rows: Mapping[str, Iterable[Text | str]],
     width: int = 16,
 ) -> Table:
-    """Return a table with a row of cells for each labelled run, or "failed"; labels have up to `width` letters."""
+    """Return a table with a row of cells for each labelled run, or "failed"; labels have up to
+    `width` letters.
+    """
     laws = [trace.scenario.law.name for trace in traces.values()]
-    head = "run" if len(set(laws)) == 1 < len(laws) else "law"  # labels of runs of one law say what differs
+    # labels of runs of one law say what differs
+    if len(set(laws)) == 1 < len(laws):
+        head = "run"
+    else:
+        head = "law"
     label = Column(head, no_wrap=True, vertical="bottom", max_width=width, overflow="ellipsis")
     numbers = (Column(head, justify="right", vertical="bottom") for head in heads)
     table = titled(title, label, *numbers, padding=0, show_edge=False, pad_edge=False)
     for label, trace in traces.items():
-        table.add_row(Text(label, style.law_colour(trace.scenario.law.name)), *rows.get(label, [FAILED]))
+        table.add_row(
+            Text(label, style.law_colour(trace.scenario.law.name)), *rows.get(label, [FAILED])
+        )
     return table
 
 
 def trace_summary(trace: Trace) -> list[Table]:
-    """Return a table for each group of channels: every metric of one trace, with its unit and its meaning."""
+    """Return a table for each group of channels: every metric of one trace, with its unit and its
+    meaning.
+    """
     values, tables = metric_scores(trace), []
     for group, heading in headings(trace.scenario).items():
-        table = titled(heading, "metric", Column("value", justify="right"), "unit", "", box=None, padding=(0, 2, 0, 0))
+        table = titled(
+            heading,
+            "metric",
+            Column("value", justify="right"),
+            "unit",
+            "",
+            box=None,
+            padding=(0, 2, 0, 0),
+        )
         for m in metrics():
             if m.name in values[group.name] and (trace.scenario.realistic or not m.realistic):
-                value, unit = number(values[group.name][m.name]), m.unit_for(group.unit, group.effort)
+                value, unit = (
+                    number(values[group.name][m.name]),
+                    m.unit_for(group.unit, group.effort),
+                )
                 table.add_row(m.name, value, unit, Text(m.summary))
         tables.append(table)
     return tables
@@ -246,7 +319,9 @@ def trace_summary(trace: Trace) -> list[Table]:
 
 def catalogue(title: str, rows: Iterable[tuple[str, str]]) -> Table:
     """Return a table of names, each with a line about it."""
-    table = titled(title, Column(no_wrap=True, style="cyan"), "", show_header=False, box=None, padding=(0, 2))
+    table = titled(
+        title, Column(no_wrap=True, style="cyan"), "", show_header=False, box=None, padding=(0, 2)
+    )
     for row in rows:
         table.add_row(*map(Text, row))
     return table
@@ -256,11 +331,15 @@ def listed(known: Catalogue[T], doc: Callable[[T], str | None]) -> list[tuple[st
     """Return the name of every entry, with the first line of its docstring, and its package."""
     lines = {name: (doc(entry) or "").strip().partition("\n")[0] for name, entry in known.items()}
     # some lines end with a colon, because a formula follows
-    return [(name, with_package(line.rstrip(":"), known.package(name))) for name, line in lines.items()]
+    return [
+        (name, with_package(line.rstrip(":"), known.package(name))) for name, line in lines.items()
+    ]
 
 
 def with_package(line: str, package: str) -> str:
-    """Return the line about an entry, with the name of its package in brackets; "" stands for this package."""
+    """Return the line about an entry, with the name of its package in brackets; "" stands for this
+    package.
+    """
     return f"{line} [{package}]" if package else line
 
 
@@ -269,15 +348,25 @@ def with_package(line: str, package: str) -> str:
 
 def margins(kind: str, results: Sequence[Margin]) -> Table:
     """Return the margins of one kind: a line for each plant and law."""
-    numbers = [Column(head, justify="right", no_wrap=True) for head in ("margin", "to within", "theory")]
+    numbers = []
+    for head in ("margin", "to within", "theory"):
+        numbers.append(Column(head, justify="right", no_wrap=True))
     table = titled(f"largest {kind} tolerated", "plant", "law", *numbers, "unit")
     last = None
     for margin in results:
         value = f"{'>= ' * margin.open}{number(margin.value)}"
-        theory = "" if margin.theory is None else "any" if margin.theory == math.inf else number(margin.theory)
+        if margin.theory is None:
+            theory = ""
+        elif margin.theory == math.inf:
+            theory = "any"
+        else:
+            theory = number(margin.theory)
         plant = "" if margin.plant == last else margin.plant
         law = Text(margin.law, style=style.law_colour(margin.law))
-        within = number(margin.resolution) if margin.resolution else ""
+        if margin.resolution:
+            within = number(margin.resolution)
+        else:
+            within = ""
         table.add_row(plant, law, value, within, theory, margin.unit)
         last = margin.plant
     return table
@@ -290,17 +379,24 @@ def chattering(
     measured: Sequence[tuple[float, float]],
     changes: Sequence[StepChange],
 ) -> Table:
-    """Return predicted and measured limit cycles of a channel (amplitude of s, Hz), a line for each scenario."""
+    """Return predicted and measured limit cycles of a channel (amplitude of s, Hz), a line for each
+    scenario.
+    """
     plant = scenarios[0].plant
     last = "coupling" if plant.driven > 1 else "third"
     heads = [f"s ({plant.units[channel]}/s)", "measured", "Hz", "measured", "±", last]
     numbers = [Column(head, justify="right", no_wrap=True) for head in heads]
     table = titled(f"chattering of {plant.name}: predicted, and measured in runs", "law", *numbers)
-    for scenario, cycle, (amplitude, frequency), change in zip(scenarios, cycles, measured, changes, strict=True):
+    for scenario, cycle, (amplitude, frequency), change in zip(
+        scenarios, cycles, measured, changes, strict=True
+    ):
         law = Text(scenario.law.name, style=style.law_colour(scenario.law.name))
         sizes = number(cycle.amplitude), number(amplitude) + MARK * change.marked
         rates = number(cycle.frequency), number(frequency) + MARK * change.marked
-        share = cycle.coupling if plant.driven > 1 else cycle.third_harmonic
+        if plant.driven > 1:
+            share = cycle.coupling
+        else:
+            share = cycle.third_harmonic
         table.add_row(law, *sizes, *rates, _share(cycle.uncertainty), _share(share))
     if any(change.marked for change in changes):
         table.caption = NOTE
@@ -309,4 +405,8 @@ def chattering(
 
 def _share(share: float) -> str:
     """Return a share in percent; "" for NaN."""
-    return "" if math.isnan(share) else f"{100 * share:.0f} %" if share <= 1.0 else "> 100 %"
+    if math.isnan(share):
+        return ""
+    if share <= 1.0:
+        return f"{100 * share:.0f} %"
+    return "> 100 %"

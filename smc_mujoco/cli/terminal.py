@@ -15,7 +15,9 @@ from smc_mujoco.common.scripts import users_traceback
 
 @contextlib.contextmanager
 def errors_as_sentences() -> Iterator[None]:
-    """Exit with a sentence on an error that the user can correct; with a traceback of their script if it fails."""
+    """Exit with a sentence on an error that the user can correct; with a traceback of their script
+    if it fails.
+    """
     try:
         yield
     except ScenarioError as error:
@@ -30,7 +32,9 @@ def errors_as_sentences() -> Iterator[None]:
             print(lines, end="", file=sys.stderr)
             raise SystemExit(1) from None
         if isinstance(error, OSError):
-            _fail(f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room")
+            _fail(
+                f"{error.filename or 'a file'}: {error.strerror or error}; choose another folder or make room"
+            )
         if isinstance(error, MemoryError):
             _fail("out of memory: give fewer or shorter runs")
         raise
@@ -42,7 +46,10 @@ def _fail(sentence: str, code: int = 2) -> None:
 
 
 class Terminal(Console):
-    """The console of a command, which also measures its time. It prints brackets as they are, not as markup."""
+    """The console of a command, which also measures its time.
+
+    It prints brackets as they are, not as markup.
+    """
 
     def __init__(self):
         super().__init__(markup=False, emoji=False)

@@ -13,7 +13,9 @@ def module(name: str, what: str) -> ModuleType:
     if annex in ANNEXES and not installed(annex):
         from smc_mujoco.common.extras import MissingPackageError
 
-        raise MissingPackageError(f"{what} needs smc_mujoco.{annex}, which is missing here: install all of smc-mujoco")
+        raise MissingPackageError(
+            f"{what} needs smc_mujoco.{annex}, which is missing here: install all of smc-mujoco"
+        )
     return importlib.import_module(name)
 
 

@@ -1,13 +1,15 @@
-"""Catalogues: entries of the library by name, and those that other installed packages add by entry points.
+"""Catalogues: entries of the library by name, and those that other installed packages add by entry
+points.
 
     [project.entry-points."smc_mujoco.laws"]
     my_law = "my_package.laws:my_law"
 
-The names of other packages' entries are read from the packages' metadata. An entry is imported when it is asked for by
-its name, or when all entries are listed. So a package costs nothing, and cannot fail, until somebody asks for it.
+The names of other packages' entries are read from the packages' metadata. An entry is imported when
+it is asked for by its name, or when all entries are listed. So a package costs nothing, and cannot
+fail, until somebody asks for it.
 
-If an entry is wrong, one sentence says why. It is an error if the entry was asked for by its name, and a
-`PackageWarning` if all are listed, because the others still work.
+If an entry is wrong, one sentence says why. It is an error if the entry was asked for by its name,
+and a `PackageWarning` if all are listed, because the others still work.
 """
 
 import dataclasses
@@ -33,9 +35,15 @@ NAME = operator.attrgetter("name")
 PREFIX = "smc_mujoco."
 KINDS = {  # group of entry points -> what an entry is, and how one makes it
     "smc_mujoco.laws": ("law", "a function decorated with smc.law_function"),
-    "smc_mujoco.joint_laws": ("law of many joints", "a function decorated with smc.law_function(joint=True)"),
+    "smc_mujoco.joint_laws": (
+        "law of many joints",
+        "a function decorated with smc.law_function(joint=True)",
+    ),
     "smc_mujoco.surfaces": ("surface", "a function decorated with smc.surface_function"),
-    "smc_mujoco.estimators": ("velocity estimator", "a function decorated with smc.estimator_function"),
+    "smc_mujoco.estimators": (
+        "velocity estimator",
+        "a function decorated with smc.estimator_function",
+    ),
     "smc_mujoco.plants": ("plant", "a smc_mujoco.mechanisms.plant.Plant"),
     "smc_mujoco.rigs": ("rig", "a smc_mujoco.evidence.rigs.rig.Rig"),
     "smc_mujoco.scenes": ("scene", "a module that declares a `scene`"),
@@ -48,7 +56,10 @@ U = TypeVar("U")
 
 
 class PackageWarning(UserWarning):
-    """An installed package has an entry point for smc_mujoco that cannot be used. The message is one sentence."""
+    """An installed package has an entry point for smc_mujoco that cannot be used.
+
+    The message is one sentence.
+    """
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +72,9 @@ class Added(Generic[T_co]):
     @property
     def package(self) -> str:
         """The name of the installed package."""
-        return self.point.dist.name if self.point.dist else self.point.module.partition(".")[0]
+        if self.point.dist:
+            return self.point.dist.name
+        return self.point.module.partition(".")[0]
 
     def __str__(self) -> str:
         return f"package {self.package!r}: its {KINDS[self.point.group][0]} {self.point.name!r} ({self.point.value})"
@@ -69,7 +82,10 @@ class Added(Generic[T_co]):
     @property
     def value(self) -> T_co:
         """The entry."""
-        entry = self._load() if _being_imported(self.point.module) else self._loaded
+        if _being_imported(self.point.module):
+            entry = self._load()
+        else:
+            entry = self._loaded
         if isinstance(entry, ScenarioError):
             raise ScenarioError(str(entry)) from entry.__cause__
         return entry
@@ -86,13 +102,18 @@ class Added(Generic[T_co]):
         except ScenarioError as error:
             return ScenarioError(f"{self}: {error}")
         except (Exception, SystemExit) as error:  # whatever another package raises
-            failed = ScenarioError(f"{self} cannot be loaded ({words(error)}): fix, update or uninstall that package")
+            failed = ScenarioError(
+                f"{self} cannot be loaded ({words(error)}): fix, update or uninstall that package"
+            )
             failed.__cause__ = error
             return failed
 
 
 def _being_imported(module: str) -> bool:
-    """Return whether a module, or a package around it, is being imported. Its entries may not exist yet."""
+    """Return whether a module, or a package around it, is being imported.
+
+    Its entries may not exist yet.
+    """
     around = itertools.accumulate(module.split("."), "{}.{}".format)
     specs = (getattr(sys.modules.get(name), "__spec__", None) for name in around)
     return any(getattr(spec, "_initializing", False) for spec in specs)  # importlib's own mark
@@ -101,23 +122,30 @@ def _being_imported(module: str) -> bool:
 class Catalogue(Mapping[str, T_co]):
     """Entries by name, in alphabetical order.
 
-    `catalogue[name]` loads one entry. Iteration loads all, warns of those that cannot be loaded, and leaves them out.
+    `catalogue[name]` loads one entry. Iteration loads all, warns of those that cannot be loaded,
+    and leaves them out.
     """
 
-    def __init__(self, own: Mapping[str, T_co], added: Mapping[str, tuple[Added[T_co], ...]] | None = None):
+    def __init__(
+        self, own: Mapping[str, T_co], added: Mapping[str, tuple[Added[T_co], ...]] | None = None
+    ):
         self.own = own
         self.added = dict(added or {})  # entries of other packages
 
     def __getitem__(self, name: str) -> T_co:
         if name in self.own:
             for entry in self.added.get(name, ()):
-                warn(f"{entry} has the name of an entry of the library, which is used instead: give it another name")
+                warn(
+                    f"{entry} has the name of an entry of the library, which is used instead: give it another name"
+                )
             return self.own[name]
         first, *others = self.added[name]
         if others:
             kind = KINDS[first.point.group][0]
             packages = " and ".join(repr(entry.package) for entry in (first, *others))
-            raise ScenarioError(f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename it")
+            raise ScenarioError(
+                f"{kind} {name!r} is in the packages {packages}: uninstall one of them, or rename it"
+            )
         return first.value
 
     def __contains__(self, name: object) -> bool:
@@ -151,20 +179,31 @@ class Catalogue(Mapping[str, T_co]):
             return default
 
     def __or__(self, other: Mapping[str, U]) -> "Catalogue[T_co | U]":
-        """Return the entries of both. Of two entries of the library with one name, that of `other` is taken."""
-        other = other if isinstance(other, Catalogue) else Catalogue(other)
+        """Return the entries of both.
+
+        Of two entries of the library with one name, that of `other` is taken.
+        """
+        if not isinstance(other, Catalogue):
+            other = Catalogue(other)
         names = {*self.added, *other.added}
         both = {name: (*self.added.get(name, ()), *other.added.get(name, ())) for name in names}
         own: Any = ChainMap[str, Any](other.own, self.own)  # pyright: ignore[reportArgumentType]  # it is only read
         return Catalogue(own, both)
 
     def taken(self, name: str) -> bool:
-        """Return whether an entry has this name. An entry whose module is being imported does not count."""
-        return name in self.own or any(not _being_imported(entry.point.module) for entry in self.added.get(name, ()))
+        """Return whether an entry has this name.
+
+        An entry whose module is being imported does not count.
+        """
+        return name in self.own or any(
+            not _being_imported(entry.point.module) for entry in self.added.get(name, ())
+        )
 
     def package(self, name: str) -> str:
         """Return the name of the package that an entry is from, or "" if it is the library's."""
-        return "" if name in self.own or name not in self.added else self.added[name][0].package
+        if name in self.own or name not in self.added:
+            return ""
+        return self.added[name][0].package
 
 
 def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[T], ...]]:
@@ -176,7 +215,9 @@ def added(group: str, make: Callable[[EntryPoint], T]) -> dict[str, tuple[Added[
 
 
 def imported(kind: type[T], wanted: Callable[[T], bool]) -> Callable[[EntryPoint], T]:
-    """Return a function that imports the object that an entry point names, and checks its kind and its name."""
+    """Return a function that imports the object that an entry point names, and checks its kind and
+    its name.
+    """
 
     def make(point: EntryPoint) -> T:
         entry = point.load()
@@ -190,11 +231,16 @@ def imported(kind: type[T], wanted: Callable[[T], bool]) -> Callable[[EntryPoint
 
 
 def source(point: EntryPoint) -> ModuleSpec:
-    """Return the spec of the module that an entry point names. It imports only the packages around the module."""
+    """Return the spec of the module that an entry point names.
+
+    It imports only the packages around the module.
+    """
     if point.attr:
         raise ScenarioError(f"it is {point.attr!r} in a module: give {KINDS[point.group][1]}")
     if (spec := importlib.util.find_spec(point.module)) is None:
-        raise ScenarioError(f"there is no module {point.module}: fix, update or uninstall that package")
+        raise ScenarioError(
+            f"there is no module {point.module}: fix, update or uninstall that package"
+        )
     if (its_name := point.module.rpartition(".")[2]) != point.name:
         raise ScenarioError(f"its own name is {its_name!r}: give the entry point the same name")
     return spec
@@ -202,10 +248,16 @@ def source(point: EntryPoint) -> ModuleSpec:
 
 @functools.cache
 def _points() -> dict[str, list[EntryPoint]]:
-    """Return group -> the entry points of all installed packages. It reads their metadata, and imports nothing."""
+    """Return group -> the entry points of all installed packages.
+
+    It reads their metadata, and imports nothing.
+    """
     known = importlib.metadata.entry_points()
     groups = [group for group in known.groups if group.startswith(PREFIX)]
-    return {group: sorted(known.select(group=group), key=lambda point: (point.name, point.value)) for group in groups}
+    return {
+        group: sorted(known.select(group=group), key=lambda point: (point.name, point.value))
+        for group in groups
+    }
 
 
 def points(group: str) -> list[EntryPoint]:
@@ -227,7 +279,10 @@ def _warn_of_unknown_groups() -> None:
     """Warn of entry points in groups that do not exist."""
     for group, (point, *_) in _points().items():
         if group not in KINDS:
-            package = point.dist.name if point.dist else point.value
+            if point.dist:
+                package = point.dist.name
+            else:
+                package = point.value
             warn(f"package {package!r}: {unknown('group of entry points', group, KINDS)}")
 
 
@@ -241,17 +296,28 @@ def modules(package: str) -> Iterator[ModuleType]:
 
 
 def discover(package: str, kind: type[T]) -> dict[str, T]:
-    """Return name -> object, of every object of a kind at the top level of a package's modules, sorted by name."""
-    values = [value for module in modules(package) for value in vars(module).values() if isinstance(value, kind)]
+    """Return name -> object, of every object of a kind at the top level of a package's modules,
+    sorted by name.
+    """
+    values = [
+        value
+        for module in modules(package)
+        for value in vars(module).values()
+        if isinstance(value, kind)
+    ]
     return {NAME(value): value for value in sorted(values, key=NAME)}
 
 
 class Files(Mapping[str, T_co]):
-    """The objects of a kind in a package's modules, one in each and named as it, imported when it is asked for."""
+    """The objects of a kind in a package's modules, one in each and named as it, imported when it
+    is asked for.
+    """
 
     def __init__(self, package: str, kind: type[T_co]):
         self.package, self.kind = package, kind
-        self.names = sorted(info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__))
+        self.names = sorted(
+            info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__)
+        )
 
     def __getitem__(self, name: str) -> T_co:
         if name not in self.names:
@@ -260,7 +326,9 @@ class Files(Mapping[str, T_co]):
         for value in vars(module).values():
             if isinstance(value, self.kind) and NAME(value) == name:
                 return value
-        raise ScenarioError(f"{module.__file__} has no {self.kind.__name__} {name!r}: name the file as what it adds")
+        raise ScenarioError(
+            f"{module.__file__} has no {self.kind.__name__} {name!r}: name the file as what it adds"
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -272,12 +340,17 @@ class Files(Mapping[str, T_co]):
 def catalogue_of(
     package: str, kind: type[T], group: str, wanted: Callable[[T], bool] = lambda value: True
 ) -> Catalogue[T]:
-    """Return the objects of a kind in a package's modules, and those of other packages in a group of entry points."""
+    """Return the objects of a kind in a package's modules, and those of other packages in a group
+    of entry points.
+    """
     return Catalogue(Files(package, kind), added(group, imported(kind, wanted)))
 
 
 def subclasses(base: type[T]) -> list[type[T]]:
-    """Return every class derived from a base, users' too. A class comes before those derived from it."""
+    """Return every class derived from a base, users' too.
+
+    A class comes before those derived from it.
+    """
     below = base.__subclasses__()
     for kind in below:
         below.extend(kind.__subclasses__())

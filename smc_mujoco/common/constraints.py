@@ -1,8 +1,10 @@
-"""What a field of data or an argument may be, declared with its type: `tau: Annotated[float, Number(low=0.0)]`.
+"""What a field of data or an argument may be, declared with its type:
 
-Data whose __post_init__ calls `constrain`, and the arguments of a function with the decorator `constrained`, are then
-what is declared, or a ScenarioError is raised. None passes if the type names it, as `Positive | None` does. What
-depends on several values is checked by hand.
+`tau: Annotated[float, Number(low=0.0)]`.
+
+Data whose __post_init__ calls `constrain`, and the arguments of a function with the decorator
+`constrained`, are then what is declared, or a ScenarioError is raised. None passes if the type
+names it, as `Positive | None` does. What depends on several values is checked by hand.
 """
 
 import contextlib
@@ -25,7 +27,10 @@ T = TypeVar("T")
 
 
 class Constraint:
-    """Base of constraints. Called with the name of a thing and a value, one returns the value as what it declares."""
+    """Base of constraints.
+
+    Called with the name of a thing and a value, one returns the value as what it declares.
+    """
 
     def __call__(self, what: str, value: Any) -> Any:
         raise NotImplementedError
@@ -41,7 +46,9 @@ class Number(Constraint):
     infinite: bool = False
 
     def __call__(self, what: str, value: Any) -> float:
-        return number(what, value, above=self.above, low=self.low, high=self.high, infinite=self.infinite)
+        return number(
+            what, value, above=self.above, low=self.low, high=self.high, infinite=self.infinite
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -94,7 +101,9 @@ class Each(Constraint):
         ):
             return self.one(what, value)
         if not (listed := items_of(what, value)):
-            raise ScenarioError(f"{what} is {shown(value)}: give a number, or one for each driven channel")
+            raise ScenarioError(
+                f"{what} is {shown(value)}: give a number, or one for each driven channel"
+            )
         return tuple(self.one(f"{what}[{i}]", item) for i, item in enumerate(listed))
 
 
@@ -107,7 +116,9 @@ class Range(Constraint):
 
     def __call__(self, what: str, value: Any) -> tuple[float, float]:
         if not isinstance(value, tuple | list) or len(value) != 2:
-            raise ScenarioError(f"{what} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)")
+            raise ScenarioError(
+                f"{what} is {shown(value)}: give the lowest and the highest, as (0.7, 1.3)"
+            )
         low, high = (number(what, one, above=self.above, low=self.low) for one in value)
         if low > high:
             raise ScenarioError(f"{what} is from {low:g} to {high:g}: give the lowest first")
@@ -129,7 +140,9 @@ class OrNone(Constraint):
     one: Constraint
 
     def __call__(self, what: str, value: Any) -> Any:
-        return None if value is None else self.one(what, value)
+        if value is None:
+            return None
+        return self.one(what, value)
 
 
 MAX_SEED = 2**53 - 1  # a float64 holds every whole number up to it exactly
@@ -146,17 +159,23 @@ Timeout = Annotated[float, Number(above=0.0, high=86_400.0)]  # s, a day at most
 def of_type(kind: Any) -> Constraint | None:
     """Return the constraint in a type, which lets None pass if the type names it; None without one."""
     if typing.get_origin(kind) is Annotated:
-        return next((note for note in typing.get_args(kind)[1:] if isinstance(note, Constraint)), None)
+        return next(
+            (note for note in typing.get_args(kind)[1:] if isinstance(note, Constraint)), None
+        )
     options = typing.get_args(kind)
     found = next(filter(None, map(of_type, options)), None)
-    return OrNone(one=found) if found and type(None) in options else found
+    if found and type(None) in options:
+        return OrNone(one=found)
+    return found
 
 
 @functools.cache
 def of_fields(kind: type) -> dict[str, Constraint]:
     """Return the constraint of each field of a class of data that declares one."""
     types = {field.name: field.type for field in dataclasses.fields(kind)}
-    if any(isinstance(one, str) for one in types.values()):  # under `from __future__ import annotations`
+    if any(
+        isinstance(one, str) for one in types.values()
+    ):  # under `from __future__ import annotations`
         with contextlib.suppress(NameError):  # names that only a type checker imports
             hints = typing.get_type_hints(kind, include_extras=True)
             types = {name: hints[name] for name in types}
@@ -166,13 +185,17 @@ def of_fields(kind: type) -> dict[str, Constraint]:
 @functools.cache
 def of_parameters(function: Callable) -> dict[str, Constraint]:
     """Return the constraint of each parameter that declares one."""
-    return {name: found for name, one in function.__annotations__.items() if (found := of_type(one))}
+    return {
+        name: found for name, one in function.__annotations__.items() if (found := of_type(one))
+    }
 
 
 def constrain(data: Any) -> None:
     """Replace the fields of frozen data that declare a constraint by what it makes of them."""
     for name, constraint in of_fields(type(data)).items():
-        object.__setattr__(data, name, constraint(f"{type(data).__name__}'s {name}", getattr(data, name)))
+        object.__setattr__(
+            data, name, constraint(f"{type(data).__name__}'s {name}", getattr(data, name))
+        )
 
 
 def suggesting(kind: type[T]) -> type[T]:
@@ -182,7 +205,9 @@ def suggesting(kind: type[T]) -> type[T]:
     def made(self: T, *args: Any, **fields: Any) -> None:
         if foreign := next((name for name in fields if name not in names), ""):
             hint = str(unknown("field", foreign, names)).partition(": ")[2]
-            raise TypeError(f"{kind.__name__}() got an unexpected keyword argument {foreign!r}: {hint}")
+            raise TypeError(
+                f"{kind.__name__}() got an unexpected keyword argument {foreign!r}: {hint}"
+            )
         make(self, *args, **fields)
 
     vars(made)["__signature__"] = inspect.signature(make)
@@ -191,7 +216,9 @@ def suggesting(kind: type[T]) -> type[T]:
 
 
 def constrained(function: Callable[P, T]) -> Callable[P, T]:
-    """Check the arguments of each call whose parameters declare a constraint, before the function runs."""
+    """Check the arguments of each call whose parameters declare a constraint, before the function
+    runs.
+    """
     constraints, signature = of_parameters(function), inspect.signature(function)
 
     @functools.wraps(function)

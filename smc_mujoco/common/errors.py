@@ -1,4 +1,6 @@
-"""ScenarioError, the error that users see: one sentence with thing, value and cure; and the checks that raise it."""
+"""ScenarioError, the error that users see: one sentence with thing, value and cure; and the checks
+that raise it.
+"""
 
 import difflib
 import itertools
@@ -14,9 +16,12 @@ import numpy as np
 T = TypeVar("T")
 MAX_NAME = 100  # characters: chosen, for tables and figures
 MAX_ITEMS = 1_000_000  # items of a list that a user gives, and runs of a grid: chosen
-MAX_LISTED = 1100  # characters of the names to choose from; chosen: all laws, and the sentence stays below 1250
+# characters of the names to choose from; chosen: all laws, and the sentence stays below 1250
+MAX_LISTED = 1100
 MAX_MESSAGE = 1500  # characters of a message, which may hold a long path: chosen
-END_OF_MESSAGE = 500  # characters of a longer message that are kept at its end, where the cure is: chosen
+END_OF_MESSAGE = (
+    500  # characters of a longer message that are kept at its end, where the cure is: chosen
+)
 MAX_SHOWN = 60  # characters of a value in a message: chosen
 
 
@@ -34,26 +39,36 @@ class BrokenLawError(ScenarioError):
 
 
 class ScenarioWarning(UserWarning):
-    """A scenario that runs, but is probably not what its author means. The message is one sentence, as an error's."""
+    """A scenario that runs, but is probably not what its author means.
+
+    The message is one sentence, as an error's.
+    """
 
 
 def printable(text: str) -> str:
-    """Return the text with escapes for characters that a terminal would act on, such as a newline in a file's name."""
+    """Return the text with escapes for characters that a terminal would act on, such as a newline
+    in a file's name.
+    """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown(value: object) -> str:
-    """Return a value's repr on one line of at most MAX_SHOWN characters; its class in <> if the repr fails."""
+    """Return a value's repr on one line of at most MAX_SHOWN characters; its class in <> if the
+    repr fails.
+    """
     try:
         text = " ".join(_brief(value).split())
     except Exception:  # from a __repr__ of the user's; RecursionError in deeply nested lists
         text = f"<{type(value).__name__}>"
-    text = text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+    if not (len(text) <= MAX_SHOWN):
+        text = f"{text[: MAX_SHOWN - 3]}..."
     return printable(text)
 
 
 def _brief(value: object) -> str:
-    """Return the repr of a value, or that of its first MAX_SHOWN items if it is a long text, list or dict."""
+    """Return the repr of a value, or that of its first MAX_SHOWN items if it is a long text, list
+    or dict.
+    """
     if isinstance(value, str | bytes | list | tuple):
         value = value[:MAX_SHOWN]
     elif isinstance(value, dict):
@@ -62,35 +77,58 @@ def _brief(value: object) -> str:
 
 
 def unknown(kind: str, name: object, known: Iterable[str]) -> ScenarioError:
-    """Return the error for a name that is not in `known`. It suggests the nearest name, or lists all names."""
-    names = sorted(known, key=lambda text: (int(text) if text.isdecimal() else -1, text))  # claims have numbers
-    hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}" if names else "there are none"
+    """Return the error for a name that is not in `known`.
+
+    It suggests the nearest name, or lists all names.
+    """
+    names = sorted(
+        known, key=lambda text: (int(text) if text.isdecimal() else -1, text)
+    )  # claims have numbers
+    if names:
+        hint = f"choose from {one_line(', '.join(names), MAX_LISTED)}"
+    else:
+        hint = "there are none"
     if near := _nearest(name, names) if isinstance(name, str) else []:
         hint = f"did you mean {' or '.join(map(repr, near))}?"
     return ScenarioError(f"unknown {kind} {shown(name)}: {hint}")
 
 
 def _nearest(name: str, names: list[str]) -> list[str]:
-    """Return the names that an abbreviation may mean, else the nearest in spelling, else the first that contains it."""
+    """Return the names that an abbreviation may mean, else the nearest in spelling, else the first
+    that contains it.
+    """
     plain = {known.casefold(): known for known in names}
     wanted = name.casefold()
-    if name.isupper() and (abbreviated := [known for known in names if _abbreviates(wanted, known.split("_"))]):
+    if name.isupper() and (
+        abbreviated := [known for known in names if _abbreviates(wanted, known.split("_"))]
+    ):
         return abbreviated
     close = difflib.get_close_matches(wanted, list(plain), n=1)
-    return [plain[near] for near in close or [known for known in plain if wanted and wanted in known]][:1]
+    return [
+        plain[near] for near in close or [known for known in plain if wanted and wanted in known]
+    ][:1]
 
 
 def _abbreviates(short: str, words: list[str]) -> bool:
-    """Return whether `short` is a usual abbreviation of a name's words, as sta, stc and stsmc of super_twisting."""
+    """Return whether `short` is a usual abbreviation of a name's words, as sta, stc and stsmc of
+    super_twisting.
+    """
     initials = "".join(word[:1] for word in words)
-    ending = "smc?" if len(words) == 1 else "(a|c|sm|smc)?"
+    if len(words) == 1:
+        ending = "smc?"
+    else:
+        ending = "(a|c|sm|smc)?"
     return re.fullmatch(re.escape(initials) + ending, short) is not None
 
 
 def one_line(text: str, length: int = 200) -> str:
-    """Return text on one line of at most `length` characters, with a ? for each that cannot be printed."""
+    """Return text on one line of at most `length` characters, with a ? for each that cannot be
+    printed.
+    """
     text = "".join(c if c.isprintable() else "?" for c in " ".join(text[: 2 * length].split()))
-    return text if len(text) <= length else f"{text[: length - 3]}..."
+    if len(text) <= length:
+        return text
+    return f"{text[: length - 3]}..."
 
 
 def find(kind: str, name: object, known: Mapping[str, T]) -> T:
@@ -109,7 +147,9 @@ def number(
     high: float = math.inf,
     infinite: bool = False,
 ) -> float:
-    """Return `value` as a float that is > `above`, >= `low` and <= `high`, finite unless `infinite`, and never NaN."""
+    """Return `value` as a float that is > `above`, >= `low` and <= `high`, finite unless
+    `infinite`, and never NaN.
+    """
     real = _real(value)
     if real is None:
         raise ScenarioError(f"{what} is {shown(value)}: give a number")
@@ -137,15 +177,21 @@ def whole(what: str, value: object, low: int, high: int) -> int:
 
 
 def _real(value: Any) -> Any:
-    """Return a real number, also from an array without axes; None for anything else, such as flags and durations."""
+    """Return a real number, also from an array without axes; None for anything else, such as flags
+    and durations.
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    is_real = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_ | np.timedelta64)
+    is_real = isinstance(value, numbers.Real) and not isinstance(
+        value, bool | np.bool_ | np.timedelta64
+    )
     return value if is_real else None
 
 
 def items_of(what: str, values: Iterable[T]) -> list[T]:
-    """Return the items of a user's list, or raise ScenarioError naming `what` if there are more than MAX_ITEMS."""
+    """Return the items of a user's list, or raise ScenarioError naming `what` if there are more
+    than MAX_ITEMS.
+    """
     try:
         items = iter(values)
     except Exception:  # an array without axes, or a user's object that fails
@@ -165,18 +211,26 @@ def words(error: BaseException) -> str:
 
 
 def name(what: str, value: object) -> str:
-    """Return `value` if it is a name, 1 to MAX_NAME printable characters, else raise ScenarioError naming `what`."""
+    """Return `value` if it is a name, 1 to MAX_NAME printable characters, else raise ScenarioError
+    naming `what`.
+    """
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise ScenarioError(f"{what} is {shown(value)}: give a name of printable characters")
     if len(value) > MAX_NAME:
-        raise ScenarioError(f"{what} is {shown(value)}, {len(value)} characters: give at most {MAX_NAME}")
+        raise ScenarioError(
+            f"{what} is {shown(value)}, {len(value)} characters: give at most {MAX_NAME}"
+        )
     return value
 
 
 def users_stacklevel() -> int:
-    """Return the stacklevel of the nearest caller outside this package and `dataclasses`: that of the user's line."""
+    """Return the stacklevel of the nearest caller outside this package and `dataclasses`: that of
+    the user's line.
+    """
     frame, level = sys._getframe(1), 1
     inner = "smc_mujoco", "dataclasses"
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in inner:
+    while (
+        frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] in inner
+    ):
         frame, level = frame.f_back, level + 1
     return level

@@ -1,4 +1,6 @@
-"""Optional packages, which an extra such as `pip install 'smc-mujoco[film]'` installs, and errors if one is missing."""
+"""Optional packages, which an extra such as `pip install 'smc-mujoco[film]'` installs, and errors
+if one is missing.
+"""
 
 import contextlib
 import importlib.util
@@ -11,7 +13,10 @@ LAST_PYTHON = {"dm": (3, 12)}  # extra -> the last Python for which pip can inst
 
 
 class MissingPackageError(ScenarioError, ImportError):
-    """An optional package is missing, or is of another version. The message says how to install one that fits."""
+    """An optional package is missing, or is of another version.
+
+    The message says how to install one that fits.
+    """
 
 
 @contextlib.contextmanager
@@ -19,8 +24,13 @@ def extra(name: str, what: str) -> Iterator[None]:
     """Say how to install an extra if an import in the with block fails."""
     try:
         yield
-    except (ImportError, AttributeError) as error:  # AttributeError: a package is too old for one that imports it
-        raise MissingPackageError(f"{what} needs an optional package ({error}): {cure(name)}") from error
+    except (
+        ImportError,
+        AttributeError,
+    ) as error:  # AttributeError: a package is too old for one that imports it
+        raise MissingPackageError(
+            f"{what} needs an optional package ({error}): {cure(name)}"
+        ) from error
 
 
 @contextlib.contextmanager
@@ -35,7 +45,9 @@ def package(name: str, what: str) -> Iterator[None]:
 def missing(name: str, what: str, *packages: str) -> str | None:
     """Return None if packages of an extra are installed, else a sentence that says which are not."""
     absent = [package for package in packages if importlib.util.find_spec(package) is None]
-    return f"{what} needs {' and '.join(absent)}: {cure(name)}" if absent else None
+    if absent:
+        return f"{what} needs {' and '.join(absent)}: {cure(name)}"
+    return None
 
 
 def cure(name: str) -> str:

@@ -1,4 +1,6 @@
-"""Files: the package's folders, names, atomic writing, reading what may be damaged, JSON with NaN and infinity."""
+"""Files: the package's folders, names, atomic writing, reading what may be damaged, JSON with NaN
+and infinity.
+"""
 
 import contextlib
 import csv
@@ -19,8 +21,16 @@ from smc_mujoco.common.errors import ScenarioError, shown
 
 MAX_NAME = 60  # bytes of a name in a file's name, which most file systems limit to 255
 MAX_SIZE = 2 * 10**9  # bytes of a file that is read: chosen
-MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = 500_000_000, 20, 10_000  # of an archive: bytes, per byte packed, files; chosen
-NON_FINITE = {"NaN": math.nan, "Infinity": math.inf, "-Infinity": -math.inf}  # numbers that JSON lacks
+MAX_UNPACKED, MAX_RATIO, MAX_MEMBERS = (
+    500_000_000,
+    20,
+    10_000,
+)  # of an archive: bytes, per byte packed, files; chosen
+NON_FINITE = {
+    "NaN": math.nan,
+    "Infinity": math.inf,
+    "-Infinity": -math.inf,
+}  # numbers that JSON lacks
 
 
 def shipped(folder: str) -> Path:
@@ -35,7 +45,8 @@ def shipped(folder: str) -> Path:
 def slug(name: str, max_bytes: int = MAX_NAME) -> str:
     """Return a name as part of a file name: letters, digits, and _ . + - between them.
 
-    It has no separator of folders and begins with no dot. Beyond `max_bytes` it is cut and ends in a hash.
+    It has no separator of folders and begins with no dot. Beyond `max_bytes` it is cut and ends in
+    a hash.
     """
     words = re.sub(r"\s*=\s*", "-", name.lower())
     part = re.sub(r"[^\w.+-]+", "_", words).lstrip("._").rstrip("_") or "run"
@@ -46,7 +57,9 @@ def slug(name: str, max_bytes: int = MAX_NAME) -> str:
 
 
 def as_path(path: object, what: str = "the path") -> Path:
-    """Return a path; raise ScenarioError, which names `what`, for what is none, or what no file can be called."""
+    """Return a path; raise ScenarioError, which names `what`, for what is none, or what no file can
+    be called.
+    """
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"{what} is {shown(path)}: give the name of a file or folder as a text")
     named = Path(path)
@@ -57,12 +70,16 @@ def as_path(path: object, what: str = "the path") -> Path:
         raise ScenarioError(f"{what} is {shown(str(path))}: {cure}") from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
-            raise ScenarioError(f"{what} is {shown(str(path))}: {error.strerror}; give a shorter one") from None
+            raise ScenarioError(
+                f"{what} is {shown(str(path))}: {error.strerror}; give a shorter one"
+            ) from None
     return named
 
 
 def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
-    """Return the path if its name ends in one of `endings`, such as ".json"; raise ScenarioError otherwise."""
+    """Return the path if its name ends in one of `endings`, such as ".json"; raise ScenarioError
+    otherwise.
+    """
     path = as_path(path)
     if path.suffix not in endings:
         raise ScenarioError(f"cannot save to {str(path)!r}: end the name in {' or '.join(endings)}")
@@ -70,11 +87,18 @@ def with_ending(path: str | os.PathLike[str], *endings: str) -> Path:
 
 
 def writable(*paths: str | os.PathLike[str] | None) -> None:
-    """Raise ScenarioError for a file that cannot be written. Call it before a computation that takes minutes."""
+    """Raise ScenarioError for a file that cannot be written.
+
+    Call it before a computation that takes minutes.
+    """
     for path in (Path(given) for given in paths if given is not None):
         if os.path.isdir(path):  # unlike Path.is_dir, False also for a name that is too long
             raise ScenarioError(f"cannot write {path}: it is a folder, give the file in it a name")
-        with _writing(path), tempfile.TemporaryFile(dir=path.parent), contextlib.suppress(FileNotFoundError):
+        with (
+            _writing(path),
+            tempfile.TemporaryFile(dir=path.parent),
+            contextlib.suppress(FileNotFoundError),
+        ):
             _part(path).lstat()  # raises for a name that is too long
 
 
@@ -87,7 +111,9 @@ def _writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         why = error.strerror or error
-        raise ScenarioError(f"cannot write {path}: {why}; choose another folder or make room") from error
+        raise ScenarioError(
+            f"cannot write {path}: {why}; choose another folder or make room"
+        ) from error
 
 
 def without_room(why: object) -> ScenarioError:
@@ -97,7 +123,9 @@ def without_room(why: object) -> ScenarioError:
 
 @contextlib.contextmanager
 def no_room(*numbers: int) -> Iterator[None]:
-    """Turn an OSError in the block, which writes temporary files, into a ScenarioError; `numbers`: only these errno."""
+    """Turn an OSError in the block, which writes temporary files, into a ScenarioError; `numbers`:
+    only these errno.
+    """
     try:
         yield
     except OSError as error:
@@ -117,7 +145,10 @@ def scratch() -> Iterator[Path]:
 
 @contextlib.contextmanager
 def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path]:
-    """Turn an exception in the with block, which reads a file, into one sentence. Yield the path."""
+    """Turn an exception in the with block, which reads a file, into one sentence.
+
+    Yield the path.
+    """
     if not isinstance(path, str | os.PathLike):
         raise ScenarioError(f"cannot read {shown(path)}: {cure}")
     try:
@@ -131,7 +162,10 @@ def reading(path: str | os.PathLike[str], kind: str, cure: str) -> Iterator[Path
         raise ScenarioError(f"{path} is not a {kind} (it is not text): {cure}") from None
     except Exception as error:  # damaged bytes raise any exception there is
         explained = isinstance(error, ScenarioError)
-        why = str(error) if explained else ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+        if explained:
+            why = str(error)
+        else:
+            why = ", ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
         raise ScenarioError(f"{path} is not a {kind} ({why}): {cure}") from None
 
 
@@ -153,13 +187,21 @@ def _bounded(file: Path) -> None:
 
 
 def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
-    """Return line number and cells of each row. If semicolons separate the cells, a comma is a decimal point."""
-    with reading(path, "CSV file", "give a CSV file, with commas or semicolons between cells") as file:
+    """Return line number and cells of each row.
+
+    If semicolons separate the cells, a comma is a decimal point.
+    """
+    with reading(
+        path, "CSV file", "give a CSV file, with commas or semicolons between cells"
+    ) as file:
         with file.open(newline="", encoding="utf-8-sig") as text:
             semicolons = ";" in re.sub('"[^"]*"', "", text.readline())
             text.seek(0)
             reader = csv.reader(text, strict=True, delimiter=";" if semicolons else ",")
-            rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if len(row) > 1 or any(row)]
+            rows = []
+            for row in reader:
+                if len(row) > 1 or any(row):
+                    rows.append((reader.line_num, [cell.strip() for cell in row]))
         if any("\0" in cell for _, row in rows for cell in row):
             raise ScenarioError("it is not text")
     if semicolons:
@@ -168,13 +210,18 @@ def csv_rows(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
 
 
 def plain(data: Any) -> Any:
-    """Return the data with words for NaN and infinities. A text that is such a word gets a leading '."""
+    """Return the data with words for NaN and infinities.
+
+    A text that is such a word gets a leading '.
+    """
     if isinstance(data, Mapping):
         return {name: plain(value) for name, value in data.items()}
     if isinstance(data, list | tuple):
         return [plain(value) for value in data]
     if isinstance(data, float) and not math.isfinite(data):
-        return "NaN" if math.isnan(data) else "Infinity" if data > 0 else "-Infinity"
+        if math.isnan(data):
+            return "NaN"
+        return "Infinity" if data > 0 else "-Infinity"
     if isinstance(data, str) and data.lstrip("'") in NON_FINITE:
         return f"'{data}"
     return data
@@ -187,7 +234,9 @@ def _restored(data: Any) -> Any:
     if isinstance(data, list):
         return [_restored(value) for value in data]
     if isinstance(data, str) and data.lstrip("'") in NON_FINITE:
-        return data[1:] if data.startswith("'") else NON_FINITE[data]
+        if data.startswith("'"):
+            return data[1:]
+        return NON_FINITE[data]
     return data
 
 
@@ -221,7 +270,10 @@ def _part(path: Path) -> Path:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary file beside `path`. It replaces `path` if the block succeeds, and is deleted otherwise."""
+    """Yield a temporary file beside `path`.
+
+    It replaces `path` if the block succeeds, and is deleted otherwise.
+    """
     part = _part(path)
     with _writing(path):
         part.touch(exist_ok=False)

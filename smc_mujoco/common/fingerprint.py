@@ -2,11 +2,11 @@
 
     of(my_law.function)        # "5f0c..."; it changes with the function, and with every helper that the function calls
 
-A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches by a global name:
-constants by value, functions by their own code, objects by their class and by what pickle keeps of them. Functions and
-classes of Python and of the numerical packages count by name, since the versions of those packages are recorded. A law
-in C counts by its machine code. File names, line numbers and comments do not count. Hashes hold for one version of
-Python.
+A function's hash covers its bytecode, constants, defaults, closure and everything that it reaches
+by a global name: constants by value, functions by their own code, objects by their class and by
+what pickle keeps of them. Functions and classes of Python and of the numerical packages count by
+name, since the versions of those packages are recorded. A law in C counts by its machine code. File
+names, line numbers and comments do not count. Hashes hold for one version of Python.
 """
 
 import contextlib
@@ -32,14 +32,24 @@ from smc_mujoco.common.numba_internals import builtin_registry
 from smc_mujoco.common.rebuild import names_in
 
 PACKAGE = Path(__file__).parents[1]
-BESIDE_PACKAGE = ("models", "scenes")  # folders that are in the package in a wheel, and beside it in a checkout
+BESIDE_PACKAGE = (
+    "models",
+    "scenes",
+)  # folders that are in the package in a wheel, and beside it in a checkout
 PRESENTATION = (
     "evidence/report",
     "evidence/commands",
     "exchange/commands.py",
     "cli",
 )  # files that show results and do not change them
-VERSIONED = {*sys.stdlib_module_names, "numpy", "numba", "llvmlite", "scipy", "mujoco"}  # identified by their version
+VERSIONED = {
+    *sys.stdlib_module_names,
+    "numpy",
+    "numba",
+    "llvmlite",
+    "scipy",
+    "mujoco",
+}  # identified by their version
 VALUES = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.ndarray)
 VALUES += (tuple, list, set, frozenset, Mapping)
 
@@ -48,21 +58,34 @@ VALUES += (tuple, list, set, frozenset, Mapping)
 def arithmetic() -> str:
     """Return a hash of values of the C library's functions on this machine.
 
-    The last bits of these values differ between C libraries, and between processors with and without FMA (fused
-    multiply-add). IEEE 754 fixes everything else that a run computes.
+    The last bits of these values differ between C libraries, and between processors with and
+    without FMA (fused multiply-add). IEEE 754 fixes everything else that a run computes.
     """
     inputs = [1e-3 * 1.01**k for k in range(1000)]  # 1 mrad to 20 rad
-    functions = math.sin, math.cos, math.tan, math.atan, math.tanh, math.exp, math.log, lambda x: x**0.7
+    functions = (
+        math.sin,
+        math.cos,
+        math.tan,
+        math.atan,
+        math.tanh,
+        math.exp,
+        math.log,
+        lambda x: x**0.7,
+    )
     values = [f(x) for f in functions for x in inputs]
     return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
 
 
 @functools.cache
 def package(*without: str) -> str:
-    """Return a hash of this package's code, models, gains and papers, without PRESENTATION and some folders."""
+    """Return a hash of this package's code, models, gains and papers, without PRESENTATION and some
+    folders.
+    """
     left_out = (*BESIDE_PACKAGE, *PRESENTATION, *without)
     files = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*")}
-    files = {name: path for name, path in files.items() if not any(map(name.is_relative_to, left_out))}
+    files = {
+        name: path for name, path in files.items() if not any(map(name.is_relative_to, left_out))
+    }
     files |= {Path("models") / path.name: path for path in shipped("models").rglob("*")}
     digest = hashlib.sha256()
     for name, path in sorted(files.items()):
@@ -72,18 +95,24 @@ def package(*without: str) -> str:
 
 
 def of(thing: Any) -> str:
-    """Return the hash of a function, a class with its methods, a callable object, or a tuple of these.
+    """Return the hash of a function, a class with its methods, a callable object, or a tuple of
+    these.
 
-    For functions and classes of this package it is computed once; for others at each call, until `keep` keeps it.
+    For functions and classes of this package it is computed once; for others at each call, until
+    `keep` keeps it.
     """
     try:
-        return _compiled_hashes[thing] if thing in _compiled_hashes else _cached(thing) if ours(thing) else now(thing)
+        if thing in _compiled_hashes:
+            return _compiled_hashes[thing]
+        return _cached(thing) if ours(thing) else now(thing)
     except TypeError:  # not hashable
         return now(thing)
 
 
 def keep(thing: Any) -> None:
-    """Keep the first hash of a function or class that is compiled, because compiled code keeps its present globals."""
+    """Keep the first hash of a function or class that is compiled, because compiled code keeps its
+    present globals.
+    """
     with contextlib.suppress(ScenarioError):
         _compiled_hashes.setdefault(thing, of(thing))
 
@@ -101,14 +130,20 @@ def now(thing: Any) -> str:
 
 
 def variables(function: Any) -> dict[str, str]:
-    """Return name -> hash of each variable that a function reads from outside itself; {} for machine code."""
+    """Return name -> hash of each variable that a function reads from outside itself; {} for
+    machine code.
+    """
     function = _as_written(function)
     if not isinstance(function, FunctionType):
         return {}
     names = names_in(function.__code__)
     reached = _reached(function.__globals__, names.variables, names.attributes, set())
-    cells = zip(function.__code__.co_freevars, map(_cell_contents, function.__closure__ or ()), strict=True)
-    return {name: now(value) for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells)}
+    cells = zip(
+        function.__code__.co_freevars, map(_cell_contents, function.__closure__ or ()), strict=True
+    )
+    return {
+        name: now(value) for name, value in (*zip(reached[::2], reached[1::2], strict=True), *cells)
+    }
 
 
 _compiled_hashes: dict[Any, str] = {}  # function or class -> its hash when it was compiled
@@ -117,14 +152,21 @@ _cached = functools.cache(now)
 
 def ours(thing: Any) -> bool:
     """Return whether a thing is a function or class of this package."""
-    return isinstance(thing, FunctionType | type) and (thing.__module__ or "").startswith(f"{PACKAGE.name}.")
+    return isinstance(thing, FunctionType | type) and (thing.__module__ or "").startswith(
+        f"{PACKAGE.name}."
+    )
 
 
 class _CodePickler(pickle._Pickler):
-    """Pickler that writes the contents of functions and classes, not their names. The result is never loaded."""
+    """Pickler that writes the contents of functions and classes, not their names.
+
+    The result is never loaded.
+    """
 
     def memoize(self, obj: Any) -> None:
-        """Note an object as written, except constants: whether equal ones are one object depends on the compiler."""
+        """Note an object as written, except constants: whether equal ones are one object depends on
+        the compiler.
+        """
         if not isinstance(obj, tuple | str | bytes | CodeType):
             super().memoize(obj)  # pyright: ignore[reportAttributeAccessIssue] of the pickler in Python
 
@@ -135,10 +177,14 @@ class _CodePickler(pickle._Pickler):
             return f"module {obj.__name__}"
         if isinstance(obj, AtAddress):
             return f"machine code {obj.digest}"
-        return f"{obj.__module__}.{obj.__qualname__}" if _versioned(obj) else None
+        if _versioned(obj):
+            return f"{obj.__module__}.{obj.__qualname__}"
+        return None
 
     def reducer_override(self, obj: Any) -> Any:
-        """Return how an object is written: its kind, and its contents, which may contain the object itself."""
+        """Return how an object is written: its kind, and its contents, which may contain the object
+        itself.
+        """
         obj, kind = _as_written(obj), ""
         contents: Any = NotImplemented
         if isinstance(obj, FunctionType):
@@ -156,7 +202,9 @@ class _CodePickler(pickle._Pickler):
             contents = sorted(obj, key=repr)
         elif isinstance(obj, Mapping):
             contents = sorted(obj.items(), key=lambda item: repr(item[0]))
-        return contents if contents is NotImplemented else (str, (f"{type(obj).__name__} {kind}",), contents)
+        if contents is NotImplemented:
+            return contents
+        return (str, (f"{type(obj).__name__} {kind}",), contents)
 
 
 def _as_written(thing: Any) -> Any:
@@ -170,7 +218,11 @@ def _as_written(thing: Any) -> Any:
 def _versioned(thing: Any) -> bool:
     """Return whether a thing is a function or class of a package in VERSIONED."""
     module = getattr(thing, "__module__", None)
-    return hasattr(thing, "__qualname__") and isinstance(module, str) and module.split(".")[0] in VERSIONED
+    return (
+        hasattr(thing, "__qualname__")
+        and isinstance(module, str)
+        and module.split(".")[0] in VERSIONED
+    )
 
 
 def _function_contents(function: FunctionType) -> list[Any]:
@@ -178,24 +230,41 @@ def _function_contents(function: FunctionType) -> list[Any]:
     names = names_in(function.__code__)
     closure = [_cell_contents(cell) for cell in function.__closure__ or ()]
     return [
-        function.__code__, function.__defaults__, function.__kwdefaults__, closure,
-        *_reached(function.__globals__, names.variables, names.attributes, set()), *_overloads(function),
-    ]  # fmt: skip
+        function.__code__,
+        function.__defaults__,
+        function.__kwdefaults__,
+        closure,
+        *_reached(function.__globals__, names.variables, names.attributes, set()),
+        *_overloads(function),
+    ]
 
 
 def _overloads(function: FunctionType) -> list[Any]:
-    """Return the functions that numba compiles in place of this one, as declared by `numba.extending.overload`."""
+    """Return the functions that numba compiles in place of this one, as declared by
+    `numba.extending.overload`.
+    """
     kinds = (kind for known, kind in builtin_registry.globals if known is function)
-    return [vars(each)["_overload_func"] for kind in kinds for each in kind.templates if "_overload_func" in vars(each)]
+    return [
+        vars(each)["_overload_func"]
+        for kind in kinds
+        for each in kind.templates
+        if "_overload_func" in vars(each)
+    ]
 
 
-def _reached(space: Mapping[str, Any], names: set[str], attributes: set[str], known: set[int]) -> list[Any]:
-    """Return the values of some names in a namespace, and of some attributes of the modules among those values."""
+def _reached(
+    space: Mapping[str, Any], names: set[str], attributes: set[str], known: set[int]
+) -> list[Any]:
+    """Return the values of some names in a namespace, and of some attributes of the modules among
+    those values.
+    """
     parts: list[Any] = []
     for name in sorted(names & space.keys()):
         value = space[name]
         parts += [name, value]
-        unversioned = isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
+        unversioned = (
+            isinstance(value, ModuleType) and value.__name__.split(".")[0] not in VERSIONED
+        )
         if unversioned and id(value) not in known:
             known.add(id(value))
             parts += _reached(vars(value), attributes, attributes, known)

@@ -1,11 +1,13 @@
 """The OpenGL backend that renders pictures: EGL, OSMesa, or one that opens a window.
 
-MuJoCo reads MUJOCO_GL when it is imported; if the variable is unset, it takes a backend that needs a display.
-Importing smc_mujoco does not change the variable. The backend is chosen when the first picture is rendered: the one
-that MUJOCO_GL names if it loads, else EGL, else OSMesa, else none. `renderer` uses it even if MuJoCo took another one.
+MuJoCo reads MUJOCO_GL when it is imported; if the variable is unset, it takes a backend that needs
+a display. Importing smc_mujoco does not change the variable. The backend is chosen when the first
+picture is rendered: the one that MUJOCO_GL names if it loads, else EGL, else OSMesa, else none.
+`renderer` uses it even if MuJoCo took another one.
 
-`import mujoco` fails if MUJOCO_GL names a backend that MuJoCo does not know or cannot load. `choose_gl` prevents that;
-the command line calls it. Only Linux has a choice of backends. This module imports mujoco only when it is needed.
+`import mujoco` fails if MUJOCO_GL names a backend that MuJoCo does not know or cannot load.
+`choose_gl` prevents that; the command line calls it. Only Linux has a choice of backends. This
+module imports mujoco only when it is needed.
 """
 
 import atexit
@@ -21,10 +23,27 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import mujoco
 
-OFF_VALUES = ("disable", "disabled", "off", "false", "0")  # values of MUJOCO_GL that turn rendering off
-DISPLAY_VALUES = ("enable", "enabled", "on", "true", "1", "glfw", "glx")  # values for a backend that needs a display
+OFF_VALUES = (
+    "disable",
+    "disabled",
+    "off",
+    "false",
+    "0",
+)  # values of MUJOCO_GL that turn rendering off
+DISPLAY_VALUES = (
+    "enable",
+    "enabled",
+    "on",
+    "true",
+    "1",
+    "glfw",
+    "glx",
+)  # values for a backend that needs a display
 LIBRARIES = {  # backend -> groups of libraries; mujoco loads one of each group
-    "egl": (("libEGL.so.1",), ("libOpenGL.so.0", "libGL.so.1", "libGLESv2.so.2", "libGLESv1_CM.so.1")),
+    "egl": (
+        ("libEGL.so.1",),
+        ("libOpenGL.so.0", "libGL.so.1", "libGLESv2.so.2", "libGLESv1_CM.so.1"),
+    ),
     "osmesa": (("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so"),),
 }
 CURE = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
@@ -43,7 +62,10 @@ _RENDERERS: "weakref.WeakSet[mujoco.Renderer]" = weakref.WeakSet()  # to be clos
 
 @functools.cache
 def choice() -> tuple[str, str]:
-    """Return what MUJOCO_GL names ("" when unset), and the backend of this process. The first call decides."""
+    """Return what MUJOCO_GL names ("" when unset), and the backend of this process.
+
+    The first call decides.
+    """
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
     if sys.platform != "linux":
         return wish, wish
@@ -53,8 +75,9 @@ def choice() -> tuple[str, str]:
 def choose_gl() -> str:
     """Set MUJOCO_GL to a backend that loads here, and return its name ("disabled" for none).
 
-    Call it before you import mujoco if you make your own renderers. After the import, and on systems other than Linux,
-    it sets nothing. Films, stills and environments of this package do not need it.
+    Call it before you import mujoco if you make your own renderers. After the import, and on
+    systems other than Linux, it sets nothing. Films, stills and environments of this package do not
+    need it.
     """
     _, backend = choice()
     if sys.platform == "linux" and "mujoco" not in sys.modules:
@@ -85,7 +108,10 @@ def note() -> str | None:
     wish, backend = choice()
     if wish in ("", backend):
         return None
-    why = "does not load here" if wish in LIBRARIES else "is not a backend of MuJoCo"
+    if wish in LIBRARIES:
+        why = "does not load here"
+    else:
+        why = "is not a backend of MuJoCo"
     return f"MUJOCO_GL={wish} {why}: {'films are off' if backend in OFF_VALUES else f'{backend} is used instead'}"
 
 
@@ -95,7 +121,10 @@ def missing() -> str | None:
     wish, backend = choice()
     if wish in OFF_VALUES:
         return f"no film: MUJOCO_GL={wish} turns rendering off: unset it"
-    unusable = f" (and MUJOCO_GL={wish} cannot be used)" if note() else ""
+    if note():
+        unusable = f" (and MUJOCO_GL={wish} cannot be used)"
+    else:
+        unusable = ""
     if backend in OFF_VALUES:
         if platform := os.environ.get("PYOPENGL_PLATFORM"):
             return f"no film: PYOPENGL_PLATFORM={platform} rules out what is installed{unusable}: unset it"
@@ -105,18 +134,25 @@ def missing() -> str | None:
         return None
     if backend in LIBRARIES:
         return f"no film: {backend} does not render{unusable} ({error}): {CURE}"
-    cure = "set MUJOCO_GL=egl" if sys.platform == "linux" else "unset MUJOCO_GL"
+    if sys.platform == "linux":
+        cure = "set MUJOCO_GL=egl"
+    else:
+        cure = "unset MUJOCO_GL"
     return f"no film: MuJoCo cannot open a window to render in ({error}): {cure}"
 
 
 def probe(backend: str, code: str = PROBE) -> str | None:
-    """Return None if a new process can run some code with a backend, else the last line of its error."""
+    """Return None if a new process can run some code with a backend, else the last line of its
+    error.
+    """
     import subprocess
 
     environment = os.environ | ({"MUJOCO_GL": backend} if backend else {})
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False
+        )
     except (OSError, subprocess.TimeoutExpired) as error:
         return f"a trial failed: {error}"
     if done.returncode == 0:
@@ -125,7 +161,9 @@ def probe(backend: str, code: str = PROBE) -> str | None:
 
 
 def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "mujoco.Renderer":
-    """Return a renderer of pictures of this size, px, with the backend of `choice`, even if MuJoCo took another one."""
+    """Return a renderer of pictures of this size, px, with the backend of `choice`, even if MuJoCo
+    took another one.
+    """
     import mujoco
 
     from smc_mujoco.common.errors import ScenarioError
@@ -136,7 +174,9 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
     if sys.platform != "linux":
         return mujoco.Renderer(model, height, width)
     _, backend = choice()
-    module = sys.modules[mujoco.Renderer.__module__].gl_context  # from which a Renderer takes its context class
+    module = sys.modules[
+        mujoco.Renderer.__module__
+    ].gl_context  # from which a Renderer takes its context class
     with _LOCK:
         before = getattr(module, "GLContext", None)  # absent if MUJOCO_GL turned rendering off
         try:
@@ -150,7 +190,9 @@ def renderer(model: "mujoco.MjModel", height: int = 240, width: int = 320) -> "m
                 del module.GLContext
     _RENDERERS.add(made)
     atexit.unregister(_close_all)
-    atexit.register(_close_all)  # registered after MuJoCo's function that ends EGL, so that it runs before that one
+    atexit.register(
+        _close_all
+    )  # registered after MuJoCo's function that ends EGL, so that it runs before that one
     return made
 
 

@@ -1,4 +1,7 @@
-"""Short tables, pictures and films as HTML for notebooks, in the colour of the page. All text but `Html` is escaped."""
+"""Short tables, pictures and films as HTML for notebooks, in the colour of the page.
+
+All text but `Html` is escaped.
+"""
 
 import base64
 import html
@@ -19,7 +22,9 @@ class Html(str):
 
 def text(value: object) -> Html:
     """Return a value as HTML."""
-    return value if isinstance(value, Html) else Html(html.escape(str(value)))
+    if isinstance(value, Html):
+        return value
+    return Html(html.escape(str(value)))
 
 
 def strong(value: object) -> Html:
@@ -36,14 +41,21 @@ def table(
     max_rows: int = MAX_ROWS,
 ) -> Html:
     """Return a table: caption above, note below, the columns `numbers` aligned to the right."""
-    width = len(headings or rows[0]) if headings or rows else 1
+    if headings or rows:
+        width = len(headings or rows[0])
+    else:
+        width = 1
     sides = ["right" if i in numbers else "left" for i in range(width)]
-    parts = ['<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">']
+    parts = [
+        '<table style="border-collapse:collapse;font-variant-numeric:tabular-nums;color:inherit">'
+    ]
     if caption:
         style = "caption-side:top;text-align:left;color:inherit;padding:2px 10px"
         parts.append(f'<caption style="{style}">{strong(caption)}</caption>')
     if headings:
-        cells = _cells("th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;")
+        cells = _cells(
+            "th", headings, sides, "font-weight:normal;border-bottom:1px solid currentColor;"
+        )
         parts.append(f"<thead><tr>{cells}</tr></thead>")
     lines = [f"<tr>{_cells('td', row, sides, '')}</tr>" for row in rows[:max_rows]]
     wide = f'<tr><td colspan="{width}" style="{_CELL}left;opacity:0.75">'
@@ -57,7 +69,8 @@ def table(
 def _cells(tag: str, values: Sequence[object], sides: Sequence[str], style: str) -> str:
     """Return the cells of a row; `sides` are their alignments."""
     return "".join(
-        f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>' for value, side in zip(values, sides, strict=True)
+        f'<{tag} style="{style}{_CELL}{side}">{text(value)}</{tag}>'
+        for value, side in zip(values, sides, strict=True)
     )
 
 
@@ -70,7 +83,10 @@ def fields(values: Mapping[str, object], caption: str) -> Html:
 def embedded(content: bytes, kind: str, width: float | None = None) -> Html:
     """Return a picture or a film, kept in the page itself and no wider than the page."""
     source = f'src="data:{kind};base64,{base64.b64encode(content).decode()}" style="max-width:100%;height:auto"'
-    source += "" if width is None else f' width="{width:.0f}"'
+    if width is None:
+        source += ""
+    else:
+        source += f' width="{width:.0f}"'
     if kind.startswith("video/"):
         return Html(f"<video {source} controls autoplay muted loop playsinline></video>")
     return Html(f"<img {source}>")
@@ -84,8 +100,15 @@ def in_notebook() -> bool:
 
 
 def environment(templates: Path) -> "Environment":
-    """Return the jinja2 environment of a folder of templates: what they insert is escaped, a missing name an error."""
+    """Return the jinja2 environment of a folder of templates: what they insert is escaped, a
+    missing name an error.
+    """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    options = {"autoescape": True, "undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    options = {
+        "autoescape": True,
+        "undefined": StrictUndefined,
+        "trim_blocks": True,
+        "lstrip_blocks": True,
+    }
     return Environment(loader=FileSystemLoader(templates), **options)

@@ -8,7 +8,10 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def delay_ctrl_c() -> Iterator[None]:
-    """Delay Ctrl-C to the end of a with block. Other threads never receive it, so they delay nothing."""
+    """Delay Ctrl-C to the end of a with block.
+
+    Other threads never receive it, so they delay nothing.
+    """
     handler = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(handler):
         yield

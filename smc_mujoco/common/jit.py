@@ -1,4 +1,6 @@
-"""Compilation with numba: intrinsics for addresses and calls, C functions, and laws that check array bounds."""
+"""Compilation with numba: intrinsics for addresses and calls, C functions, and laws that check
+array bounds.
+"""
 
 # pyright: reportCallIssue=false
 # (an intrinsic is called without its typing context)
@@ -31,7 +33,9 @@ from smc_mujoco.common.rebuild import rebuild
 
 SIGNATURE = types.int64(types.intp, types.intp, types.intp, types.intp)
 DIGEST_SIZE = hashlib.sha256().digest_size
-MAX_FILES_OF_A_NAME = 64  # in the cache: functions of one name, such as laws that are written from numbers
+MAX_FILES_OF_A_NAME = (
+    64  # in the cache: functions of one name, such as laws that are written from numbers
+)
 # Beginnings of lines in numba's errors that say where an error was, not what it was.
 WHEREABOUTS = re.compile(
     r"Failed in|No implementation|There are|- Of which|Overload|Intrinsic|With argument|Rejected|"
@@ -39,19 +43,22 @@ WHEREABOUTS = re.compile(
 )
 COLOURS = re.compile(r"\x1b\[[\d;]*m")  # numba writes them if NUMBA_COLOR_SCHEME is set
 
-# When numba loads a function from its cache, it imports the function's module. If that module cannot be imported, such
-# as a scene file, numba stores the name of a placeholder instead. Registering the placeholder lets numba import it.
+# When numba loads a function from its cache, it imports the function's module. If that module
+# cannot be imported, such as a scene file, numba stores the name of a placeholder instead.
+# Registering the placeholder lets numba import it.
 sys.modules.setdefault(internals.dynamic_modname, internals.dynamic_module)
 
 free_after_fork(internals.global_compiler_lock)
 
 
 class Numbers:
-    """Numbers for the functions that this package compiles. They count from a random one, so no process repeats them.
+    """Numbers for the functions that this package compiles.
 
-    The number is part of a function's symbol, also in code on disk. Numba counts from 1 in every process, so a process
-    that loads code of two others would run one function in place of another with the same name, types and number
-    (https://github.com/numba/numba/issues/10486).
+    They count from a random one, so no process repeats them.
+
+    The number is part of a function's symbol, also in code on disk. Numba counts from 1 in every
+    process, so a process that loads code of two others would run one function in place of another
+    with the same name, types and number (https://github.com/numba/numba/issues/10486).
     """
 
     FIRST = 2**61  # numba's own count does not come so far
@@ -69,7 +76,10 @@ class Numbers:
     def given(self) -> Iterator[None]:
         """Let numba give these numbers to the functions that it compiles in the block."""
         with internals.global_compiler_lock:
-            theirs, internals.FunctionIdentity._unique_ids = internals.FunctionIdentity._unique_ids, self.count
+            theirs, internals.FunctionIdentity._unique_ids = (
+                internals.FunctionIdentity._unique_ids,
+                self.count,
+            )
             try:
                 yield
             finally:
@@ -110,13 +120,17 @@ def floats(names: Iterable[str]) -> np.dtype:
 
 
 def record_at(dtype: Any) -> Callable:
-    """Return a compiled function (address, i) -> record i of the NumPy array of this dtype at an address."""
+    """Return a compiled function (address, i) -> record i of the NumPy array of this dtype at an
+    address.
+    """
     record = from_dtype(dtype)
 
     @intrinsic
     def at(typingctx, address, i):
         def codegen(context, builder, signature, args):
-            place = builder.add(args[0], builder.mul(args[1], ir.Constant(args[1].type, dtype.itemsize)))
+            place = builder.add(
+                args[0], builder.mul(args[1], ir.Constant(args[1].type, dtype.itemsize))
+            )
             return builder.inttoptr(place, context.get_value_type(record))
 
         return record(types.intp, types.intp), codegen
@@ -125,14 +139,18 @@ def record_at(dtype: Any) -> Callable:
 
 
 def _calling(bits: int) -> Callable:
-    """Return a compiled function that calls the C function at an address; its status has this many bits."""
+    """Return a compiled function that calls the C function at an address; its status has this many
+    bits.
+    """
 
     @intrinsic
     def call(typingctx, address, inputs, parameters, memory, outputs):
         def codegen(context, builder, signature, args):
             function = ir.FunctionType(ir.IntType(bits), [ir.IntType(64)] * 4).as_pointer()
             status = builder.call(builder.inttoptr(args[0], function), args[1:])
-            return builder.sext(status, ir.IntType(64)) if bits < 64 else status
+            if bits < 64:
+                return builder.sext(status, ir.IntType(64))
+            return status
 
         return types.int64(*[types.intp] * 5), codegen
 
@@ -140,7 +158,9 @@ def _calling(bits: int) -> Callable:
 
 
 call = _calling(64)  # (address, inputs, parameters, memory, outputs) -> status
-call_int = _calling(32)  # the same for a C function that returns an int: the register's upper half is undefined
+call_int = _calling(
+    32
+)  # the same for a C function that returns an int: the register's upper half is undefined
 
 
 @intrinsic
@@ -157,9 +177,12 @@ def call_callback(typingctx, address, model, data):
 
 @functools.cache
 def attempting(count: int, estimates: bool = False) -> Callable:
-    """Return a compiled function: it stores the `count` numbers of body(*arguments). It returns 1 if body raised, or 0.
+    """Return a compiled function: it stores the `count` numbers of body(*arguments).
 
-    No exception reaches Python. An estimator may return one number, its velocity: its acceleration is then NaN.
+    It returns 1 if body raised, or 0.
+
+    No exception reaches Python. An estimator may return one number, its velocity: its acceleration
+    is then NaN.
     """
 
     @intrinsic
@@ -176,11 +199,19 @@ def attempting(count: int, estimates: bool = False) -> Callable:
             compiled = body.dispatcher.overloads[resolved.args]
             context.active_code_library.add_linking_library(compiled.library)
             values = [builder.extract_value(args[1], i) for i in range(len(resolved.args))]
-            status, result = context.call_internal_no_propagate(builder, compiled.fndesc, resolved, values)
+            status, result = context.call_internal_no_propagate(
+                builder, compiled.fndesc, resolved, values
+            )
             with builder.if_then(status.is_ok):
                 single = not isinstance(returned, types.BaseTuple)
-                numbers = [result] if single else [builder.extract_value(result, i) for i in range(count)]
-                stored = [context.cast(builder, x, item, types.float64) for x, item in zip(numbers, items, strict=True)]
+                if single:
+                    numbers = [result]
+                else:
+                    numbers = [builder.extract_value(result, i) for i in range(count)]
+                stored = [
+                    context.cast(builder, x, item, types.float64)
+                    for x, item in zip(numbers, items, strict=True)
+                ]
                 place = builder.inttoptr(args[2], ir.DoubleType().as_pointer())
                 for i, x in enumerate([*stored, ir.Constant(ir.DoubleType(), math.nan)][:count]):
                     builder.store(x, builder.gep(place, [ir.Constant(ir.IntType(64), i)]))
@@ -213,17 +244,24 @@ def loader(kind: type) -> Callable:
     return load
 
 
-def compiled(signature: Any, body: Callable, cache: bool | tuple[str, str] = False) -> internals.CFunc:
+def compiled(
+    signature: Any, body: Callable, cache: bool | tuple[str, str] = False
+) -> internals.CFunc:
     """Compile a C function with numba. Ctrl-C is delayed to the end, as numba may lose it.
 
-    `cache`: whether to use numba's cache on disk; for a body whose closure holds functions, its name and a hash of all.
+    `cache`: whether to use numba's cache on disk; for a body whose closure holds functions, its
+    name and a hash of all.
     """
-    made = internals.CFunc(body, internals.normalize_signature(signature), {}, {"error_model": "numpy"})
+    made = internals.CFunc(
+        body, internals.normalize_signature(signature), {}, {"error_model": "numpy"}
+    )
     _compile(made, body, cache)
     return made
 
 
-def compile_for(made: internals.Dispatcher, arguments: tuple[Any, ...], cache: bool | tuple[str, str]) -> None:
+def compile_for(
+    made: internals.Dispatcher, arguments: tuple[Any, ...], cache: bool | tuple[str, str]
+) -> None:
     """Compile a function of numba's njit for the types of these arguments, as `compiled` does."""
     _compile(made, made.py_func, cache, tuple(map(typeof, arguments)))
 
@@ -239,13 +277,17 @@ def _compile(made: Any, body: Callable, cache: bool | tuple[str, str], *types: A
 
 @contextlib.contextmanager
 def _compiling() -> Iterator[None]:
-    """Let numba compile in the block, with this package's numbers, and arrays written in place within their bounds."""
+    """Let numba compile in the block, with this package's numbers, and arrays written in place
+    within their bounds.
+    """
     with delay_ctrl_c(), NUMBERS.given():
         _load_numba()
         from numba.np import npyimpl
 
         theirs = npyimpl.numpy_ufunc_kernel
-        npyimpl.numpy_ufunc_kernel = functools.partial(_within_bounds, theirs, npyimpl._prepare_argument)
+        npyimpl.numpy_ufunc_kernel = functools.partial(
+            _within_bounds, theirs, npyimpl._prepare_argument
+        )
         try:
             yield
         finally:
@@ -253,27 +295,39 @@ def _compiling() -> Iterator[None]:
 
 
 def _within_bounds(kernel, prepare, context, builder, sig, args, ufunc, kind):
-    """Write numba's code for a function of whole arrays. Where it writes into an array, compare all shapes before.
+    """Write numba's code for a function of whole arrays.
+
+    Where it writes into an array, compare all shapes before.
 
     Numba's own code for a += b reads beyond the end of b if a is longer.
     """
     pairs = [*zip(args, sig.args, strict=True)]
     targets, arrays = (
-        [prepare(context, builder, value, of) for value, of in some if isinstance(of, types.ArrayCompatible)]
+        [
+            prepare(context, builder, value, of)
+            for value, of in some
+            if isinstance(of, types.ArrayCompatible)
+        ]
         for some in (pairs[ufunc.nin :], pairs)
     )
     for target, array in itertools.product(targets, arrays):
         if array.ndim > target.ndim:
             raise internals.TypingError("it writes into an array of fewer dimensions than it reads")
         for its, size in zip(reversed(array.shape), reversed(target.shape), strict=False):
-            fits = builder.or_(builder.icmp_signed("==", its, size), builder.icmp_signed("==", its, its.type(1)))
+            fits = builder.or_(
+                builder.icmp_signed("==", its, size), builder.icmp_signed("==", its, its.type(1))
+            )
             with builder.if_then(builder.not_(fits), likely=False):
-                context.call_conv.return_user_exc(builder, ValueError, ("operands could not be broadcast",))
+                context.call_conv.return_user_exc(
+                    builder, ValueError, ("operands could not be broadcast",)
+                )
     return kernel(context, builder, sig, args, ufunc, kind)
 
 
 def _load_numba() -> None:
-    """Load numba's array functions without SciPy's linear algebra, which takes a tenth of a process's start."""
+    """Load numba's array functions without SciPy's linear algebra, which takes a tenth of a
+    process's start.
+    """
     with internals.global_compiler_lock:
         if "numba.np.arraymath" not in sys.modules:
             from numba.np import linalg
@@ -286,7 +340,10 @@ def _load_numba() -> None:
 
 
 class Cache(internals.FunctionCache):
-    """Cache of a compiled function on disk. A damaged file counts as missing; a full disk is not an error."""
+    """Cache of a compiled function on disk.
+
+    A damaged file counts as missing; a full disk is not an error.
+    """
 
     def __init__(self, body: Callable, name: str = "", content: str = ""):
         super().__init__(body)
@@ -295,11 +352,18 @@ class Cache(internals.FunctionCache):
         of_name = f"{name[:80]}-{{}}-{base}"  # a file's name has 255 bytes at most
         self.files_of_name = of_name.format("?" * len(digest))
         stamp = content or locator.get_source_stamp()
-        self._cache_file = Sealed(locator.get_cache_path(), of_name.format(digest) if name else base, stamp)
+        self._cache_file = Sealed(
+            locator.get_cache_path(), of_name.format(digest) if name else base, stamp
+        )
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple:
-        """Return the key of an overload. Numba's own key hashes a closure without the functions in it."""
-        return (sig, codegen.magic_tuple()) if self.content else super()._index_key(sig, codegen)
+        """Return the key of an overload.
+
+        Numba's own key hashes a closure without the functions in it.
+        """
+        if self.content:
+            return (sig, codegen.magic_tuple())
+        return super()._index_key(sig, codegen)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Write an overload, unless no other process could load it. Ignore a full disk."""
@@ -309,33 +373,50 @@ class Cache(internals.FunctionCache):
                 self._remove_oldest()
 
     def _remove_oldest(self) -> None:
-        """Remove files of other functions of this name, those written first, beyond MAX_FILES_OF_A_NAME."""
-        written = sorted(Path(self.cache_path).glob(f"{self.files_of_name}.nbi"), key=lambda path: path.stat().st_mtime)
+        """Remove files of other functions of this name, those written first, beyond
+        MAX_FILES_OF_A_NAME.
+        """
+        written = sorted(
+            Path(self.cache_path).glob(f"{self.files_of_name}.nbi"),
+            key=lambda path: path.stat().st_mtime,
+        )
         for index in written[:-MAX_FILES_OF_A_NAME]:
             for path in (index, *index.parent.glob(f"{index.stem}.*.nbc")):
                 path.unlink()
 
 
 def _complete(library: internals.CPUCodeLibrary) -> bool:
-    """Return whether code is complete before it is linked, so that another process can load it, beside any other.
+    """Return whether code is complete before it is linked, so that another process can load it,
+    beside any other.
 
-    Numba fills in some addresses while it links, such as that of a function that calls itself, and only in the process
-    that compiles. A process that loads such code from the disk would abort. A function that numba compiled
-    outside of this package has one of numba's own numbers.
+    Numba fills in some addresses while it links, such as that of a function that calls itself, and
+    only in the process that compiles. A process that loads such code from the disk would abort. A
+    function that numba compiled outside of this package has one of numba's own numbers.
     """
     module = library._final_module
-    linked = any(variable.name.startswith(internals.RuntimeLinker.PREFIX) for variable in module.global_variables)
-    return not linked and not any(NUMBERS.foreign(f.name) for f in module.functions if not f.is_declaration)
+    linked = any(
+        variable.name.startswith(internals.RuntimeLinker.PREFIX)
+        for variable in module.global_variables
+    )
+    return not linked and not any(
+        NUMBERS.foreign(f.name) for f in module.functions if not f.is_declaration
+    )
 
 
 class Sealed(internals.IndexDataCacheFile):
-    """Files of numba's cache, sealed with a hash of content and source; one that does not fit counts as missing."""
+    """Files of numba's cache, sealed with a hash of content and source; one that does not fit
+    counts as missing.
+    """
 
     def _load_index(self) -> dict:
-        return super()._load_index() if self._intact(self._index_path) else {}
+        if self._intact(self._index_path):
+            return super()._load_index()
+        return {}
 
     def _load_data(self, name: str) -> Any:
-        return super()._load_data(name) if self._intact(self._data_path(name)) else None
+        if self._intact(self._data_path(name)):
+            return super()._load_data(name)
+        return None
 
     @contextlib.contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[IO[bytes]]:  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -362,7 +443,9 @@ class Function:
     def __init__(self, body: Callable, cache: bool | tuple[str, str] = False):
         try:
             self._cfunc = compiled(SIGNATURE, body, cache)
-        except Exception as error:  # numba raises many types; each means that it cannot compile the function
+        except (
+            Exception
+        ) as error:  # numba raises many types; each means that it cannot compile the function
             raise NotCompilable(reason(error)) from None
         self.address: int = self._cfunc.address  # pyright: ignore[reportAttributeAccessIssue] numba's own
 
@@ -375,7 +458,10 @@ class AtAddress:
 
 
 class Uncompiled:
-    """Base of laws that only run in Python. `why` is the reason, worded to follow the law's name."""
+    """Base of laws that only run in Python.
+
+    `why` is the reason, worded to follow the law's name.
+    """
 
     why: str
 
@@ -384,18 +470,26 @@ class Uncompiled:
         raise NotImplementedError
 
     def fresh(self) -> "Uncompiled":
-        """Return what one channel of one run calls: itself, if it keeps no state outside of the memory."""
+        """Return what one channel of one run calls: itself, if it keeps no state outside of the
+        memory.
+        """
         return self
 
 
 def reason(error: Exception) -> str:
-    """Return the line of a compiler's error that says what is wrong, printable even if it quotes a user's text."""
-    lines = [line.strip() for line in COLOURS.sub("", str(error)).splitlines() if line.strip(" ^~.")]
+    """Return the line of a compiler's error that says what is wrong, printable even if it quotes a
+    user's text.
+    """
+    lines = []
+    for line in COLOURS.sub("", str(error)).splitlines():
+        if line.strip(" ^~."):
+            lines.append(line.strip())
     telling = [line for line in lines if not WHEREABOUTS.match(line)]
     return printable((telling or lines or [type(error).__name__])[0].removeprefix("TypingError: "))
 
 
-# Raises out of bounds and at division by zero. Without wrappers for Python, which would take half the time to compile.
+# Raises out of bounds and at division by zero. Without wrappers for Python, which would take half
+# the time to compile.
 OPTIONS: dict[str, Any] = {"error_model": "python", "boundscheck": True}
 OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 checked = njit(**OPTIONS)
@@ -405,7 +499,9 @@ _shared: dict[Callable, Any] = {}  # this package's own helpers, compiled once f
 
 @functools.cache
 def jit(function: Callable) -> Callable:
-    """Compile a function, and the compiled functions that it calls, to raise out of bounds and at division by zero."""
+    """Compile a function, and the compiled functions that it calls, to raise out of bounds and at
+    division by zero.
+    """
     with internals.global_compiler_lock:
         copies = dict(_shared)
         try:
@@ -413,16 +509,26 @@ def jit(function: Callable) -> Callable:
         except Exception as error:
             raise NotCompilable(f"a {type(function).__name__} is not a plain function") from error
         # shared only now: after an exception the copies may lack functions that they call
-        _shared.update({f: copy for f, copy in copies.items() if (f.__module__ or "").startswith("smc_mujoco.")})
+        _shared.update(
+            {
+                f: copy
+                for f, copy in copies.items()
+                if (f.__module__ or "").startswith("smc_mujoco.")
+            }
+        )
         return made
 
 
 def compiled_for(function: Callable, types: tuple[Any, ...]) -> Any:
-    """Return numba's result for a function that `jit` compiles for arguments of these types; raises NotCompilable."""
+    """Return numba's result for a function that `jit` compiles for arguments of these types; raises
+    NotCompilable.
+    """
     made: Any = jit(function)
     try:
         with _compiling():
             made.compile(types)
-    except Exception as error:  # numba raises many types; each means that it cannot compile the function
+    except (
+        Exception
+    ) as error:  # numba raises many types; each means that it cannot compile the function
         raise NotCompilable(reason(error)) from None
     return made.overloads[types]

@@ -1,4 +1,6 @@
-"""Public names of a package that are imported when they are first used, so that importing the package costs nothing."""
+"""Public names of a package that are imported when they are first used, so that importing the
+package costs nothing.
+"""
 
 import re
 import sys
@@ -14,7 +16,9 @@ ALIASES = re.compile(r"^(\w+) = (smc_mujoco\.\S+)$", re.MULTILINE)
 
 
 class Shelf(NamedTuple):
-    """What a package's `__init__.py` defines; `modules` are public modules, by the names that they have here."""
+    """What a package's `__init__.py` defines; `modules` are public modules, by the names that they
+    have here.
+    """
 
     getattr: Callable[[str], object]
     dir: Callable[[], list[str]]
@@ -23,7 +27,8 @@ class Shelf(NamedTuple):
 
 
 def shelf(package: str) -> Shelf:
-    """Return the public names of a package, which `__init__.pyi` beside its `__init__.py` lists for type checkers, too.
+    """Return the public names of a package, which `__init__.pyi` beside its `__init__.py` lists for
+    type checkers, too.
 
     There, `from module import name as name` is a public name, and `name = smc_mujoco.module` or
     `from package import module as module` a public module.
@@ -41,7 +46,10 @@ def shelf(package: str) -> Shelf:
         with delay_ctrl_c():
             what = f"{package.replace('smc_mujoco', 'smc', 1)}.{name}"
             module = annexes.module(modules.get(name) or origins[name], what)
-        value = module if name in modules else getattr(module, name)
+        if name in modules:
+            value = module
+        else:
+            value = getattr(module, name)
         setattr(own, name, value)
         return value
 

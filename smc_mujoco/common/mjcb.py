@@ -1,14 +1,16 @@
 """Ownership of MuJoCo's callbacks, and the compiling of models while a callback is installed.
 
-A process has one set of eight callbacks. A run installs the control callback and a time callback, and removes the other
-six, so that a trace depends only on its scenario. Afterwards all are restored.
+A process has one set of eight callbacks. A run installs the control callback and a time callback,
+and removes the other six, so that a trace depends only on its scenario. Afterwards all are
+restored.
 
-MuJoCo reads the clock about 25 times in each evaluation of the forces, to fill `mjData.timer`. That takes 16 to 40 % of
-a plain `mj_step`. The time callback of a run reads no clock, so the durations in `mjData.timer` are 0.
+MuJoCo reads the clock about 25 times in each evaluation of the forces, to fill `mjData.timer`. That
+takes 16 to 40 % of a plain `mj_step`. The time callback of a run reads no clock, so the durations
+in `mjData.timer` are 0.
 
-MuJoCo cannot compile a model while a callback is a Python function, because it would call that function with a model
-that Python does not know. The reference loop installs such a function. The compiled callback is native code, with
-which MuJoCo can compile models.
+MuJoCo cannot compile a model while a callback is a Python function, because it would call that
+function with a model that Python does not know. The reference loop installs such a function. The
+compiled callback is native code, with which MuJoCo can compile models.
 """
 
 import contextlib
@@ -23,12 +25,26 @@ from typing import Any
 
 import mujoco
 
-CALLBACKS = ("control", "passive", "contactfilter", "sensor", "time", "act_dyn", "act_gain", "act_bias")
+CALLBACKS = (
+    "control",
+    "passive",
+    "contactfilter",
+    "sensor",
+    "time",
+    "act_dyn",
+    "act_gain",
+    "act_bias",
+)
 
 _lock = threading.RLock()  # held while callbacks are replaced
-_given: list[dict[str, Any]] = []  # the callbacks of the with blocks of `installed`, the innermost last
-_python_lock = threading.RLock()  # held while no Python callback may be installed; its holder never waits
-# MuJoCo warns of a model with each of its many compilations: once is enough, when a plant is made of it
+_given: list[
+    dict[str, Any]
+] = []  # the callbacks of the with blocks of `installed`, the innermost last
+_python_lock = (
+    threading.RLock()
+)  # held while no Python callback may be installed; its holder never waits
+# MuJoCo warns of a model with each of its many compilations: once is enough, when a plant is made
+# of it
 warnings.filterwarnings("ignore", category=UserWarning, module=re.escape(__name__), append=True)
 
 
@@ -37,7 +53,9 @@ def _after_fork() -> None:
     global _lock, _python_lock
     _lock, _python_lock = threading.RLock(), threading.RLock()
     mujoco.set_mjcb_control(None)
-    if no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock():  # else it is None or a user's
+    if (
+        no_clock.cache_info().currsize and mujoco.get_mjcb_time() is no_clock()
+    ):  # else it is None or a user's
         mujoco.set_mjcb_time(None)
 
 
@@ -47,9 +65,15 @@ if hasattr(os, "register_at_fork"):
 
 @contextlib.contextmanager
 def installed(control: Any) -> Iterator[None]:
-    """Install a control callback, or None, and `no_clock`, and no others, in a with block. Other threads wait."""
+    """Install a control callback, or None, and `no_clock`, and no others, in a with block.
+
+    Other threads wait.
+    """
     with _lock:
-        before, ours = _callbacks(), dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()}
+        before, ours = (
+            _callbacks(),
+            dict.fromkeys(CALLBACKS) | {"control": control, "time": no_clock()},
+        )
         try:
             _install(ours)
             _given.append(ours)
@@ -60,14 +84,19 @@ def installed(control: Any) -> Iterator[None]:
 
 
 def replaced() -> str:
-    """Return the name of a callback that other code has set since `installed`, in its with block; "" for none."""
+    """Return the name of a callback that other code has set since `installed`, in its with block;
+    "" for none.
+    """
     now = _callbacks()
     return next((name for name, callback in _given[-1].items() if now[name] is not callback), "")
 
 
 @functools.cache
 def no_clock() -> Any:
-    """Return a time callback, a C function that returns 0. Without one, MuJoCo would read the system's clock."""
+    """Return a time callback, a C function that returns 0.
+
+    Without one, MuJoCo would read the system's clock.
+    """
     from numba import types
 
     from smc_mujoco.common import jit
@@ -78,11 +107,15 @@ def no_clock() -> Any:
     return jit.compiled(types.float64(), zero, cache=True).ctypes
 
 
-def compiled(spec: mujoco.MjSpec, build: Callable[[mujoco.MjSpec], mujoco.MjModel] | None = None) -> mujoco.MjModel:
-    """Compile a spec; MuJoCo's warnings are shown if `build`, which compiles it, is a function of another module.
+def compiled(
+    spec: mujoco.MjSpec, build: Callable[[mujoco.MjSpec], mujoco.MjModel] | None = None
+) -> mujoco.MjModel:
+    """Compile a spec; MuJoCo's warnings are shown if `build`, which compiles it, is a function of
+    another module.
 
-    A Python callback is removed meanwhile. The thread that installed it does not wait, so that a policy can make an
-    environment during a run. Other threads wait until that run is over. No thread waits for native callbacks.
+    A Python callback is removed meanwhile. The thread that installed it does not wait, so that a
+    policy can make an environment during a run. Other threads wait until that run is over. No
+    thread waits for native callbacks.
     """
     with _python_lock:
         if not any(map(_python, _callbacks().values())):
@@ -97,7 +130,9 @@ def _callbacks() -> dict[str, Any]:
 
 
 def _install(callbacks: dict[str, Any]) -> None:
-    """Install those of the callbacks, given as `_callbacks` returns them, that are not installed yet."""
+    """Install those of the callbacks, given as `_callbacks` returns them, that are not installed
+    yet.
+    """
     with _python_lock if any(map(_python, callbacks.values())) else contextlib.nullcontext():
         for name, callback in callbacks.items():
             if getattr(mujoco, f"get_mjcb_{name}")() is not callback:

@@ -9,9 +9,13 @@ from typing import Any
 
 
 def free_after_fork(lock: Any) -> None:
-    """Let a fork wait until no other thread holds a lock, because nobody would release it in the child process."""
+    """Let a fork wait until no other thread holds a lock, because nobody would release it in the
+    child process.
+    """
     if hasattr(os, "register_at_fork"):
-        os.register_at_fork(before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release)
+        os.register_at_fork(
+            before=lock.acquire, after_in_parent=lock.release, after_in_child=lock.release
+        )
 
 
 class TimedOut(Exception):
@@ -24,26 +28,39 @@ def _kill(process: subprocess.Popen[str]) -> None:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(process.pid, signal.SIGKILL)
     else:
-        subprocess.run(["taskkill", "/F", "/T", "/PID", str(process.pid)], capture_output=True, check=False)
+        subprocess.run(
+            ["taskkill", "/F", "/T", "/PID", str(process.pid)], capture_output=True, check=False
+        )
         process.kill()
 
 
 def timed(
-    command: Sequence[str], timeout: float, output: bool = True, cwd: str | os.PathLike[str] | None = None
+    command: Sequence[str],
+    timeout: float,
+    output: bool = True,
+    cwd: str | os.PathLike[str] | None = None,
 ) -> subprocess.CompletedProcess[str]:
     """Run a command, and stop it and every process that it started when its time, s, is up."""
-    pipe = subprocess.PIPE if output else subprocess.DEVNULL  # a user's code may print without end
-    with subprocess.Popen(
-        command,
-        cwd=cwd,
-        stdin=subprocess.DEVNULL,
-        stdout=pipe,
-        stderr=pipe,
-        text=True,
-        errors="replace",
-        env=os.environ | {"LC_ALL": "C"},
-        start_new_session=True,
-    ) as process:  # whose pipes are closed after the block, though a process that left the session may hold them
+    # a user's code may print without end
+    if output:
+        pipe = subprocess.PIPE
+    else:
+        pipe = subprocess.DEVNULL
+    with (
+        subprocess.Popen(
+            command,
+            cwd=cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=pipe,
+            stderr=pipe,
+            text=True,
+            errors="replace",
+            env=os.environ | {"LC_ALL": "C"},
+            start_new_session=True,
+        ) as process
+        # whose pipes are closed after the block, though a process that left the session may hold
+        # them
+    ):
         try:
             printed = process.communicate(timeout=timeout)
         except subprocess.TimeoutExpired:

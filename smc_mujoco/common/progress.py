@@ -1,4 +1,6 @@
-"""Progress of work that takes more than two seconds: a bar on a terminal and in a notebook, lines in a log."""
+"""Progress of work that takes more than two seconds: a bar on a terminal and in a notebook, lines
+in a log.
+"""
 
 import contextlib
 import html
@@ -15,9 +17,16 @@ from smc_mujoco.common.html import in_notebook
 if TYPE_CHECKING:
     from rich.console import Console
 
-Report = Callable[[float, float], None]  # called with the work done and the whole work, which may be an estimate
-SPEED_WINDOW = 120.0  # s over which the terminal's bar averages its speed, for the time left: chosen
-DRAWING_PERIOD, LINE_PERIOD = 0.2, 10.0  # s between two drawings of a notebook's bar, and two lines of a log: chosen
+Report = Callable[
+    [float, float], None
+]  # called with the work done and the whole work, which may be an estimate
+SPEED_WINDOW = (
+    120.0  # s over which the terminal's bar averages its speed, for the time left: chosen
+)
+DRAWING_PERIOD, LINE_PERIOD = (
+    0.2,
+    10.0,
+)  # s between two drawings of a notebook's bar, and two lines of a log: chosen
 
 
 class Bar:
@@ -32,7 +41,13 @@ class Bar:
         period: float = 0.0,
         delay: float = 0.0,
     ):
-        self.what, self.whole, self.counted, self.draw, self.period = what, whole, counted, draw, period
+        self.what, self.whole, self.counted, self.draw, self.period = (
+            what,
+            whole,
+            counted,
+            draw,
+            period,
+        )
         self.done, self.start = 0.0, time.monotonic()
         self.due = self.start + delay  # s, of the next drawing
 
@@ -55,19 +70,31 @@ class Bar:
     @property
     def share(self) -> float:
         """The share of the work that is done."""
-        return min(1.0, self.done / self.whole) if self.whole else 0.0
+        if self.whole:
+            return min(1.0, self.done / self.whole)
+        return 0.0
 
     def __str__(self) -> str:
         if not self.whole:
             return self.what
-        size = f"{self.done:g}/{self.whole:g}" if self.counted else f"{100 * self.share:.0f} %"
-        left = (time.monotonic() - self.start) * (1.0 / self.share - 1.0) if self.share else math.inf
+        if self.counted:
+            size = f"{self.done:g}/{self.whole:g}"
+        else:
+            size = f"{100 * self.share:.0f} %"
+        if self.share:
+            left = (time.monotonic() - self.start) * (1.0 / self.share - 1.0)
+        else:
+            left = math.inf
         return f"{self.what} {size}" + (f", {left:.0f} s left" if left < math.inf else "")
 
 
 @contextlib.contextmanager
-def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool = False) -> Iterator[Bar]:
-    """Show a bar while the block lasts. If stderr is no terminal, print a line each ten seconds instead.
+def bar(
+    what: str, whole: float | None = None, shown: bool = True, counted: bool = False
+) -> Iterator[Bar]:
+    """Show a bar while the block lasts.
+
+    If stderr is no terminal, print a line each ten seconds instead.
 
     `whole` is None if `reached` sets it; if `counted`, the bar has "3/60" instead of a percentage.
     """
@@ -84,17 +111,25 @@ def bar(what: str, whole: float | None = None, shown: bool = True, counted: bool
         with _on_terminal(what, whole, counted, console) as draw:
             yield Bar(what, whole, counted, draw)
     else:
-        yield Bar(what, whole, counted, lambda bar: print(bar, file=sys.stderr), LINE_PERIOD, LINE_PERIOD)
+        yield Bar(
+            what, whole, counted, lambda bar: print(bar, file=sys.stderr), LINE_PERIOD, LINE_PERIOD
+        )
 
 
 def note(text: str) -> None:
     """Say something about work that begins, on stderr."""
     width = shutil.get_terminal_size().columns
-    print(textwrap.fill(text, width, break_long_words=False, break_on_hyphens=False), file=sys.stderr, flush=True)
+    print(
+        textwrap.fill(text, width, break_long_words=False, break_on_hyphens=False),
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def about(seconds: float) -> str:
-    """Return a duration in words that promise no more than they know: "about 40 s", "about 3 minutes"."""
+    """Return a duration in words that promise no more than they know: "about 40 s", "about 3
+    minutes".
+    """
     if seconds < 95.0:
         return f"about {max(1, round(seconds, -1 if seconds > 10.0 else None)):.0f} s"
     return f"about {round(seconds / 60.0):.0f} minutes"
@@ -102,13 +137,19 @@ def about(seconds: float) -> str:
 
 @contextlib.contextmanager
 def _in_cell() -> Iterator[Callable[[Bar], None]]:
-    """Yield what draws a bar in a notebook's cell, where it vanishes in the end. Rich would need ipywidgets."""
+    """Yield what draws a bar in a notebook's cell, where it vanishes in the end.
+
+    Rich would need ipywidgets.
+    """
     from IPython.display import HTML, display
 
     cell: Any = display(HTML(""), display_id=True)
 
     def draw(bar: Bar) -> None:
-        value = f' value="{bar.share:.3f}" max="1"' if bar.whole else ""
+        if bar.whole:
+            value = f' value="{bar.share:.3f}" max="1"'
+        else:
+            value = ""
         cell.update(HTML(f"<progress{value}></progress> {html.escape(str(bar))}"))
 
     try:
@@ -118,16 +159,25 @@ def _in_cell() -> Iterator[Callable[[Bar], None]]:
 
 
 @contextlib.contextmanager
-def _on_terminal(what: str, whole: float | None, counted: bool, console: "Console") -> Iterator[Callable[[Bar], None]]:
+def _on_terminal(
+    what: str, whole: float | None, counted: bool, console: "Console"
+) -> Iterator[Callable[[Bar], None]]:
     """Yield what draws a bar with rich."""
     from rich import progress
 
-    share = progress.MofNCompleteColumn() if counted else progress.TaskProgressColumn()
+    if counted:
+        share = progress.MofNCompleteColumn()
+    else:
+        share = progress.TaskProgressColumn()
     text = progress.TextColumn("{task.description}", markup=False)
     columns = text, progress.BarColumn(), share, progress.TimeRemainingColumn()
-    with progress.Progress(*columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW) as drawn:
+    with progress.Progress(
+        *columns, transient=True, console=console, speed_estimate_period=SPEED_WINDOW
+    ) as drawn:
         task = drawn.add_task(what, total=whole)
-        yield lambda bar: drawn.update(task, completed=bar.done, total=bar.whole, description=bar.what)
+        yield lambda bar: drawn.update(
+            task, completed=bar.done, total=bar.whole, description=bar.what
+        )
 
 
 def summed(report: Report, done: float, whole: float) -> Callable[[float], None]:
@@ -143,7 +193,10 @@ def summed(report: Report, done: float, whole: float) -> Callable[[float], None]
 
 @contextlib.contextmanager
 def counter(runs: int, steps: int, shown: bool) -> Iterator[Callable[[int], None]]:
-    """Yield a function that adds simulated steps. A bar shows how many runs are done and how many a second."""
+    """Yield a function that adds simulated steps.
+
+    A bar shows how many runs are done and how many a second.
+    """
     start, done = time.monotonic(), 0
 
     def stepped(count: int) -> None:

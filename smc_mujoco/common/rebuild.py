@@ -1,7 +1,9 @@
-"""Copies of functions in which every compiled helper is replaced: by one with bounds checks, or by plain Python.
+"""Copies of functions in which every compiled helper is replaced: by one with bounds checks, or by
+plain Python.
 
-The author of a law may compile its helpers, and numba checks array bounds only on request. So the callback runs a law
-with copies of its helpers that are compiled with checks. The reference loop runs it with the helpers' plain Python.
+The author of a law may compile its helpers, and numba checks array bounds only on request. So the
+callback runs a law with copies of its helpers that are compiled with checks. The reference loop
+runs it with the helpers' plain Python.
 """
 
 import dis
@@ -11,8 +13,15 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common.numba_internals import Dispatcher
 
-# Instructions with the name of a global variable; those of all others have the name of an attribute.
-OF_VARIABLES = {"LOAD_GLOBAL", "STORE_GLOBAL", "DELETE_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS"}
+# Instructions with the name of a global variable; those of all others have the name of an
+# attribute.
+OF_VARIABLES = {
+    "LOAD_GLOBAL",
+    "STORE_GLOBAL",
+    "DELETE_GLOBAL",
+    "LOAD_NAME",
+    "LOAD_FROM_DICT_OR_GLOBALS",
+}
 
 
 class Names(NamedTuple):
@@ -22,7 +31,9 @@ class Names(NamedTuple):
     attributes: set[str]
 
 
-def rebuild(function: Any, finish: Callable[[Any], Any], copies: dict[Callable, Any] | None = None) -> Any:
+def rebuild(
+    function: Any, finish: Callable[[Any], Any], copies: dict[Callable, Any] | None = None
+) -> Any:
     """Return a copy of a function that calls copies of its compiled helpers."""
     function, copies = getattr(function, "py_func", function), {} if copies is None else copies
     if not isinstance(function, FunctionType):
@@ -32,24 +43,34 @@ def rebuild(function: Any, finish: Callable[[Any], Any], copies: dict[Callable, 
     elif function not in copies:
         space, names = dict(function.__globals__), names_in(function.__code__)
         cells = tuple(CellType() for _ in function.__closure__ or ())
-        copy = FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells)
+        copy = FunctionType(
+            function.__code__, space, function.__name__, function.__defaults__, cells
+        )
         copies[function] = finish(copy)
         # filled in only now, because a function may call itself
-        space |= {name: _swapped(space[name], names, finish, copies) for name in names.variables & space.keys()}
+        space |= {
+            name: _swapped(space[name], names, finish, copies)
+            for name in names.variables & space.keys()
+        }
         for cell, old in zip(cells, function.__closure__ or (), strict=True):
             cell.cell_contents = _swapped(old.cell_contents, names, finish, copies)
     return copies[function]
 
 
 def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
-    """Return the copy of a compiled function, or of a module with such attributes among `names`; else the value."""
+    """Return the copy of a compiled function, or of a module with such attributes among `names`;
+    else the value.
+    """
     if isinstance(value, Dispatcher):
         return rebuild(value, finish, copies)
     if isinstance(value, ModuleType) and _holds(value, names.attributes):
         copy = ModuleType(value.__name__)
         for name, thing in vars(value).items():
             used = name in names.attributes
-            vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, copies) if used else thing
+            if used:
+                vars(copy)[name] = _swapped(thing, Names(set(), set()), finish, copies)
+            else:
+                vars(copy)[name] = thing
         return copy
     return value
 
@@ -57,9 +78,15 @@ def _swapped(value: Any, names: Names, finish: Callable, copies: dict) -> Any:
 def _calls_compiled(function: FunctionType) -> bool:
     """Return whether a function refers to a compiled function, by name or in a module."""
     names = names_in(function.__code__)
-    values = [function.__globals__[name] for name in names.variables if name in function.__globals__]
+    values = []
+    for name in names.variables:
+        if name in function.__globals__:
+            values.append(function.__globals__[name])
     values += [cell.cell_contents for cell in function.__closure__ or ()]
-    return any(isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names.attributes)) for v in values)
+    return any(
+        isinstance(v, Dispatcher) or (isinstance(v, ModuleType) and _holds(v, names.attributes))
+        for v in values
+    )
 
 
 def _holds(module: ModuleType, names: set[str]) -> bool:
@@ -72,8 +99,12 @@ def names_in(code: CodeType) -> Names:
     names = Names(set(), set())
     for instruction in dis.get_instructions(code):
         if instruction.opcode in dis.hasname:
-            (names.variables if instruction.opname in OF_VARIABLES else names.attributes).add(instruction.argval)
-    for inner in (names_in(constant) for constant in code.co_consts if isinstance(constant, CodeType)):
+            (names.variables if instruction.opname in OF_VARIABLES else names.attributes).add(
+                instruction.argval
+            )
+    for inner in (
+        names_in(constant) for constant in code.co_consts if isinstance(constant, CodeType)
+    ):
         names.variables.update(inner.variables)
         names.attributes.update(inner.attributes)
     return names

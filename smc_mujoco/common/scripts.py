@@ -17,13 +17,21 @@ def execute(path: Path) -> dict:
     try:
         return runpy.run_path(str(path))
     except ScenarioError as error:
-        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-        where = f"{path}, line {lines[-1]}" if lines else str(path)
+        lines = []
+        for frame in traceback.extract_tb(error.__traceback__):
+            if frame.filename == str(path):
+                lines.append(frame.lineno)
+        if lines:
+            where = f"{path}, line {lines[-1]}"
+        else:
+            where = str(path)
         raise ScenarioError(f"{where}: {error}") from error
 
 
 def users_traceback(error: BaseException) -> str:
-    """Return the traceback of an exception that a script raised, without what called it; "" for any other exception."""
+    """Return the traceback of an exception that a script raised, without what called it; "" for any
+    other exception.
+    """
     step, inside = error.__traceback__, False
     while step is not None:
         code = step.tb_frame.f_code

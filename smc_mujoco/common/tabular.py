@@ -1,9 +1,11 @@
-"""Tables of text, with writers for a terminal, for plain text of 80 columns, for notebooks and for LaTeX.
+"""Tables of text, with writers for a terminal, for plain text of 80 columns, for notebooks and for
+LaTeX.
 
-    table = Tabular(headings=["law", "ITAE (m s^2)"], rows=[["pid", Cell("1.2", "1.1–1.3", strong=True)]])
-    print(table); rich.print(table); table.to_latex()
+    table = Tabular(headings=["law", "ITAE (m s^2)"], rows=[["pid", Cell("1.2", "1.1–1.3",
+    strong=True)]]) print(table); rich.print(table); table.to_latex()
 
-A table that is wider than the terminal is shown in several parts, each with the columns at the left.
+A table that is wider than the terminal is shown in several parts, each with the columns at the
+left.
 """
 
 import dataclasses
@@ -20,19 +22,32 @@ if TYPE_CHECKING:
     from rich.text import Text
 
 PLAIN_WIDTH = 80  # characters of a line of plain text
-NAME_WIDTH, HEADING_WIDTH = 20, 8  # characters: of names before they are broken, and of headings at least
+NAME_WIDTH, HEADING_WIDTH = (
+    20,
+    8,
+)  # characters: of names before they are broken, and of headings at least
 MAX_HTML_ROWS = 40
 NO_BREAK = "\N{NO-BREAK SPACE}"
 WIDTH_HINT = r"too wide for a column: \resizebox{\textwidth}{!}{...}, of graphicx, or fewer metrics"
 # A character -> as LaTeX writes it, with any engine.
 TEX = {c: f"\\{c}" for c in "&%$#_{}"} | {c: f"${c}$" for c in "<>|"}
 TEX |= {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
-TEX |= {"–": "--", "·": r"$\cdot$", "×": r"$\times$", "±": r"$\pm$", "−": "$-$", "′": "$'$", "″": "$''$"}
+TEX |= {
+    "–": "--",
+    "·": r"$\cdot$",
+    "×": r"$\times$",
+    "±": r"$\pm$",
+    "−": "$-$",
+    "′": "$'$",
+    "″": "$''$",
+}
 LETTERS = "αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ"
 LETTER_NAMES = "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon"
 LETTER_NAMES += " varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
 TEX |= {letter: f"$\\{name}$" for letter, name in zip(LETTERS, LETTER_NAMES.split(), strict=True)}
-TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {c: f"$^{i}$" for i, c in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}
+TEX |= {c: f"$_{i}$" for i, c in enumerate("₀₁₂₃₄₅₆₇₈₉")} | {
+    c: f"$^{i}$" for i, c in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")
+}
 
 
 class Cell(NamedTuple):
@@ -58,7 +73,9 @@ class Tabular:
     def __str__(self) -> str:
         return plain(self)
 
-    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
+    def __rich_console__(
+        self, console: "Console", options: "ConsoleOptions"
+    ) -> "Iterator[RenderableType]":
         from rich import box
         from rich.table import Table
         from rich.text import Text
@@ -70,8 +87,12 @@ class Tabular:
             table = Table(box=box.SIMPLE_HEAD, padding=0, pad_edge=False, show_edge=False)
             lines = max(columns[i][0].plain.count("\n") for i in part)
             for i in part:
-                head = Text("\n" * (lines - columns[i][0].plain.count("\n"))).append_text(columns[i][0])
-                table.add_column(head, justify="left" if i < self.left else "right", overflow="fold")
+                head = Text("\n" * (lines - columns[i][0].plain.count("\n"))).append_text(
+                    columns[i][0]
+                )
+                table.add_column(
+                    head, justify="left" if i < self.left else "right", overflow="fold"
+                )
             for row in zip(*(columns[i][1:] for i in part), strict=True):
                 table.add_row(*row)
             yield table
@@ -79,12 +100,19 @@ class Tabular:
             yield Text(note)
 
     def _columns(self, width: int) -> "list[list[Text]]":
-        """Return the columns of names, then those of numbers, with wide intervals on two lines where space is short."""
+        """Return the columns of names, then those of numbers, with wide intervals on two lines
+        where space is short.
+        """
         names = [self._names(i) for i in range(self.left)]
         numbers = range(self.left, len(self.headings))
-        columns, narrow = [self._column(i) for i in numbers], [self._column(i, narrow=True) for i in numbers]
+        columns, narrow = (
+            [self._column(i) for i in numbers],
+            [self._column(i, narrow=True) for i in numbers],
+        )
         while sum(_widest(column) + 1 for column in [*names, *columns]) - 1 > width:
-            savings = [_widest(wide) - _widest(other) for wide, other in zip(columns, narrow, strict=True)]
+            savings = []
+            for wide, other in zip(columns, narrow, strict=True):
+                savings.append(_widest(wide) - _widest(other))
             if max(savings, default=0) <= 0:
                 break
             at = savings.index(max(savings))
@@ -98,15 +126,21 @@ class Tabular:
         texts = [Text(self.headings[i])]
         for cell in (_cell(row[i]) for row in self.rows):
             name = Text(folded(cell.text, NAME_WIDTH), cell.colour)
-            texts.append(name.append("".join(f"\n{line}" for line in cell.below.splitlines()), "dim"))
+            texts.append(
+                name.append("".join(f"\n{line}" for line in cell.below.splitlines()), "dim")
+            )
         return texts
 
     def _column(self, i: int, narrow: bool = False) -> "list[Text]":
-        """Return the heading and the cells of a column of numbers. If `narrow`, intervals are on two lines."""
+        """Return the heading and the cells of a column of numbers.
+
+        If `narrow`, intervals are on two lines.
+        """
         from rich.text import Text
 
         cells = [_cell(row[i]) for row in self.rows]
-        cells = [cell._replace(below=cell.below.replace("–", "–\n")) for cell in cells] if narrow else cells
+        if narrow:
+            cells = [cell._replace(below=cell.below.replace("–", "–\n")) for cell in cells]
         star = any(cell.strong for cell in cells)
         texts = []
         for cell in cells:
@@ -117,7 +151,9 @@ class Tabular:
             texts.append(text)
         width = max([HEADING_WIDTH, *map(_width, texts)])
         whole = re.sub(r"\(.*\)", lambda unit: unit[0].replace(" ", NO_BREAK), self.headings[i])
-        heading = "\n".join(textwrap.wrap(whole, width, break_long_words=False)).replace(NO_BREAK, " ")
+        heading = "\n".join(textwrap.wrap(whole, width, break_long_words=False)).replace(
+            NO_BREAK, " "
+        )
         return [Text(heading), *texts]
 
     def _repr_html_(self) -> html.Html:
@@ -128,16 +164,26 @@ class Tabular:
         return html.table(heads, lines, self.title, note, numbers, max_rows=MAX_HTML_ROWS)
 
     def to_latex(self) -> str:
-        """Return a tabular, which needs the package booktabs, below comments with the title and the notes."""
-        lines = [f"% {text}" for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT) if text]
-        lines += [f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}", "\\toprule"]
+        """Return a tabular, which needs the package booktabs, below comments with the title and the
+        notes.
+        """
+        lines = []
+        for text in (self.title, *self.notes, "needs booktabs", WIDTH_HINT):
+            if text:
+                lines.append(f"% {text}")
+        lines += [
+            f"\\begin{{tabular}}{{{'l' * self.left}{'r' * (len(self.headings) - self.left)}}}",
+            "\\toprule",
+        ]
         lines += [_tex_line(map(tex, self.headings)), "\\midrule"]
         lines += [_tex_line(_tex_cell(_cell(cell)) for cell in row) for row in self.rows]
         return "\n".join([*lines, "\\bottomrule", "\\end{tabular}\n"])
 
 
 class Tables:
-    """Base of results that are shown as `tables` by `print`, in terminals and notebooks, and in LaTeX."""
+    """Base of results that are shown as `tables` by `print`, in terminals and notebooks, and in
+    LaTeX.
+    """
 
     @property
     def tables(self) -> Sequence[Tabular]:
@@ -150,7 +196,9 @@ class Tables:
     def __repr__(self) -> str:
         return str(self)
 
-    def __rich_console__(self, console: "Console", options: "ConsoleOptions") -> "Iterator[RenderableType]":
+    def __rich_console__(
+        self, console: "Console", options: "ConsoleOptions"
+    ) -> "Iterator[RenderableType]":
         for table in self.tables:
             yield table
             yield ""
@@ -159,7 +207,9 @@ class Tables:
         return "<br>".join(table._repr_html_() for table in self.tables)
 
     def to_latex(self) -> str:
-        """Return a LaTeX tabular for each table, below comments that say what it shows; needs booktabs."""
+        """Return a LaTeX tabular for each table, below comments that say what it shows; needs
+        booktabs.
+        """
         return "\n".join(table.to_latex() for table in self.tables if table.rows)
 
 
@@ -168,18 +218,28 @@ def plain(shown: "RenderableType", width: int = PLAIN_WIDTH) -> str:
     from rich.console import Console
 
     console = Console(
-        file=io.StringIO(), width=width, markup=False, emoji=False, highlight=False, color_system=None,
-        force_terminal=False, force_jupyter=False,
-    )  # fmt: skip
+        file=io.StringIO(),
+        width=width,
+        markup=False,
+        emoji=False,
+        highlight=False,
+        color_system=None,
+        force_terminal=False,
+        force_jupyter=False,
+    )
     console.print(shown)
     return "\n".join(line.rstrip() for line in console.file.getvalue().splitlines())  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def folded(name: str, width: int) -> str:
-    """Return a name that is longer than a width on several lines, broken at spaces and after underscores."""
+    """Return a name that is longer than a width on several lines, broken at spaces and after
+    underscores.
+    """
     if len(name) <= width:
         return name
-    return "\n".join(line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), width))
+    return "\n".join(
+        line.replace("_ ", "_") for line in textwrap.wrap(name.replace("_", "_ "), width)
+    )
 
 
 def _cell(cell: Cell | str) -> Cell:
@@ -196,7 +256,9 @@ def _widest(column: "Sequence[Text]") -> int:
 
 
 def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
-    """Return the columns of each part of a table that fits into a width; each part begins with the names."""
+    """Return the columns of each part of a table that fits into a width; each part begins with the
+    names.
+    """
     left = list(range(names))
     parts = [left]
     for i, column_width in enumerate(widths[names:], names):
@@ -208,9 +270,16 @@ def _parts(widths: Sequence[int], width: int, names: int) -> list[list[int]]:
 
 def _html(cell: Cell) -> html.Html:
     """Return a cell as HTML, with the lines below in smaller letters."""
-    text = html.strong(cell.text) if cell.strong else html.text(cell.text)
-    below = "<br>".join(html.text(line) for part in (cell.below, cell.alarm) for line in part.splitlines())
-    return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>') if below else text
+    if cell.strong:
+        text = html.strong(cell.text)
+    else:
+        text = html.text(cell.text)
+    below = "<br>".join(
+        html.text(line) for part in (cell.below, cell.alarm) for line in part.splitlines()
+    )
+    if below:
+        return html.Html(f'{text}<br><small style="white-space:nowrap">{below}</small>')
+    return text
 
 
 def _tex_line(cells: Iterable[str]) -> str:
@@ -219,14 +288,23 @@ def _tex_line(cells: Iterable[str]) -> str:
 
 def _tex_cell(cell: Cell) -> str:
     """Return a cell as LaTeX, with the line below in brackets beside it."""
-    text, below = (re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", line) for line in (cell.text, cell.below))
+    text, below = (
+        re.sub(r"([\d.]+)e(-?\d+)", r"\1·10^\2", line) for line in (cell.text, cell.below)
+    )
     below, alarm = (", ".join(lines.splitlines()) for lines in (below, cell.alarm))
-    strong = f"\\textbf{{{tex(text)}}}" if cell.strong else tex(text)
+    if cell.strong:
+        strong = f"\\textbf{{{tex(text)}}}"
+    else:
+        strong = tex(text)
     return (f"{strong} [{tex(below)}]" if below else strong) + (f", {tex(alarm)}" if alarm else "")
 
 
 def tex(text: str) -> str:
-    """Return text with LaTeX's special characters escaped, and powers, Greek letters and dashes in its notation."""
+    """Return text with LaTeX's special characters escaped, and powers, Greek letters and dashes in
+    its notation.
+    """
     return re.sub(
-        r"\^(-?\d+)|(.)", lambda match: TEX.get(match[2], match[2]) if match[2] else f"$^{{{match[1]}}}$", text
+        r"\^(-?\d+)|(.)",
+        lambda match: TEX.get(match[2], match[2]) if match[2] else f"$^{{{match[1]}}}$",
+        text,
     )

@@ -5,7 +5,9 @@ from collections.abc import Iterable
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number to `digits` significant digits; "never" for inf, "none" for NaN, "<1e-9" if it is that small."""
+    """Return a number to `digits` significant digits; "never" for inf, "none" for NaN, "<1e-9" if
+    it is that small.
+    """
     if math.isnan(value):
         return "none"
     if math.isinf(value):
@@ -23,7 +25,9 @@ def number(value: float, digits: int = 3) -> str:
 def joined(parts: Iterable[str]) -> str:
     """Return "a, b and c"; "" for no parts."""
     *others, last = list(parts) or [""]
-    return f"{', '.join(others)} and {last}" if others else last
+    if others:
+        return f"{', '.join(others)} and {last}"
+    return last
 
 
 def capital(text: str) -> str:

@@ -1,11 +1,14 @@
-"""What laws of free bodies share: the attitude that turns the thrust to a wanted force, its rate, and the command.
+"""What laws of free bodies share: the attitude that turns the thrust to a wanted force, its rate,
+and the command.
 
-A law wants an acceleration v(e, e') of the position's error, of stiffness -dv/de and damping -dv/de'. So it wants the
-force F = m (r'' + v) + h, and wd, the wanted attitude's rate, follows from F' = m (r''' - stiffness e' - damping e'').
-r''' is the difference of r'' over a sample, which has no noise. e'' is the measured e' through p B / (p + B): 0 at rest
-and on the path, so that it adds to no steady error, and late by 1 / B after a gust. The difference of the wanted
-attitude over a sample would bring the noise of F, divided by the period, into wd. wd' is left out, as in the
-Crazyflie's firmware. Attitudes are unit quaternions (w, x, y, z), body to world, see mechanisms/rotation.py.
+A law wants an acceleration v(e, e') of the position's error, of stiffness -dv/de and damping
+-dv/de'. So it wants the force F = m (r'' + v) + h, and wd, the wanted attitude's rate, follows from
+F' = m (r''' - stiffness e' - damping e''). r''' is the difference of r'' over a sample, which has
+no noise. e'' is the measured e' through p B / (p + B): 0 at rest and on the path, so that it adds
+to no steady error, and late by 1 / B after a gust. The difference of the wanted attitude over a
+sample would bring the noise of F, divided by the period, into wd. wd' is left out, as in the
+Crazyflie's firmware. Attitudes are unit quaternions (w, x, y, z), body to world, see
+mechanisms/rotation.py.
 """
 
 import math
@@ -16,22 +19,31 @@ from numba import njit
 from smc_mujoco.control.joint_law import tanh
 from smc_mujoco.mechanisms.rotation import quaternion, rate, relative, turned, turned_back
 
-BANDWIDTH = 20.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
-LEAST = 0.127  # least thrust over weight: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
+BANDWIDTH = (
+    20.0  # 1/s, chosen: B. A larger one loses less on a fast path, and stands less noise and delay
+)
+# least thrust over weight: 0.04 N for 0.032 kg, as published, so that rotors can turn the body over
+LEAST = 0.127
 STEERING = 2  # slots of a law's memory, the first ones, which `steer` keeps
 MIN_FORCE = 1e-9  # N, chosen: a smaller wanted force has no direction
-MIN_SINE = 1e-6  # chosen: sine of the angle between thrust and heading; below it the heading says nothing
+MIN_SINE = (
+    1e-6  # chosen: sine of the angle between thrust and heading; below it the heading says nothing
+)
 
 
 @njit(error_model="numpy")
 def of_thrust(F, r):
-    """Return the attitude whose third axis is along the force F, (3,), and whose first is nearest to the heading.
+    """Return the attitude whose third axis is along the force F, (3,), and whose first is nearest
+    to the heading.
 
-    The heading is the first axis of the rotation vector r, (3,), or minus its third one if the force is along the
-    first, as in a flip.
+    The heading is the first axis of the rotation vector r, (3,), or minus its third one if the
+    force is along the first, as in a flip.
     """
     size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
-    z = (F[0] / size, F[1] / size, F[2] / size) if size > MIN_FORCE else turned(heading, 0.0, 0.0, 1.0)
+    if size > MIN_FORCE:
+        z = (F[0] / size, F[1] / size, F[2] / size)
+    else:
+        z = turned(heading, 0.0, 0.0, 1.0)
     ahead = _ahead(z, heading)
     y = _cross(z, turned(heading, ahead[0], ahead[1], ahead[2]))
     sine = math.sqrt(_dot(y, y))
@@ -41,16 +53,25 @@ def of_thrust(F, r):
 
 @njit(error_model="numpy")
 def rate_of(wanted, F, dF, r, dr):
-    """Return the rate of the attitude `wanted` by `of_thrust`, in its axes, as F and r change by dF and dr a second."""
+    """Return the rate of the attitude `wanted` by `of_thrust`, in its axes, as F and r change by dF
+    and dr a second.
+    """
     size, heading = math.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2]), quaternion(r[0], r[1], r[2])
     if size <= MIN_FORCE:
         return 0.0, 0.0, 0.0
-    x, y, z = turned(wanted, 1.0, 0.0, 0.0), turned(wanted, 0.0, 1.0, 0.0), turned(wanted, 0.0, 0.0, 1.0)
+    x, y, z = (
+        turned(wanted, 1.0, 0.0, 0.0),
+        turned(wanted, 0.0, 1.0, 0.0),
+        turned(wanted, 0.0, 0.0, 1.0),
+    )
     along = _dot(z, dF)
     dz = (dF[0] - along * z[0]) / size, (dF[1] - along * z[1]) / size, (dF[2] - along * z[2]) / size
     ahead = _ahead(z, heading)
     turning = _cross(rate(r[0], r[1], r[2], dr[0], dr[1], dr[2]), ahead)
-    b, db = turned(heading, ahead[0], ahead[1], ahead[2]), turned(heading, turning[0], turning[1], turning[2])
+    b, db = (
+        turned(heading, ahead[0], ahead[1], ahead[2]),
+        turned(heading, turning[0], turning[1], turning[2]),
+    )
     across = _cross(z, b)
     yaw = (_dot(x, _cross(dz, b)) + _dot(x, _cross(z, db))) / math.sqrt(_dot(across, across))
     return -_dot(y, dz), _dot(x, dz), -yaw
@@ -60,7 +81,9 @@ def rate_of(wanted, F, dF, r, dr):
 def _ahead(z, heading):
     """Return the axis that is the heading for `of_thrust`, in the axes of the quaternion `heading`."""
     y = _cross(z, turned(heading, 1.0, 0.0, 0.0))
-    return (1.0, 0.0, 0.0) if math.sqrt(_dot(y, y)) >= MIN_SINE else (0.0, 0.0, -1.0)
+    if math.sqrt(_dot(y, y)) >= MIN_SINE:
+        return (1.0, 0.0, 0.0)
+    return (0.0, 0.0, -1.0)
 
 
 @njit(error_model="numpy")
@@ -75,8 +98,15 @@ def _dot(a, b):
 
 @njit(error_model="numpy")
 def _of_axes(x, y, z):
-    """Return the quaternion of a rotation matrix with these columns, by the largest of its four numbers."""
-    squares = 1 + x[0] + y[1] + z[2], 1 + x[0] - y[1] - z[2], 1 - x[0] + y[1] - z[2], 1 - x[0] - y[1] + z[2]
+    """Return the quaternion of a rotation matrix with these columns, by the largest of its four
+    numbers.
+    """
+    squares = (
+        1 + x[0] + y[1] + z[2],
+        1 + x[0] - y[1] - z[2],
+        1 - x[0] + y[1] - z[2],
+        1 - x[0] - y[1] + z[2],
+    )
     a, b, c = y[2] - z[1], z[0] - x[2], x[1] - y[0]
     d, e, f = x[1] + y[0], z[0] + x[2], y[2] + z[1]
     if squares[0] >= 1.0:
@@ -94,7 +124,8 @@ def _of_axes(x, y, z):
 
 @njit(error_model="numpy")
 def slide(y, c, K, rho):
-    """Return s = e' + c e of the position, v = -c e' - K tanh(rho s), its stiffness and its damping, (3,) each.
+    """Return s = e' + c e of the position, v = -c e' - K tanh(rho s), its stiffness and its
+    damping, (3,) each.
 
     c, K and rho are numbers, or vectors (3,).
     """
@@ -106,11 +137,13 @@ def slide(y, c, K, rho):
 
 @njit(error_model="numpy")
 def steer(y, v, stiffness, damping, memory):
-    """Return the force for the acceleration v of the position's error, and how far the body is off its attitude.
+    """Return the force for the acceleration v of the position's error, and how far the body is off
+    its attitude.
 
-    Arguments are vectors (3,). After the force come the quaternion from the wanted attitude to the body's, and two
-    angular velocities in the axes of the body: the body's relative to the wanted attitude, and that attitude's own. In
-    two slots the memory keeps the filtered e' and r'' of the sample before, and whether there was one.
+    Arguments are vectors (3,). After the force come the quaternion from the wanted attitude to the
+    body's, and two angular velocities in the axes of the body: the body's relative to the wanted
+    attitude, and that attitude's own. In two slots the memory keeps the filtered e' and r'' of the
+    sample before, and whether there was one.
     """
     m, F, dF = y.M[0, 0], np.zeros(3), np.zeros(3)
     if memory[0, 1] == 0.0:
@@ -119,7 +152,9 @@ def steer(y, v, stiffness, damping, memory):
         F[i] = m * (y.ddr[i] + v[i]) + y.h[i]
         change = BANDWIDTH * (y.de[i] - memory[i, 0]) / (1.0 + y.dt * BANDWIDTH)
         memory[i, 0] += y.dt * change
-        dF[i] = m * ((y.ddr[i] - memory[3 + i, 0]) / y.dt - stiffness[i] * y.de[i] - damping[i] * change)
+        dF[i] = m * (
+            (y.ddr[i] - memory[3 + i, 0]) / y.dt - stiffness[i] * y.de[i] - damping[i] * change
+        )
         memory[3 + i, 0] = y.ddr[i]
     wanted = of_thrust(F, y.r[3:])
     w = rate_of(wanted, F, dF, y.r[3:], y.dr[3:])
@@ -130,7 +165,8 @@ def steer(y, v, stiffness, damping, memory):
 
 @njit(error_model="numpy")
 def shorter(error, turning):
-    """Return 2 sgn(q0) qv of an error quaternion, and its rate at a relative angular velocity; sgn(0) = 1.
+    """Return 2 sgn(q0) qv of an error quaternion, and its rate at a relative angular velocity;
+    sgn(0) = 1.
 
     q and -q are the same attitude, and the sign is that of the shorter way.
     """
@@ -138,16 +174,19 @@ def shorter(error, turning):
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         angle[i] = 2.0 * sign * error[1 + i]
-        change[i] = sign * (error[0] * turning[i] + error[1 + j] * turning[k] - error[1 + k] * turning[j])
+        change[i] = sign * (
+            error[0] * turning[i] + error[1 + j] * turning[k] - error[1 + k] * turning[j]
+        )
     return angle, change
 
 
 @njit(error_model="numpy")
 def wrench(y, F, v, moving):
-    """Return a law's command, (6,): the share of F along the body's third axis, and the torque for the acceleration v.
+    """Return a law's command, (6,): the share of F along the body's third axis, and the torque for
+    the acceleration v.
 
-    The thrust is at least `LEAST` of the weight, also upside down. v, (3,), is the change of the angular velocity
-    relative to the wanted one, `moving`, in the axes of the body.
+    The thrust is at least `LEAST` of the weight, also upside down. v, (3,), is the change of the
+    angular velocity relative to the wanted one, `moving`, in the axes of the body.
     """
     u, w = np.zeros(6), (y.v[3], y.v[4], y.v[5])
     up, carried = turned(quaternion(y.x[3], y.x[4], y.x[5]), 0.0, 0.0, 1.0), _cross(w, moving)

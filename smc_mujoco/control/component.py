@@ -1,8 +1,11 @@
-"""Components: pure functions with named gains and a memory. Laws, surfaces and estimators are components.
+"""Components: pure functions with named gains and a memory.
 
-A `Template` is the function with its default gains. Called with gains it returns a `Component`, the plain data in a
-Scenario. The function is called as `function(y, gains, memory)` and reads y and gains by attribute. Each channel has
-its own memory, an array of floats that the function may change. It is zero at the start of a run.
+Laws, surfaces and estimators are components.
+
+A `Template` is the function with its default gains. Called with gains it returns a `Component`, the
+plain data in a Scenario. The function is called as `function(y, gains, memory)` and reads y and
+gains by attribute. Each channel has its own memory, an array of floats that the function may
+change. It is zero at the start of a run.
 """
 
 import dataclasses
@@ -33,7 +36,9 @@ AccuracyOrder = float | Callable[[SimpleNamespace], float]  # a number, or a fun
 class Rest(NamedTuple):
     """The linear part of a law that is linear near s = 0."""
 
-    linear: Callable[[SimpleNamespace], tuple[float, float]]  # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
+    linear: Callable[
+        [SimpleNamespace], tuple[float, float]
+    ]  # gains -> (lam, k1) of u = -lam (e' + k1 e), near s = 0
     force: Callable  # (gains, errors at rest, (k,)) -> the force towards 0 at each, (k,)
 
 
@@ -60,13 +65,24 @@ class Options(TypedDict, total=False):
     joint: bool
 
 
-OF_SURFACE = ("gains", "memory", "positive", "nonnegative", "relative_degree", "conditions", "label")
+OF_SURFACE = (
+    "gains",
+    "memory",
+    "positive",
+    "nonnegative",
+    "relative_degree",
+    "conditions",
+    "label",
+)
 OPTIONS = {  # kind of a component -> options of its decorator
     "law": tuple(Options.__optional_keys__),
     "surface": OF_SURFACE,
     "estimator": tuple(name for name in OF_SURFACE if name != "relative_degree"),
 }
-OPTION_KEYS = {"accuracy": ("s", "e"), "admits": ("d", "d'")}  # option that is a mapping -> its possible keys
+OPTION_KEYS = {
+    "accuracy": ("s", "e"),
+    "admits": ("d", "d'"),
+}  # option that is a mapping -> its possible keys
 
 
 class GainWarning(UserWarning):
@@ -81,21 +97,29 @@ class Component:
     name: str
     gains: Mapping[str, Any]  # name -> GainValue
     memory: int  # floats per channel
-    function: Callable | None  # None if a loaded trace names one that is not available, and if there is `each`
+    function: (
+        Callable | None
+    )  # None if a loaded trace names one that is not available, and if there is `each`
     relative_degree: int = 1
     plants: tuple[str, ...] = ()
     requires_model: bool = False
     joint: bool = False  # whether it is a law of many joints
     shared: tuple[str, ...] = ()  # gains that are one number for all joints in a law of many joints
     each: "tuple[Component, ...]" = ()  # the laws of the driven channels if they are different laws
-    template: "Template | None" = dataclasses.field(default=None, compare=False, repr=False)  # None if not available
-    source: Source = dataclasses.field(default=Source(), compare=False, repr=False)  # where the gains come from
+    template: "Template | None" = dataclasses.field(
+        default=None, compare=False, repr=False
+    )  # None if not available
+    source: Source = dataclasses.field(
+        default=Source(), compare=False, repr=False
+    )  # where the gains come from
 
     def __repr__(self) -> str:
         return f"{self.kind}({', '.join([repr(self.name), *(f'{k}={gain_text(v)}' for k, v in self.gains.items())])})"
 
     def __reduce__(self):
-        """Pickle the name that its template has in its module: that of the function before it was decorated."""
+        """Pickle the name that its template has in its module: that of the function before it was
+        decorated.
+        """
         name = getattr(self.function, "__module__", ""), getattr(self.function, "__qualname__", "?")
         template = _template_at(*name)
         if template is not None and template.function is self.function:
@@ -106,23 +130,34 @@ class Component:
         gains = {name: ANY_GAIN(f"{self.name}'s {name}", gain) for name, gain in self.gains.items()}
         object.__setattr__(self, "gains", frozen(gains))
         if self.source.gains != self.gains:  # the gains were replaced
-            object.__setattr__(self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains))
-        if self.template and (self.template.function is not self.function or self.template.name != self.name):
+            object.__setattr__(
+                self, "source", Source(kind=YOURS if gains else NONE, gains=self.gains)
+            )
+        if self.template and (
+            self.template.function is not self.function or self.template.name != self.name
+        ):
             object.__setattr__(self, "template", None)  # the function or the name was replaced
 
     def named(self, name: str) -> "Component":
-        """Return the same function and gains under another name, to compare two sets of gains of one law.
+        """Return the same function and gains under another name, to compare two sets of gains of
+        one law.
 
         Tables and figures show the name, and runs under different names are different runs.
         """
         errors.name(f"name of the {self.kind}", name)
-        template = self.template and dataclasses.replace(self.template, name=name, label="", short="", colour="")
+        template = self.template and dataclasses.replace(
+            self.template, name=name, label="", short="", colour=""
+        )
         return dataclasses.replace(self, name=name, template=template)
 
     def sourced(self, kind: str, search: Search | None = None) -> "Component":
-        """Return the same law with another source of its gains, one of `source.KINDS`; a law without gains has none."""
+        """Return the same law with another source of its gains, one of `source.KINDS`; a law
+        without gains has none.
+        """
         source = Source(kind=kind, gains=self.gains, search=search)
-        return dataclasses.replace(self, source=source) if self.gains else self
+        if self.gains:
+            return dataclasses.replace(self, source=source)
+        return self
 
     @property
     def uniform(self) -> bool:
@@ -135,8 +170,12 @@ class Component:
         return self.each or (self,)
 
     def on_computed_torque(self) -> "Component":
-        """Return a law of many joints with this law, of one channel, as the outer law of computed torque."""
-        return importlib.import_module("smc_mujoco.control.outer_law").on_computed_torque(self)  # which imports this
+        """Return a law of many joints with this law, of one channel, as the outer law of computed
+        torque.
+        """
+        return importlib.import_module("smc_mujoco.control.outer_law").on_computed_torque(
+            self
+        )  # which imports this
 
     def of_channel(self, i: int) -> "Component":
         """Return the component of channel i, with one number for each gain."""
@@ -151,7 +190,9 @@ class Component:
 
     def of_channels(self, n: int) -> "list[Component]":
         """Return one component for all n channels, or one for each if laws or gains differ."""
-        return [self] if self.joint or self.uniform else [self.of_channel(i) for i in range(n)]
+        if self.joint or self.uniform:
+            return [self]
+        return [self.of_channel(i) for i in range(n)]
 
     def __str__(self):
         return f"{self.name}({', '.join(f'{k}={gain_text(v)}' for k, v in self.gains.items())})"
@@ -159,7 +200,9 @@ class Component:
 
 def gain_text(value: GainValue) -> str:
     """Return a gain as text, such as 3 or (3, 4.5)."""
-    return f"({', '.join(f'{one:g}' for one in value)})" if isinstance(value, tuple) else f"{value:g}"
+    if isinstance(value, tuple):
+        return f"({', '.join(f'{one:g}' for one in value)})"
+    return f"{value:g}"
 
 
 def unit_cure(name: str, default: GainValue) -> str:
@@ -177,12 +220,16 @@ def _template_at(module: str, name: str) -> "Template | None":
     return value if isinstance(value, Template) else None
 
 
-def _unpickled(module: str, qualname: str, gains: dict[str, float], name: str, source: Source) -> Component:
+def _unpickled(
+    module: str, qualname: str, gains: dict[str, float], name: str, source: Source
+) -> Component:
     importlib.import_module(module)
     template = _template_at(module, qualname)
     assert template is not None
     component = dataclasses.replace(template.bind(gains), source=source)
-    return component.named(name) if name != component.name else component
+    if name != component.name:
+        return component.named(name)
+    return component
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -206,7 +253,9 @@ class Template:
     continuous: bool = False
     finite_time: str = ""
     accuracy: Mapping[str, AccuracyOrder] = dataclasses.field(default_factory=dict)
-    admits: Mapping[str, Callable[[SimpleNamespace], float]] = dataclasses.field(default_factory=dict)
+    admits: Mapping[str, Callable[[SimpleNamespace], float]] = dataclasses.field(
+        default_factory=dict
+    )
     joint: bool = False
 
     def __repr__(self) -> str:
@@ -223,24 +272,37 @@ class Template:
         """The docstring of the function, or of its module if both have the same name."""
         module = inspect.getmodule(self.function)
         same_name = module is not None and module.__name__.rsplit(".", 1)[-1] == self.name
-        return inspect.cleandoc((module.__doc__ if same_name and module else self.function.__doc__) or self.name)
+        return inspect.cleandoc(
+            (module.__doc__ if same_name and module else self.function.__doc__) or self.name
+        )
 
     def order(self, quantity: str, gains: Mapping[str, GainValue]) -> float | None:
-        """Return theory's order of accuracy of "s" or "e" with these gains; None if the law does not state it."""
+        """Return theory's order of accuracy of "s" or "e" with these gains; None if the law does
+        not state it.
+        """
         order = self.accuracy.get(quantity)
-        return min(map(order, _per_channel(gains))) if callable(order) else order
+        if callable(order):
+            return min(map(order, _per_channel(gains)))
+        return order
 
     def unmet(self, gains: Mapping[str, GainValue]) -> list[str]:
         """Return the conditions of the theorem that these gains violate, in words."""
         channels = list(_per_channel(gains))
-        return [words for words, test in self.conditions.items() if not all(_holds(test, g) for g in channels)]
+        return [
+            words
+            for words, test in self.conditions.items()
+            if not all(_holds(test, g) for g in channels)
+        ]
 
     def __call__(self, **gains: float | Sequence[float]) -> Component:
         """Return `bind(gains, warn=True)`."""
         return self.bind(gains, warn=True)
 
     def bind(self, gains: Mapping[str, float | Sequence[float]], warn: bool = False) -> Component:
-        """Bind the function to these gains and the defaults of others. Warn of gains that violate a condition."""
+        """Bind the function to these gains and the defaults of others.
+
+        Warn of gains that violate a condition.
+        """
         values: dict[str, GainValue] = {**self.defaults}
         for key, value in gains.items():
             if key not in values:
@@ -249,15 +311,32 @@ class Template:
             values[key] = gain.constraint(f"{self.name}'s {key}", value)
             if isinstance(values[key], tuple) and (gain.shared or self.kind != "law"):
                 text = gain_text(values[key])
-                raise ScenarioError(f"{self.name}'s {key} is {text}: give one number for all channels")
+                raise ScenarioError(
+                    f"{self.name}'s {key} is {text}: give one number for all channels"
+                )
         for words in self.unmet(values) if warn else ():
             text = ", ".join(f"{name} = {gain_text(value)}" for name, value in values.items())
-            warnings.warn(f"{self.kind} {self.name!r} asks for {words}, but {text}", GainWarning, users_stacklevel())
-        same = ("kind", "name", "memory", "function", "relative_degree", "plants", "requires_model", "joint")
+            warnings.warn(
+                f"{self.kind} {self.name!r} asks for {words}, but {text}",
+                GainWarning,
+                users_stacklevel(),
+            )
+        same = (
+            "kind",
+            "name",
+            "memory",
+            "function",
+            "relative_degree",
+            "plants",
+            "requires_model",
+            "joint",
+        )
         shared = tuple(name for name, gain in self.gains.items() if gain.shared)
         properties = {name: getattr(self, name) for name in same}
         component = Component(gains=values, shared=shared, template=self, **properties)
-        return component if gains else component.sourced(DEFAULT)
+        if gains:
+            return component
+        return component.sourced(DEFAULT)
 
 
 def _per_channel(gains: Mapping[str, GainValue]) -> Iterable[SimpleNamespace]:
@@ -272,17 +351,29 @@ def by_channel(laws: "Sequence[Component]") -> Component:
     first = laws[0]
     for i, law in enumerate(laws):
         if law.joint or not law.uniform:
-            fact = "of many joints" if law.joint else f"{law}, with gains by channel,"
-            raise ScenarioError(f"the law of channel {i} is {law.name!r}, {fact}: give it a law of one channel")
+            if law.joint:
+                fact = "of many joints"
+            else:
+                fact = f"{law}, with gains by channel,"
+            raise ScenarioError(
+                f"the law of channel {i} is {law.name!r}, {fact}: give it a law of one channel"
+            )
     source = combined([law.source for law in laws])
     if all(law.function is first.function and law.name == first.name for law in laws):
         by_name = {name: tuple(law.gains[name] for law in laws) for name in first.gains}
-        gains = {name: values if len(set(values)) > 1 else values[0] for name, values in by_name.items()}
+        gains = {}
+        for name, values in by_name.items():
+            if len(set(values)) > 1:
+                gains[name] = values
+            else:
+                gains[name] = values[0]
         return dataclasses.replace(first, gains=gains, source=source.with_gains(gains))
     component = Component(
         kind=first.kind,
         name=" + ".join(dict.fromkeys(law.name for law in laws)),
-        gains={f"{name}[{i}]": value for i, law in enumerate(laws) for name, value in law.gains.items()},
+        gains={
+            f"{name}[{i}]": value for i, law in enumerate(laws) for name, value in law.gains.items()
+        },
         memory=max(law.memory for law in laws),
         function=None,
         relative_degree=max(law.relative_degree for law in laws),
@@ -293,8 +384,13 @@ def by_channel(laws: "Sequence[Component]") -> Component:
 
 
 def gain_at(value: GainValue, i: int) -> float:
-    """Return a gain's value in channel i. A tuple that is too short, which a scenario refuses, gives its last value."""
-    return value[min(i, len(value) - 1)] if isinstance(value, tuple) else value
+    """Return a gain's value in channel i.
+
+    A tuple that is too short, which a scenario refuses, gives its last value.
+    """
+    if isinstance(value, tuple):
+        return value[min(i, len(value) - 1)]
+    return value
 
 
 def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace) -> bool:
@@ -306,30 +402,51 @@ def _holds(condition: Callable[[SimpleNamespace], bool], gains: SimpleNamespace)
 
 
 def as_gains(gains: object, known: Mapping[str, GainValue] = frozen({})) -> dict[str, Gain]:
-    """Return a decorator's gains, numbers or Gains, as Gains. They follow the known ones and can change these."""
+    """Return a decorator's gains, numbers or Gains, as Gains.
+
+    They follow the known ones and can change these.
+    """
     if not isinstance(gains, Mapping | None):
-        raise ScenarioError(f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}")
+        raise ScenarioError(
+            f"gains is {shown(gains)}: give names with their defaults, such as {{'k1': 3.0}}"
+        )
     checked: dict[str, Gain] = {}
     for key, value in {**known, **(gains or {})}.items():
-        if not isinstance(key, str) or not key.isidentifier() or key.startswith("_") or keyword.iskeyword(key):
-            raise ScenarioError(f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'")
-        gain = value if isinstance(value, Gain) else Gain(value)
+        if (
+            not isinstance(key, str)
+            or not key.isidentifier()
+            or key.startswith("_")
+            or keyword.iskeyword(key)
+        ):
+            raise ScenarioError(
+                f"gain {shown(key)} cannot be written as gains.name: call it something like 'k1'"
+            )
+        if isinstance(value, Gain):
+            gain = value
+        else:
+            gain = Gain(value)
         default = ANY_GAIN(f"default of gain {key}", gain.default)
         checked[key] = dataclasses.replace(gain, default=default)
     for key, gain in checked.items():
         if not (gain.unit is None or isinstance(gain.unit, Unit) or callable(gain.unit)):
-            raise ScenarioError(f"unit of gain {key} is {shown(gain.unit)}: {unit_cure(key, gain.default)}")
+            raise ScenarioError(
+                f"unit of gain {key} is {shown(gain.unit)}: {unit_cure(key, gain.default)}"
+            )
         if gain.over is not None and gain.over not in checked:
             raise unknown(f"gain that {key} is divided by", gain.over, checked)
     return checked
 
 
-def decorated(kind: str, function: Callable | None, options: Mapping) -> "Callable[[Callable], Template] | Template":
+def decorated(
+    kind: str, function: Callable | None, options: Mapping
+) -> "Callable[[Callable], Template] | Template":
     """Return the Template of a function, or its decorator if the function is None."""
     if foreign := options.keys() - OPTIONS[kind]:
         raise unknown(f"option of {kind}_function", min(foreign), OPTIONS[kind])
     decorate = template_decorator(kind, **options)
-    return decorate if function is None else decorate(function)
+    if function is None:
+        return decorate
+    return decorate(function)
 
 
 @constrained
@@ -351,19 +468,25 @@ def template_decorator(
     for option, keys in OPTION_KEYS.items():
         if not isinstance(value := options.get(option, {}), Mapping) or not value.keys() <= {*keys}:
             names = " and ".join(map(repr, keys))
-            raise ScenarioError(f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}")
+            raise ScenarioError(
+                f"{option} is {shown(value)}: give numbers, or functions of the gains, for {names}"
+            )
     if not re.fullmatch("(#[0-9a-fA-F]{6})?", str(options.get("colour", ""))):
         raise ScenarioError(f"colour is {shown(options['colour'])}: give one like '#0072B2'")
     if options.get("finite_time", "") not in FINITE_TIME:
         raise ScenarioError(f"finite_time is {shown(options['finite_time'])}: give 's', 'e' or ''")
     for sign, names in (("positive", positive), ("nonnegative", nonnegative)):
         for name in names:
-            checked[name] = dataclasses.replace(find(f"gain that is {sign}", name, checked), **{sign: True})
+            checked[name] = dataclasses.replace(
+                find(f"gain that is {sign}", name, checked), **{sign: True}
+            )
 
     def decorate(function: Callable) -> Template:
         if not callable(function):
             raise ScenarioError(f"{kind} is {shown(function)}: give a function (y, gains, memory)")
-        name = errors.name(f"name of the {kind}", getattr(function, "__name__", type(function).__name__))
+        name = errors.name(
+            f"name of the {kind}", getattr(function, "__name__", type(function).__name__)
+        )
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None, None, None)
         except (TypeError, ValueError) as error:  # ValueError: a builtin without a signature

@@ -11,7 +11,8 @@ from smc_mujoco.control.law import Law, law
 from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 
-DIFFERENCE_STEP = 1e-6  # rad or m, and per second, of central differences: about the cube root of the rounding error
+# rad or m, and per second, of central differences: about the cube root of the rounding error
+DIFFERENCE_STEP = 1e-6
 
 
 def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
@@ -39,21 +40,28 @@ def linearised(plant: Plant, law: str) -> tuple[float, float, float]:
 
 
 def at_plant(law: Law, plant: Plant) -> Law:
-    """Return a law with the values of `linearised` for those of its gains a1, a2 and b that were not given."""
+    """Return a law with the values of `linearised` for those of its gains a1, a2 and b that were
+    not given.
+    """
     if law.each:
         return dataclasses.replace(law, each=tuple(at_plant(one, plant) for one in law.each))
     known = law.template.gains if law.template else {}
-    missing = {name: known[name].plant for name, value in law.gains.items()
-               if name in known and known[name].plant and value == math.inf}  # fmt: skip
+    missing = {}
+    for name, value in law.gains.items():
+        if name in known and known[name].plant and value == math.inf:
+            missing[name] = known[name].plant
     if not missing:
         return law
     values, order = linearised(plant, law.name), ("a1", "a2", "b")
-    gains = dict(law.gains) | {name: values[order.index(of_plant)] for name, of_plant in missing.items()}
+    gains = dict(law.gains) | {
+        name: values[order.index(of_plant)] for name, of_plant in missing.items()
+    }
     return dataclasses.replace(law, gains=gains).sourced(law.source.kind, law.source.search)
 
 
 def lqr(plant: Plant | str, q: tuple[float, float] = (100.0, 16.0), r: float = 1.0) -> Law:
-    """Return the law `lqr` for a plant at the origin, which minimises the integral of q[0] e^2 + q[1] de^2 + r u^2.
+    """Return the law `lqr` for a plant at the origin, which minimises the integral of q[0] e^2 +
+    q[1] de^2 + r u^2.
 
     Args:
       plant: a Plant or the name of one.

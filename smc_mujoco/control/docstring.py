@@ -14,7 +14,9 @@ DISCRETE = re.compile(r"\b(explicit|implicit|discreti[sz]|Euler|bilinear|sampled
 
 
 class Entry(NamedTuple):
-    """The parts of a docstring: name in words, formula, what the gains are, discretisation, other sentences, source."""
+    """The parts of a docstring: name in words, formula, what the gains are, discretisation, other
+    sentences, source.
+    """
 
     title: str
     formula: str
@@ -32,7 +34,11 @@ def entry(template: Template) -> Entry:
     if head.endswith(":") and paragraphs:
         head += " " + paragraphs.pop(0)
     title, colon, formula = head.removesuffix(".").partition(": ")
-    sentences = [s for p in (*more, *paragraphs) for s in SENTENCE.split(p) if s]
+    sentences = []
+    for p in (*more, *paragraphs):
+        for s in SENTENCE.split(p):
+            if s:
+                sentences.append(s)
     gains = [s for s in sentences if s.startswith("Gains: ")]
     sentences = [s for s in sentences if s not in gains]
     discrete = [s for s in sentences if DISCRETE.search(s)]

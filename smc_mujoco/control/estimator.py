@@ -1,4 +1,6 @@
-"""Velocity estimators: pure functions (y, gains, memory) -> velocity, or -> (velocity, acceleration)."""
+"""Velocity estimators: pure functions (y, gains, memory) -> velocity, or -> (velocity,
+acceleration).
+"""
 
 import functools
 from collections.abc import Callable
@@ -26,7 +28,8 @@ def estimator_function(**options: Unpack[Options]) -> Callable[[Callable[..., An
 def estimator_function(
     function: Callable[..., Any] | None = None, /, **options: Unpack[Options]
 ) -> Callable[[Callable[..., Any]], Template] | Template:
-    """Turn a function (y, gains, memory) -> velocity, or -> (velocity, acceleration), into an estimator.
+    """Turn a function (y, gains, memory) -> velocity, or -> (velocity, acceleration), into an
+    estimator.
 
     Arguments as of `law_function`: gains, memory, positive, nonnegative, conditions and label.
     """
@@ -37,10 +40,16 @@ def estimator_function(
 def catalogue() -> Catalogue[Template]:
     """Return every estimator of smc_mujoco.control.estimators and of other packages, by name."""
     return catalogue_of(
-        "smc_mujoco.control.estimators", Template, "smc_mujoco.estimators", lambda one: one.kind == "estimator"
+        "smc_mujoco.control.estimators",
+        Template,
+        "smc_mujoco.estimators",
+        lambda one: one.kind == "estimator",
     )
 
 
 def estimator(name: str, **gains: float) -> Estimator:
-    """Return the estimator `name` with these gains. An unknown name or a gain out of range is a ScenarioError."""
+    """Return the estimator `name` with these gains.
+
+    An unknown name or a gain out of range is a ScenarioError.
+    """
     return find("velocity estimator", name, catalogue()).bind(gains, warn=True)

@@ -4,9 +4,9 @@
     smc.law("my_law.py", lam=5)  # a law made by @smc.law_function
     smc.law("slow: classical(k=2, c=3)")
 
-Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a file, too. A text
-is parsed and never evaluated, but the code of a file is run. So data that others wrote is restored by serialise.py,
-which runs no files.
+Files are Python (.py), tunings (.json), C (.c, .so) and FMUs (.fmu). Gains in brackets may follow a
+file, too. A text is parsed and never evaluated, but the code of a file is run. So data that others
+wrote is restored by serialise.py, which runs no files.
 """
 
 import ast
@@ -25,24 +25,34 @@ from smc_mujoco.control import serialise
 from smc_mujoco.control.component import Component, GainValue, Template
 from smc_mujoco.control.law import Law, known_laws
 
-NAME_AND_GAINS = re.compile(r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL)  # pid(kp=50, ki=1)
-LABELLED = re.compile(r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL)  # slow: pid(kp=50)
+NAME_AND_GAINS = re.compile(
+    r"(?P<head>[^()]+?)\s*(?:\((?P<gains>.*)\))?", re.DOTALL
+)  # pid(kp=50, ki=1)
+LABELLED = re.compile(
+    r"(?P<label>[^:()]+):\s*(?P<rest>.+(?:\(.*\)|\.\w+)\s*)", re.DOTALL
+)  # slow: pid(kp=50)
 
 
 def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
-    """Return a law from a text, with these gains. `smc.law(...).named("slow")` gives it another name.
+    """Return a law from a text, with these gains.
+
+    `smc.law(...).named("slow")` gives it another name.
 
     Args:
-      text: the name of a law of the library, such as "pid"; a name with gains, such as "pid(kp=50, ki=1)"; or a file
-        with one law: FILE.json that `smc-mujoco tune` wrote, FILE.py, FILE.c or FILE.fmu. Or your own law itself.
+      text: the name of a law of the library, such as "pid"; a name with gains, such as "pid(kp=50,
+        ki=1)"; or a file with one law: FILE.json that `smc-mujoco tune` wrote, FILE.py, FILE.c or
+        FILE.fmu. Or your own law itself.
       gains: one number for all channels, or a sequence with one for each driven channel.
 
     Raises:
-      ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with several.
+      ScenarioError: an unknown law or gain, a gain out of range, or a file without a law or with
+        several.
     """
     if isinstance(text, Law | Template) and text.kind == "law":
         return _with_gains(text() if isinstance(text, Template) else text, gains)
-    first, *others = (known_laws()[item]() if isinstance(item, str) else item for item in laws(text))
+    first, *others = (
+        known_laws()[item]() if isinstance(item, str) else item for item in laws(text)
+    )
     if others:
         names = ", ".join(law.name for law in (first, *others))
         raise ScenarioError(f"{text} has several laws, {names}: give a file with one")
@@ -50,7 +60,10 @@ def law(text: str | Law | Template, **gains: float | Sequence[float]) -> Law:
 
 
 def laws(text: object) -> list[str | Law]:
-    """Return the laws of a text. The name of a law of the library stays a name, which sets of gains need."""
+    """Return the laws of a text.
+
+    The name of a law of the library stays a name, which sets of gains need.
+    """
     if not isinstance(text, str) or text in known_laws():
         find("law", text, known_laws())
         return [str(text)]
@@ -66,7 +79,10 @@ def laws(text: object) -> list[str | Law]:
 
 
 def component(kind: str, text: str, known: Mapping[str, Template], example: str) -> Component:
-    """Return a component of a catalogue from its name, with gains in brackets or without. Errors give the example."""
+    """Return a component of a catalogue from its name, with gains in brackets or without.
+
+    Errors give the example.
+    """
     head, gains = _parts(kind, text, example)
     return find(kind, head, known).bind(gains, warn=True)
 
@@ -80,9 +96,15 @@ def _parts(kind: str, text: str, example: str) -> tuple[str, dict[str, GainValue
             raise ValueError
         gains: dict[str, GainValue] = {}
         for word in call.keywords:
-            several = word.value.elts if isinstance(word.value, ast.Tuple | ast.List) else None
+            if isinstance(word.value, ast.Tuple | ast.List):
+                several = word.value.elts
+            else:
+                several = None
             values = tuple(float(ast.unparse(one)) for one in several or [word.value])
-            gains[str(word.arg)] = values[0] if several is None else values
+            if several is None:
+                gains[str(word.arg)] = values[0]
+            else:
+                gains[str(word.arg)] = values
         return matched["head"], gains
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ScenarioError(f"{kind} {shown(text)} cannot be read: write it as {example}") from None
@@ -98,12 +120,24 @@ def _with_gains(law: Law, gains: Mapping[str, float | Sequence[float]]) -> Law:
 
 
 def _of_python(path: str) -> list[Law]:
-    """Return the laws of a Python file: of @smc.law_function, with their default gains, and of smc.law_from."""
+    """Return the laws of a Python file: of @smc.law_function, with their default gains, and of
+    smc.law_from.
+    """
     values = execute(Path(path)).values()
-    templates = {value.name: value for value in values if isinstance(value, Template) and value.kind == "law"}
-    bound = {value.name: value for value in values if isinstance(value, Law) and value.kind == "law"}
-    made = {template.function for template in (*templates.values(), *known_laws().values())}  # not again where bound
-    laws = [template() for name, template in templates.items() if template is not known_laws().get(name)]
+    templates = {
+        value.name: value for value in values if isinstance(value, Template) and value.kind == "law"
+    }
+    bound = {}
+    for value in values:
+        if isinstance(value, Law) and value.kind == "law":
+            bound[value.name] = value
+    made = {
+        template.function for template in (*templates.values(), *known_laws().values())
+    }  # not again where bound
+    laws = []
+    for name, template in templates.items():
+        if template is not known_laws().get(name):
+            laws.append(template())
     laws += [law for law in bound.values() if not made & {part.function for part in law.parts}]
     if not laws:
         raise ScenarioError(
@@ -114,12 +148,16 @@ def _of_python(path: str) -> list[Law]:
 
 def _of_tuning(path: str) -> list[Law]:
     """Return the law of a tuning, with its search as the source of the gains."""
-    with reading(path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote") as file:
+    with reading(
+        path, "tuning", "give a .json file that smc-mujoco tune or Tuned.save wrote"
+    ) as file:
         scenario = read_json(file)["scenario"]
         law = serialise.law(scenario["law"], scenario["source"])
     if law.function is None:
         gains = ", ".join(f"{name}={value!r}" for name, value in law.gains.items())
-        raise ScenarioError(f"law {law.name} of {path} is your own: give its file with its gains, as FILE.py({gains})")
+        raise ScenarioError(
+            f"law {law.name} of {path} is your own: give its file with its gains, as FILE.py({gains})"
+        )
     return [law]
 
 
@@ -144,7 +182,10 @@ def _reader(text: str) -> Callable[[str], list[Any]] | None:
 
 
 def parsed_gains(text: str, what: str) -> dict[str, Any]:
-    """Return the gains in a text such as "lam=6,k1=3 5", where k1 is 3 and 5 for two joints. Errors call it `what`."""
+    """Return the gains in a text such as "lam=6,k1=3 5", where k1 is 3 and 5 for two joints.
+
+    Errors call it `what`.
+    """
     parsed: dict[str, GainValue] = {}
     for part in filter(None, (p.strip() for p in text.split(","))):
         name, _, value = (word.strip() for word in part.partition("="))
@@ -153,6 +194,11 @@ def parsed_gains(text: str, what: str) -> dict[str, Any]:
         except ValueError:
             values = ()
         if not values or not name.isidentifier() or name in parsed or any(map(math.isnan, values)):
-            raise ScenarioError(f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3")
-        parsed[name] = values[0] if len(values) == 1 else values
+            raise ScenarioError(
+                f"{what} is {shown(text)}: give names and numbers, each once, such as lam=6,k1=3"
+            )
+        if len(values) == 1:
+            parsed[name] = values[0]
+        else:
+            parsed[name] = values
     return parsed

@@ -3,10 +3,12 @@
     law("duffing", "classical")                # tuned by the rule of `tuning`, with a cost of the variation of u
     law("duffing", "classical", "study")       # as first chosen
 
-- study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the light of results.
-- tuned: the gains that independent searches by `tuning` found, for every general law, with a cost of the variation of
-  u. The runs of a study use their sets in turn, run i that of search i, so that gains are part of the sample. The laws
-  of COMPARED have twelve searches, all others three, too few for a verdict.
+- study: a first tuning of the paper's laws to the same bound |u| <= 6. It is never changed in the
+  light of results.
+- tuned: the gains that independent searches by `tuning` found, for every general law, with a cost
+  of the variation of u. The runs of a study use their sets in turn, run i that of search i, so that
+  gains are part of the sample. The laws of COMPARED have twelve searches, all others three, too few
+  for a verdict.
 - tracking: the same for the laws of LAWS, of three searches, without that cost.
 - default: the default gains of the law.
 
@@ -35,20 +37,34 @@ SETS = ("study", "tuned", "tracking")
 KNOWN_SETS: Mapping[str, None] = dict.fromkeys((*SETS, "default"))
 NameOfSet = Annotated[str, OneOf(names=(*KNOWN_SETS,))]
 OBJECTIVES = {"tuned": "balanced", "tracking": "tracking"}  # set -> objective of its tuning
-# The laws on the report's first page, which are compared where none are named: the four of the paper, two more of its
-# first study, and the first law of each other family in the table of docs/catalogue.md, which was written before any
-# tuning; then laws without a sliding mode that want to win, written for that after the others were tuned.
+# The laws on the report's first page, which are compared where none are named: the four of the
+# paper, two more of its first study, and the first law of each other family in the table of
+# docs/catalogue.md, which was written before any tuning; then laws without a sliding mode that want
+# to win, written for that after the others were tuned.
 LAWS = (
-    "observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting",
-    "implicit_first_order", "twisting", "terminal", "extended_state", "pid",
-)  # fmt: skip
+    "observer_free",
+    "classical",
+    "boundary_layer",
+    "adaptive",
+    "super_twisting",
+    "conditioned_super_twisting",
+    "implicit_first_order",
+    "twisting",
+    "terminal",
+    "extended_state",
+    "pid",
+)
 RIVALS = ("adrc", "pd_observer", "lqi", "mpc", "loop_shaping")
 COMPARED = (*LAWS, *RIVALS)
 
 # Other implementation or name of a law -> the law whose gains it uses.
-ALIASES = {f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")}
+ALIASES = {
+    f"observer_free_{form}": "observer_free" for form in ("q15", "single", "table", "taylor")
+}
 ALIASES["super_twisting_unclamped"] = "super_twisting"
-ALIASES["proper_conditioned_super_twisting"] = "proper_super_twisting"  # the same law while u is not saturated
+ALIASES["proper_conditioned_super_twisting"] = (
+    "proper_super_twisting"  # the same law while u is not saturated
+)
 STUDY_ALIASES = ALIASES | {"conditioned_super_twisting": "super_twisting"}  # in the set "study"
 
 
@@ -57,15 +73,20 @@ def file_of(gains: str) -> Path:
     return Path(__file__).parent / "tuned_gains" / f"{gains}.json"
 
 
-# The set "study": plant -> law -> gains. Super-twisting was tuned with w_max = u_max, and runs with it.
+# The set "study": plant -> law -> gains. Super-twisting was tuned with w_max = u_max, and runs with
+# it.
 STUDY: dict[str, dict[str, dict[str, float]]] = read_json(file_of("study"))
 
 
 @constrained
-def law(plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | None = None) -> Component:
-    """Return the law with its gains for a plant, from a set, without warnings of conditions that they violate.
+def law(
+    plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | None = None
+) -> Component:
+    """Return the law with its gains for a plant, from a set, without warnings of conditions that
+    they violate.
 
-    With a seed, the gains are those of search `seed` modulo their number; without, those of the least J of all.
+    With a seed, the gains are those of search `seed` modulo their number; without, those of the
+    least J of all.
     """
     base = find_law(name)
     if gains == "default":
@@ -76,26 +97,41 @@ def law(plant: str | Plant, name: str, gains: NameOfSet = "tuned", seed: int | N
         values = find("law of the paper's study", STUDY_ALIASES.get(name, name), of_plant)
     else:
         shipped = tuned(plant, name, gains)
-        values = shipped.best if seed is None else shipped.sets[seed % len(shipped.sets)]
+        if seed is None:
+            values = shipped.best
+        else:
+            values = shipped.sets[seed % len(shipped.sets)]
         search = shipped.search
-    law = dataclasses.replace(base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()})
+    law = dataclasses.replace(
+        base, gains={gain: values.get(gain, value) for gain, value in base.gains.items()}
+    )
     return law.sourced(source.SHIPPED if search else source.STUDY, search)
 
 
 def general() -> tuple[str, ...]:
-    """List every law that can be compared on some plant: those of COMPARED, then all others by name."""
-    others = {name for name, template in catalogue().items() if not template.plants} - {"none", *ALIASES, *COMPARED}
+    """List every law that can be compared on some plant: those of COMPARED, then all others by
+    name.
+    """
+    others = {name for name, template in catalogue().items() if not template.plants} - {
+        "none",
+        *ALIASES,
+        *COMPARED,
+    }
     return *COMPARED, *sorted(others)
 
 
 @constrained
 def general_laws(plants: Sequence[str | Plant], gains: NameOfSet) -> list[str]:
-    """List the general laws that have gains in a set on each of these plants, those of COMPARED first."""
+    """List the general laws that have gains in a set on each of these plants, those of COMPARED
+    first.
+    """
     named = [as_plant(plant) for plant in plants]
     if names := [name for name in general() if all(in_set(plant, name, gains) for plant in named)]:
         return names
     together = ", ".join(plant.name for plant in named)
-    raise ScenarioError(f"gains is {gains!r}, and no general law has such gains on {together}: give 'default'")
+    raise ScenarioError(
+        f"gains is {gains!r}, and no general law has such gains on {together}: give 'default'"
+    )
 
 
 def in_set(plant: Plant, name: str, gains: str) -> bool:
@@ -112,13 +148,23 @@ class TunedGains:
     """The gains of a law on a plant, and the searches that found them."""
 
     sets: tuple[Mapping[str, float], ...]  # each name -> value; of each search, in order
-    objectives: tuple[float, ...]  # J of each, s^2, see `analysis.tuning.objective`; each search has its own runs
+    objectives: tuple[
+        float, ...
+    ]  # J of each, s^2, see `analysis.tuning.objective`; each search has its own runs
     evaluations: int  # number of sets of gains that the searches evaluated
     seed: int
-    at_bound: Mapping[str, str]  # gain -> "lower" or "upper", for those of the best gains at a bound of the search
-    near: Mapping[str, tuple[float, float]]  # gain -> its range in sets within 3 % of their search's best
-    front: tuple[tuple[float, float], ...]  # tracking in s^2 and variation in 1/s, Pareto front of the first search
-    first: tuple[float, float]  # tracking and variation of the first search's best gains, which are on the front
+    at_bound: Mapping[
+        str, str
+    ]  # gain -> "lower" or "upper", for those of the best gains at a bound of the search
+    near: Mapping[
+        str, tuple[float, float]
+    ]  # gain -> its range in sets within 3 % of their search's best
+    front: tuple[
+        tuple[float, float], ...
+    ]  # tracking in s^2 and variation in 1/s, Pareto front of the first search
+    first: tuple[
+        float, float
+    ]  # tracking and variation of the first search's best gains, which are on the front
     rule: str  # the search, in words
     versions: Mapping[str, str]  # of the packages that the numbers depend on
 
@@ -137,7 +183,9 @@ class TunedGains:
         """The searches: their rule, number and evaluations, and how far their J differ."""
         spread = max(self.objectives) / self.objective - 1.0
         count = len(self.sets)
-        return source.Search(rule=self.rule, evaluations=self.evaluations, searches=count, spread=spread)
+        return source.Search(
+            rule=self.rule, evaluations=self.evaluations, searches=count, spread=spread
+        )
 
 
 def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
@@ -155,7 +203,10 @@ def tuned(plant: str | Plant, name: str, gains: str = "tuned") -> TunedGains:
 
 
 def paper_plant(plant: object) -> str:
-    """Return the plant if it is the name of one of the paper's plants. Raise ScenarioError otherwise."""
+    """Return the plant if it is the name of one of the paper's plants.
+
+    Raise ScenarioError otherwise.
+    """
     if isinstance(plant, str) and (plant in STUDY or plant not in plants_known()):
         find("plant of the paper's study", plant, STUDY)
         return plant
@@ -166,9 +217,11 @@ def paper_plant(plant: object) -> str:
 
 
 def _stored(plant: str, name: str, gains: str) -> TunedGains | None:
-    """Return a law's gains on a plant, from this package or that of the law or the plant; None if there are none.
+    """Return a law's gains on a plant, from this package or that of the law or the plant; None if
+    there are none.
 
-    Other packages have files that `smc.tune` wrote, tuned_gains/SET/PLANT-LAW.json beside their code.
+    Other packages have files that `smc.tune` wrote, tuned_gains/SET/PLANT-LAW.json beside their
+    code.
     """
     if (stored := _package_gains(gains).get((plant, name))) is not None:
         return stored

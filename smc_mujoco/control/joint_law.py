@@ -1,16 +1,19 @@
-"""Laws of many joints: functions of the measurement of all channels, which return a command for each channel.
+"""Laws of many joints: functions of the measurement of all channels, which return a command for
+each channel.
 
     @law_function(joint=True, gains={"lam": 6.0, "k1": 3.0})
     def my_law(y, gains, memory):
         s = y.de + gains.k1 * y.e                     # vectors (n,), one number for each channel
         return -gains.lam * saturate(s), s
 
-The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' + h(x, v) = u + d. A
-law of one channel sees x'' = f + g u instead. M and h come from MuJoCo's own functions for your own models,
-`double_pendulum`, `panda` and `quadrotor`. The other plants have one equation per channel, so their M is diagonal.
+The law runs once per control sample. It sees the nominal model of the whole mechanism, M(x) x'' +
+h(x, v) = u + d. A law of one channel sees x'' = f + g u instead. M and h come from MuJoCo's own
+functions for your own models, `double_pendulum`, `panda` and `quadrotor`. The other plants have one
+equation per channel, so their M is diagonal.
 
-A gain is a vector (n,), unless its `Gain` is shared. The memory is an array (n, slots). The measurement's arrays are
-copies, which a law may overwrite. A law without the model (`y.model == 0.0`) sees M = 1 and h = g = 0.
+A gain is a vector (n,), unless its `Gain` is shared. The memory is an array (n, slots). The
+measurement's arrays are copies, which a law may overwrite. A law without the model (`y.model ==
+0.0`) sees M = 1 and h = g = 0.
 """
 
 # pyright: reportCallIssue=false
@@ -29,7 +32,10 @@ from smc_mujoco.control.component import Template
 
 
 class JointMeasurement(NamedTuple):
-    """The inputs of a law of many joints: all channels at a sample, in SI units. Vectors are (n,)."""
+    """The inputs of a law of many joints: all channels at a sample, in SI units.
+
+    Vectors are (n,).
+    """
 
     t: float  # time of the sample
     dt: float  # control period
@@ -49,11 +55,13 @@ class JointMeasurement(NamedTuple):
     g: np.ndarray  # h(x, 0), the forces at rest: gravity and springs
 
 
-ARRAYS = JointMeasurement._fields[4:]  # the vectors, M, h and g, in the order in which they are stored
+ARRAYS = JointMeasurement._fields[
+    4:
+]  # the vectors, M, h and g, in the order in which they are stored
 # What is stored before the arrays. `dynamics` is 0, or the address of a HANDLE.
 HEAD = floats(("t", "dt", "model", "dynamics", "n"))
-# The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of their parameters, and
-# the force per unit of u.
+# The nominal mechanism: addresses of the functions for C(x, v) w and the tip's Jacobian, and of
+# their parameters, and the force per unit of u.
 HANDLE = floats(("coriolis", "jacobian", "parameters", "unit"))
 head_at, handle_at, HEAD_BYTES = record_at(HEAD), record_at(HANDLE), HEAD.itemsize
 
@@ -65,7 +73,9 @@ def stored_dtype(n: int) -> np.dtype:
 
 
 def measurement_of(stored: np.void, dynamics: Any) -> JointMeasurement:
-    """Return the measurement in a record of `stored_dtype`; `dynamics` has the methods `coriolis` and `jacobian`."""
+    """Return the measurement in a record of `stored_dtype`; `dynamics` has the methods `coriolis`
+    and `jacobian`.
+    """
     t, dt, model = (float(stored[name]) for name in ("t", "dt", "model"))
     return JointMeasurement(t, dt, model, dynamics, *(stored[name] for name in ARRAYS))
 
@@ -93,14 +103,18 @@ def measurement_at(address):
     M = _array_after(limit, (n, n))
     h = _array_after(M, (n,))
     g = _array_after(h, (n,))
-    return JointMeasurement(head.t, head.dt, head.model, int(head.dynamics), x, v, e, de, r, dr, ddr, a, limit, M, h, g)
+    return JointMeasurement(
+        head.t, head.dt, head.model, int(head.dynamics), x, v, e, de, r, dr, ddr, a, limit, M, h, g
+    )
 
 
 def coriolis(y, w):
-    """Return C(x, v) w, (n,), for a vector w (n,). C is made of Christoffel symbols, so M' - 2 C is skew-symmetric.
+    """Return C(x, v) w, (n,), for a vector w (n,).
 
-    c(x, v) = C(x, v) v is part of y.h. The product follows from c alone: C(x, v) w = (c(x, v + w) - c(x, v - w)) / 4.
-    It is 0 without the model, and for plants with one equation per channel.
+    C is made of Christoffel symbols, so M' - 2 C is skew-symmetric.
+
+    c(x, v) = C(x, v) v is part of y.h. The product follows from c alone: C(x, v) w = (c(x, v + w) -
+    c(x, v - w)) / 4. It is 0 without the model, and for plants with one equation per channel.
     """
     return y.dynamics.coriolis(np.asarray(w, float))
 
@@ -116,7 +130,13 @@ def _coriolis(y, w):
             vector[i] = w[i]
         if y.dynamics != 0:
             handle = handle_at(y.dynamics, 0)
-            call(int(handle.coriolis), vector.ctypes.data, int(handle.parameters), 0, forces.ctypes.data)
+            call(
+                int(handle.coriolis),
+                vector.ctypes.data,
+                int(handle.parameters),
+                0,
+                forces.ctypes.data,
+            )
             for i in range(n):
                 forces[i] /= handle.unit
         return forces
@@ -125,9 +145,11 @@ def _coriolis(y, w):
 
 
 def jacobian(y):
-    """Return the nominal Jacobian J of the plant's tip, (3, n); ValueError without a model or a tip.
+    """Return the nominal Jacobian J of the plant's tip, (3, n); ValueError without a model or a
+    tip.
 
-    J v is the tip's velocity, m/s. J' F is the generalised force of a force F, N, that acts on the tip.
+    J v is the tip's velocity, m/s. J' F is the generalised force of a force F, N, that acts on the
+    tip.
     """
     return y.dynamics.jacobian()
 
@@ -158,7 +180,10 @@ def product(M, w):
 
 @njit
 def inner(a, b):
-    """Return the sum of a_i b_i, added in the same order in Python and compiled. `a @ b` does not promise that."""
+    """Return the sum of a_i b_i, added in the same order in Python and compiled.
+
+    `a @ b` does not promise that.
+    """
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -167,7 +192,10 @@ def inner(a, b):
 
 @njit
 def solve(M, b):
-    """Return M^-1 b for a positive definite M, by Cholesky's factors. The bits are the same in Python and compiled."""
+    """Return M^-1 b for a positive definite M, by Cholesky's factors.
+
+    The bits are the same in Python and compiled.
+    """
     n = len(b)
     L, x = np.zeros((n, n)), b.copy()
     for i in range(n):
@@ -175,7 +203,10 @@ def solve(M, b):
             rest = M[i, j]
             for k in range(j):
                 rest -= L[i, k] * L[j, k]
-            L[i, j] = math.sqrt(rest) if i == j else rest / L[j, j]
+            if i == j:
+                L[i, j] = math.sqrt(rest)
+            else:
+                L[i, j] = rest / L[j, j]
         for k in range(i):
             x[i] -= L[i, k] * x[k]
         x[i] /= L[i, i]
@@ -188,7 +219,10 @@ def solve(M, b):
 
 @njit
 def torque(y, v):
-    """Return the u for the accelerations v of the errors: M (v + r'') + h with the model, v without."""
+    """Return the u for the accelerations v of the errors:
+
+    M (v + r'') + h with the model, v without.
+    """
     if y.model == 0.0:
         return v
     return product(y.M, v + y.ddr) + y.h
@@ -202,7 +236,10 @@ def saturate(a):
 
 @njit
 def tanh(a):
-    """Return the hyperbolic tangents of a vector. The bits are the same in Python and compiled, unlike numpy's."""
+    """Return the hyperbolic tangents of a vector.
+
+    The bits are the same in Python and compiled, unlike numpy's.
+    """
     values = np.zeros(len(a))
     for i in range(len(a)):
         values[i] = math.tanh(a[i])
@@ -219,5 +256,8 @@ def norm(a):
 def catalogue() -> Catalogue[Template]:
     """Return every law of smc_mujoco.control.joint_laws and of other packages, by name."""
     return catalogue_of(
-        "smc_mujoco.control.joint_laws", Template, "smc_mujoco.joint_laws", lambda law: law.kind == "law" and law.joint
+        "smc_mujoco.control.joint_laws",
+        Template,
+        "smc_mujoco.joint_laws",
+        lambda law: law.kind == "law" and law.joint,
     )

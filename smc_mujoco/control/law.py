@@ -5,12 +5,13 @@
         s = y.de + gains.k1 * y.e
         return -gains.lam * math.tanh(s), s        # commanded control before saturation, sliding variable
 
-The law runs once per control sample. Its u is clipped to +-limit and stays until the next sample. A law knows nothing
-of the simulator, and nothing of the plant except the nominal f and g in its measurement.
+The law runs once per control sample. Its u is clipped to +-limit and stays until the next sample. A
+law knows nothing of the simulator, and nothing of the plant except the nominal f and g in its
+measurement.
 
-The laws of this library compute a desired acceleration v of the error. `sliding` returns the sliding variable and the
-acceleration that keeps it constant. `command` converts v to u: with the nominal model if the scenario gives it to the
-law, otherwise with f = 0 and g = 1.
+The laws of this library compute a desired acceleration v of the error. `sliding` returns the
+sliding variable and the acceleration that keeps it constant. `command` converts v to u: with the
+nominal model if the scenario gives it to the law, otherwise with f = 0 and g = 1.
 """
 
 import functools
@@ -51,7 +52,8 @@ class Measurement(NamedTuple):
     has_surface: float = 0.0  # 1 if the scenario has a surface, else 0
     s: float = 0.0  # sliding variable of the scenario's surface
     v_eq: float = 0.0  # equivalent control: acceleration of the error that keeps s constant
-    q: float = 0.0  # measured position of the joint without actuator that this one moves; 0 without such a joint
+    # measured position of the joint without actuator that this one moves; 0 without such a joint
+    q: float = 0.0
     dq: float = 0.0  # its velocity
     fq: float = 0.0  # its nominal q'' = fq + gq u
     gq: float = 0.0
@@ -61,8 +63,9 @@ class Measurement(NamedTuple):
 def sliding(y, c):
     """Return the sliding variable s, and v_eq, the acceleration of the error that keeps s constant.
 
-    Both are those of the scenario's surface, with the model and without. If the scenario has no surface, s = de + c e.
-    Then v_eq is -c de with the model and 0 without, because model-free laws are published without this term.
+    Both are those of the scenario's surface, with the model and without. If the scenario has no
+    surface, s = de + c e. Then v_eq is -c de with the model and 0 without, because model-free laws
+    are published without this term.
     """
     if y.has_surface != 0.0:
         return y.s, y.v_eq
@@ -71,7 +74,9 @@ def sliding(y, c):
 
 @njit
 def command(y, v):
-    """Return the u for the acceleration v of the error: (v - f + r'') / g with the model, v without."""
+    """Return the u for the acceleration v of the error: (v - f + r'') / g with the model, v
+    without.
+    """
     if y.model == 0.0:
         return v
     return (v - y.f + y.ddr) / y.g
@@ -87,7 +92,8 @@ def input_gain(y):
 def linear_plant(y, a1, a2, b):
     """Return a1, a2, b of the plant e'' = a1 e + a2 de + b u that a law of the linear theory takes.
 
-    They are the law's gains; 0, 0, 1 with the model, which cancels f and g, and where no plant gave them.
+    They are the law's gains; 0, 0, 1 with the model, which cancels f and g, and where no plant gave
+    them.
     """
     if y.model != 0.0 or b == math.inf:
         return 0.0, 0.0, 1.0
@@ -103,7 +109,9 @@ def sgn(a):
 @njit
 def power(a, p):
     """Return [a]^p = |a|^p sgn(a), p > 0."""
-    return math.copysign(abs(a) ** p, a) if a != 0.0 else 0.0
+    if a != 0.0:
+        return math.copysign(abs(a) ** p, a)
+    return 0.0
 
 
 @overload
@@ -118,37 +126,47 @@ def law_function(
     Args:
       gains: name -> default value, or a Gain with unit and range. `smc.tune` needs the units.
       memory: floats of memory per channel. Default: 8.
-      positive, nonnegative: names of gains that must be greater than 0, or at least 0. A Gain can state this itself.
-      relative_degree: of the sliding variable that the law needs: 1, the default, or 2 or 3 for laws of e.
-      conditions: condition of the theorem, in words -> function of the gains, read by attribute, that tests it. A
-        warning quotes the words.
-      plants: names of the plants that the law is for, or "a free body" for all that are one. Default: all.
+      positive, nonnegative: names of gains that must be greater than 0, or at least 0. A Gain can
+        state this itself.
+      relative_degree: of the sliding variable that the law needs: 1, the default, or 2 or 3 for
+        laws of e.
+      conditions: condition of the theorem, in words -> function of the gains, read by attribute,
+        that tests it. A warning quotes the words.
+      plants: names of the plants that the law is for, or "a free body" for all that are one.
+        Default: all.
       requires_model: whether the law needs the nominal model. A scenario then gives it by default.
       label: name in figures and tables. Default: the function's name.
       short: name in two or three letters. Default: initials.
       colour: "#RRGGBB". Default: a colour of a palette, always the same.
-      rest: the law's linear part, a `smc_mujoco.control.component.Rest`. Default: the law is not linear.
+      rest: the law's linear part, a `smc_mujoco.control.component.Rest`. Default: the law is not
+        linear.
       family: one word, such as "terminal", by which lists group the laws.
-      continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws of e), however short
-        the control period. Default: no.
-      finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e", the error; "s", the
-        sliding variable, so that e then decays as on the surface; "", the default, neither.
-      accuracy: "s" and "e" -> theory's order of accuracy: sampled with the control period h, under a disturbance that
-        the law's theorem admits, |s| and |e| end below a multiple of h to this power. 0: below a bound that h does not
-        change. A number, or a function of the gains, read by attribute. `smc.accuracy` measures the orders.
-      admits: "d" and "d'" -> function of the gains, read by attribute, that returns the bound below which |d|, N or
-        N m, and |d'| must stay in the law's theorem. `smc.worst_case` says where a class goes beyond it.
-      joint: whether it is a law of many joints: the function then gets the measurement of all channels, a
-        `smc_mujoco.control.joint_law.JointMeasurement`, and returns two vectors u and s, one number for each channel.
+      continuous: whether u is a continuous function of the measurement at s = 0 (at e = 0 for laws
+        of e), however short the control period. Default: no.
+      finite_time: what is 0 after a finite time by the law's theorem, without a disturbance: "e",
+        the error; "s", the sliding variable, so that e then decays as on the surface; "", the
+        default, neither.
+      accuracy: "s" and "e" -> theory's order of accuracy: sampled with the control period h, under
+        a disturbance that the law's theorem admits, |s| and |e| end below a multiple of h to this
+        power. 0: below a bound that h does not change. A number, or a function of the gains, read
+        by attribute. `smc.accuracy` measures the orders.
+      admits: "d" and "d'" -> function of the gains, read by attribute, that returns the bound below
+        which |d|, N or N m, and |d'| must stay in the law's theorem. `smc.worst_case` says where a
+        class goes beyond it.
+      joint: whether it is a law of many joints: the function then gets the measurement of all
+        channels, a `smc_mujoco.control.joint_law.JointMeasurement`, and returns two vectors u and
+        s, one number for each channel.
 
-    The function must be pure: state belongs in memory, parameters in gains. A compiled function keeps the values that
-    its globals and closure had at compilation, and its random numbers would come from a shared generator. Each new
-    function object is compiled once and occupies about 2.5 MB until the process ends, because numba never frees code.
-    So change the value of a gain instead of defining a function per value. Ctrl-C does not stop a compiled law with an
-    endless loop; kill the process. Endless recursion in a compiled law crashes the process.
+    The function must be pure: state belongs in memory, parameters in gains. A compiled function
+    keeps the values that its globals and closure had at compilation, and its random numbers would
+    come from a shared generator. Each new function object is compiled once and occupies about 2.5
+    MB until the process ends, because numba never frees code. So change the value of a gain instead
+    of defining a function per value. Ctrl-C does not stop a compiled law with an endless loop; kill
+    the process. Endless recursion in a compiled law crashes the process.
 
     Returns:
-      A decorator. The decorated function, called with gains as in `my_law(lam=5.0)`, returns the Law of a Scenario.
+      A decorator. The decorated function, called with gains as in `my_law(lam=5.0)`, returns the
+      Law of a Scenario.
     """
     return decorated("law", function, options)
 
@@ -157,7 +175,10 @@ def law_function(
 def catalogue() -> Catalogue[Template]:
     """Return every law of smc_mujoco.control.laws and of other packages, by name."""
     return catalogue_of(
-        "smc_mujoco.control.laws", Template, "smc_mujoco.laws", lambda law: law.kind == "law" and not law.joint
+        "smc_mujoco.control.laws",
+        Template,
+        "smc_mujoco.laws",
+        lambda law: law.kind == "law" and not law.joint,
     )
 
 
@@ -168,12 +189,17 @@ def known_laws() -> Catalogue[Template]:
 
 
 def checked_name(law: Law) -> Law:
-    """Return the law. Raise ScenarioError if it is a user's with the name of a law of the catalogue."""
+    """Return the law.
+
+    Raise ScenarioError if it is a user's with the name of a law of the catalogue.
+    """
     known = known_laws().get(law.name)
     if known is None or law.function is None:
         return law
     # module and name stay the same when the module is loaded again
-    names = {(getattr(f, "__module__", ""), getattr(f, "__qualname__", f)) for f in (law.function, known.function)}
+    names = set()
+    for f in (law.function, known.function):
+        names.add((getattr(f, "__module__", ""), getattr(f, "__qualname__", f)))
     if len(names) == 1:
         return law
     package = known_laws().package(law.name)
@@ -184,15 +210,18 @@ def checked_name(law: Law) -> Law:
 
 
 def law(name: str, **gains: float | Sequence[float]) -> Law:
-    """Return the library's law `name` with these gains: one number for all channels, or one for each driven channel."""
+    """Return the library's law `name` with these gains: one number for all channels, or one for
+    each driven channel.
+    """
     return find("law", name, known_laws()).bind(gains, warn=True)
 
 
 def suits(law: Law | Template, plant: Plant) -> bool:
-    """Return whether a law is for a plant: for all plants, for this one, or for user's models of the same kind.
+    """Return whether a law is for a plant: for all plants, for this one, or for user's models of
+    the same kind.
 
-    A template with gains of the plant's linearisation is for plants that have one. A law without code, as a loaded
-    trace may name, is taken to suit.
+    A template with gains of the plant's linearisation is for plants that have one. A law without
+    code, as a loaded trace may name, is taken to suit.
     """
     if law.function is None:
         return True
@@ -210,19 +239,24 @@ FREE_BODY = "a free body"  # among a law's plants: it is for plants whose channe
 
 
 KINDS = {  # of laws and of their parts -> the catalogue
-    "law": catalogue, "joint": joint_law.catalogue, "surface": surface.catalogue, "estimator": estimator.catalogue,
-}  # fmt: skip
+    "law": catalogue,
+    "joint": joint_law.catalogue,
+    "surface": surface.catalogue,
+    "estimator": estimator.catalogue,
+}
 
 
 def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
-    """List the names of laws; with a plant, only those for it: of one channel, or for a free body of many joints.
+    """List the names of laws; with a plant, only those for it: of one channel, or for a free body
+    of many joints.
 
-    A law that names no plants is for every plant whose channels all have an actuator. `none` is for every plant. A law
-    for joints without an actuator is also for your own models with such joints.
+    A law that names no plants is for every plant whose channels all have an actuator. `none` is for
+    every plant. A law for joints without an actuator is also for your own models with such joints.
 
     Args:
       plant: of the library by its name, or your own; None lists all.
-      kind: "law", of one channel; "joint", a law of many joints; "surface"; or "estimator", of velocities.
+      kind: "law", of one channel; "joint", a law of many joints; "surface"; or "estimator", of
+        velocities.
 
     Raises:
       ScenarioError: another kind, a plant with another kind than "law", or an unknown plant.
@@ -235,4 +269,8 @@ def laws(plant: Plant | str | None = None, kind: str = "law") -> list[str]:
     plant = as_plant(plant)
     known = known_laws() if plant.pose else catalogue()
     whole = not plant.underactuated and plant.pose != "heading"
-    return [name for name, law in known.items() if suits(law, plant) and (law.plants or name == "none" or whole)]
+    return [
+        name
+        for name, law in known.items()
+        if suits(law, plant) and (law.plants or name == "none" or whole)
+    ]

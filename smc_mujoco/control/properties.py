@@ -3,8 +3,8 @@
     suitable(["continuous", "two-gains"])     # templates of laws
     reads(smc.law("pid").template)            # {"e", "de", ...}: what the law measures
 
-Most properties are derived from the law's code. Continuity and finite time follow from theory alone, so the law's
-decorator states them. Tests compare both kinds with what the law does.
+Most properties are derived from the law's code. Continuity and finite time follow from theory
+alone, so the law's decorator states them. Tests compare both kinds with what the law does.
 """
 
 import ast
@@ -20,18 +20,26 @@ from smc_mujoco.control.component import Template
 from smc_mujoco.control.law import Measurement, catalogue, known_laws, laws
 from smc_mujoco.mechanisms.plant import Plant
 
-VELOCITY = {"v", "de", "dq"}  # fields of the measurement that a velocity sensor or an estimator gives
+VELOCITY = {
+    "v",
+    "de",
+    "dq",
+}  # fields of the measurement that a velocity sensor or an estimator gives
 
 
 class Property(NamedTuple):
-    """A property of a law in words, as in "laws that need no model", and the function that tests it."""
+    """A property of a law in words, as in "laws that need no model", and the function that tests
+    it.
+    """
 
     words: str
     holds: Callable[[Template], bool]
 
 
 def reads(law: Template) -> frozenset[str]:
-    """Return the fields of the measurement that a law's code reads; all of them if its code cannot be read."""
+    """Return the fields of the measurement that a law's code reads; all of them if its code cannot
+    be read.
+    """
     return read_by(law.function)
 
 
@@ -51,10 +59,16 @@ PROPERTIES: Mapping[str, Property] = {
     "no-acceleration": Property("need no acceleration", lambda law: "a" not in reads(law)),
     "no-model": Property("need no model of the plant", lambda law: not law.requires_model),
     "continuous": Property("have a continuous u", lambda law: law.continuous),
-    "finite-time": Property("bring the error to 0 in finite time", lambda law: law.finite_time == "e"),
-    "finite-reaching": Property("bring s or the error to 0 in finite time", lambda law: law.finite_time != ""),
+    "finite-time": Property(
+        "bring the error to 0 in finite time", lambda law: law.finite_time == "e"
+    ),
+    "finite-reaching": Property(
+        "bring s or the error to 0 in finite time", lambda law: law.finite_time != ""
+    ),
     "one-gain": Property("have one gain to choose", lambda law: len(searched(law)) == 1),
-    "two-gains": Property("have at most two gains to choose", lambda law: len(searched(law)) in (1, 2)),
+    "two-gains": Property(
+        "have at most two gains to choose", lambda law: len(searched(law)) in (1, 2)
+    ),
 }
 
 
@@ -74,7 +88,9 @@ def suitable(needs: Iterable[str] = (), plant: Plant | str | None = None) -> lis
 
 
 def _reads(function: object, position: int, seen: set[object]) -> set[str]:
-    """Return the attributes that a function reads of its argument at a position; every field if that is not known."""
+    """Return the attributes that a function reads of its argument at a position; every field if
+    that is not known.
+    """
     function = getattr(function, "py_func", function)
     if function in seen:
         return set()
@@ -87,7 +103,11 @@ def _reads(function: object, position: int, seen: set[object]) -> set[str]:
         return set(Measurement._fields)
     name, fields, understood = tree.args.args[position].arg, set(), 0
     for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == name:
+        if (
+            isinstance(node, ast.Attribute)
+            and isinstance(node.value, ast.Name)
+            and node.value.id == name
+        ):
             fields.add(node.attr)
             understood += 1
         elif isinstance(node, ast.Call):
@@ -96,4 +116,6 @@ def _reads(function: object, position: int, seen: set[object]) -> set[str]:
                     fields |= _reads(function.__globals__.get(ast.unparse(node.func)), i, seen)
                     understood += 1
     uses = sum(isinstance(node, ast.Name) and node.id == name for node in ast.walk(tree))
-    return fields if uses == understood else set(Measurement._fields)
+    if uses == understood:
+        return fields
+    return set(Measurement._fields)

@@ -10,7 +10,10 @@ from smc_mujoco.control import source as sources
 from smc_mujoco.control.component import Component, Template, by_channel
 from smc_mujoco.control.law import known_laws
 
-ANNEXES = ("smc_mujoco.evidence", "smc_mujoco.benchmark")  # with laws that are not in the catalogue, as those of rigs
+ANNEXES = (
+    "smc_mujoco.evidence",
+    "smc_mujoco.benchmark",
+)  # with laws that are not in the catalogue, as those of rigs
 
 
 def describe(c: Component) -> dict[str, Any]:
@@ -24,23 +27,36 @@ def describe(c: Component) -> dict[str, Any]:
 
 
 def law(data: Mapping[str, Any], source: Mapping[str, Any] | None) -> Component:
-    """Return the law that `describe` wrote, with the source of its gains: the user, if none is given."""
+    """Return the law that `describe` wrote, with the source of its gains: the user, if none is
+    given.
+    """
     if "each" in data:
         made = by_channel([law(item, source) for item in data["each"]])
     else:
         made = restore(data, "law", known_laws() | _laws_of_annex(data["module"]))
-    restored = sources.Source(kind=sources.YOURS) if source is None else sources.restore(source)
+    if source is None:
+        restored = sources.Source(kind=sources.YOURS)
+    else:
+        restored = sources.restore(source)
     return made.sourced(restored.kind, restored.search)
 
 
 def restore(data: Mapping[str, Any], kind: str, known: Catalogue[Template]) -> Component:
-    """Return the component that `describe` wrote, without its function if that is not among the known ones."""
+    """Return the component that `describe` wrote, without its function if that is not among the
+    known ones.
+    """
     module, template = data["module"], known.get(data["name"])
-    candidates = known.own.values() if template is None else [template]  # a law may have another name, see `named`
+    # a law may have another name, see `named`
+    if template is None:
+        candidates = known.own.values()
+    else:
+        candidates = [template]
     for template in candidates:
         if template.function.__module__ == module and {*data["gains"]} <= {*template.gains}:
             component = template.bind(data["gains"])
-            return component if component.name == data["name"] else component.named(data["name"])
+            if component.name == data["name"]:
+                return component
+            return component.named(data["name"])
     stored = {name: data[name] for name in ("name", "gains", "memory")}
     return Component(kind=kind, relative_degree=data["degree"], function=None, **stored)
 

@@ -1,7 +1,8 @@
 """Sliding surfaces: pure functions (y, gains, memory) -> (s, v_eq).
 
-A surface gives a first-order law its sliding variable s, of relative degree `relative_degree`, and v_eq, the
-acceleration of the error that keeps s constant: s' = 0 for e'' = v_eq. Notation as in laws.
+A surface gives a first-order law its sliding variable s, of relative degree `relative_degree`, and
+v_eq, the acceleration of the error that keeps s constant: s' = 0 for e'' = v_eq. Notation as in
+laws.
 """
 
 import functools
@@ -24,7 +25,8 @@ def surface_function(
 ) -> Callable[[Callable[..., Any]], Template] | Template:
     """Turn a function (y, gains, memory) -> (s, v_eq) into a surface.
 
-    Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree, conditions and label.
+    Arguments as of `law_function`: gains, memory, positive, nonnegative, relative_degree,
+    conditions and label.
     """
     return decorated("surface", function, options)
 
@@ -33,10 +35,16 @@ def surface_function(
 def catalogue() -> Catalogue[Template]:
     """Return every surface of smc_mujoco.control.surfaces and of other packages, by name."""
     return catalogue_of(
-        "smc_mujoco.control.surfaces", Template, "smc_mujoco.surfaces", lambda one: one.kind == "surface"
+        "smc_mujoco.control.surfaces",
+        Template,
+        "smc_mujoco.surfaces",
+        lambda one: one.kind == "surface",
     )
 
 
 def surface(name: str, **gains: float) -> Surface:
-    """Return the surface `name` with these gains. An unknown name or a gain out of range is a ScenarioError."""
+    """Return the surface `name` with these gains.
+
+    An unknown name or a gain out of range is a ScenarioError.
+    """
     return find("surface", name, catalogue()).bind(gains, warn=True)

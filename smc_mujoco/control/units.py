@@ -1,10 +1,11 @@
 """Gains and their units.
 
-    @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
+    @law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(2.5, RATE), "order":
+    Gain(2.0, held=True)})
 
-A unit is a product of powers of force F, position X and time T. Tuning derives the bounds of each gain from its unit
-and from F, X and T of the plant (`smc_mujoco.analysis.tuning.search_space`). Tests use the units to check that a law
-behaves the same in every system of units.
+A unit is a product of powers of force F, position X and time T. Tuning derives the bounds of each
+gain from its unit and from F, X and T of the plant (`smc_mujoco.analysis.tuning.search_space`).
+Tests use the units to check that a law behaves the same in every system of units.
 """
 
 import dataclasses
@@ -52,20 +53,28 @@ Formula = Callable[[SimpleNamespace], Unit]
 class Gain:
     """A gain of a law, a surface or an estimator.
 
-    Its unit is a function of all gains, read by attribute, if an exponent among them decides it. None: a number without
-    a unit, or an unknown unit; tuning searches it about its default.
+    Its unit is a function of all gains, read by attribute, if an exponent among them decides it.
+    None: a number without a unit, or an unknown unit; tuning searches it about its default.
     """
 
     default: float  # a law of many joints in C may have a tuple, with one for each joint
     unit: Unit | Formula | None = None
     positive: bool = False  # whether it must be greater than 0
     nonnegative: bool = False  # whether it must be at least 0
-    held: bool = False  # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
-    over: str | None = None  # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
-    # "a1", "a2" or "b" of x'' = a1 x + a2 x' + b u near the plant's origin, which a scenario puts in place of inf
+    # whether tuning leaves it at its default: an initial value, an exponent or the size of a table
+    held: bool = False
+    over: str | None = (
+        # the gain that the law divides it by, b in the force k / b: tuning bounds k / b as a force
+        None
+    )
+    # "a1", "a2" or "b" of x'' = a1 x + a2 x' + b u near the plant's origin, which a scenario puts
+    # in place of inf
     plant: str = ""
-    shared: bool = False  # whether it is one number for all joints in a law of many joints, instead of a vector
-    turns: bool = False  # whether it is of the attitude, in a law of free bodies, and not of the position
+    # whether it is one number for all joints in a law of many joints, instead of a vector
+    shared: bool = False
+    turns: bool = (
+        False  # whether it is of the attitude, in a law of free bodies, and not of the position
+    )
 
     @property
     def constraint(self) -> Each:
@@ -76,7 +85,9 @@ class Gain:
 
     def unit_at(self, gains: Mapping[str, float]) -> Unit | None:
         """Return the unit at these values of all gains."""
-        return self.unit(SimpleNamespace(**gains)) if callable(self.unit) else self.unit
+        if callable(self.unit):
+            return self.unit(SimpleNamespace(**gains))
+        return self.unit
 
 
 def force_per(exponent: str) -> Formula:

@@ -1,8 +1,8 @@
 """Reduction of a dense signal for drawing: to its range in few windows of time, and to one line.
 
-A chattering control drawn sample by sample is a solid block. Its range shows how hard it switches. Its mean acts on the
-plant: Utkin's equivalent control (Sliding Modes in Control and Optimization, 1992). The line is this mean while the
-signal chatters, and the signal itself elsewhere.
+A chattering control drawn sample by sample is a solid block. Its range shows how hard it switches.
+Its mean acts on the plant: Utkin's equivalent control (Sliding Modes in Control and Optimization,
+1992). The line is this mean while the signal chatters, and the signal itself elsewhere.
 """
 
 import dataclasses
@@ -13,12 +13,19 @@ import numpy as np
 
 from smc_mujoco.simulation.trace import Trace
 
-MEAN_WINDOW = 0.01, 40  # of a mean: share of the run, and smallest number of samples; chosen, see `window`
+MEAN_WINDOW = (
+    0.01,
+    40,
+)  # of a mean: share of the run, and smallest number of samples; chosen, see `window`
 MIN_MOVE = 2e-3  # of the largest value: smaller steps between samples do not count as moves
 MIN_REVERSALS = 6  # in a row are chattering, if each follows within a quarter of a window
-TREND_SHARE = 0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
+TREND_SHARE = (
+    0.5  # of the variance along a straight line, above which y moves rather than chatters; chosen
+)
 COLUMNS = 360  # of pixels of a panel: traces of more samples are drawn as means and ranges
-MAX_GAP = 0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence; chosen
+MAX_GAP = (
+    0.02  # s: shorter gaps between parts that switch are closed, or they look like a fence; chosen
+)
 LINE_PARTS = 250  # of a line, of which each keeps its smallest and its largest value
 
 
@@ -32,14 +39,19 @@ class Envelope(NamedTuple):
 
 
 def finite(trace: Trace) -> Trace:
-    """Return the trace up to its last finite sample; if there is none, one sample with the initial state."""
+    """Return the trace up to its last finite sample; if there is none, one sample with the initial
+    state.
+    """
     bad = ~np.isfinite(trace.x).all(axis=1) | ~np.isfinite(trace.v).all(axis=1)
     if not bad.any():
         return trace
     count = int(np.argmax(bad))
     part = {name: array[: max(1, count)] for name, array in trace.arrays().items()}
     if count == 0:
-        part |= {"x": np.array([trace.scenario.resolved.x0]), "v": np.array([trace.scenario.resolved.v0])}
+        part |= {
+            "x": np.array([trace.scenario.resolved.x0]),
+            "v": np.array([trace.scenario.resolved.v0]),
+        }
     return dataclasses.replace(trace, **part)
 
 
@@ -49,7 +61,8 @@ def end(traces: Sequence[Trace]) -> float:
 
 
 def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
-    """Return range and mean of y (K+1, n), held from sample to sample, between consecutive edges (s, ascending).
+    """Return range and mean of y (K+1, n), held from sample to sample, between consecutive edges
+    (s, ascending).
 
     A window has the samples in it and the one held at its left edge.
     """
@@ -61,7 +74,8 @@ def windows(t: np.ndarray, y: np.ndarray, edges: np.ndarray) -> Envelope:
 
 
 def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP between swings.
+    """Return times with the least and largest y (K+1, n) about them, without gaps up to MAX_GAP
+    between swings.
 
     There are at most COLUMNS windows, of equally many samples each.
     """
@@ -79,8 +93,8 @@ def band(t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def window(trace: Trace) -> int:
     """Return the number of samples that a mean is taken over: a multiple of 4.
 
-    If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w, which makes the line
-    jagged. The window is so wide that this is less than the width of the line.
+    If a control switches irregularly between +-1, its mean over w samples varies by about 2 / w,
+    which makes the line jagged. The window is so wide that this is less than the width of the line.
     """
     share, shortest = MEAN_WINDOW
     return 4 * round(max(share * trace.scenario.samples, shortest) / 4)
@@ -89,13 +103,14 @@ def window(trace: Trace) -> int:
 def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
     """Return where y (K+1,) chatters.
 
-    A move is a step between samples of more than MIN_MOVE of the largest |y|. A reversal is a pair of successive moves
-    with opposite signs. Reversals are n-close if neither the time between a reversal's moves nor the time to the next
-    reversal is longer than n samples. y chatters where MIN_REVERSALS or more in a row are (width / 4)-close.
+    A move is a step between samples of more than MIN_MOVE of the largest |y|. A reversal is a pair
+    of successive moves with opposite signs. Reversals are n-close if neither the time between a
+    reversal's moves nor the time to the next reversal is longer than n samples. y chatters where
+    MIN_REVERSALS or more in a row are (width / 4)-close.
 
-    A part goes from the first move to the last of the width-close reversals around these. It extends to the end of y
-    if that is as close. It extends to the start only if that is within a quarter of `width`, because a y that rests
-    there longer does not chatter yet.
+    A part goes from the first move to the last of the width-close reversals around these. It
+    extends to the end of y if that is as close. It extends to the start only if that is within a
+    quarter of `width`, because a y that rests there longer does not chatter yet.
     """
     step = np.diff(y)
     moving = np.flatnonzero(np.abs(step) > MIN_MOVE * np.abs(y).max())
@@ -108,7 +123,9 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
         parts = np.split(brief, np.flatnonzero(first[brief[1:]] - last[brief[:-1]] > near) + 1)
         return [part for part in parts if len(part)]
 
-    seeds = np.array([first[part[0]] + 1 for part in sequences(width // 4) if len(part) >= MIN_REVERSALS])
+    seeds = np.array(
+        [first[part[0]] + 1 for part in sequences(width // 4) if len(part) >= MIN_REVERSALS]
+    )
     result = []
     for part in sequences(width):
         a, b = first[part[0]] + 1, last[part[-1]] + 1
@@ -118,12 +135,14 @@ def chattering_parts(y: np.ndarray, width: int) -> list[slice]:
 
 
 def smooth(y: np.ndarray, width: int) -> np.ndarray:
-    """Return y (K+1,), replaced where it chatters by its mean over `width` samples with triangular weights.
+    """Return y (K+1,), replaced where it chatters by its mean over `width` samples with triangular
+    weights.
 
-    The weights result from averaging twice over half the width, which suppresses a periodic signal far better than one
-    average. Within half a width of the ends of a part the value is that of the nearest whole triangle; where y moves
-    there, as a noisy one does before it settles, it is that of the longest triangle about the sample. In a part shorter
-    than the width the triangle is as long as the part.
+    The weights result from averaging twice over half the width, which suppresses a periodic signal
+    far better than one average. Within half a width of the ends of a part the value is that of the
+    nearest whole triangle; where y moves there, as a noisy one does before it settles, it is that
+    of the longest triangle about the sample. In a part shorter than the width the triangle is as
+    long as the part.
     """
     line = y.astype(float)
     for part in chattering_parts(y, width):
@@ -133,8 +152,12 @@ def smooth(y: np.ndarray, width: int) -> np.ndarray:
         means = np.pad(triangular_mean(line[part], half), half - 1, "edge")
         for values, mean in ((line[part], means), (line[part][::-1], means[::-1])):  # from each end
             start = values[: 2 * half - 1]
-            if detrend(start).var() < (1.0 - TREND_SHARE) * start.var():  # it moves more than it varies
-                mean[: half - 1] = [triangular_mean(values[: 2 * k - 1], k)[0] for k in range(1, half)]
+            if (
+                detrend(start).var() < (1.0 - TREND_SHARE) * start.var()
+            ):  # it moves more than it varies
+                mean[: half - 1] = [
+                    triangular_mean(values[: 2 * k - 1], k)[0] for k in range(1, half)
+                ]
         line[part] = means
     return line
 
@@ -151,10 +174,14 @@ def running_mean(y: np.ndarray, width: int) -> np.ndarray:
 
 
 def line(t: np.ndarray, y: np.ndarray, width: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points that keep extremes."""
+    """Return times and values of a curve for y (K+1,): smoothed where it chatters, in few points
+    that keep extremes.
+    """
     y, size = smooth(y, width), -(-len(t) // LINE_PARTS)
     starts = np.arange(0, len(t), size)
     padded = np.pad(y, (0, len(starts) * size - len(y)), "edge").reshape(-1, size)
-    keep = np.unique([0, *starts + padded.argmin(axis=1), *starts + padded.argmax(axis=1), len(t) - 1])
+    keep = np.unique(
+        [0, *starts + padded.argmin(axis=1), *starts + padded.argmax(axis=1), len(t) - 1]
+    )
     keep = keep[keep < len(t)]
     return t[keep], y[keep]

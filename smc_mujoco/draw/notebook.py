@@ -28,21 +28,27 @@ def show(
     A figure at the end of a cell shows itself; `show` is for several in a cell.
 
     Args:
-      what: one or several traces of one plant, which are filmed; what `film(traces)` returns; or a figure.
+      what: one or several traces of one plant, which are filmed; what `film(traces)` returns; or a
+        figure.
       labels, title, size, fps, speed, camera: of a film, as `film`.
 
     Raises:
       ScenarioError: not in a notebook, or as `film`.
     """
     if not html.in_notebook():
-        raise ScenarioError("smc.show needs a notebook: elsewhere, write a film with smc.film(traces, 'film.mp4')")
+        raise ScenarioError(
+            "smc.show needs a notebook: elsewhere, write a film with smc.film(traces, 'film.mp4')"
+        )
     from IPython.display import HTML, display
 
     if isinstance(what, Figure | SubFigure):
         content, width = page.embedded(what)
         display(HTML(html.embedded(content, "image/png", width)))
         return
-    frames = what if isinstance(what, Frames) else Frames(what, labels, title, size, fps, speed, camera)
+    if isinstance(what, Frames):
+        frames = what
+    else:
+        frames = Frames(what, labels, title, size, fps, speed, camera)
     if why := film.missing():
         raise ScenarioError(why)
     with scratch() as folder:

@@ -1,8 +1,11 @@
-"""Predicted chattering beside a run: L and 1/N in the complex plane with their crossing, and s with the amplitude.
+"""Predicted chattering beside a run:
 
-L is the answer of the linearised mechanism to u, 1/N the inverse of the law's describing function at the frequency of
-the crossing. Both are divided by their common value there, and turned: they cross at -1. One row for each scenario; s
-is that of the last periods of a run, or of the whole run where no limit cycle is predicted.
+L and 1/N in the complex plane with their crossing, and s with the amplitude.
+
+L is the answer of the linearised mechanism to u, 1/N the inverse of the law's describing function
+at the frequency of the crossing. Both are divided by their common value there, and turned: they
+cross at -1. One row for each scenario; s is that of the last periods of a run, or of the whole run
+where no limit cycle is predicted.
 """
 
 import math
@@ -59,7 +62,9 @@ def nyquist(
         whole = pages.head_height(style.FULL_WIDTH, handles) + ROW_HEIGHT * len(scenarios)
         page = pages.blank(style.FULL_WIDTH, whole)
         axes = page.subplots(len(scenarios), 2, squeeze=False, width_ratios=[1.0, 2.0])
-        for row, scenario, cycle, trace, colour in zip(axes, scenarios, cycles, traces, colours, strict=True):
+        for row, scenario, cycle, trace, colour in zip(
+            axes, scenarios, cycles, traces, colours, strict=True
+        ):
             if cycle:
                 plane(row[0], scenario, cycle, channel, colour)
             else:  # nothing crosses: s has the whole row
@@ -89,23 +94,52 @@ def plane(ax: Axes, scenario: Scenario, cycle: Chattering, channel: int, colour:
     response = np.array([loop.response(w) for w in omegas]) / unit
     amplitudes = cycle.amplitude_x * np.geomspace(1 / SPAN_FACTOR, SPAN_FACTOR, 60)
     inverse = np.array([1.0 / (loop.gain(a, omega) or math.nan) for a in amplitudes]) / unit
-    ax.plot(response.real, response.imag, color=style.INK, lw=style.points(1.6), label="L, over frequency")
-    ax.plot(inverse.real, inverse.imag, color=colour, lw=style.points(1.6), ls=(0, (4, 2)), label="1/N, over amplitude")
+    ax.plot(
+        response.real,
+        response.imag,
+        color=style.INK,
+        lw=style.points(1.6),
+        label="L, over frequency",
+    )
+    ax.plot(
+        inverse.real,
+        inverse.imag,
+        color=colour,
+        lw=style.points(1.6),
+        ls=(0, (4, 2)),
+        label="1/N, over amplitude",
+    )
     cycle_label = "cycle, with harmonics of e"
-    ax.plot([-1.0], [0.0], "o", color=colour, ms=style.points(8), mec=style.PAPER, label=cycle_label)
-    ax.legend(loc="upper right", fontsize=style.points(8.5), frameon=True, framealpha=0.8, handlelength=1.6)
+    ax.plot(
+        [-1.0], [0.0], "o", color=colour, ms=style.points(8), mec=style.PAPER, label=cycle_label
+    )
+    ax.legend(
+        loc="upper right",
+        fontsize=style.points(8.5),
+        frameon=True,
+        framealpha=0.8,
+        handlelength=1.6,
+    )
 
 
 def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour: str) -> None:
-    """Draw s in the last periods of a run, the predicted amplitude as a band and an unstable one as lines."""
-    start = trace.t[-1] - SHOWN_PERIODS / cycle.frequency if cycle else trace.t[0]
+    """Draw s in the last periods of a run, the predicted amplitude as a band and an unstable one as
+    lines.
+    """
+    if cycle:
+        start = trace.t[-1] - SHOWN_PERIODS / cycle.frequency
+    else:
+        start = trace.t[0]
     part = trace.t >= start
     factor, unit = style.prefixed(
         float(np.abs(trace.s[part, channel]).max()), f"{trace.scenario.plant.units[channel]}/s"
     )
     t, s = trace.t[part] - trace.t[part][0], factor * trace.s[part, channel]
     ax.plot(1e3 * t if cycle else t, s, color=colour, lw=style.points(1.4), drawstyle="steps-post")
-    ax.set(xlabel=f"last {SHOWN_PERIODS} periods predicted (ms)" if cycle else "time (s)", ylabel=f"s ({unit})")
+    ax.set(
+        xlabel=f"last {SHOWN_PERIODS} periods predicted (ms)" if cycle else "time (s)",
+        ylabel=f"s ({unit})",
+    )
     if cycle:
         mean, amplitude = float(s.mean()), factor * cycle.amplitude
         ax.axhspan(mean - amplitude, mean + amplitude, color=colour, alpha=0.15, lw=0)
@@ -117,4 +151,12 @@ def last_periods(ax: Axes, trace: Trace, cycle: Chattering, channel: int, colour
             for level in (mean - unstable, mean + unstable):
                 ax.axhline(level, color=colour, lw=style.points(1.2), ls="dotted")
             words += f"; dotted: about ±{style.short(unstable)}, unstable, within it a run rests"
-        ax.text(0.99, 0.97, words, ha="right", va="top", transform=ax.transAxes, fontsize=style.points(9.5))
+        ax.text(
+            0.99,
+            0.97,
+            words,
+            ha="right",
+            va="top",
+            transform=ax.transAxes,
+            fontsize=style.points(9.5),
+        )

@@ -1,7 +1,7 @@
 """A page of figures: its size, title, legend, ticks and files.
 
-A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. It is as wide as a page of this package
-(8.8 in), an IEEE page or column, a slide, or has any size in inches.
+A figure is new, or is drawn into the caller's matplotlib Figure or SubFigure. It is as wide as a
+page of this package (8.8 in), an IEEE page or column, a slide, or has any size in inches.
 """
 
 import io
@@ -31,14 +31,28 @@ from smc_mujoco.simulation.trace import Trace
 
 DPI, PRINT_DPI = 200, 400  # of a PNG: of a full page or a slide, and of a journal's page or column
 FORMATS = ("svg", "png", "pdf")
-DESCRIPTION = {".svg": "Description", ".png": "Description", ".pdf": "Subject"}  # the key of a file's description
-NAMED = {"ieee-column": (3.5, None), "ieee-page": (7.16, None), "slide": (style.SLIDE_WIDTH, 7.5)}  # inches
+DESCRIPTION = {
+    ".svg": "Description",
+    ".png": "Description",
+    ".pdf": "Subject",
+}  # the key of a file's description
+NAMED = {
+    "ieee-column": (3.5, None),
+    "ieee-page": (7.16, None),
+    "slide": (style.SLIDE_WIDTH, 7.5),
+}  # inches
 SIDE_RANGE = (2.0, 100.0)  # inches, shortest and longest
 NARROW = 6.0  # inches: narrower pages have one column of panels
 TEXT_SIZE, TITLE_SIZE = 11.0, 17.0  # points on a full page
-ENTRY_SAMPLE, ENTRY_SPACE = 1.6, 2.3  # of a legend's entry, in heights of its letters: its sample, and all its spaces
+ENTRY_SAMPLE, ENTRY_SPACE = (
+    1.6,
+    2.3,
+)  # of a legend's entry, in heights of its letters: its sample, and all its spaces
 TITLE_PAD = 5.0  # points on a full page, above the title
-MAX_SHARE, MAX_SINGLE_SHARE = 0.55, 0.95  # largest width of a legend's entry, of the page's: in several columns, in one
+MAX_SHARE, MAX_SINGLE_SHARE = (
+    0.55,
+    0.95,
+)  # largest width of a legend's entry, of the page's: in several columns, in one
 MAX_NAME = 0.42  # of a full page's width, of a run's name in a legend
 MAX_TICKS = 9  # ticks of an axis, as of matplotlib's
 TICK_GAP = 0.6  # between labels of ticks, in heights of their letters
@@ -63,14 +77,20 @@ def embedded(page: Figure | SubFigure) -> tuple[bytes, float]:
 
 def resolution(page: Figure | SubFigure) -> float:
     """Return the dots per inch of the PNG of the whole figure."""
-    return DPI if page.get_figure(root=True).get_figwidth() >= style.JOURNAL_WIDTH else PRINT_DPI
+    if page.get_figure(root=True).get_figwidth() >= style.JOURNAL_WIDTH:
+        return DPI
+    return PRINT_DPI
 
 
 def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, float | None]:
-    """Return the width and height of a figure in inches; None for a height that depends on the contents."""
+    """Return the width and height of a figure in inches; None for a height that depends on the
+    contents.
+    """
     if fig is not None:
         if size is not None:
-            raise ScenarioError(f"size is {shown(size)}, but fig already has a size: give one of the two")
+            raise ScenarioError(
+                f"size is {shown(size)}, but fig already has a size: give one of the two"
+            )
         box = fig.bbox.transformed(fig.dpi_scale_trans.inverted())
         return box.width, box.height
     if size is None:
@@ -91,7 +111,10 @@ def measure(size: Size, fig: Figure | SubFigure | None = None) -> tuple[float, f
 
 
 def blank(width: float, height: float, fig: Figure | SubFigure | None = None) -> Figure | SubFigure:
-    """Return a page to draw on: `fig`, or a new one of this size in inches. Its layout keeps texts apart."""
+    """Return a page to draw on:
+
+    `fig`, or a new one of this size in inches. Its layout keeps texts apart.
+    """
     across, down = style.points(7.2) / 72, style.points(TITLE_PAD) / 72  # inches
     layout = ConstrainedLayoutEngine(w_pad=across, h_pad=down, wspace=0.02, hspace=0.02)
     if fig is None:
@@ -110,23 +133,31 @@ def head_height(width: float, handles: Sequence[Handle]) -> float:
 
 
 def _legend(handles: Sequence[Handle], width: float) -> tuple[list[str], int]:
-    """Return a legend's labels, each on up to two lines, and its columns: as many as fit on a page of `width` inches.
+    """Return a legend's labels, each on up to two lines, and its columns: as many as fit on a page
+    of `width` inches.
 
     In a single column labels may be as wide as the page.
     """
     page, size, labels = 72 * width, style.points(TEXT_SIZE), []
     beside = (ENTRY_SAMPLE + ENTRY_SPACE) * size  # of a label
     for share in (MAX_SHARE, MAX_SINGLE_SHARE):
-        labels = [style.wrapped(str(one.get_label()), share * page - beside, size, lines=2) for one in handles]
-        widths = [max(style.width(line, size) for line in label.split("\n")) + beside for label in labels]
+        labels = []
+        for one in handles:
+            labels.append(style.wrapped(str(one.get_label()), share * page - beside, size, lines=2))
+        widths = []
+        for label in labels:
+            widths.append(max(style.width(line, size) for line in label.split("\n")) + beside)
         for columns in range(len(widths), 1, -1):
             if sum(map(max, np.array_split(widths, columns))) < page - 16:
                 return labels, columns
     return labels, 1
 
 
-def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = "") -> None:
-    """Draw the title with the legend below it, in as few rows as fit, and a note at the right of the title.
+def set_head(
+    page: Figure | SubFigure, width: float, title: str, handles: Sequence[Handle], note: str = ""
+) -> None:
+    """Draw the title with the legend below it, in as few rows as fit, and a note at the right of
+    the title.
 
     A long title has smaller letters, no smaller than the legend's.
     """
@@ -135,11 +166,23 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
     if note:
         note = style.cropped(note, MAX_SHARE * room, size)
         room -= style.width(note, size) + big
-        place = {"xytext": (-8, -style.points(TITLE_PAD) - big), "textcoords": "offset points", "ha": "right"}
-        look = {"fontsize": size, "color": style.MUTED, "parse_math": False, "annotation_clip": False}
-        text = Annotation(note, (1.0, 1.0), xycoords=page.transSubfigure, **place, va="baseline", **look)
+        place = {
+            "xytext": (-8, -style.points(TITLE_PAD) - big),
+            "textcoords": "offset points",
+            "ha": "right",
+        }
+        look = {
+            "fontsize": size,
+            "color": style.MUTED,
+            "parse_math": False,
+            "annotation_clip": False,
+        }
+        text = Annotation(
+            note, (1.0, 1.0), xycoords=page.transSubfigure, **place, va="baseline", **look
+        )
         page.add_artist(text).set_in_layout(False)
-    big = max(size, min(big, big * room / style.width(title, big, bold=True))) if title else big
+    if title:
+        big = max(size, min(big, big * room / style.width(title, big, bold=True)))
     legend = page.legend(
         handles=handles or [Line2D([], [], lw=0)],
         labels=["."] * len(words) or [""],  # matplotlib leaves out labels that begin with _
@@ -159,32 +202,45 @@ def set_head(page: Figure | SubFigure, width: float, title: str, handles: Sequen
         label.set_parse_math(False)
 
 
-def run_handles(traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]) -> tuple[list[Handle], str]:
-    """Return a legend's entries for runs, which say when a run failed, and the note of `gain_sources`."""
+def run_handles(
+    traces: Sequence[Trace], names: Sequence[str], colours: Sequence[str]
+) -> tuple[list[Handle], str]:
+    """Return a legend's entries for runs, which say when a run failed, and the note of
+    `gain_sources`.
+    """
     handles: list[Handle] = []
     gains, shared = gain_sources([[trace.scenario.law.source] for trace in traces])
     for trace, name, colour, source in zip(traces, names, colours, gains, strict=True):
         how = style.ending(trace)
-        words = style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE) + source + (f" ({how})" if how else "")
+        words = (
+            style.cropped(name, MAX_NAME * 72 * style.FULL_WIDTH, TEXT_SIZE)
+            + source
+            + (f" ({how})" if how else "")
+        )
         handles.append(Line2D([], [], color=colour, lw=style.points(3), label=words))
     return handles, shared
 
 
 def gain_sources(sources: Sequence[Iterable[Source]]) -> tuple[list[str], str]:
-    """Return where gains come from: a text behind each label, such as ", gains: default", and a note.
+    """Return where gains come from: a text behind each label, such as ", gains: default", and a
+    note.
 
     If all gains come from the same source, the note says so, and the texts are "".
     """
-    words = [f"gains: {source}" if (source := kinds(its)) not in ("", NONE) else "" for its in sources]
+    words = [
+        f"gains: {source}" if (source := kinds(its)) not in ("", NONE) else "" for its in sources
+    ]
     if len(different := {text for text in words if text}) == 1:
         return [""] * len(words), different.pop()
     return [f", {text}" if text else "" for text in words], ""
 
 
 def files(path: str | os.PathLike[str] | None, format: str | None = None) -> list[Path]:
-    """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if `format` is given.
+    """Return the files of a figure: a PDF for .pdf, else an SVG and a PNG; only one of them if
+    `format` is given.
 
-    ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings. Without a path there are no files.
+    ".5" in "lam_0.5" and ".b c" in "a.b c" do not count as endings. Without a path there are no
+    files.
     """
     if path is None:
         if format is not None:
@@ -192,7 +248,9 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
         return []
     base = Path(path)
     if not base.name or "\0" in base.name:
-        raise ScenarioError(f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg")
+        raise ScenarioError(
+            f"cannot draw to {str(path)!r}: give the name of a file, such as network.svg"
+        )
     if format is not None and format not in FORMATS:
         raise unknown("format", format, FORMATS)
     ending = base.suffix[1:]
@@ -201,8 +259,13 @@ def files(path: str | os.PathLike[str] | None, format: str | None = None) -> lis
     elif ending.isalnum() and ending[0].isalpha():
         raise ScenarioError(f"cannot draw to {base.name!r}: end the name in .svg, .png or .pdf")
     if format is not None and ending in FORMATS and ending != format:
-        raise ScenarioError(f"cannot draw to {Path(path).name!r} as {format}: end the name in .{format}")
-    several = ("pdf",) if ending == "pdf" else ("svg", "png")
+        raise ScenarioError(
+            f"cannot draw to {Path(path).name!r} as {format}: end the name in .{format}"
+        )
+    if ending == "pdf":
+        several = ("pdf",)
+    else:
+        several = ("svg", "png")
     return [base.with_name(f"{base.name}.{kind}") for kind in ((format,) if format else several)]
 
 
@@ -212,14 +275,22 @@ def hint(text: str) -> str:
 
 
 def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
-    """Write a figure to files of these names, its label as their description. The same figure gives the same files."""
+    """Write a figure to files of these names, its label as their description.
+
+    The same figure gives the same files.
+    """
     if not paths:
         return
     whole, about = page.get_figure(root=True), str(page.get_label()) or None
-    dates, layout = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}, whole.get_layout_engine()
+    dates, layout = (
+        {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}},
+        whole.get_layout_engine(),
+    )
     if layout is not None:
         canvas, dpi = whole.canvas, whole.dpi
-        get_registered_canvas_class(paths[0].suffix[1:])(whole)  # texts are as large as this canvas draws them
+        get_registered_canvas_class(paths[0].suffix[1:])(
+            whole
+        )  # texts are as large as this canvas draws them
         whole.dpi = resolution(whole)
         layout.execute(whole)
         whole.set_canvas(canvas)
@@ -235,12 +306,17 @@ def write(page: Figure | SubFigure, paths: Sequence[Path]) -> None:
             )
             if path.suffix == ".svg":
                 text = Path(part).read_text(encoding="utf-8")
-                Path(part).write_text(re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8")
+                Path(part).write_text(
+                    re.sub(r'<g id="hint: (.*?)">', r"<g><title>\1</title>", text), encoding="utf-8"
+                )
     whole.set_layout_engine(layout)
 
 
 class Spaced(AutoLocator):
-    """Ticks at round numbers whose labels do not touch. Matplotlib assumes labels that are three letters wide."""
+    """Ticks at round numbers whose labels do not touch.
+
+    Matplotlib assumes labels that are three letters wide.
+    """
 
     def __init__(self):
         super().__init__()
@@ -253,16 +329,28 @@ class Spaced(AutoLocator):
         box, formatter, ticks = self.axis.axes.bbox, self.axis.get_major_formatter(), []
         for count in range(MAX_TICKS, 0, -1):
             self.set_params(nbins=count)
-            ticks = [tick for tick in np.asarray(self.tick_values(low, high)).tolist() if low <= tick <= high]
-            widest = max((style.width(text, self.size) for text in formatter.format_ticks(ticks)), default=0.0)
-            pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low) if ticks[1:] else 0.0
+            ticks = []
+            for tick in np.asarray(self.tick_values(low, high)).tolist():
+                if low <= tick <= high:
+                    ticks.append(tick)
+            widest = max(
+                (style.width(text, self.size) for text in formatter.format_ticks(ticks)),
+                default=0.0,
+            )
+            if ticks[1:]:
+                pitch = 72 * box.width / self.axis.figure.dpi * (ticks[1] - ticks[0]) / (high - low)
+            else:
+                pitch = 0.0
             if widest + TICK_GAP * self.size <= pitch:
                 return ticks
         return ticks[:1]
 
 
 def space_ticks(page: Figure | SubFigure) -> None:
-    """Give the axes of a page ticks whose labels do not touch. Logarithmic axes and ticks that were set stay."""
+    """Give the axes of a page ticks whose labels do not touch.
+
+    Logarithmic axes and ticks that were set stay.
+    """
     for ax in page.findobj(Axes):
         assert isinstance(ax, Axes)
         if isinstance(ax.xaxis.get_major_locator(), MaxNLocator):

@@ -1,7 +1,8 @@
 """The indices of a sensitivity as bars, beside the runs over the two axes that tell most.
 
-A bar is dark up to the first-order index and light up to the total index, with its interval. On the right a dot is a
-run, darker the worse its score is, and a cross a run that fails. A dashed line bounds the first region of failures.
+A bar is dark up to the first-order index and light up to the total index, with its interval. On the
+right a dot is a run, darker the worse its score is, and a cross a run that fails. A dashed line
+bounds the first region of failures.
 """
 
 import os
@@ -41,8 +42,18 @@ def draw(
     handles: list[Handle] = [
         Patch(facecolor=colour, label="alone"),
         Patch(facecolor=pale, label="with others, 95 % interval"),
-        Line2D([], [], ls="", marker="o", color=colour, label=f"a run, darker: worse {CATALOGUE[found.metric].label}"),
-        *([Line2D([], [], ls="", marker="x", color=style.INK, label="a run that fails")] * bool(found.failed.any())),
+        Line2D(
+            [],
+            [],
+            ls="",
+            marker="o",
+            color=colour,
+            label=f"a run, darker: worse {CATALOGUE[found.metric].label}",
+        ),
+        *(
+            [Line2D([], [], ls="", marker="x", color=style.INK, label="a run that fails")]
+            * bool(found.failed.any())
+        ),
     ]
     with style.page(width):
         head = pages.head_height(width, handles)
@@ -66,7 +77,9 @@ def _bars(ax: Axes, found: Explained, colour: str, pale: str) -> None:
     ends = np.clip([(its.low, its.high) for its in total], 0.0, 1.0) * 100
     ax.hlines(rows, *ends.T, color=style.INK, lw=style.points(1.2))
     ax.set_yticks(rows, [in_words(axis.name) for axis in found.axes])
-    ax.set(xlim=(0.0, 100.0), xlabel=f"share of the variance of {CATALOGUE[found.metric].label} (%)")
+    ax.set(
+        xlim=(0.0, 100.0), xlabel=f"share of the variance of {CATALOGUE[found.metric].label} (%)"
+    )
     ax.invert_yaxis()
     ax.grid(visible=False, axis="y")
 
@@ -74,11 +87,16 @@ def _bars(ax: Axes, found: Explained, colour: str, pale: str) -> None:
 def _runs(ax: Axes, found: Explained, colour: str) -> None:
     """Draw independent runs over the axes of the first region, then those of the largest indices."""
     space = found.space
-    wanted = [cut.axis for cut in found.regions[0].cuts] if found.regions else []
+    if found.regions:
+        wanted = [cut.axis for cut in found.regions[0].cuts]
+    else:
+        wanted = []
     ranked = [space.names.index(axis.name) for axis in found.axes if axis.name != CHANCE]
     at = [*wanted, *(i for i in ranked if i not in wanted)][:2]
     scales = [style.prefixed(space.ends[i][1], space.ends[i][2]) for i in at]
-    columns = [factor * space.column(i, found.shares) for i, (factor, _) in zip(at, scales, strict=True)]
+    columns = [
+        factor * space.column(i, found.shares) for i, (factor, _) in zip(at, scales, strict=True)
+    ]
     if len(at) < 2:  # one axis has the score beside it
         columns.append(found.values)
         ax.set_ylabel(f"{CATALOGUE[found.metric].label} ({found.unit})")
@@ -87,9 +105,18 @@ def _runs(ax: Axes, found: Explained, colour: str) -> None:
     place[order] = np.linspace(0.0, 1.0, len(order))
     shades = np.array(style.ramp(colour, 12))
     tone = shades[np.minimum((place * len(shades)).astype(int), len(shades) - 1)]
-    for marker, kind, of in (("o", ~found.failed, tone), ("x", found.failed, np.full(len(tone), style.INK))):
+    for marker, kind, of in (
+        ("o", ~found.failed, tone),
+        ("x", found.failed, np.full(len(tone), style.INK)),
+    ):
         picked = order[kind[order]]
-        ax.scatter(columns[0][picked], columns[1][picked], style.points(DOT_SIZE), of[picked].tolist(), marker=marker)
+        ax.scatter(
+            columns[0][picked],
+            columns[1][picked],
+            style.points(DOT_SIZE),
+            of[picked].tolist(),
+            marker=marker,
+        )
     for k, (i, (_, unit)) in enumerate(zip(at, scales, strict=True)):
         (ax.set_xlabel, ax.set_ylabel)[k](f"{in_words(space.names[i])} ({unit or 'of nominal'})")
         if (constant := space.columns[i]) and constant.geometric:
@@ -98,12 +125,22 @@ def _runs(ax: Axes, found: Explained, colour: str) -> None:
         _border(ax, found.regions[0].cuts, at, [factor for factor, _ in scales], space)
 
 
-def _border(ax: Axes, cuts: Sequence[Cut], at: list[int], factors: list[float], space: Space) -> None:
+def _border(
+    ax: Axes, cuts: Sequence[Cut], at: list[int], factors: list[float], space: Space
+) -> None:
     """Draw the border of a region."""
     ends = [list(ax.get_xlim()), list(ax.get_ylim())]
     for cut in cuts:
         k = at.index(cut.axis)
         ends[k][not cut.above] = factors[k] * space.value(cut.axis, cut.share)
     (left, right), (low, high) = ends
-    border = Rectangle((left, low), right - left, high - low, fill=False, ls="--", ec=style.INK, lw=style.points(1.2))
+    border = Rectangle(
+        (left, low),
+        right - left,
+        high - low,
+        fill=False,
+        ls="--",
+        ec=style.INK,
+        lw=style.points(1.2),
+    )
     ax.add_patch(border)

@@ -1,7 +1,8 @@
-"""Runs that a person watches and changes: at every moment they are those of `smc.run`, so that they can be saved.
+"""Runs that a person watches and changes: at every moment they are those of `smc.run`, so that they
+can be saved.
 
-A changed gain, condition or law starts the runs again. A push joins their disturbances, and they are repeated up to the
-present. So the session is its scenarios, and a saved one repeats it.
+A changed gain, condition or law starts the runs again. A push joins their disturbances, and they
+are repeated up to the present. So the session is its scenarios, and a saved one repeats it.
 """
 
 import dataclasses
@@ -61,7 +62,9 @@ class Slider(NamedTuple):
 
 
 class Session:
-    """Runs of one plant under its laws, of which `sample` samples are over; a reset goes back to `first`."""
+    """Runs of one plant under its laws, of which `sample` samples are over; a reset goes back to
+    `first`.
+    """
 
     def __init__(self, scenarios: Sequence[Scenario]):
         self.first = tuple(scenarios)
@@ -71,7 +74,9 @@ class Session:
     def begin(self, scenarios: Sequence[Scenario], sample: int = 0) -> None:
         """Start these scenarios, and repeat them up to a sample of the control."""
         if len({(s.control_period, s.samples) for s in scenarios}) > 1:
-            raise ScenarioError("no view: the runs differ in control_period or duration: give both the same")
+            raise ScenarioError(
+                "no view: the runs differ in control_period or duration: give both the same"
+            )
         prepared = [prepare(scenario) for scenario in scenarios]
         if reason := next((one.why_not for one in prepared if one.why_not), None):
             raise ScenarioError(f"no view: {reason}")
@@ -110,10 +115,17 @@ class Session:
             if batch.records["failure"][0] != state.FINE:
                 self.message = f"{batch.scenarios[0].law.name} failed: {batch.trace(0).failure}"
 
-    def change(self, changed: Callable[[Scenario], Scenario], run: int | None = None, sample: int = 0) -> None:
-        """Start again with changed scenarios, all or one; a change that they refuse leaves them, and says why."""
+    def change(
+        self, changed: Callable[[Scenario], Scenario], run: int | None = None, sample: int = 0
+    ) -> None:
+        """Start again with changed scenarios, all or one; a change that they refuse leaves them,
+        and says why.
+        """
         try:
-            self.begin([changed(s) if run in {None, i} else s for i, s in enumerate(self.scenarios)], sample)
+            self.begin(
+                [changed(s) if run in {None, i} else s for i, s in enumerate(self.scenarios)],
+                sample,
+            )
             self.message = ""
         except ScenarioError as error:
             self.message = str(error)
@@ -127,16 +139,24 @@ class Session:
         """Push a body from now on: a half sine of 0.1 s with this peak in the axes of the world, N."""
         x, y, z = force.tolist()
         push = Push(body=body, x=x, y=y, z=z, time=self.time, width=PUSH_WIDTH)
-        self.change(lambda s: dataclasses.replace(s, disturbance=(*s.disturbance, push)), sample=self.sample)
+        self.change(
+            lambda s: dataclasses.replace(s, disturbance=(*s.disturbance, push)), sample=self.sample
+        )
 
     def take_law(self, law: Law | str, run: int) -> None:
         """Give one run another law, by its name with its gains for the plant."""
-        self.change(lambda s: dataclasses.replace(s, law=law_for(s.plant, law), surface=None, model=None), run)
+        self.change(
+            lambda s: dataclasses.replace(s, law=law_for(s.plant, law), surface=None, model=None),
+            run,
+        )
 
     def state(self, run: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return positions, velocities and activations of a run."""
         bind = self.batches[run].batch.bind
-        act = bind("act")[0] if self.batches[run].model.na else np.zeros(0)
+        if self.batches[run].model.na:
+            act = bind("act")[0]
+        else:
+            act = np.zeros(0)
         return bind("qpos")[0], bind("qvel")[0], act
 
     def log(self, run: int) -> np.ndarray:
@@ -146,8 +166,8 @@ class Session:
     def screen(self) -> mujoco.MjModel:
         """Return the mechanism with the true parameters at the start, for the screen.
 
-        Multisampling and ambient occlusion, which Studio reads from the model, are off: each would take a third of a
-        frame where a processor draws.
+        Multisampling and ambient occlusion, which Studio reads from the model, are off: each would
+        take a third of a frame where a processor draws.
         """
         scenario = self.scenarios[0].resolved
         spec = models.spec(scenario)
@@ -179,16 +199,24 @@ class Session:
         runs = {f"{s.law.name} {i + 1}": describe(s) for i, s in enumerate(self.scenarios)}
         runs = json.loads(json.dumps(runs))
         if [restore(run) for run in runs.values()] != list(self.scenarios):
-            raise ScenarioError("the session cannot be saved: a scene file cannot name its law or plant")
+            raise ScenarioError(
+                "the session cannot be saved: a scene file cannot name its law or plant"
+            )
         plant = self.scenarios[0].plant.name
         self.message = f"saved as {path}"
-        path.write_text(SAVED.format(plant=plant, runs=pformat(runs, width=110, sort_dicts=False)), encoding="utf-8")
+        path.write_text(
+            SAVED.format(plant=plant, runs=pformat(runs, width=110, sort_dicts=False)),
+            encoding="utf-8",
+        )
         return path
 
 
 def sliders(s: Scenario) -> dict[str, Slider]:
     """Return name -> slider of a run's gains and conditions."""
-    gains = {} if len(s.law.parts) > 1 else gain_sliders(s.law)
+    if len(s.law.parts) > 1:
+        gains = {}
+    else:
+        gains = gain_sliders(s.law)
     return gains | {name: one for name, one in condition_sliders(s).items() if takes(s, one)}
 
 
@@ -198,15 +226,21 @@ def laws_of(plant: Plant) -> list[str]:
 
 
 def law_for(plant: Plant, law: Law | Template | str) -> Law | Template | str:
-    """Return a law; for a name, with the package's gains for the plant where there are any, else its defaults."""
+    """Return a law; for a name, with the package's gains for the plant where there are any, else
+    its defaults.
+    """
     try:
-        return law_with_gains(plant, law) if isinstance(law, str) else law
+        if isinstance(law, str):
+            return law_with_gains(plant, law)
+        return law
     except ScenarioError:
         return law
 
 
 def at_keyframe(scenario: Scenario, model: mujoco.MjModel, key: int) -> Scenario:
-    """Return a scenario that starts in a keyframe; refuse one that the channels' x0 and v0 cannot give."""
+    """Return a scenario that starts in a keyframe; refuse one that the channels' x0 and v0 cannot
+    give.
+    """
     qpos, qvel, joints = model.key_qpos[key], model.key_qvel[key], models.moving_joints(model)[0]
     if scenario.plant.pose:
         first, dof = model.jnt_qposadr[joints[0]], model.jnt_dofadr[joints[0]]
@@ -222,36 +256,57 @@ def at_keyframe(scenario: Scenario, model: mujoco.MjModel, key: int) -> Scenario
 
 
 def gain_sliders(law: Law) -> dict[str, Slider]:
-    """Return a slider for each finite gain that all channels share: a tenth to ten times it, 0 to 1 for 0."""
+    """Return a slider for each finite gain that all channels share: a tenth to ten times it, 0 to 1
+    for 0.
+    """
 
     def fields(name: str) -> Callable[[Scenario, float], dict[str, Any]]:
-        return lambda s, gain: {"law": dataclasses.replace(s.law, gains={**s.law.gains, name: gain})}
+        return lambda s, gain: {
+            "law": dataclasses.replace(s.law, gains={**s.law.gains, name: gain})
+        }
 
     return {
-        name: Slider(gain, min(gain / 10.0, gain * 10.0), max(gain / 10.0, gain * 10.0) if gain else 1.0, fields(name))
+        name: Slider(
+            gain,
+            min(gain / 10.0, gain * 10.0),
+            max(gain / 10.0, gain * 10.0) if gain else 1.0,
+            fields(name),
+        )
         for name, gain in law.gains.items()
         if not isinstance(gain, tuple) and math.isfinite(gain)
     }
 
 
 def condition_sliders(s: Scenario) -> Mapping[str, Slider]:
-    """Return the sliders of what acts on a run, but of friction where the scenario has a kind of its own."""
+    """Return the sliders of what acts on a run, but of friction where the scenario has a kind of
+    its own.
+    """
     step = s.resolved.physics_step
     bound = float(np.min(s.resolved.u_max))
     sliders: dict[str, Slider] = {
         "mass, factor": Slider(
-            s.mismatch.get("mass", 1.0), 0.5, 2.0, lambda s, v: {"mismatch": {**s.mismatch, "mass": v}}
+            s.mismatch.get("mass", 1.0),
+            0.5,
+            2.0,
+            lambda s, v: {"mismatch": {**s.mismatch, "mass": v}},
         ),
-        "delay, s": Slider(s.input_delay, 0.0, 0.05, lambda s, v: {"input_delay": round(v / step) * step}),
+        "delay, s": Slider(
+            s.input_delay, 0.0, 0.05, lambda s, v: {"input_delay": round(v / step) * step}
+        ),
         "noise, rad or m": Slider(
-            s.noise.position, 0.0, 0.02, lambda s, v: {"noise": dataclasses.replace(s.noise, position=v)}
+            s.noise.position,
+            0.0,
+            0.02,
+            lambda s, v: {"noise": dataclasses.replace(s.noise, position=v)},
         ),
     }
     coulomb = [part.level for part in s.friction if isinstance(part, Coulomb)]
     if len(coulomb) == len(s.friction) <= 1:
         level = sum(coulomb)
         most = 0.5 * bound if math.isfinite(bound) else 1.0
-        sliders["friction, N or N m"] = Slider(level, 0.0, most, lambda s, v: {"friction": Coulomb(v) if v else None})
+        sliders["friction, N or N m"] = Slider(
+            level, 0.0, most, lambda s, v: {"friction": Coulomb(v) if v else None}
+        )
     return sliders
 
 

@@ -1,9 +1,11 @@
-"""States of a machine over time: whether it sticks or slides, touches something, and where it lies in its backlash.
+"""States of a machine over time: whether it sticks or slides, touches something, and where it lies
+in its backlash.
 
-No state is shown for less than MIN_STATE_TIME: a blow of 5 ms is shown for that time, and rest only if it lasts so
-long. `metrics.conventions.at_rest` defines rest. Contact is what MuJoCo's collision detection says of the scenario's
-model, posed at each sample. The flank of a backlash is the sign of the joint's reaction. Friction and contacts are in
-the reaction too: with them the flank is the sign of the actuator's force, which does not tell when a rotor is in play.
+No state is shown for less than MIN_STATE_TIME: a blow of 5 ms is shown for that time, and rest only
+if it lasts so long. `metrics.conventions.at_rest` defines rest. Contact is what MuJoCo's collision
+detection says of the scenario's model, posed at each sample. The flank of a backlash is the sign of
+the joint's reaction. Friction and contacts are in the reaction too: with them the flank is the sign
+of the actuator's force, which does not tell when a rotor is in play.
 """
 
 import itertools
@@ -44,24 +46,36 @@ class Shape(NamedTuple):
 
 def shapes(scenario: Scenario) -> list[Shape]:
     """Return the mechanism at the start of a run, and after its jump."""
-    steps = [0] if scenario.jump is None else [0, scenario.jump_step]
+    if scenario.jump is None:
+        steps = [0]
+    else:
+        steps = [0, scenario.jump_step]
     compiled = models.compile_model(scenario)
     return [
-        Shape(step * scenario.resolved.physics_step, models.with_values(compiled, scenario, step)) for step in steps
+        Shape(step * scenario.resolved.physics_step, models.with_values(compiled, scenario, step))
+        for step in steps
     ]
 
 
 def timeline(trace: Trace, times: np.ndarray, hold: float = MIN_STATE_TIME) -> list[State | None]:
-    """Return the state at each time, s; None for a machine without states, and after its run failed."""
+    """Return the state at each time, s; None for a machine without states, and after its run
+    failed.
+    """
     dry, gap = has_dry_friction(trace.scenario), backlash_gap(trace.scenario)
     contact = np.any(np.stack([extended(on, trace.t, hold) for on in in_contact(trace).T]), axis=0)
     sliding = np.array([extended(~on, trace.t, hold) for on in at_rest(trace).T])
-    sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T]) if gap else None
+    if gap:
+        sides = np.array([backlash_side(flank, trace.t, hold) for flank in flanks(trace).T])
+    else:
+        sides = None
     states: list[State | None] = []
     for time in times.tolist():
         k = int(np.searchsorted(trace.t, time + 1e-9)) - 1
         words = [stick_words(~sliding[:, k])] if dry else []
-        words += [backlash_words(sides[:, k])] if sides is not None else []
+        if sides is not None:
+            words += [backlash_words(sides[:, k])]
+        else:
+            words += []
         if trace.diverged_at is not None and time >= trace.diverged_at:
             states.append(None)
         elif contact[k]:
@@ -81,13 +95,25 @@ def at_rest(trace: Trace) -> np.ndarray:
 
 
 def debounced(states: Sequence[State | None], times: np.ndarray, hold: float) -> list[State | None]:
-    """Return the states, with those shorter than `hold` s replaced by the ones before. Contacts are kept."""
-    runs = [list(run) for _, run in itertools.groupby(range(len(states)), key=lambda frame: states[frame])]
+    """Return the states, with those shorter than `hold` s replaced by the ones before.
+
+    Contacts are kept.
+    """
+    runs = [
+        list(run)
+        for _, run in itertools.groupby(range(len(states)), key=lambda frame: states[frame])
+    ]
     result = list(states)
     for run, after in itertools.pairwise(runs):
         state, before = states[run[0]], result[run[0] - 1] if run[0] else states[after[0]]
         brief = times[after[0]] - times[run[0]] < hold - 1e-9
-        if brief and state and before and state.mood != STRUCK and (run[0] or before.mood != STRUCK):
+        if (
+            brief
+            and state
+            and before
+            and state.mood != STRUCK
+            and (run[0] or before.mood != STRUCK)
+        ):
             result[run[0] : after[0]] = [before] * len(run)
     return result
 
@@ -102,7 +128,10 @@ def has_dry_friction(scenario: Scenario) -> bool:
     if scenario.contact.kind == "none":
         return False
     model = shapes(scenario)[0].model
-    return any(model.pair(i).name.startswith(RUB) and model.pair_friction[i, 0] > 0.0 for i in range(model.npair))
+    return any(
+        model.pair(i).name.startswith(RUB) and model.pair_friction[i, 0] > 0.0
+        for i in range(model.npair)
+    )
 
 
 def has_contact(scenario: Scenario) -> bool:
@@ -125,7 +154,10 @@ def in_contact(trace: Trace) -> np.ndarray:
     data = [mujoco.MjData(shape.model) for shape in parts]
     places = parts[0].model.jnt_qposadr[joint_ids(parts[0].model)]
     tables = [_channels(shape.model) for shape in parts]
-    reacting = (trace.reaction != 0.0).any(axis=1) if any(hits for hits, _ in tables) else np.zeros(len(trace.t), bool)
+    if any(hits for hits, _ in tables):
+        reacting = (trace.reaction != 0.0).any(axis=1)
+    else:
+        reacting = np.zeros(len(trace.t), bool)
     for k in np.flatnonzero(reacting):
         now = sum(float(trace.t[k]) >= shape.time for shape in parts) - 1
         model, posed, (hits, owner) = parts[now].model, data[now], tables[now]
@@ -141,24 +173,33 @@ def in_contact(trace: Trace) -> np.ndarray:
 
 
 def _channels(model: mujoco.MjModel) -> tuple[set[frozenset[int]], np.ndarray]:
-    """Return the pairs of geoms that hit each other, and the channel that moves each body, -1 if none does."""
+    """Return the pairs of geoms that hit each other, and the channel that moves each body, -1 if
+    none does.
+    """
     geoms = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
     hits = {frozenset(pair) for i, pair in enumerate(geoms) if model.pair(i).name.startswith(HIT)}
     owner = np.full(model.nbody, -1)
     bodies = model.jnt_bodyid[joint_ids(model)].tolist()
     for body in range(1, model.nbody):
-        owner[body] = bodies.index(body) if body in bodies else owner[model.body_parentid[body]]
+        if body in bodies:
+            owner[body] = bodies.index(body)
+        else:
+            owner[body] = owner[model.body_parentid[body]]
     return hits, owner
 
 
 def flanks(trace: Trace) -> np.ndarray:
-    """Return the side from which each rotor pushes its joint, -1, 0 or 1, (K + 1, n): 1 pushes towards larger x."""
+    """Return the side from which each rotor pushes its joint, -1, 0 or 1, (K + 1, n): 1 pushes
+    towards larger x.
+    """
     alone = not trace.scenario.friction and trace.scenario.contact.kind == "none"
     return np.sign(np.nan_to_num(trace.reaction if alone else trace.force))
 
 
 def extended(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return the signal (K + 1,), extended by `hold` s each time it is on, without gaps shorter than that."""
+    """Return the signal (K + 1,), extended by `hold` s each time it is on, without gaps shorter
+    than that.
+    """
     last = np.maximum.accumulate(np.where(on, t, -np.inf))
     on = t - last < hold - 1e-9
     edges = np.flatnonzero(np.diff(on.astype(int), prepend=0))  # on, off, on, ...
@@ -168,7 +209,9 @@ def extended(on: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
 
 
 def backlash_side(flank: np.ndarray, t: np.ndarray, hold: float) -> np.ndarray:
-    """Return the key of SIDES at each sample, (K + 1,): flank -1 or 1, 0 in play, 2 if it crosses too often to show."""
+    """Return the key of SIDES at each sample, (K + 1,): flank -1 or 1, 0 in play, 2 if it crosses
+    too often to show.
+    """
     touched = np.flatnonzero(flank)
     crossed = touched[1:][np.diff(flank[touched]) != 0]
     rattles = np.zeros(len(t), bool)

@@ -1,7 +1,9 @@
-"""`smc.view`: any machine in MuJoCo's Studio, in a browser tab, stepped by the compiled loop of `smc.run`.
+"""`smc.view`: any machine in MuJoCo's Studio, in a browser tab, stepped by the compiled loop of
+`smc.run`.
 
-Studio shows copies of the runs' positions, so nothing in its panels changes a run but the panel "Laws", the push of the
-mouse and Reset. Its page runs in a thread of its own, which only asks: the loop of `show` acts between two frames.
+Studio shows copies of the runs' positions, so nothing in its panels changes a run but the panel
+"Laws", the push of the mouse and Reset. Its page runs in a thread of its own, which only asks: the
+loop of `show` acts between two frames.
 """
 
 # pyright: reportMissingImports=false
@@ -30,8 +32,8 @@ from smc_mujoco.simulation.scenario import Scenario
 
 FRAME_TIME = 1.0 / 60.0  # s
 MAX_FRAME_TIME = 0.1  # s, simulated in a frame at most, so that slow runs still answer
-# Where a processor draws the page, each pixel takes 0.4 us of it. So it has fewer along each side: chosen, as decimal
-# points are lost at 0.5.
+# Where a processor draws the page, each pixel takes 0.4 us of it. So it has fewer along each side:
+# chosen, as decimal points are lost at 0.5.
 FEWER_PIXELS = """<head><script>{
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -47,11 +49,12 @@ def view(
     open_browser: bool = True,
     watched: Callable[[Session], bool] = lambda session: True,
 ) -> tuple[Scenario, ...]:
-    """Show a machine under one law or two in a browser tab until Ctrl-C; return its scenarios as they are then.
+    """Show a machine under one law or two in a browser tab until Ctrl-C; return its scenarios as
+    they are then.
 
-    The second law's machine is the transparent one. The panel "Laws" has the laws, their gains, what acts on the runs,
-    u, s and e, and "save as scene". Double-click a body, hold Ctrl and drag with the right mouse button: it is pushed
-    when you let go. The tab needs MuJoCo 4.
+    The second law's machine is the transparent one. The panel "Laws" has the laws, their gains,
+    what acts on the runs, u, s and e, and "save as scene". Double-click a body, hold Ctrl and drag
+    with the right mouse button: it is pushed when you let go. The tab needs MuJoCo 4.
 
     Args:
       scenario: a Scenario or two, a plant, or "arm.xml:shoulder+elbow".
@@ -61,11 +64,14 @@ def view(
       watched: called after each frame; the view ends when it returns False.
 
     Raises:
-      ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit the machine.
+      ScenarioError: MuJoCo is older than 4, this process had a view already, or a law does not suit
+        the machine.
     """
     session = Session(runs_of(scenario, laws))
     if importlib.util.find_spec("mujoco.studio") is None:
-        raise ScenarioError(f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'")
+        raise ScenarioError(
+            f"no view: MuJoCo {mujoco.__version__} has no Studio: pip install 'mujoco>=4'"
+        )
     from mujoco.studio import app, launch_web, viewer_protocol
     from mujoco.studio.web import web_server
 
@@ -73,11 +79,19 @@ def view(
 
     bind = web_server.bind_public_socket
     if bind.__module__ == __name__:
-        raise ScenarioError("no view: this process had one already, and Studio crashes in a second: restart Python")
-    web_server.bind_public_socket = lambda host, port: bind("127.0.0.1", port)  # Studio would serve the whole network
-    config = viewer_protocol.ViewerConfig(title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser)
+        raise ScenarioError(
+            "no view: this process had one already, and Studio crashes in a second: restart Python"
+        )
+    web_server.bind_public_socket = lambda host, port: bind(
+        "127.0.0.1", port
+    )  # Studio would serve the whole network
+    config = viewer_protocol.ViewerConfig(
+        title="smc_mujoco", gfx="web", http_port=port, open_browser=open_browser
+    )
     panel = Panel(session)
-    shell = app.App(app.Config(show_options=False, show_inspector=False))  # of a simulation that is not ours
+    shell = app.App(
+        app.Config(show_options=False, show_inspector=False)
+    )  # of a simulation that is not ours
     with tempfile.TemporaryDirectory() as folder, contextlib.suppress(KeyboardInterrupt):
         put_page(Path(web_server.__file__).parent / "dist", Path(folder))
         with launch_web.launch(config, plugins=[shell, panel]) as page:
@@ -89,23 +103,38 @@ def put_page(original: Path, folder: Path) -> None:
     """Let Studio serve a copy of its page that has `FEWER_PIXELS`."""
     shutil.copytree(original, folder, dirs_exist_ok=True)
     page = folder / "index.html"
-    page.write_text(page.read_text(encoding="utf-8").replace("<head>", FEWER_PIXELS, 1), encoding="utf-8")
+    page.write_text(
+        page.read_text(encoding="utf-8").replace("<head>", FEWER_PIXELS, 1), encoding="utf-8"
+    )
     os.environ["MUJOCO_WEB_VIEWER_DIST"] = str(folder)
 
 
-def runs_of(scenario: Scenario | Sequence[Scenario] | Plant | str, laws: Sequence[Law | str]) -> list[Scenario]:
+def runs_of(
+    scenario: Scenario | Sequence[Scenario] | Plant | str, laws: Sequence[Law | str]
+) -> list[Scenario]:
     """Return the scenarios to show."""
     wanted = listed_laws(laws) if laws else []
-    runs = [scenario] if isinstance(scenario, Scenario) else scenario
+    if isinstance(scenario, Scenario):
+        runs = [scenario]
+    else:
+        runs = scenario
     if isinstance(runs, list | tuple):
         if not runs or not all(isinstance(one, Scenario) for one in runs):
-            raise ScenarioError(f"scenario is {shown(scenario)}: give a Scenario or two, or a plant")
-        runs = [dataclasses.replace(runs[0], law=law_for(runs[0].plant, law)) for law in wanted] or list(runs)
+            raise ScenarioError(
+                f"scenario is {shown(scenario)}: give a Scenario or two, or a plant"
+            )
+        runs = [
+            dataclasses.replace(runs[0], law=law_for(runs[0].plant, law)) for law in wanted
+        ] or list(runs)
     else:
         plant = as_plant(runs)
-        runs = [Scenario(plant=plant, law=law_for(plant, law)) for law in wanted or laws_of(plant)[:1]]
+        runs = []
+        for law in wanted or laws_of(plant)[:1]:
+            runs.append(Scenario(plant=plant, law=law_for(plant, law)))
     if len(runs) > 2:
-        raise ScenarioError(f"{len(runs)} runs to show: give one or two, which are shown in one picture")
+        raise ScenarioError(
+            f"{len(runs)} runs to show: give one or two, which are shown in one picture"
+        )
     return runs
 
 

@@ -1,4 +1,7 @@
-"""The panel "Laws" of `smc.view`, and the second run's machine. It runs in the thread of Studio's page."""
+"""The panel "Laws" of `smc.view`, and the second run's machine.
+
+It runs in the thread of Studio's page.
+"""
 
 # pyright: reportMissingImports=false
 # (MuJoCo 3, which the lock has, lacks Studio)
@@ -52,7 +55,9 @@ class Panel(plugin.ViewerPlugin):
             imgui.SameLine()
             self.button(f"save as scene {SAVED_AS}", functools.partial(session.save, SAVED_AS))
             for key in range(self.viewer.model.nkey):
-                name = self.viewer.model.key(key).name.removeprefix("smc:") or key  # "smc:start" is that of a user
+                name = (
+                    self.viewer.model.key(key).name.removeprefix("smc:") or key
+                )  # "smc:start" is that of a user
                 self.button(f"keyframe {name}", functools.partial(session.keyframe, key))
             for run in range(len(session.scenarios)):
                 self.run(run)
@@ -71,24 +76,34 @@ class Panel(plugin.ViewerPlugin):
     def run(self, run: int) -> None:
         """Show the law of a run, and its sliders."""
         law = self.session.scenarios[run].law.name
-        names = self.laws if law in self.laws else [law, *self.laws]
+        if law in self.laws:
+            names = self.laws
+        else:
+            names = [law, *self.laws]
         changed, chosen = imgui.Combo(f"law {run + 1}", names.index(law), names)
         if changed:
             self.asked.put(functools.partial(self.session.take_law, names[chosen], run))
         for name, slider in self.session.sliders[run].items():
-            changed, value = imgui.SliderFloat(f"{name}##{run}", slider.value, slider.low, slider.high, "%.4g")
+            changed, value = imgui.SliderFloat(
+                f"{name}##{run}", slider.value, slider.low, slider.high, "%.4g"
+            )
             if changed:
                 self.asked.put(functools.partial(self.session.move, run, slider, value))
 
     def curves(self) -> None:
-        """Show u, s and e of each run's first channel up to now; of a free body, those along the vertical."""
+        """Show u, s and e of each run's first channel up to now; of a free body, those along the
+        vertical.
+        """
         for name in ("u", "s", "e"):
             implot.SetNextAxesToFit()
             if implot.BeginPlot(name, imgui.Vec2(-1.0, 130.0)):
                 for run, scenario in enumerate(self.session.scenarios):
                     log = self.session.log(run)[:, 2 if scenario.plant.pose else 0]
                     log = log[:: max(1, len(log) // SAMPLES)]
-                    values = log["x"] - log["r"] if name == "e" else log[name]
+                    if name == "e":
+                        values = log["x"] - log["r"]
+                    else:
+                        values = log[name]
                     implot.PlotLine(
                         f"{scenario.law.name}##{run}",
                         np.linspace(0.0, self.session.time, len(log)).tolist(),
@@ -104,7 +119,9 @@ class Panel(plugin.ViewerPlugin):
         data.qpos[:] = self.ghost_at
         mujoco.mj_forward(model, data)
         dynamic = mujoco.mjtCatBit.mjCAT_DYNAMIC.value
-        mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), dynamic, ghost)
+        mujoco.mjv_updateScene(
+            model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(), dynamic, ghost
+        )
         geoms = [ghost.geoms[i] for i in range(ghost.ngeom)]
         for geom in geoms:
             geom.rgba[3] = GHOST

@@ -1,9 +1,10 @@
 """Style of figures and films: colours, labels, units and fonts.
 
-Laws and plants state their labels in their own files. A law has one colour in nearly all pictures: the one that its
-file states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can tell apart; or else one of
-`_palette`. Matplotlib's petroff10 has only ten colours, fewer than there are laws; two of them are the grey of failed
-runs, and one is the violet of friction.
+Laws and plants state their labels in their own files. A law has one colour in nearly all pictures:
+the one that its file states, of Okabe and Ito (Color Universal Design, 2008), which colour-blind
+readers can tell apart; or else one of `_palette`. Matplotlib's petroff10 has only ten colours,
+fewer than there are laws; two of them are the grey of failed runs, and one is the violet of
+friction.
 """
 
 import colorsys
@@ -35,12 +36,20 @@ from smc_mujoco.simulation.trace import Trace
 
 INK, MUTED, GRID, PAPER, FAILED = "#1F2429", "#646C75", "#E3E6E9", "#FFFFFF", "#A9AFB6"
 DISTURBANCE, BAND, RULE = "#3A3F46", "#DDE1E5", "#B9BFC5"
-# Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours, the disturbance's
-# and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6), 2009).
+# Friction and contact. Chosen from a grid as one of the farthest in CIELAB from the laws' colours,
+# the disturbance's and paper, with any colour blindness (G. M. Machado et al., IEEE TVCG 15(6),
+# 2009).
 REACTION = "#9018F0"
 LOG_RANGE = 20.0  # largest over smallest value above which an axis may be logarithmic; chosen
 MANY_DIGITS = 1e5  # from it on, matplotlib writes numbers with an exponent
-PREFIXES = {-2: "M", -1: "k", 0: "", 1: "m", 2: "µ", 3: "n"}  # of units, by the power of 1000 that a number is given
+PREFIXES = {
+    -2: "M",
+    -1: "k",
+    0: "",
+    1: "m",
+    2: "µ",
+    3: "n",
+}  # of units, by the power of 1000 that a number is given
 CAMEL = re.compile(
     r"(?:(?<=[a-z]{3})|(?<=[A-Z]{2}))([A-Z])(?=[a-z])"
 )  # where a word begins in DCMotor, but not in LuGre
@@ -48,17 +57,27 @@ MARKS = "osD^vPX<>*dp"  # of laws, for readers who see no colours; after twelve 
 MAX_DIGITS, MAX_VALUES = 17, 8  # digits that tell two numbers apart; numbers of a label
 WHITE_SHARE = 0.35  # share of white in a law's colour on a dark page: chosen
 MIN_DISTANCE = 15.0  # colours closer than this are mistaken for each other, see `distance`; chosen
-LIGHTEST, DARKEST = 61.0, 21.0  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper; of a ramp
-SIGHTS = np.array([  # linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
+LIGHTEST, DARKEST = (
+    61.0,
+    21.0,
+)  # lightness in CIELAB: up to it lines have a contrast of 3 : 1 to paper; of a ramp
+# linear sRGB -> as it looks with all cones, no red, no green, no blue ones (Machado et al.)
+SIGHTS = np.array([
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
     [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
     [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
     [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
 ])  # fmt: skip
-XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]])
+XYZ = np.array(
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.072175],
+        [0.0193339, 0.119192, 0.9503041],
+    ]
+)
 
-# Inches. A full page is 845 px of SVG, so that its least letters have 11 px in 800 px, as in a README. Letters of
-# narrower pages than a journal's have 8 points, those of slides 16.
+# Inches. A full page is 845 px of SVG, so that its least letters have 11 px in 800 px, as in a
+# README. Letters of narrower pages than a journal's have 8 points, those of slides 16.
 FULL_WIDTH, JOURNAL_WIDTH, SLIDE_WIDTH = 8.8, 8.5, 13.3
 RC = {
     "font.family": "DejaVu Sans",
@@ -97,15 +116,22 @@ RC = {
 def page(width: float = FULL_WIDTH):
     """Return a context in which matplotlib draws in this style, on a page of this width in inches.
 
-    A full page has the letters and lines of RC. On journal pages and columns they are smaller, with letters of 8
-    points, on slides larger, with letters of 16.
+    A full page has the letters and lines of RC. On journal pages and columns they are smaller, with
+    letters of 8 points, on slides larger, with letters of 16.
     """
     from matplotlib import rc_context
 
-    letters = 8.0 if width < JOURNAL_WIDTH else 16.0 if width >= SLIDE_WIDTH else RC["font.size"]
+    if width < JOURNAL_WIDTH:
+        letters = 8.0
+    elif width >= SLIDE_WIDTH:
+        letters = 16.0
+    else:
+        letters = RC["font.size"]
     scale = letters / RC["font.size"]
     keys = ("size", "linewidth", "markersize")
-    return rc_context({key: value * scale if key.endswith(keys) else value for key, value in RC.items()})  # pyright: ignore[reportArgumentType]
+    return rc_context(
+        {key: value * scale if key.endswith(keys) else value for key, value in RC.items()}
+    )  # pyright: ignore[reportArgumentType]
 
 
 def points(size: float) -> float:
@@ -127,15 +153,21 @@ def law_colour(law: Component | str) -> str:
 def law_colours(laws: Sequence[Component | str]) -> list[str]:
     """Return one colour per law for one picture, all different.
 
-    The library's laws have their colours, in pictures of two and of many. Only one that would be mistaken for a law
-    that is before it in the palette, wherever they stand, gets the colour farthest from all: any 12 laws are then 13.7
-    apart, 24 are 9.6. Laws that are not of the library, whose colours say nothing, come after them. A law that runs
-    several times has shades of its colour, from light to dark.
+    The library's laws have their colours, in pictures of two and of many. Only one that would be
+    mistaken for a law that is before it in the palette, wherever they stand, gets the colour
+    farthest from all: any 12 laws are then 13.7 apart, 24 are 9.6. Laws that are not of the
+    library, whose colours say nothing, come after them. A law that runs several times has shades of
+    its colour, from light to dark.
     """
     names = [_template(law)[1] for law in laws]
     colours: dict[int, str] = {}
-    own, places = known_laws().own, {name: place for place, name in enumerate(_palette(), 1)}  # stated colours have 0
-    library, others = ([i for i, name in enumerate(names) if (name in own) == ours] for ours in (True, False))
+    own, places = (
+        known_laws().own,
+        {name: place for place, name in enumerate(_palette(), 1)},
+    )  # stated colours have 0
+    library, others = (
+        [i for i, name in enumerate(names) if (name in own) == ours] for ours in (True, False)
+    )
     library.sort(key=lambda i: (places.get(names[i], 0), names[i]))
     changed = []
     for i in library + others:
@@ -149,26 +181,33 @@ def law_colours(laws: Sequence[Component | str]) -> list[str]:
             colours[i] = wanted
     for i in sorted(changed):
         used = [*colours.values(), PAPER, INK, DISTURBANCE, REACTION, FAILED]
-        colours[i] = _farthest([colour for colour in _grid(len(colours)) if colour not in used], used)
+        colours[i] = _farthest(
+            [colour for colour in _grid(len(colours)) if colour not in used], used
+        )
     return [colours[i] for i in range(len(laws))]
 
 
 @functools.cache
 def _palette() -> dict[str, str]:
-    """Return the colours of the library's laws that state none, each the farthest from all before it.
+    """Return the colours of the library's laws that state none, each the farthest from all before
+    it.
 
-    Those of LAWS are first, then baselines. The former are at least MIN_DISTANCE apart in all SIGHTS; all cannot be.
+    Those of LAWS are first, then baselines. The former are at least MIN_DISTANCE apart in all
+    SIGHTS; all cannot be.
     """
     laws = known_laws().own.values()
     free = sorted(
-        (law for law in laws if not law.colour), key=lambda law: (law.name not in LAWS, law.family != "baseline")
+        (law for law in laws if not law.colour),
+        key=lambda law: (law.name not in LAWS, law.family != "baseline"),
     )
     colours = spread(len(free), [law.colour for law in laws if law.colour])
     return {law.name: colour for law, colour in zip(free, colours, strict=True)}
 
 
 def spread(count: int, others: Sequence[str] = ()) -> list[str]:
-    """Return colours, each the farthest from the neutral ones, from the others and from all before it."""
+    """Return colours, each the farthest from the neutral ones, from the others and from all before
+    it.
+    """
     used = [PAPER, INK, DISTURBANCE, REACTION, FAILED, *others]
     for _ in range(count):
         used.append(_farthest([colour for colour in _grid(0) if colour not in used], used))
@@ -190,7 +229,10 @@ def _grid(count: int) -> tuple[str, ...]:
         hues *= 2  # a few grids serve all counts
     parts = itertools.product(range(hues), (0.24, 0.33, 0.42, 0.51, 0.6), (0.45, 0.7, 0.95))
     colours = (
-        "#" + "".join(f"{round(255 * c):02X}" for c in colorsys.hls_to_rgb(k / hues, lightness, saturation))
+        "#"
+        + "".join(
+            f"{round(255 * c):02X}" for c in colorsys.hls_to_rgb(k / hues, lightness, saturation)
+        )
         for k, lightness, saturation in parts
     )
     return tuple(colour for colour in colours if _seen(colour)[0][0] < LIGHTEST)
@@ -211,7 +253,9 @@ def _linear(colour: str) -> np.ndarray:
 
 
 def distance(one: str, other: str) -> float:
-    """Return the least distance of two colours in CIELAB over normal sight and three kinds of colour blindness."""
+    """Return the least distance of two colours in CIELAB over normal sight and three kinds of
+    colour blindness.
+    """
     return float(np.linalg.norm(_seen(one) - _seen(other), axis=1).min())
 
 
@@ -222,15 +266,23 @@ def law_name(law: Component | str) -> str:
 
 
 def label(name: str) -> str:
-    """Return the label of the library's law, surface or estimator of this name; other words unchanged."""
+    """Return the label of the library's law, surface or estimator of this name; other words
+    unchanged.
+    """
     known = surfaces.catalogue() | estimators.catalogue()
-    return law_name(name) if name in known_laws() else in_words(name) if name in known else name
+    if name in known_laws():
+        return law_name(name)
+    return in_words(name) if name in known else name
 
 
 def law_initials(law: str) -> str:
     """Return a law's name in two or three letters, for narrow places."""
     template, name = _template(law)
-    return (template and template.short) or "".join(word[:1] for word in name.split("_")).upper()[:3] or "?"
+    return (
+        (template and template.short)
+        or "".join(word[:1] for word in name.split("_")).upper()[:3]
+        or "?"
+    )
 
 
 def _template(law: Component | str) -> tuple[Template | None, str]:
@@ -246,25 +298,37 @@ def in_words(name: str) -> str:
 
 
 def labels(traces: Sequence[Trace], given: Sequence[str] | None) -> list[str]:
-    """Return one label per trace: the given ones, else the laws' labels, with what differs between runs of one law.
+    """Return one label per trace: the given ones, else the laws' labels, with what differs between
+    runs of one law.
 
-    Machines whose parameters differ have these in their labels, whatever their laws. Equal labels are numbered.
+    Machines whose parameters differ have these in their labels, whatever their laws. Equal labels
+    are numbered.
     """
     if given is not None:
         if isinstance(given, str) or len(given) != len(traces):
-            raise ScenarioError(f"labels are {shown(given)} for {len(traces)} traces: give one string a trace")
+            raise ScenarioError(
+                f"labels are {shown(given)} for {len(traces)} traces: give one string a trace"
+            )
         return [label if isinstance(label, str) else shown(label) for label in given]
     names = [law_name(trace.scenario.law) for trace in traces]
-    words = [
-        differences(trace, [one for one, other in zip(traces, names, strict=True) if other == name], traces)
-        for trace, name in zip(traces, names, strict=True)
-    ]
+    words = []
+    for trace, name in zip(traces, names, strict=True):
+        words.append(
+            differences(
+                trace,
+                [one for one, other in zip(traces, names, strict=True) if other == name],
+                traces,
+            )
+        )
     names = [f"{name}: {what}" if what else name for name, what in zip(names, words, strict=True)]
-    return [n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)]
+    return [
+        n if names.count(n) == 1 else f"{n} {names[:i].count(n) + 1}" for i, n in enumerate(names)
+    ]
 
 
 def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -> str:
-    """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no noise, m = 0.7".
+    """Return how a run differs from those of its law, and its machine from all, as "k1 = 6, no
+    noise, m = 0.7".
 
     Where the condition differs, its name replaces the fields that are equal in all its runs.
     """
@@ -272,37 +336,58 @@ def differences(trace: Trace, alike: Sequence[Trace], others: Sequence[Trace]) -
     condition = settings.pop("condition", "")
     if condition:
         same = _differing(
-            _settings, trace, [run for run in alike if run.scenario.condition == trace.scenario.condition]
+            _settings,
+            trace,
+            [run for run in alike if run.scenario.condition == trace.scenario.condition],
         )
-        settings = {name: words for name, words in settings.items() if name in same or name not in CONDITION_FIELDS}
-    true = _differing(lambda run: vars(run.scenario.plant.values(run.scenario.mismatch)), trace, others)
-    machine = [f"plant's {words}" if name in trace.scenario.law.gains else words for name, words in true.items()]
+        settings = {
+            name: words
+            for name, words in settings.items()
+            if name in same or name not in CONDITION_FIELDS
+        }
+    true = _differing(
+        lambda run: vars(run.scenario.plant.values(run.scenario.mismatch)), trace, others
+    )
+    machine = []
+    for name, words in true.items():
+        machine.append(f"plant's {words}" if name in trace.scenario.law.gains else words)
     return ", ".join([*[condition] * bool(condition), *settings.values(), *machine])
 
 
 def _differing(
     settings: Callable[[Trace], Mapping[str, object]], trace: Trace, others: Sequence[Trace]
 ) -> dict[str, str]:
-    """Return the settings of a run that not all others share, in words that tell it from the others."""
+    """Return the settings of a run that not all others share, in words that tell it from the
+    others.
+    """
     mine, *tables = _in_parts([settings(run) for run in (trace, *others)])
     words = {}
     for name, value in mine.items():
         unequal = [table.get(name) for table in tables if table.get(name) != value]
         if unequal:
             told = (
-                (_setting(name, value, digits), {_setting(name, other, digits) for other in unequal})
+                (
+                    _setting(name, value, digits),
+                    {_setting(name, other, digits) for other in unequal},
+                )
                 for digits in range(3, MAX_DIGITS + 1)
             )
-            words[name] = next((its for its, different in told if its not in different), _setting(name, value))
+            words[name] = next(
+                (its for its, different in told if its not in different), _setting(name, value)
+            )
     return words
 
 
 def _in_parts(tables: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
-    """Return settings with the fields of a part or signal, such as "disturbance omega", where all are of one kind."""
+    """Return settings with the fields of a part or signal, such as "disturbance omega", where all
+    are of one kind.
+    """
     found = [dict(table) for table in tables]
     for name in tables[0]:
         values = [table.get(name) for table in tables]
-        parts = [value[0] if isinstance(value, tuple) and len(value) == 1 else value for value in values]
+        parts = []
+        for value in values:
+            parts.append(value[0] if isinstance(value, tuple) and len(value) == 1 else value)
         kind = type(parts[0])
         if (
             dataclasses.is_dataclass(kind)
@@ -321,14 +406,21 @@ def _settings(trace: Trace) -> Mapping[str, object]:
     """Return the gains of a run, and the fields of its scenario."""
     scenario = trace.scenario
     fields = {field.name: getattr(scenario, field.name) for field in dataclasses.fields(scenario)}
-    kept = {name: value for name, value in fields.items() if name not in ("law", "plant", "mismatch")}
+    kept = {}
+    for name, value in fields.items():
+        if name not in ("law", "plant", "mismatch"):
+            kept[name] = value
     return dict(scenario.law.gains) | kept
 
 
 def distinct(names: Sequence[str]) -> list[str]:
-    """Return labels without the law that all of them begin with: "k = 1", "k = 2" of "Twisting: k = 1", ..."""
+    """Return labels without the law that all of them begin with: "k = 1", "k = 2" of "Twisting: k =
+    1", ...
+    """
     law = f"{names[0].partition(': ')[0]}: "
-    return [name.removeprefix(law) for name in names] if all(name.startswith(law) for name in names) else list(names)
+    if all(name.startswith(law) for name in names):
+        return [name.removeprefix(law) for name in names]
+    return list(names)
 
 
 def _setting(name: str, value: object, digits: int = 3) -> str:
@@ -342,9 +434,13 @@ def _setting(name: str, value: object, digits: int = 3) -> str:
         return f"no {words}"
     if value is True:
         return words
-    numbers = isinstance(value, int | float) or (isinstance(value, tuple) and isinstance(value[0], int | float))
+    numbers = isinstance(value, int | float) or (
+        isinstance(value, tuple) and isinstance(value[0], int | float)
+    )
     its = _value(value, digits).removeprefix(f"{capital(words)}, ")  # a noise is a Noise
-    return f"{words}{' =' * numbers} {its}" if its != capital(words) else f"no {words}"
+    if its != capital(words):
+        return f"{words}{' =' * numbers} {its}"
+    return f"no {words}"
 
 
 def _value(value: object, digits: int) -> str:
@@ -354,35 +450,51 @@ def _value(value: object, digits: int) -> str:
     if isinstance(value, tuple):
         same, few = len(set(value)) == 1, len(value) <= MAX_VALUES
         parts = [_value(part, digits) for part in value[: 1 if same else len(value)]]
-        return ", ".join(parts) if same or few else f"{len(value)} values"
+        if same or few:
+            return ", ".join(parts)
+        return f"{len(value)} values"
     if isinstance(value, Component):
         return law_name(value)
     if not dataclasses.is_dataclass(value):
         return str(value).replace("_", " ")
     kind = re.sub(CAMEL, lambda start: f" {start[1].lower()}", type(value).__name__)
     fields = {field: getattr(value, field.name) for field in dataclasses.fields(value)}
-    told = {field.name: _value(its, digits) for field, its in fields.items() if its != field.default}
+    told = {}
+    for field, its in fields.items():
+        if its != field.default:
+            told[field.name] = _value(its, digits)
     if len(fields) == 1:
         return " ".join([kind, *told.values()])
-    return ", ".join([told.pop("kind", kind), *(f"{name.replace('_', ' ')} {words}" for name, words in told.items())])
+    return ", ".join(
+        [
+            told.pop("kind", kind),
+            *(f"{name.replace('_', ' ')} {words}" for name, words in told.items()),
+        ]
+    )
 
 
 def ending(trace: Trace) -> str:
-    """Return how a run failed: "diverged at 0.4 s" (the plant) or "failed at 0.4 s" (its law); "" if it did not."""
+    """Return how a run failed: "diverged at 0.4 s" (the plant) or "failed at 0.4 s" (its law); ""
+    if it did not.
+    """
     if trace.diverged_at is None:
         return ""
     return f"{'diverged' if trace.plant_diverged else 'failed'} at {trace.diverged_at:.3g} s"
 
 
 def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> dict[float, str]:
-    """Return the changes of plants, and the `blows` on arms, time in s -> "mass × 2", "blow of 400 N for 20 ms".
+    """Return the changes of plants, and the `blows` on arms, time in s -> "mass × 2", "blow of 400
+    N for 20 ms".
 
     The labels of the runs precede what only some of them have.
     """
     who_at: dict[tuple[float, str], list[str]] = {}
     for trace, name in zip(traces, names, strict=True):
         plant, jump = trace.scenario.plant, trace.scenario.jump
-        events = [] if jump is None else [(jump.time, plant.change(jump.factors))]
+        if jump is None:
+            events = []
+        else:
+            events = [(jump.time, plant.change(jump.factors))]
         for push in pushes([trace]) if blows else ():
             size = short(math.hypot(push.x, push.y, push.z))
             events.append((push.time, f"blow of {size} N for {1e3 * push.width:.3g} ms"))
@@ -390,7 +502,9 @@ def marks(traces: Sequence[Trace], names: Sequence[str], blows: bool = True) -> 
             who_at.setdefault(event, []).append(name)
     words: dict[float, list[str]] = {}
     for (time, what), who in sorted(who_at.items()):
-        words.setdefault(time, []).append(what if len(who) == len(traces) else f"{', '.join(who)}: {what}")
+        words.setdefault(time, []).append(
+            what if len(who) == len(traces) else f"{', '.join(who)}: {what}"
+        )
     return {time: "; ".join(parts) for time, parts in words.items()}
 
 
@@ -402,11 +516,16 @@ def pushes(traces: Sequence[Trace]) -> list[Push]:
 
 @functools.cache
 def font(size: float, bold: bool = False):
-    """Return DejaVu Sans, which comes with matplotlib, as a font of Pillow with letters `size` high."""
+    """Return DejaVu Sans, which comes with matplotlib, as a font of Pillow with letters `size`
+    high.
+    """
     import matplotlib
     from PIL import ImageFont
 
-    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    if bold:
+        name = "DejaVuSans-Bold.ttf"
+    else:
+        name = "DejaVuSans.ttf"
     return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), size)
 
 
@@ -424,13 +543,16 @@ def cropped(text: str, room: float, size: float, bold: bool = False) -> str:
 
 
 def wrapped(text: str, room: float, size: float, lines: int) -> str:
-    """Return the text on at most `lines` lines, broken between words, with an ellipsis at its end if it is too long.
+    """Return the text on at most `lines` lines, broken between words, with an ellipsis at its end
+    if it is too long.
 
     A number and a short word after it, such as its unit, stay together.
     """
     broken, words = [], re.split(r"(?<!\d)\s+|\s+(?!\S{1,4}(?:\s|$))", text.strip())
     while words and len(broken) < lines - 1:
-        count = next((n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1)
+        count = next(
+            (n for n in range(len(words), 1, -1) if width(" ".join(words[:n]), size) <= room), 1
+        )
         broken.append(cropped(" ".join(words[:count]), room, size))
         words = words[count:]
     return "\n".join([*broken, cropped(" ".join(words), room, size)] if words else broken)
@@ -439,30 +561,49 @@ def wrapped(text: str, room: float, size: float, lines: int) -> str:
 def same_plant(traces: Trace | Sequence[Trace]) -> list[Trace]:
     """Return the traces as a list; refuse those that cannot share axes."""
     if hasattr(traces, "column"):
-        raise ScenarioError(f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run")
+        raise ScenarioError(
+            f"traces is {shown(traces)}: smc.plot draws a table, and this draws traces of smc.run"
+        )
     if isinstance(traces, Scenario):
         raise ScenarioError("traces is a Scenario: run it first, smc.run(scenario)")
-    traces = [traces] if isinstance(traces, Trace) else items_of("traces", traces)
+    if isinstance(traces, Trace):
+        traces = [traces]
+    else:
+        traces = items_of("traces", traces)
     if others := [given for given in traces if not isinstance(given, Trace)]:
-        raise ScenarioError(f"traces has {shown(others[0])}, which is no trace: give those of smc.run or smc.load")
+        raise ScenarioError(
+            f"traces has {shown(others[0])}, which is no trace: give those of smc.run or smc.load"
+        )
     if not traces:
-        raise ScenarioError("no traces to draw: give at least one, from smc.run(...) or smc.load(...)")
+        raise ScenarioError(
+            "no traces to draw: give at least one, from smc.run(...) or smc.load(...)"
+        )
     plants = sorted({trace.scenario.plant.name for trace in traces})
     if len(plants) > 1:
-        raise ScenarioError(f"traces of {' and '.join(plants)} share no axes: draw one plant at a time")
+        raise ScenarioError(
+            f"traces of {' and '.join(plants)} share no axes: draw one plant at a time"
+        )
     if len({tuple((g.name, g.unit) for g in groups(trace.scenario)) for trace in traces}) > 1:
         raise ScenarioError(
             f"traces of {plants[0]} differ in their kinds of channels: draw those with the same ones at a time"
         )
     if len(units := sorted({trace.scenario.efforts[0] for trace in traces})) > 1:
-        raise ScenarioError(f"traces of {plants[0]} have u in {' and '.join(units)}: draw those of one unit at a time")
+        raise ScenarioError(
+            f"traces of {plants[0]} have u in {' and '.join(units)}: draw those of one unit at a time"
+        )
     return traces
 
 
 def split(traces: Sequence[Trace]) -> dict[Group, list[Trace]]:
-    """Return the traces of each group of channels, which share a pair of axes. All traces are of one plant."""
+    """Return the traces of each group of channels, which share a pair of axes.
+
+    All traces are of one plant.
+    """
     kinds = zip(*(groups(trace.scenario) for trace in traces), strict=True)
-    return {kind[0]: [group_trace(trace, group) for trace, group in zip(traces, kind, strict=True)] for kind in kinds}
+    return {
+        kind[0]: [group_trace(trace, group) for trace, group in zip(traces, kind, strict=True)]
+        for kind in kinds
+    }
 
 
 def units(group: Group) -> dict[str, str]:
@@ -473,28 +614,49 @@ def units(group: Group) -> dict[str, str]:
 
 
 def plant_name(plant: Plant | str, short: bool = False) -> str:
-    """Return the plant's label: its own, or its name in words. A user's model keeps the user's name."""
+    """Return the plant's label: its own, or its name in words.
+
+    A user's model keeps the user's name.
+    """
     if isinstance(plant, str):
         known = catalogue().get(plant)
         return plant_name(known, short) if known else plant
-    return (short and plant.short) or plant.label or (plant.name if plant.own else in_words(plant.name))
+    return (
+        (short and plant.short)
+        or plant.label
+        or (plant.name if plant.own else in_words(plant.name))
+    )
 
 
 def head(scenarios: Sequence[Scenario]) -> str:
-    """Return what a picture of runs is about: their plant, and their condition if all have the same one with a name."""
-    return heading([scenarios[0].plant], [scenario.condition or "nominal" for scenario in scenarios])
+    """Return what a picture of runs is about: their plant, and their condition if all have the same
+    one with a name.
+    """
+    return heading(
+        [scenarios[0].plant], [scenario.condition or "nominal" for scenario in scenarios]
+    )
 
 
-def heading(plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False) -> str:
+def heading(
+    plants: Sequence[Plant | str], conditions: Sequence[str] = (), short: bool = False
+) -> str:
     """Return plants, and the condition if there is only one, which is not the nominal one."""
     names, condition = dict.fromkeys(plant_name(plant, short) for plant in plants), {*conditions}
-    alone = next(iter(condition)) if len(condition) == 1 else "nominal"
+    if len(condition) == 1:
+        alone = next(iter(condition))
+    else:
+        alone = "nominal"
     return ", ".join([*names, *[alone.replace("_", " ")] * (alone != "nominal")])
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
-    """Return a factor and the unit with a prefix, with which values up to `largest` need no exponent."""
-    power = -math.floor(math.log10(largest) / 3.0) if 0.0 < largest < 0.1 or largest >= MANY_DIGITS else 0
+    """Return a factor and the unit with a prefix, with which values up to `largest` need no
+    exponent.
+    """
+    if 0.0 < largest < 0.1 or largest >= MANY_DIGITS:
+        power = -math.floor(math.log10(largest) / 3.0)
+    else:
+        power = 0
     power = min(max(power, min(PREFIXES)), max(PREFIXES))
     return 1e3**power, PREFIXES[power] + unit
 
@@ -506,7 +668,9 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def mixed(colour: str, other: str, share: float) -> str:
     """Return a colour mixed with this share of another."""
-    return "#" + "".join(f"{round(a + share * (b - a)):02X}" for a, b in zip(rgb(colour), rgb(other), strict=True))
+    return "#" + "".join(
+        f"{round(a + share * (b - a)):02X}" for a, b in zip(rgb(colour), rgb(other), strict=True)
+    )
 
 
 def lighter(colour: str) -> str:
@@ -516,9 +680,15 @@ def lighter(colour: str) -> str:
 
 def ramp(colour: str, count: int, lightest: float = LIGHTEST) -> list[str]:
     """Return shades of a colour from light to dark, in equal steps of lightness."""
-    shades = [mixed(colour, other, share) for other in (PAPER, "#000000") for share in np.linspace(0.0, 0.95, 96)]
+    shades = []
+    for other in (PAPER, "#000000"):
+        for share in np.linspace(0.0, 0.95, 96):
+            shades.append(mixed(colour, other, share))
     lightness = np.array([_seen(shade)[0][0] for shade in shades])
-    return [shades[int(np.abs(lightness - level).argmin())] for level in np.linspace(lightest, DARKEST, count)]
+    return [
+        shades[int(np.abs(lightness - level).argmin())]
+        for level in np.linspace(lightest, DARKEST, count)
+    ]
 
 
 @functools.cache
@@ -534,5 +704,7 @@ def _luminance(colour: str) -> float:
 
 
 def short(value: float, digits: int = 2) -> str:
-    """Return a number with few digits, such as 0.25, 6, 280; with an exponent from 1e6 on and below 1e-4."""
+    """Return a number with few digits, such as 0.25, 6, 280; with an exponent from 1e6 on and below
+    1e-4.
+    """
     return f"{float(f'{value:.{digits}g}'):g}"

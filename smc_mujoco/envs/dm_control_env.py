@@ -1,13 +1,16 @@
-"""Plants as dm_env environments, through dm_control's control.Environment: `pip install 'smc-mujoco[dm]'`.
+"""Plants as dm_env environments, through dm_control's control.Environment:
+
+`pip install 'smc-mujoco[dm]'`.
 
     environment = suite.load("duffing", "regulate", task_kwargs={"random": 0})
     timestep = environment.reset()
     while not timestep.last():
         timestep = environment.step(agent(timestep))
 
-An action is the command of the driven channels, divided by their limits. Observations are {"position": x,
-"velocity": v}, (n,) each, with unwrapped angles, and for `track` also "reference": r, r', r''. The module `tasks`
-describes tasks and rewards. dm_control's viewer shows an environment: viewer.launch(environment).
+An action is the command of the driven channels, divided by their limits. Observations are
+{"position": x, "velocity": v}, (n,) each, with unwrapped angles, and for `track` also "reference":
+r, r', r''. The module `tasks` describes tasks and rewards. dm_control's viewer shows an
+environment: viewer.launch(environment).
 """
 
 import contextlib
@@ -43,7 +46,10 @@ class PlantPhysics(Physics):
     step_counts: Iterable[int] = ()  # from `Episode.apply_action`
 
     def step(self, nstep: int = 1) -> None:
-        """Take physics steps. Those of an action are taken one by one if `DriveStep` simulates a drive."""
+        """Take physics steps.
+
+        Those of an action are taken one by one if `DriveStep` simulates a drive.
+        """
         step_counts, self.step_counts = self.step_counts, ()
         for steps in step_counts:
             super().step(steps)
@@ -58,7 +64,9 @@ class PlantPhysics(Physics):
 
 
 class PlantTask(Episode, control.Task):
-    """A task of `tasks` for dm_control: an Episode with `random`, the numpy generator of its starts."""
+    """A task of `tasks` for dm_control: an Episode with `random`, the numpy generator of its
+    starts.
+    """
 
     def __init__(self, setting: Setting, random: Any):
         super().__init__(setting)
@@ -79,11 +87,16 @@ class PlantTask(Episode, control.Task):
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the spec of an action: commands of the driven channels, divided by their limits."""
-        return specs.BoundedArray(self.setting.action_shape, float, minimum=-1.0, maximum=1.0, name="u")
+        return specs.BoundedArray(
+            self.setting.action_shape, float, minimum=-1.0, maximum=1.0, name="u"
+        )
 
     def get_observation(self, physics: Physics) -> OrderedDict[str, np.ndarray]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return positions and velocities, and the reference if the task has one."""
-        x, v = (bounded(self.x), bounded(self.v)) if self.diverged else (self.x, self.v)
+        if self.diverged:
+            x, v = (bounded(self.x), bounded(self.v))
+        else:
+            x, v = (self.x, self.v)
         observation = OrderedDict(position=x, velocity=v)
         if self.setting.task.moving:
             observation["reference"] = self.setting.reference(self.sample)
@@ -113,15 +126,20 @@ def load(
     Args:
       domain: a Plant or the name of one.
       task: one of `smc_mujoco.envs.tasks.tasks(domain)`.
-      task_kwargs: arguments of dm_control's suite: random, and time_limit in s, which is the field duration.
-      environment_kwargs: arguments of dm_control's suite: flat_observation, and control_timestep in s, which is the
-        field control_period. These and task_kwargs take precedence over the arguments below.
+      task_kwargs: arguments of dm_control's suite: random, and time_limit in s, which is the field
+        duration.
+      environment_kwargs: arguments of dm_control's suite: flat_observation, and control_timestep in
+        s, which is the field control_period. These and task_kwargs take precedence over the
+        arguments below.
       random: a seed or a numpy generator for the starts; None for different starts every time.
-      changes: Scenario field -> value, such as {"duration": 5.0, "control_period": 0.01, "u_max": 3.0}.
-      flat_observation: whether an observation is one array, {"observations": ...}, as in dm_control's suite.
+      changes: Scenario field -> value, such as {"duration": 5.0, "control_period": 0.01, "u_max":
+        3.0}.
+      flat_observation: whether an observation is one array, {"observations": ...}, as in
+        dm_control's suite.
 
     Raises:
-      ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out of range.
+      ScenarioError: an unknown plant, task or field, a task that is not for the plant, a value out
+        of range.
       MissingPackageError: dm_control does not fit the MuJoCo that is installed.
     """
     values = _renamed("task_kwargs", task_kwargs, TASK_KWARGS)
@@ -141,16 +159,21 @@ def load(
     return control.Environment(
         _physics(setting.model),
         PlantTask(setting, random),
-        time_limit=(scenario.samples - 0.5) * scenario.control_period,  # half a sample less: sums of floats miss it
+        time_limit=(scenario.samples - 0.5)
+        * scenario.control_period,  # half a sample less: sums of floats miss it
         n_sub_steps=scenario.steps,
         flat_observation=flat_observation,
-        legacy_step=False,  # observations need positions and velocities only, which are already current
+        # observations need positions and velocities only, which are already current
+        legacy_step=False,
     )
 
 
 @functools.cache
 def __getattr__(name: str) -> object:
-    """Return ALL_TASKS, pairs of every plant and each of its tasks. It is made on demand, since it loads all models."""
+    """Return ALL_TASKS, pairs of every plant and each of its tasks.
+
+    It is made on demand, since it loads all models.
+    """
     if name == "ALL_TASKS":
         return tuple((plant, task) for plant in plants() for task in tasks(plant))
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -168,4 +191,6 @@ def _physics(model: mujoco.MjModel) -> PlantPhysics:
         return PlantPhysics.from_model(MjModel(model))
     except AttributeError as error:  # dm_control looks for every field that it knows
         here = f"dm_control {version('dm-control')} does not know MuJoCo {mujoco.__version__}"
-        raise MissingPackageError(f"{here} ({error}): {cure('dm')}, which brings two that fit") from error
+        raise MissingPackageError(
+            f"{here} ({error}): {cure('dm')}, which brings two that fit"
+        ) from error

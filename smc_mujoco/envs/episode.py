@@ -1,8 +1,10 @@
-"""A plant with a task, compiled, and an episode of it: the base of dm_env, gymnasium and batched environments.
+"""A plant with a task, compiled, and an episode of it: the base of dm_env, gymnasium and batched
+environments.
 
-The physics are those of `smc.run`. An action is the command u of each driven channel, divided by the channel's limit
-and held for one control period; it saturates outside [-1, 1]. The limit is u_max, or that of the channel's own motor.
-An environment has no law, no noise, delay or encoder, and no disturbances, contacts or jumps.
+The physics are those of `smc.run`. An action is the command u of each driven channel, divided by
+the channel's limit and held for one control period; it saturates outside [-1, 1]. The limit is
+u_max, or that of the channel's own motor. An environment has no law, no noise, delay or encoder,
+and no disturbances, contacts or jumps.
 """
 
 import dataclasses
@@ -27,9 +29,19 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario, stepped_by_mujoco
 from smc_mujoco.simulation.signals import PerChannel
 
 FIELDS = (  # of a Scenario, that an environment accepts
-    "duration", "control_period", "physics_step", "integrator", "u_max", "x0", "v0", "reference", "mismatch",
-    "friction", "mechanism", "actuator",
-)  # fmt: skip
+    "duration",
+    "control_period",
+    "physics_step",
+    "integrator",
+    "u_max",
+    "x0",
+    "v0",
+    "reference",
+    "mismatch",
+    "friction",
+    "mechanism",
+    "actuator",
+)
 
 
 @law_function(joint=True, plants=(FREE_BODY,), memory=1)
@@ -51,8 +63,8 @@ class Setting:
     ):
         """Compile a plant for one of its tasks. `changes`: Scenario field -> value, of FIELDS.
 
-        `edit` changes the mechanism before it is compiled, and must not change the motion. A plant that `flies` is a
-        free body; its runs are those of `flown`.
+        `edit` changes the mechanism before it is compiled, and must not change the motion. A plant
+        that `flies` is a free body; its runs are those of `flown`.
         """
         plant = as_plant(plant)
         self.task, known = find("task", task, TASKS), FLIGHT_TASKS if flies else tasks(plant)
@@ -60,48 +72,84 @@ class Setting:
             cure = "make its environment by gymnasium.make, and copies by make_vec(..., vectorization_mode='sync')"
             raise ScenarioError(f"{plant.name} is a free body: {cure}")
         if flies and not plant.pose:
-            raise ScenarioError(f"{plant.name} is no free body: make its environment by gymnasium.make")
+            raise ScenarioError(
+                f"{plant.name} is no free body: make its environment by gymnasium.make"
+            )
         if task not in known:
-            raise ScenarioError(f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}")
+            raise ScenarioError(
+                f"task {task!r} is not for {plant.name}: choose from {', '.join(known)}"
+            )
         changes = _checked({} if changes is None else changes, task)
         # the run that equals an episode
         scenario = Scenario(**({"plant": plant, "law": "none"} | self.task.fields(plant) | changes))
         self.scenario = stepped_by_mujoco(scenario).resolved
-        self.flown = dataclasses.replace(scenario, law=commanded()) if flies else scenario
+        if flies:
+            self.flown = dataclasses.replace(scenario, law=commanded())
+        else:
+            self.flown = scenario
         if self.scenario.drive_step and self.scenario.drive_step.ripple:
             raise ScenarioError("environments have no DCMotor with a ripple: give ripple=0")
         if self.scenario.stepper is not None:
-            raise ScenarioError("environments have no Stepper, whose queue the callback keeps: give another actuator")
+            raise ScenarioError(
+                "environments have no Stepper, whose queue the callback keeps: give another actuator"
+            )
         if self.scenario.formula_friction is not None:
             name = type(self.scenario.formula_friction).__name__
-            raise ScenarioError(f"friction {name} is a formula, which environments lack: give Coulomb or LuGre")
+            raise ScenarioError(
+                f"friction {name} is a formula, which environments lack: give Coulomb or LuGre"
+            )
         if math.inf in self.scenario.limits:
-            raise ScenarioError("u_max is inf: give a finite one, because actions are fractions of it")
+            raise ScenarioError(
+                "u_max is inf: give a finite one, because actions are fractions of it"
+            )
         fixed = np.array(self.scenario.x0)
         # bounds of the initial positions, (n,) each
-        self.low, self.high = starts(self.task, plant) if changes.get("x0") is None else (fixed, fixed)
+        if changes.get("x0") is None:
+            self.low, self.high = starts(self.task, plant)
+        else:
+            self.low, self.high = (fixed, fixed)
         spec = models.spec(self.scenario)
         edit(spec)
         self.model = models.with_values(models.compiled(spec, self.scenario), self.scenario)
         table = channels(self.model)
         self.qpos, self.qvel = table["qpos"], table["qvel"]  # addresses of the channels, (n,) each
         self.joints = models.moving_joints(self.model)
-        # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,) each
+        # addresses of the driven channels' actuators, and in qvel of what they drive, (driven,)
+        # each
         self.ctrl, self.shafts = (table[name][: plant.driven] for name in ("ctrl", "shaft"))
         # the largest commands, (driven,), and the actuators' inputs per unit of them
-        self.limits, self.scale = np.array(self.scenario.limits), math.prod(p.scale for p in self.scenario.actuator)
-        # the channels that the task treats differently, (n,) of bool, and from where positions count in errors, (n,)
+        self.limits, self.scale = (
+            np.array(self.scenario.limits),
+            math.prod(p.scale for p in self.scenario.actuator),
+        )
+        # the channels that the task treats differently, (n,) of bool, and from where positions
+        # count in errors, (n,)
         self.selected, self.rest_x = self.task.selected(plant), rest(plant)
         # the channels that the reward counts: not the tilt of a body that leans to move
-        self.counted = list(plant.judged) if flies else slice(None)
-        self.references = _references(self.scenario, self.scenario.samples + 1 if self.task.moving else 1)
+        if flies:
+            self.counted = list(plant.judged)
+        else:
+            self.counted = slice(None)
+        self.references = _references(
+            self.scenario, self.scenario.samples + 1 if self.task.moving else 1
+        )
         width = self.references.shape[1]
-        self.observation_size, self.action_shape = 2 * plant.n + width * self.task.moving, (plant.driven,)
-        self.rest_r = np.zeros(width)  # from where the references count: the rest of each that has one, then zeros
-        self.rest_r[: width // 3] = self.rest_x[: width // 3] if plant.rest else 0.0
+        self.observation_size, self.action_shape = (
+            2 * plant.n + width * self.task.moving,
+            (plant.driven,),
+        )
+        self.rest_r = np.zeros(
+            width
+        )  # from where the references count: the rest of each that has one, then zeros
+        if plant.rest:
+            self.rest_r[: width // 3] = self.rest_x[: width // 3]
+        else:
+            self.rest_r[: width // 3] = 0.0
 
     def command(self, action: Any, copies: tuple[int, ...] = ()) -> np.ndarray:
-        """Return the commands of an action, (*copies, driven): its saturated values times the limits."""
+        """Return the commands of an action, (*copies, driven): its saturated values times the
+        limits.
+        """
         shape = copies + self.action_shape
         try:
             a = np.asarray(action, float)
@@ -112,17 +160,23 @@ class Setting:
         return self.limits * np.minimum(np.maximum(a, -1.0), 1.0)
 
     def drive_start(self, qvel: np.ndarray) -> np.ndarray | float:
-        """Return both states of `DriveStep` at the start of episodes with velocities qvel (..., nv)."""
+        """Return both states of `DriveStep` at the start of episodes with velocities qvel (...,
+        nv).
+        """
         effect = self.scenario.drive_step
-        return 0.0 if effect is None else effect.start(qvel[..., self.shafts])
+        if effect is None:
+            return 0.0
+        return effect.start(qvel[..., self.shafts])
 
     def apply_command(
         self, ctrl: np.ndarray, command: np.ndarray, drive_states: np.ndarray, qvel: np.ndarray
     ) -> Iterator[int]:
-        """Write inputs into ctrl (..., nu) over a control period; yield after each how many physics steps it lasts.
+        """Write inputs into ctrl (..., nu) over a control period; yield after each how many physics
+        steps it lasts.
 
-        `command` is (..., driven); `drive_states`, (2, ..., driven), is updated in place; `qvel` is (..., nv). The mean
-        force of a drive acts throughout a step. In a run with RK4, a Lag's first moment acts, too.
+        `command` is (..., driven); `drive_states`, (2, ..., driven), is updated in place; `qvel` is
+        (..., nv). The mean force of a drive acts throughout a step. In a run with RK4, a Lag's
+        first moment acts, too.
         """
         effect, steps = self.scenario.drive_step, self.scenario.steps
         if effect is None:
@@ -131,12 +185,16 @@ class Setting:
             return
         for _ in range(steps):
             states = drive_states[0], drive_states[1]
-            force, drive_states[0], drive_states[1] = effect(command, *states, qvel[..., self.shafts])
+            force, drive_states[0], drive_states[1] = effect(
+                command, *states, qvel[..., self.shafts]
+            )
             ctrl[..., self.ctrl] = self.scale * force
             yield 1
 
     def draw_start(self, random: Any, options: Mapping[str, Any] | None = None) -> Pair:
-        """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options x0 and v0."""
+        """Return a start, x and v, (n,) each: drawn from a numpy generator, or set by the options
+        x0 and v0.
+        """
         x, v = random.uniform(self.low, self.high), np.array(self.scenario.v0)
         for name, value in (options or {}).items():
             if name not in ("x0", "v0"):
@@ -152,7 +210,9 @@ class Setting:
         return np.take(self.references, k, axis=0, mode="clip")
 
     def observe(self, x: np.ndarray, v: np.ndarray, k: Any) -> np.ndarray:
-        """Return the observation at sample k, (..., size): x, v, and the reference if the task has one."""
+        """Return the observation at sample k, (..., size): x, v, and the reference if the task has
+        one.
+        """
         return np.concatenate((x, v, self.reference(k)) if self.task.moving else (x, v), axis=-1)
 
     def errors(self, x: np.ndarray, v: np.ndarray, k: Any) -> Pair:
@@ -165,7 +225,9 @@ class Setting:
 
 
 class Episode:
-    """An episode of one simulation: the base of a gymnasium environment and of a task for dm_control."""
+    """An episode of one simulation: the base of a gymnasium environment and of a task for
+    dm_control.
+    """
 
     def __init__(self, setting: Setting):
         self.setting, self.episodes, self.diverged = setting, 0, False
@@ -173,18 +235,24 @@ class Episode:
         self.drive_states = np.zeros((2, *setting.action_shape))  # of `DriveStep`
         self.x = self.v = np.zeros(setting.scenario.plant.n)
 
-    def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
+    def begin(
+        self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None
+    ) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         mujoco.mj_resetData(self.setting.model, data)
         start = self.setting.draw_start(random, options)
-        data.qpos[:], data.qvel[:] = models.state_with(self.setting.model, self.setting.joints, *start)
+        data.qpos[:], data.qvel[:] = models.state_with(
+            self.setting.model, self.setting.joints, *start
+        )
         self.episodes, self.sample = self.episodes + 1, 0
         self.drive_states[:] = self.setting.drive_start(data.qvel)
         self.read_state(data)
 
     def apply_action(self, data: mujoco.MjData, action: Any) -> Iterator[int]:
         """Apply an action over a control period, see `Setting.apply_command`."""
-        return self.setting.apply_command(data.ctrl, self.setting.command(action), self.drive_states, data.qvel)
+        return self.setting.apply_command(
+            data.ctrl, self.setting.command(action), self.drive_states, data.qvel
+        )
 
     def read_state(self, data: mujoco.MjData) -> None:
         """Read the state."""
@@ -192,7 +260,9 @@ class Episode:
         self.diverged = bool(self.setting.diverged(self.x, self.v))
 
     def reward_and_info(self) -> tuple[float, dict[str, Any]]:
-        """Return the reward of the state, in [0, 1], and the info of gymnasium; 0 and NaN after a divergence."""
+        """Return the reward of the state, in [0, 1], and the info of gymnasium; 0 and NaN after a
+        divergence.
+        """
         time = self.sample * self.setting.scenario.control_period
         if self.diverged:
             return 0.0, {"time": time, "error": np.full(len(self.x), np.nan)}
@@ -217,12 +287,16 @@ def _checked(changes: Mapping[str, Any], task: str) -> dict[str, Any]:
         if name not in FIELDS:
             raise unknown("field of an environment", name, FIELDS)
     if "reference" in changes and not TASKS[task].moving:
-        raise ScenarioError(f"reference is {shown(changes['reference'])}, but task {task!r} follows none: take 'track'")
+        raise ScenarioError(
+            f"reference is {shown(changes['reference'])}, but task {task!r} follows none: take 'track'"
+        )
     return dict(changes)
 
 
 def _references(scenario: Resolved, samples: int) -> np.ndarray:
-    """Return r, r' and r'' at every sample, (K + 1, 3 m), of m references: one, or one for each driven channel."""
+    """Return r, r' and r'' at every sample, (K + 1, 3 m), of m references: one, or one for each
+    driven channel.
+    """
     if samples == 1:  # the task has none
         return np.zeros((1, 3))
     times = (np.arange(samples) * scenario.control_period).tolist()
@@ -235,6 +309,8 @@ def _references(scenario: Resolved, samples: int) -> np.ndarray:
             raise ScenarioError(f"reference {failure}: give another") from None
         if not (finite := np.isfinite(values).all(axis=1)).all():
             at = f"t = {times[np.argmin(finite)]:.6g} s"
-            raise ScenarioError(f"reference {shown(signal)} is not a finite number at {at}: give another")
+            raise ScenarioError(
+                f"reference {shown(signal)} is not a finite number at {at}: give another"
+            )
         columns.append(values)
     return np.stack(columns, axis=2).reshape(samples, -1)

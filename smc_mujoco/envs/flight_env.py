@@ -2,11 +2,12 @@
 
     environment = gymnasium.make("smc_mujoco:smc/Quadrotor-v0")
 
-The callback of `smc.run` moves the body, with its rotors and drag. An action has a number in [-1, 1] for each
-actuator, from its least to its largest force, held for a control period: a rotor's thrust, not its speed. An
-observation is the pose, position in m and rotation vector in rad, then the velocity, and the angular velocity in the
-axes of the body; for `track` also r, r' and r''. The task and its reward are those of `tasks`, with the errors that
-count: not the tilt of a body that leans to move. The info has "time", s, and "error", of the pose, (6,).
+The callback of `smc.run` moves the body, with its rotors and drag. An action has a number in [-1,
+1] for each actuator, from its least to its largest force, held for a control period: a rotor's
+thrust, not its speed. An observation is the pose, position in m and rotation vector in rad, then
+the velocity, and the angular velocity in the axes of the body; for `track` also r, r' and r''. The
+task and its reward are those of `tasks`, with the errors that count: not the tilt of a body that
+leans to move. The info has "time", s, and "error", of the pose, (6,).
 """
 
 import dataclasses
@@ -43,25 +44,38 @@ class FlightEnv(PlantEnv):
         changes: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ):
-        """Make a free body with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`."""
+        """Make a free body with one of its tasks.
+
+        `changes`: Scenario field -> value, of `episode.FIELDS`.
+        """
         super().__init__(plant, task, changes, render_mode)
         model, scenario = self.setting.model, self.setting.scenario
         drives = drive_ids(model)
         if not model.actuator_ctrllimited[drives].all():
-            raise ScenarioError(f"an actuator of {scenario.plant.name} has no ctrlrange: give each one")
-        self.wrenches = model.actuator_gainprm[drives, :1] * exerted(model, free_joint(model), drives.tolist())
+            raise ScenarioError(
+                f"an actuator of {scenario.plant.name} has no ctrlrange: give each one"
+            )
+        self.wrenches = model.actuator_gainprm[drives, :1] * exerted(
+            model, free_joint(model), drives.tolist()
+        )
         self.least, self.most = model.actuator_ctrlrange[drives].T
         self.setting.action_shape, self.setting.limits = (len(drives),), np.ones(len(drives))
         self.action_space = action_space(self.setting)
         self.begin(self.data, self.np_random)
 
-    def begin(self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None) -> None:
+    def begin(
+        self, data: mujoco.MjData, random: Any, options: Mapping[str, Any] | None = None
+    ) -> None:
         """Begin an episode from a start that is drawn, or set by the options x0 and v0."""
         x0, v0 = self.setting.draw_start(random, options)
-        start = dataclasses.replace(self.setting.flown, x0=tuple(x0.tolist()), v0=tuple(v0.tolist()))
+        start = dataclasses.replace(
+            self.setting.flown, x0=tuple(x0.tolist()), v0=tuple(v0.tolist())
+        )
         with callback.installed():
             self.batch = ScenarioBatch([prepare(start)], threads=1)
-        self.memory = state.view(self.batch.packed[0].numbers, int(self.batch.records["law"]["memory"][0]), (len(x0),))
+        self.memory = state.view(
+            self.batch.packed[0].numbers, int(self.batch.records["law"]["memory"][0]), (len(x0),)
+        )
         self.episodes, self.sample = self.episodes + 1, 0
         self.read_state(data)
 
@@ -69,18 +83,26 @@ class FlightEnv(PlantEnv):
         """Take one control period and read the pose."""
         share = 0.5 + 0.5 * self.setting.command(action)
         wrench = (self.least + share * (self.most - self.least)) @ self.wrenches
-        self.memory[:] = *rotation.turned(rotation.quaternion(*self.x[3:]), *wrench[:3]), *wrench[3:]
+        self.memory[:] = (
+            *rotation.turned(rotation.quaternion(*self.x[3:]), *wrench[:3]),
+            *wrench[3:],
+        )
         self.sample += 1
         with callback.installed():
             self.batch.advance_to(self.sample * self.setting.scenario.steps)
         self.read_state(self.data)
 
     def read_state(self, data: mujoco.MjData) -> None:
-        """Read the pose and its velocity, (6,) each, and write the positions into the data that are drawn."""
+        """Read the pose and its velocity, (6,) each, and write the positions into the data that are
+        drawn.
+        """
         data.qpos[:], qvel = (self.batch.batch.bind(name)[0] for name in ("qpos", "qvel"))
         first, dof = self.setting.qpos[3], self.setting.qvel[0]
         turn = rotation.rotation_vector(*data.qpos[first : first + 4])
-        self.x, self.v = np.array([*data.qpos[first - 3 : first], *turn]), qvel[dof : dof + 6].copy()
+        self.x, self.v = (
+            np.array([*data.qpos[first - 3 : first], *turn]),
+            qvel[dof : dof + 6].copy(),
+        )
         self.diverged = bool(self.setting.diverged(self.x, self.v))
 
     def errors(self) -> Pair:
@@ -94,5 +116,8 @@ class FlightEnv(PlantEnv):
 
 
 def environment(plant: Plant | str, *args: Any, **kwargs: Any) -> gymnasium.Env:
-    """Return the environment of a plant: a FlightEnv of a free body, else a PlantEnv. Arguments are those of both."""
+    """Return the environment of a plant: a FlightEnv of a free body, else a PlantEnv.
+
+    Arguments are those of both.
+    """
     return (FlightEnv if as_plant(plant).pose else PlantEnv)(plant, *args, **kwargs)

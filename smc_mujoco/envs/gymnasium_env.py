@@ -2,11 +2,11 @@
 
     environment = gymnasium.make("smc_mujoco:Duffing-v0", task="track")
 
-An observation is one array of positions and velocities, and for `track` also r, r', r''. An action is the command of
-the driven channels, divided by their limits. An episode is truncated at the scenario's duration, the max_episode_steps
-of its spec, and terminated if the plant diverges. The info has "time", s since the start, and "error", the e of the
-task in each channel. The module `tasks` describes tasks and rewards; `vector_env` has many copies of a plant in one
-batch.
+An observation is one array of positions and velocities, and for `track` also r, r', r''. An action
+is the command of the driven channels, divided by their limits. An episode is truncated at the
+scenario's duration, the max_episode_steps of its spec, and terminated if the plant diverges. The
+info has "time", s since the start, and "error", the e of the task in each channel. The module
+`tasks` describes tasks and rewards; `vector_env` has many copies of a plant in one batch.
 """
 
 import copy
@@ -33,20 +33,28 @@ registration.register()  # also if only this module is imported
 
 
 def action_space(setting: Setting) -> spaces.Box:
-    """Return the space of actions, of float32, as learners want it; `step` takes float64 too, and rounds nothing."""
+    """Return the space of actions, of float32, as learners want it; `step` takes float64 too, and
+    rounds nothing.
+    """
     return spaces.Box(-1.0, 1.0, setting.action_shape, np.float32)
 
 
 def observation_space(setting: Setting) -> spaces.Box:
-    """Return the space of observations: up to the largest state of a run, or up to the largest r, r', r'' beyond it."""
+    """Return the space of observations: up to the largest state of a run, or up to the largest r,
+    r', r'' beyond it.
+    """
     high = np.full(setting.observation_size, MAX_STATE)
     if setting.task.moving:
-        high[2 * setting.scenario.plant.n :] = np.maximum(MAX_STATE, np.abs(setting.references).max(axis=0))
+        high[2 * setting.scenario.plant.n :] = np.maximum(
+            MAX_STATE, np.abs(setting.references).max(axis=0)
+        )
     return spaces.Box(-high, high, dtype=np.float64)
 
 
 class TimeLimited:
-    """An environment that writes the length of its episodes to its spec, which `gymnasium.make` sets."""
+    """An environment that writes the length of its episodes to its spec, which `gymnasium.make`
+    sets.
+    """
 
     max_samples: int  # control samples after which an episode is truncated
     _spec: EnvSpec | None = None
@@ -77,14 +85,20 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         changes: Mapping[str, Any] | None = None,
         render_mode: str | None = None,
     ):
-        """Make a plant with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`."""
+        """Make a plant with one of its tasks.
+
+        `changes`: Scenario field -> value, of `episode.FIELDS`.
+        """
         super().__init__(Setting(plant, task, changes, flies=self.flies))
         if render_mode not in (None, "rgb_array"):
             raise ScenarioError(f"render_mode is {shown(render_mode)}: give 'rgb_array' or None")
         scenario = self.setting.scenario
         self.render_mode, self.max_samples = render_mode, scenario.samples
         self.metadata = self.metadata | {"render_fps": max(1, round(1.0 / scenario.control_period))}
-        self.action_space, self.observation_space = action_space(self.setting), observation_space(self.setting)
+        self.action_space, self.observation_space = (
+            action_space(self.setting),
+            observation_space(self.setting),
+        )
         self.renderer: mujoco.Renderer | None = None
         self.data = mujoco.MjData(self.setting.model)
 
@@ -97,7 +111,10 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         return self.setting.observe(self.x, self.v, 0), self.reward_and_info()[1]
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Take one control period. Return observation, reward, terminated, truncated and the info."""
+        """Take one control period.
+
+        Return observation, reward, terminated, truncated and the info.
+        """
         self.advance(action)
         observation = self.setting.observe(self.x, self.v, self.sample)
         if self.diverged:
@@ -113,7 +130,9 @@ class PlantEnv(TimeLimited, Episode, gymnasium.Env):  # pyright: ignore[reportIn
         self.read_state(self.data)
 
     def render(self) -> np.ndarray | None:
-        """Return a picture from the plant's camera, (height, width, 3), with render_mode "rgb_array", else None."""
+        """Return a picture from the plant's camera, (height, width, 3), with render_mode
+        "rgb_array", else None.
+        """
         if self.render_mode is None:
             return None
         if (renderer := self.renderer) is None:

@@ -3,8 +3,8 @@
     act = smc.envs.agent(smc.law("observer_free", lam=6.0, k1=3.076), environment)
     timestep = environment.step(act(timestep))           # dm_env; of gymnasium: act(observation)
 
-The law is called by the `Controller` of the reference loop, so it measures the same as in `smc.run`, and the episode
-equals the trace of that run.
+The law is called by the `Controller` of the reference loop, so it measures the same as in
+`smc.run`, and the episode equals the trace of that run.
 """
 
 import dataclasses
@@ -31,14 +31,16 @@ def agent(
     surface: Surface | Template | str | None = None,
     velocity: Estimator | Template | str | None = None,
 ) -> Callable[[Any], np.ndarray]:
-    """Return a law as an agent: a callable observation -> action, whose memory is cleared with each episode.
+    """Return a law as an agent: a callable observation -> action, whose memory is cleared with each
+    episode.
 
     Args:
       law, model, surface, velocity: as in a Scenario.
       environment: from `suite.load`, or a single gymnasium environment, wrapped or not.
 
     Raises:
-      ScenarioError: another environment, or values that a Scenario refuses. The agent raises it if its law fails.
+      ScenarioError: another environment, or values that a Scenario refuses. The agent raises it if
+        its law fails.
     """
     episode = _episode(environment)
     scenario = dataclasses.replace(
@@ -53,7 +55,9 @@ def agent(
     last_episode = 0  # number of the episode in which it acted last
 
     def act(observation: Any) -> np.ndarray:
-        """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of gymnasium."""
+        """Return the action for an observation: a TimeStep or mapping of dm_env, or an array of
+        gymnasium.
+        """
         nonlocal controller, last_episode
         k, plant = episode.sample, scenario.plant
         if k == 0 or last_episode != episode.episodes:
@@ -85,5 +89,7 @@ def _positions_and_velocities(observation: Any, n: int) -> tuple[np.ndarray, np.
     if isinstance(values, Mapping):
         values = values.get("observations")
     if not isinstance(values, np.ndarray) or values.ndim != 1 or len(values) < 2 * n:
-        raise ScenarioError(f"observation is {shown(observation)}: give what the environment returned, unchanged")
+        raise ScenarioError(
+            f"observation is {shown(observation)}: give what the environment returned, unchanged"
+        )
     return values[:n], values[n : 2 * n]

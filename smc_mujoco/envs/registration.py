@@ -1,8 +1,10 @@
-"""Ids of the plants in gymnasium: "smc/CartPole-v0", and "Duffing-v0" where gymnasium has no environment of that name.
+"""Ids of the plants in gymnasium: "smc/CartPole-v0", and "Duffing-v0" where gymnasium has no
+environment of that name.
 
-gymnasium has no plugins, and its function `register_envs` does nothing. So importing this package registers the ids if
-gymnasium has been imported; otherwise importing gymnasium does. The package does not import gymnasium itself, which is
-optional and slow to import. This module imports no plant: it reads the names of the plants from their files.
+gymnasium has no plugins, and its function `register_envs` does nothing. So importing this package
+registers the ids if gymnasium has been imported; otherwise importing gymnasium does. The package
+does not import gymnasium itself, which is optional and slow to import. This module imports no
+plant: it reads the names of the plants from their files.
 """
 
 import pkgutil
@@ -18,7 +20,9 @@ NAMESPACE = "smc"  # of all plants
 
 def register_when_imported() -> None:
     """Register the ids at once if gymnasium has been imported, else as soon as it is."""
-    if getattr(sys.modules.get(LIBRARY), "envs", None) is not None:  # set once gymnasium has registered its own ids
+    if (
+        getattr(sys.modules.get(LIBRARY), "envs", None) is not None
+    ):  # set once gymnasium has registered its own ids
         register()
     else:
         # finders of other packages; an earlier import of this module may have left its own
@@ -29,8 +33,12 @@ def register_when_imported() -> None:
 class Importer:
     """The finder of gymnasium alone. It registers the ids after gymnasium's first import."""
 
-    def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> Any:
-        """Return the spec of gymnasium, with a loader that also registers the ids; None for other packages."""
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> Any:
+        """Return the spec of gymnasium, with a loader that also registers the ids; None for other
+        packages.
+        """
         if name != LIBRARY:
             return None
         others = [finder for finder in sys.meta_path if finder is not self]
@@ -51,9 +59,15 @@ def register() -> None:
     """Register the ids of all plants that gymnasium does not have yet."""
     from gymnasium.envs import registration as theirs
 
-    taken = {spec.name for spec in theirs.registry.values() if str(spec.entry_point).startswith(f"{LIBRARY}.")}
+    taken = set()
+    for spec in theirs.registry.values():
+        if str(spec.entry_point).startswith(f"{LIBRARY}."):
+            taken.add(spec.name)
     for plant in plants():
-        for name in (f"{NAMESPACE}/{camel(plant)}-v0", *([] if camel(plant) in taken else [f"{camel(plant)}-v0"])):
+        for name in (
+            f"{NAMESPACE}/{camel(plant)}-v0",
+            *([] if camel(plant) in taken else [f"{camel(plant)}-v0"]),
+        ):
             if name not in theirs.registry:
                 theirs.register(
                     id=name,

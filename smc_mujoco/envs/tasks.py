@@ -2,9 +2,9 @@
 
     reward = T(rms(e)) (4 + T(rms(w) / 5)) / 5,    T(a) = 10^(-a^2)
 
-in [0, 1], where rms is taken over the channels. T is dm_control's tolerance about 0 with margin 1 (Tassa et al.,
-DeepMind Control Suite, 2018), and the form is that of its cart-pole. The margins, 1 (rad or m) for e and 5 (per second)
-for w, are chosen.
+in [0, 1], where rms is taken over the channels. T is dm_control's tolerance about 0 with margin 1
+(Tassa et al., DeepMind Control Suite, 2018), and the form is that of its cart-pole. The margins, 1
+(rad or m) for e and 5 (per second) for w, are chosen.
 
     task          e                                          w                  an episode starts with |x| up to
     regulate      x                                          x'                 the plant's x0
@@ -12,8 +12,9 @@ for w, are chosen.
     swing_up      1 - cos x of toppling hinges, x of others  x'                 within 0.1 rad of hanging, others at 0
     synchronise   x - mean of the channels                   x' - its mean      the largest of the plant's x0
 
-Of an arm such as `panda`, whose rest is a pose, x and the spread of starts count from this pose, and r is a reference
-for each joint. An arm is neither swung up nor synchronised. If joints have ranges, starts also lie within these.
+Of an arm such as `panda`, whose rest is a pose, x and the spread of starts count from this pose,
+and r is a reference for each joint. An arm is neither swung up nor synchronised. If joints have
+ranges, starts also lie within these.
 """
 
 import dataclasses
@@ -32,9 +33,12 @@ from smc_mujoco.simulation.signals import Signal, Sine
 LN10 = math.log(10.0)
 RATE_MARGIN = 5.0  # rad/s or m/s, the margin of w: chosen
 SWING_UP_SPREAD = 0.1  # rad, largest distance from hanging at the start of a swing-up: chosen
-SWING_UP_TORQUE = 0.5  # u_max of a swing-up, of the torque that holds the pendulum level: chosen, too weak for one push
+# u_max of a swing-up, of the torque that holds the pendulum level: chosen, too weak for one push
+SWING_UP_TORQUE = 0.5
 TRACK_REFERENCE = Sine(amplitude=0.5, omega=1.0)  # rad or m, the default of `track`: chosen
-AMPLITUDE_SHARE = 0.5  # of the way to the end of a joint's range: bounds the default reference of an arm; chosen
+AMPLITUDE_SHARE = (
+    0.5  # of the way to the end of a joint's range: bounds the default reference of an arm; chosen
+)
 
 Pair = tuple[np.ndarray, np.ndarray]
 
@@ -71,12 +75,16 @@ class Task:
         return np.ones(plant.n, bool)
 
     def spread(self, plant: Plant) -> Pair:
-        """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring joints' ranges."""
+        """Return the lowest and the highest start of the channels from rest, (n,) each, ignoring
+        joints' ranges.
+        """
         reach = np.abs(plant.x0 - rest(plant))
         return -reach, reach
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
-        """Return e and w for x and v, (..., n) each; `r` has the references r, r' and r'', (..., 3 m), m of each."""
+        """Return e and w for x and v, (..., n) each; `r` has the references r, r' and r'', (..., 3
+        m), m of each.
+        """
         return x, v
 
 
@@ -92,7 +100,9 @@ class Track(Task):
         low, high = _ranges(plant)
         room = AMPLITUDE_SHARE * np.minimum(high - plant.rest, plant.rest - low)
         amplitudes = np.minimum(room, TRACK_REFERENCE.amplitude)
-        amplitudes = (amplitudes * np.isin(np.arange(plant.n), plant.judged))[: plant.driven].tolist()
+        amplitudes = (amplitudes * np.isin(np.arange(plant.n), plant.judged))[
+            : plant.driven
+        ].tolist()
         return {
             "reference": [
                 OffsetSine(middle, amplitude, TRACK_REFERENCE.omega)
@@ -105,7 +115,9 @@ class Track(Task):
         return np.arange(plant.n) < plant.driven
 
     def errors(self, x: np.ndarray, v: np.ndarray, r: np.ndarray, selected: np.ndarray) -> Pair:
-        """Return the distance of the driven channels from their references, and the state of the others."""
+        """Return the distance of the driven channels from their references, and the state of the
+        others.
+        """
         m, e, w = r.shape[-1] // 3, np.array(x), np.array(v)
         e[..., selected] -= r[..., :m]
         w[..., selected] -= r[..., m : 2 * m]
@@ -123,7 +135,9 @@ class SwingUp(Task):
         return bool(down.any() and hangs.all() and one_unit)
 
     def fields(self, plant: Plant) -> dict[str, Any]:
-        """Return a torque too weak to push the heaviest pendulum up at once; a cart keeps its own limit."""
+        """Return a torque too weak to push the heaviest pendulum up at once; a cart keeps its own
+        limit.
+        """
         if plant.free:
             return {}
         down, p = toppling(plant), Values(**plant.parameters)
@@ -171,7 +185,9 @@ FLIGHT_TASKS = ["regulate", "track"]  # of free bodies
 def reward(e: np.ndarray, w: np.ndarray) -> Any:
     """Return the reward for errors e and w, (..., n) each."""
     rate = -LN10 / e.shape[-1]
-    return np.exp(rate * np.vecdot(e, e)) * (0.8 + 0.2 * np.exp(rate / RATE_MARGIN**2 * np.vecdot(w, w)))
+    return np.exp(rate * np.vecdot(e, e)) * (
+        0.8 + 0.2 * np.exp(rate / RATE_MARGIN**2 * np.vecdot(w, w))
+    )
 
 
 def tasks(plant: Plant | str) -> list[str]:
@@ -181,7 +197,9 @@ def tasks(plant: Plant | str) -> list[str]:
 
 
 def starts(task: Task, plant: Plant) -> Pair:
-    """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints' ranges."""
+    """Return the lowest and the highest start of a plant's channels, (n,) each, within its joints'
+    ranges.
+    """
     lowest, highest = _ranges(plant)
     low, high = task.spread(plant)
     return np.clip(rest(plant) + low, lowest, highest), np.clip(rest(plant) + high, lowest, highest)
@@ -194,13 +212,17 @@ def rest(plant: Plant) -> np.ndarray:
 
 def _ranges(plant: Plant) -> Pair:
     """Return the lowest and the highest positions of the joints, (n,) each."""
-    ranges = np.array([(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n)
+    ranges = np.array(
+        [(low, high) for _, low, high in plant.ranges] or [(-math.inf, math.inf)] * plant.n
+    )
     return ranges[:, 0], ranges[:, 1]
 
 
 @functools.lru_cache(maxsize=64)
 def toppling(plant: Plant) -> np.ndarray:
-    """Return the channels that fall when they lean, (n,) of bool: hinges for which x = 0 is unstable."""
+    """Return the channels that fall when they lean, (n,) of bool: hinges for which x = 0 is
+    unstable.
+    """
     model = plant.load()
     hinged = model.jnt_type[joint_ids(model)] == mujoco.mjtJoint.mjJNT_HINGE
     lean = 0.1 * hinged

@@ -1,9 +1,11 @@
-"""Many copies of a plant as one gymnasium.vector.VectorEnv: all of them step in one MuJoCo Batch, on all cores.
+"""Many copies of a plant as one gymnasium.vector.VectorEnv: all of them step in one MuJoCo Batch,
+on all cores.
 
     environments = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=1024)
 
-Copy i moves like the single environment with seed + i, to 1e-12. After the end of an episode a copy begins the next
-one in the next step, which ignores the action, as gymnasium's own vector environments do (AutoresetMode.NEXT_STEP).
+Copy i moves like the single environment with seed + i, to 1e-12. After the end of an episode a copy
+begins the next one in the next step, which ignores the action, as gymnasium's own vector
+environments do (AutoresetMode.NEXT_STEP).
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,34 +51,54 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         max_episode_steps: Annotated[int, Whole(low=1, high=10**15)] | None = None,
         render_mode: None = None,
     ):
-        """Make copies of a plant with one of its tasks. `changes`: Scenario field -> value, of `episode.FIELDS`.
+        """Make copies of a plant with one of its tasks.
 
-        `threads`: None for one per available core. `max_episode_steps`: control samples after which an episode is
-        truncated, if the duration is not shorter. `render_mode`: None, because copies are not rendered.
+        `changes`: Scenario field -> value, of `episode.FIELDS`.
+
+        `threads`: None for one per available core. `max_episode_steps`: control samples after which
+        an episode is truncated, if the duration is not shorter. `render_mode`: None, because copies
+        are not rendered.
         """
         if render_mode is not None:
-            raise ScenarioError(f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment")
+            raise ScenarioError(
+                f"render_mode is {shown(render_mode)}: copies are not drawn, make a single environment"
+            )
         self.num_envs = num_envs
         self.setting = Setting(plant, task, changes, edit=remove_scenery)
-        if smooth(self.setting.model) and not self.setting.model.nflex:  # no constraints: a tenth of MuJoCo's time
+        if (
+            smooth(self.setting.model) and not self.setting.model.nflex
+        ):  # no constraints: a tenth of MuJoCo's time
             self.setting.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
         samples = self.setting.scenario.samples
-        self.max_samples = samples if max_episode_steps is None else min(samples, max_episode_steps)
+        if max_episode_steps is None:
+            self.max_samples = samples
+        else:
+            self.max_samples = min(samples, max_episode_steps)
         self.single_action_space = action_space(self.setting)
         self.single_observation_space = observation_space(self.setting)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.batch = Batch(self.setting.model, self.num_envs, min(cores(threads), self.num_envs))
-        self.qpos, self.qvel, self.ctrl = (self.batch.bind(name) for name in ("qpos", "qvel", "ctrl"))
-        self.drive_states = np.zeros((2, self.num_envs, *self.setting.action_shape))  # of `DriveStep`
+        self.qpos, self.qvel, self.ctrl = (
+            self.batch.bind(name) for name in ("qpos", "qvel", "ctrl")
+        )
+        self.drive_states = np.zeros(
+            (2, self.num_envs, *self.setting.action_shape)
+        )  # of `DriveStep`
         self.randoms: list[np.random.Generator] = []
         # control samples since each episode began, and the copies whose episode has ended
         self.samples, self.ended = np.zeros(self.num_envs, int), np.zeros(self.num_envs, bool)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin new episodes, from seed, seed + 1, ... or a list of seeds. Options x0 and v0 hold for all copies."""
+        """Begin new episodes, from seed, seed + 1, ... or a list of seeds.
+
+        Options x0 and v0 hold for all copies.
+        """
         generators = self.randoms or [None] * self.num_envs
         self.randoms = [
             seeding.np_random(number)[0] if random is None or number is not None else random
@@ -85,13 +107,19 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         self.begin(np.ones(self.num_envs, bool), options)
         return self.observe(self.setting.diverged(*self.state())), self.infos(self.errors()[0])
 
-    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Take one control period in every copy; copies at the end of an episode begin the next one."""
+    def step(
+        self, actions: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Take one control period in every copy; copies at the end of an episode begin the next
+        one.
+        """
         if not self.randoms:
             raise ScenarioError("no episode has begun: call reset first")
         restarts = self.ended.copy()
         commands = self.setting.command(actions, (self.num_envs,))
-        terminated = self.advance(np.flatnonzero(~restarts).astype(np.int32) if restarts.any() else None, commands)
+        terminated = self.advance(
+            np.flatnonzero(~restarts).astype(np.int32) if restarts.any() else None, commands
+        )
         self.samples += 1
         if restarts.any():
             self.begin(restarts)
@@ -118,19 +146,28 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
         self.drive_states[:, mask] = self.setting.drive_start(self.qvel[mask])
 
     def advance(self, ids: np.ndarray | None, commands: np.ndarray) -> np.ndarray:
-        """Take one control period in the copies `ids`, None for all. Return those that failed, (num_envs,) of bool."""
+        """Take one control period in the copies `ids`, None for all.
+
+        Return those that failed, (num_envs,) of bool.
+        """
         failed = np.zeros(self.num_envs, bool)
         for steps in self.setting.apply_command(self.ctrl, commands, self.drive_states, self.qvel):
             try:
-                with mjcb.installed(None):  # a Batch refuses Python callbacks, which runs of other threads may have set
+                with mjcb.installed(
+                    None
+                ):  # a Batch refuses Python callbacks, which runs of other threads may have set
                     self.batch.step(ids, nstep=steps)
             except SimulationError as error:
                 failed[list(error.ids)] = True
-                ids = np.setdiff1d(np.arange(self.num_envs) if ids is None else ids, error.ids).astype(np.int32)
+                ids = np.setdiff1d(
+                    np.arange(self.num_envs) if ids is None else ids, error.ids
+                ).astype(np.int32)
         return failed
 
     def observe(self, diverged: np.ndarray) -> np.ndarray:
-        """Return the observations of all copies, (num_envs, observation_size); those of `diverged` ones are bounded."""
+        """Return the observations of all copies, (num_envs, observation_size); those of `diverged`
+        ones are bounded.
+        """
         observations = self.setting.observe(*self.state(), self.samples)
         if diverged.any():
             observations[diverged] = bounded(observations[diverged])
@@ -142,8 +179,13 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             return self.setting.errors(*self.state(), self.samples)
 
     def infos(self, e: np.ndarray) -> dict[str, Any]:
-        """Return the infos of `Episode.reward_and_info` as gymnasium joins them; e is (num_envs, n)."""
-        times, known = self.samples * self.setting.scenario.control_period, np.ones(self.num_envs, bool)
+        """Return the infos of `Episode.reward_and_info` as gymnasium joins them; e is (num_envs,
+        n).
+        """
+        times, known = (
+            self.samples * self.setting.scenario.control_period,
+            np.ones(self.num_envs, bool),
+        )
         return {"time": times, "_time": known, "error": e, "_error": known.copy()}
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
@@ -156,7 +198,9 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
             return [None] * self.num_envs
         if isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str):
             if len(seed) != self.num_envs:
-                raise ScenarioError(f"seed has {len(seed)} values for {self.num_envs} copies: give one number or all")
+                raise ScenarioError(
+                    f"seed has {len(seed)} values for {self.num_envs} copies: give one number or all"
+                )
             return [None if number is None else whole("seed", number, 0, SEEDS) for number in seed]
         first = whole("seed", seed, 0, SEEDS)
         return range(first, first + self.num_envs)
@@ -165,7 +209,8 @@ class BatchEnv(TimeLimited, VectorEnv):  # pyright: ignore[reportIncompatibleVar
 def remove_scenery(spec: mujoco.MjSpec) -> None:
     """Delete scenery, merge fixed bodies and disable sensors, which take a third of MuJoCo's time.
 
-    A user's model keeps its scenery and bodies, because a fixed part may be a floor, or carry a tendon.
+    A user's model keeps its scenery and bodies, because a fixed part may be a floor, or carry a
+    tendon.
     """
     if not any(text.name == DIRECT_TEXT for text in spec.texts):
         without_scenery(spec)

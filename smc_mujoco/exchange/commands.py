@@ -29,68 +29,101 @@ def export(
     gains: options.GainValues = "",
     joints: options.Joints = None,
     numbers: Annotated[
-        str, typer.Option("--type", metavar="double|float|q15", help="C: type of numbers; q15 for observer_free only.")
+        str,
+        typer.Option(
+            "--type",
+            metavar="double|float|q15",
+            help="C: type of numbers; q15 for observer_free only.",
+        ),
     ] = "double",
     surface: Annotated[
-        str | None, typer.Option(metavar="NAME|TEXT", help="FMU: a surface, as linear(c=3); default the law's own.")
+        str | None,
+        typer.Option(
+            metavar="NAME|TEXT", help="FMU: a surface, as linear(c=3); default the law's own."
+        ),
     ] = None,
     velocity: Annotated[
         str | None,
-        typer.Option(metavar="NAME|TEXT", help="FMU: a velocity estimator, as levant(L=4800); default v is an input."),
+        typer.Option(
+            metavar="NAME|TEXT",
+            help="FMU: a velocity estimator, as levant(L=4800); default v is an input.",
+        ),
     ] = None,
     period: Annotated[float, typer.Option(help="FMU: control period, s.")] = 1e-3,
-    u_max: Annotated[float, typer.Option("--u-max", help="FMU: bound on |u|, N or N m.")] = math.inf,
+    u_max: Annotated[
+        float, typer.Option("--u-max", help="FMU: bound on |u|, N or N m.")
+    ] = math.inf,
     model: Annotated[
         str | None,
         typer.Option(
-            metavar="none|nominal", help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed."
+            metavar="none|nominal",
+            help="FMU: nominal: f and g of x'' = f + g u are inputs; default as needed.",
         ),
     ] = None,
-    joint: Annotated[str, typer.Option(metavar="hinge|slide", help="FMU: units: rad and N m, or m and N.")] = "hinge",
-    binary: Annotated[bool, typer.Option(help="FMU: whether to compile a binary for this machine.")] = True,
+    joint: Annotated[
+        str, typer.Option(metavar="hinge|slide", help="FMU: units: rad and N m, or m and N.")
+    ] = "hinge",
+    binary: Annotated[
+        bool, typer.Option(help="FMU: whether to compile a binary for this machine.")
+    ] = True,
     law: Annotated[
         list[str] | None,
-        typer.Option(metavar="LAW|FILE", help="Page: your own law, in addition to the library's; may be repeated."),
+        typer.Option(
+            metavar="LAW|FILE",
+            help="Page: your own law, in addition to the library's; may be repeated.",
+        ),
     ] = None,
 ) -> None:
     """Write a law as C or as an FMU, or a page on which MuJoCo runs in a browser, by OUT's ending.
 
-    LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or gains.json that
-    `smc-mujoco tune --out` wrote; left out, it is the name of OUT, as observer_free.c. A law of many joints may have
-    one value of a gain for each joint, as in --gains "k=8 20 15,c=5".
+    LAW is a name of `smc-mujoco list`, my_law.py with one law, made by @smc.law_function, or
+    gains.json that `smc-mujoco tune --out` wrote; left out, it is the name of OUT, as
+    observer_free.c. A law of many joints may have one value of a gain for each joint, as in --gains
+    "k=8 20 15,c=5".
 
-    - OUT.c: C99 without dependencies, for firmware or for smc.law_from. The C is translated from the law's Python,
-      operation by operation. It keeps its state in the array memory[] that its caller passes, and allocates nothing.
-      The comment at its top says how many bytes of code and state it takes. In double precision it gives the trace of
-      the library's own law; compile it with -ffp-contract=off to get the same bits.
-    - OUT.fmu: FMI 3.0 for Co-Simulation, for Simulink, Modelica and other tools, with C source code and a binary for
-      this machine; it needs no Python. Its inputs are x, v (unless an estimator replaces it), the reference r and dr,
-      and ddr if the law reads it. Its outputs are u and s. All gains are tunable parameters. The law runs every
-      --period seconds on the inputs as they are at that time. A law of many joints has a variable for each element:
-      x[1], x[2], M[1,1], and inputs for those of M, h, g, the matrix C of Coriolis forces and the tip's Jacobian J that
-      it reads.
-    - OUT.html: a page to choose laws, move sliders, push the machine and compare two laws, in a folder of files that
-      any web server can serve without this package and without network, for example `python -m http.server --directory
-      live`. The browser simulates the models of the package under its laws, translated to JavaScript, with the same
-      sampling, delay, noise and integrator. The address of the page holds all that you set, so that a link shares it.
-      The first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so has `pip
-      install 'smc-mujoco[live]'`.
+    - OUT.c: C99 without dependencies, for firmware or for smc.law_from. The C is translated from
+      the law's Python, operation by operation. It keeps its state in the array memory[] that its
+      caller passes, and allocates nothing. The comment at its top says how many bytes of code and
+      state it takes. In double precision it gives the trace of the library's own law; compile it
+      with -ffp-contract=off to get the same bits.
+    - OUT.fmu: FMI 3.0 for Co-Simulation, for Simulink, Modelica and other tools, with C source code
+      and a binary for this machine; it needs no Python. Its inputs are x, v (unless an estimator
+      replaces it), the reference r and dr, and ddr if the law reads it. Its outputs are u and s.
+      All gains are tunable parameters. The law runs every
+      --period seconds on the inputs as they are at that time. A law of many joints has a variable
+      for each element: x[1], x[2], M[1,1], and inputs for those of M, h, g, the matrix C of
+      Coriolis forces and the tip's Jacobian J that it reads.
+    - OUT.html: a page to choose laws, move sliders, push the machine and compare two laws, in a
+      folder of files that any web server can serve without this package and without network, for
+      example `python -m http.server --directory live`. The browser simulates the models of the
+      package under its laws, translated to JavaScript, with the same sampling, delay, noise and
+      integrator. The address of the page holds all that you set, so that a link shares it. The
+      first build fetches MuJoCo for browsers and three.js (10 MB) with npm. Node.js has npm, and so
+      has `pip install 'smc-mujoco[live]'`.
 
     Example: smc-mujoco export observer_free.c --gains lam=6,k1=3 --type float
 
-    Example: smc-mujoco export super_twisting controller.fmu --gains k1=5,k2=8 --velocity levant --u-max 6
+    Example: smc-mujoco export super_twisting controller.fmu --gains k1=5,k2=8 --velocity levant
+    --u-max 6
 
     Example: smc-mujoco export duffing cart_pole live/index.html --law my_law.py
     """
     outs = [text for text in what if Path(text).suffix in ENDINGS]
     if len(outs) != 1:
-        raise ScenarioError(f"{len(outs) or 'no'} files to write: give one that ends in {', '.join(ENDINGS)}")
+        raise ScenarioError(
+            f"{len(outs) or 'no'} files to write: give one that ends in {', '.join(ENDINGS)}"
+        )
     out, others = Path(outs[0]), [text for text in what if text != outs[0]]
     of_fmu = "surface", "velocity", "period", "u_max", "model", "joint", "binary"
     options.only_for(ctx, ("numbers",), out.suffix == ".c", "OUT.c")
     options.only_for(ctx, of_fmu, out.suffix == ".fmu", "OUT.fmu")
     options.only_for(ctx, ("law",), out.suffix == ".html", "OUT.html: give the law before OUT")
-    options.only_for(ctx, ("gains", "joints"), out.suffix != ".html", "OUT.c and OUT.fmu: give --law a law with gains")
+    options.only_for(
+        ctx,
+        ("gains", "joints"),
+        out.suffix != ".html",
+        "OUT.c and OUT.fmu: give --law a law with gains",
+    )
     if out.suffix == ".html":
         _write_page(others, law or [], out)
         return
@@ -98,7 +131,9 @@ def export(
         raise ScenarioError(f"{len(others)} laws for {out}: give one")
     with delay_ctrl_c():
         from smc_mujoco.control import from_text
-    chosen = from_text.law(others[0] if others else out.stem, **from_text.parsed_gains(gains, "--gains"))
+    chosen = from_text.law(
+        others[0] if others else out.stem, **from_text.parsed_gains(gains, "--gains")
+    )
     with delay_ctrl_c(), options.as_options({r"\bjoints=": "--joints "}):
         if out.suffix == ".c":
             from smc_mujoco.common.files import replacing
@@ -112,9 +147,17 @@ def export(
             from smc_mujoco.exchange.fmu.export import law_to_fmu
 
             law_to_fmu(
-                chosen, out, surface=surface, velocity=velocity, control_period=period, u_max=u_max, model=model,
-                joint=joint, joints=joints, binary=binary,
-            )  # fmt: skip
+                chosen,
+                out,
+                surface=surface,
+                velocity=velocity,
+                control_period=period,
+                u_max=u_max,
+                model=model,
+                joint=joint,
+                joints=joints,
+                binary=binary,
+            )
             what_it_is = f"FMI 3.0, Co-Simulation, every {period:g} s"
     print(f"{out}, {out.stat().st_size / 1024:.0f} kB; {what_it_is}")
 
@@ -122,7 +165,9 @@ def export(
 def _write_page(plants: Sequence[str], laws: Sequence[str], out: Path) -> None:
     """Build the live page of plants, with the library's laws and others."""
     if out.name != "index.html":
-        raise ScenarioError(f"the page is {out.name!r}: it is index.html in a folder, such as live/index.html")
+        raise ScenarioError(
+            f"the page is {out.name!r}: it is index.html in a folder, such as live/index.html"
+        )
     with delay_ctrl_c():
         from smc_mujoco.common.progress import bar
         from smc_mujoco.exchange.live.build import DEFAULT_PLANTS

@@ -1,12 +1,14 @@
-"""Linear controllers as laws: transfer functions and state-space models, of python-control or as matrices.
+"""Linear controllers as laws: transfer functions and state-space models, of python-control or as
+matrices.
 
     import control
     lead = control.tf([40, 100], [0.01, 1])                       # u = K(s) (r - x)
     smc.run(smc.Scenario(plant="duffing", law=smc.exchange.law_from_control(lead)))
 
-A controller of continuous time is discretised by Tustin's rule (bilinear, without prewarping) with the control period
-of the run. In real Schur form A is triangular but for 2 x 2 blocks, so each sample solves (I - A h/2) x = b from below.
-The law is written out as straight Python without loops, which is compiled and exported like any other law.
+A controller of continuous time is discretised by Tustin's rule (bilinear, without prewarping) with
+the control period of the run. In real Schur form A is triangular but for 2 x 2 blocks, so each
+sample solves (I - A h/2) x = b from below. The law is written out as straight Python without loops,
+which is compiled and exported like any other law.
 """
 
 import dataclasses
@@ -24,9 +26,10 @@ from smc_mujoco.control.law import Law, law_function
 from smc_mujoco.control.units import Gain, Unit
 
 INPUTS = {  # what a controller may read -> expression of the law's measurement
-    "error": "y.r - y.x", "error_rate": "y.dr - y.v",
+    "error": "y.r - y.x",
+    "error_rate": "y.dr - y.v",
     **{name: f"y.{name}" for name in ("x", "v", "q", "dq", "r", "dr", "ddr")},
-}  # fmt: skip
+}
 DEFAULT_INPUTS = ("error", "error_rate")
 MAX_STATES = 50
 CURE = "give a TransferFunction or StateSpace of python-control, (A, B, C, D, dt), or an array of gains"
@@ -34,7 +37,9 @@ Matrix = tuple[tuple[float, ...], ...]
 
 
 class System(NamedTuple):
-    """x' = a x + b w, u = c x + d w; or x+ = a x + b w if dt is not None, with dt s (or True: of any period)."""
+    """x' = a x + b w, u = c x + d w; or x+ = a x + b w if dt is not None, with dt s (or True: of
+    any period).
+    """
 
     a: np.ndarray
     b: np.ndarray
@@ -45,7 +50,10 @@ class System(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class LinearLaw:
-    """The function of a linear controller's law. It is equal to another one with the same numbers."""
+    """The function of a linear controller's law.
+
+    It is equal to another one with the same numbers.
+    """
 
     a: Matrix  # in real Schur form if the controller is of continuous time
     b: Matrix
@@ -73,8 +81,13 @@ class LinearLaw:
     def text(self) -> str:
         """The law in Python."""
         lines = [f"w{j} = {INPUTS[name]}" for j, name in enumerate(self.inputs)]
-        lines += self._step_lines() if self.discrete else self._tustin_lines()
-        return "def controller(y, gains, memory):\n" + "".join(f"    {line}\n" for line in [*lines, "return u, y.e"])
+        if self.discrete:
+            lines += self._step_lines()
+        else:
+            lines += self._tustin_lines()
+        return "def controller(y, gains, memory):\n" + "".join(
+            f"    {line}\n" for line in [*lines, "return u, y.e"]
+        )
 
     @functools.cached_property
     def py_func(self) -> Any:
@@ -91,23 +104,38 @@ class LinearLaw:
     def _step_lines(self) -> list[str]:
         n = range(len(self.a))
         lines = [*(f"x{i} = memory[{i}]" for i in n), self._output_line()]
-        return lines + [f"memory[{i}] = {_sum_of_products([(self.a[i], 'x'), (self.b[i], 'w')])}" for i in n]
+        return lines + [
+            f"memory[{i}] = {_sum_of_products([(self.a[i], 'x'), (self.b[i], 'w')])}" for i in n
+        ]
 
     def _tustin_lines(self) -> list[str]:
-        """Return the lines of x = (I - A h/2)^-1 (z + h/2 B w), u = C x + D w, z+ = 2 x - z, with z in memory."""
+        """Return the lines of x = (I - A h/2)^-1 (z + h/2 B w), u = C x + D w, z+ = 2 x - z, with z
+        in memory.
+        """
         n, last, lines = len(self.a), len(self.a) - 1, ["h = 0.5 * y.dt"] if self.a else []
         while last >= 0:  # blocks, from below
-            first = last - 1 if last > 0 and self.a[last][last - 1] else last
+            if last > 0 and self.a[last][last - 1]:
+                first = last - 1
+            else:
+                first = last
             for k in range(first, last + 1):
                 solved = [0.0] * (last + 1) + list(self.a[k][last + 1 :])
-                lines.append(f"f{k} = memory[{k}] + h * ({_sum_of_products([(solved, 'x'), (self.b[k], 'w')])})")
+                lines.append(
+                    f"f{k} = memory[{k}] + h * ({_sum_of_products([(solved, 'x'), (self.b[k], 'w')])})"
+                )
             lines += _block_lines(self.a, first, last)
             last = first - 1
-        return [*lines, self._output_line(), *(f"memory[{i}] = 2.0 * x{i} - memory[{i}]" for i in range(n))]
+        return [
+            *lines,
+            self._output_line(),
+            *(f"memory[{i}] = 2.0 * x{i} - memory[{i}]" for i in range(n)),
+        ]
 
 
 def _block_lines(a: Matrix, first: int, last: int) -> list[str]:
-    """Return the lines that solve a block of (I - A h/2) x = f: one equation, or two by Cramer's rule."""
+    """Return the lines that solve a block of (I - A h/2) x = f: one equation, or two by Cramer's
+    rule.
+    """
     if first == last:
         return [f"x{first} = f{first} / (1.0 - h * {a[first][first]!r})"]
     i, j = first, last
@@ -122,38 +150,53 @@ def _block_lines(a: Matrix, first: int, last: int) -> list[str]:
 
 def _sum_of_products(parts: Sequence[tuple[Sequence[float], str]]) -> str:
     """Return a sum of products as text, without those with 0."""
-    terms = [f"{value!r} * {name}{i}" for values, name in parts for i, value in enumerate(values) if value]
+    terms = []
+    for values, name in parts:
+        for i, value in enumerate(values):
+            if value:
+                terms.append(f"{value!r} * {name}{i}")
     return " + ".join(terms) or "0.0"
 
 
-def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: str = "linear_controller") -> Law:
+def law_from_control(
+    K: Any, inputs: Sequence[str] | str | None = None, name: str = "linear_controller"
+) -> Law:
     """Return a linear controller as a law of one channel.
 
     Args:
-      K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m; or matrices
-        (A, B, C, D) or (A, B, C, D, dt). Without dt, or with dt = 0, it is of continuous time, and discretised by
-        Tustin's rule with the control period of the run. With dt = True it is the step of any control period; with dt
-        in s, of that control period. Or an array of gains, (1, m), such as the K of control.lqr: u = K w for the m
-        inputs w, which is -K (x - r, v - r') for error and error_rate.
-      inputs: what K reads, in its order: error (r - x), error_rate (r' - v), x, v, r, dr, ddr, and q, dq of the joint
-        without actuator that this one moves. Default: error, and error_rate if K has two inputs.
+      K: a TransferFunction or StateSpace of python-control (or scipy), with one output u, N or N m;
+        or matrices (A, B, C, D) or (A, B, C, D, dt). Without dt, or with dt = 0, it is of
+        continuous time, and discretised by Tustin's rule with the control period of the run. With
+        dt = True it is the step of any control period; with dt in s, of that control period. Or an
+        array of gains, (1, m), such as the K of control.lqr: u = K w for the m inputs w, which is
+        -K (x - r, v - r') for error and error_rate.
+      inputs: what K reads, in its order: error (r - x), error_rate (r' - v), x, v, r, dr, ddr, and
+        q, dq of the joint without actuator that this one moves. Default: error, and error_rate if K
+        has two inputs.
       name: of the law.
 
-    The law has one gain, `scale`, a factor of K, which `smc.tune` searches. It has no anti-windup. For another
-    discretisation give `control.sample_system(K, h, "zoh")`.
+    The law has one gain, `scale`, a factor of K, which `smc.tune` searches. It has no anti-windup.
+    For another discretisation give `control.sample_system(K, h, "zoh")`.
 
     Raises:
-      ScenarioError: K is none of these, improper, not finite, of several outputs or over 50 states, or has other
-        inputs than are named.
+      ScenarioError: K is none of these, improper, not finite, of several outputs or over 50 states,
+        or has other inputs than are named.
     """
     errors.name("name of the controller", name)
     system = _checked(_system(K))
     states, count = len(system.a), system.b.shape[1]
-    names = DEFAULT_INPUTS[:count] if inputs is None else (inputs,) if isinstance(inputs, str) else tuple(inputs)
+    if inputs is None:
+        names = DEFAULT_INPUTS[:count]
+    elif isinstance(inputs, str):
+        names = (inputs,)
+    else:
+        names = tuple(inputs)
     for input_name in names:
         errors.find("input of a controller", input_name, INPUTS)
     if len(names) != count:
-        raise ScenarioError(f"K has {count} inputs, and {len(names)} are named: give inputs=, such as ['r', 'x']")
+        raise ScenarioError(
+            f"K has {count} inputs, and {len(names)} are named: give inputs=, such as ['r', 'x']"
+        )
     a, b, c, discrete = system.a, system.b, system.c, system.dt is not None
     if states and not discrete:
         from scipy.linalg import schur
@@ -171,7 +214,10 @@ def law_from_control(K: Any, inputs: Sequence[str] | str | None = None, name: st
         control_period=None if system.dt in (None, True) else float(system.dt),
     )
     decorate = law_function(
-        gains={"scale": Gain(1.0, Unit(), positive=True)}, memory=max(states, 1), family="linear", continuous=True
+        gains={"scale": Gain(1.0, Unit(), positive=True)},
+        memory=max(states, 1),
+        family="linear",
+        continuous=True,
     )
     return decorate(function)()
 
@@ -194,7 +240,9 @@ def _system(K: Any) -> System:
 
 
 def _matrices(a: Any, b: Any, c: Any, d: Any, dt: Any) -> System:
-    """Return matrices as arrays of two axes; a number is a matrix of 1 x 1, and a list is the column b or a row."""
+    """Return matrices as arrays of two axes; a number is a matrix of 1 x 1, and a list is the
+    column b or a row.
+    """
     try:
         arrays = [np.asarray(array) for array in (a, b, c, d)]
         if any(np.iscomplexobj(array) for array in arrays):
@@ -217,7 +265,9 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
     if np.ndim(den[0]) == 0:  # one of scipy
         num, den = [[num]], [[den]]
     if len(num) != 1:
-        raise ScenarioError(f"K has {len(num)} outputs: give one with one output, u, such as K[0, :]")
+        raise ScenarioError(
+            f"K has {len(num)} outputs: give one with one output, u, such as K[0, :]"
+        )
     forms = []
     for above, below in zip(num[0], den[0], strict=True):
         with warnings.catch_warnings():
@@ -225,7 +275,9 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
             try:
                 forms.append(tf2ss(np.atleast_1d(above), np.atleast_1d(below)))
             except ValueError:
-                order = " over ".join(str(len(np.trim_zeros(polynomial, "f")) - 1) for polynomial in (above, below))
+                order = " over ".join(
+                    str(len(np.trim_zeros(polynomial, "f")) - 1) for polynomial in (above, below)
+                )
                 cure = "filter its derivative, as s / (tau s + 1)"
                 raise ScenarioError(f"K is improper, of order {order}: {cure}") from None
     a, b = (block_diag(*(form[k] for form in forms)) for k in (0, 1))
@@ -234,21 +286,37 @@ def _realisation(num: Any, den: Any, dt: Any) -> System:
 
 
 def _checked(K: System) -> System:
-    """Return a system whose sizes fit, of finite numbers, and with None for a dt of continuous time."""
+    """Return a system whose sizes fit, of finite numbers, and with None for a dt of continuous
+    time.
+    """
     n, inputs, outputs = len(K.a), K.d.shape[1], len(K.d)
-    shapes = {"A": (K.a, (n, n)), "B": (K.b, (n, inputs)), "C": (K.c, (outputs, n)), "D": (K.d, (outputs, inputs))}
+    shapes = {
+        "A": (K.a, (n, n)),
+        "B": (K.b, (n, inputs)),
+        "C": (K.c, (outputs, n)),
+        "D": (K.d, (outputs, inputs)),
+    }
     for name, (matrix, shape) in shapes.items():
         if matrix.shape != shape:
-            raise ScenarioError(f"K's {name} is {_size(matrix.shape)}: give {_size(shape)}, as A and D have it")
+            raise ScenarioError(
+                f"K's {name} is {_size(matrix.shape)}: give {_size(shape)}, as A and D have it"
+            )
         if not np.isfinite(matrix).all():
             raise ScenarioError(f"K's {name} is not finite: {CURE}")
     if outputs != 1:
-        raise ScenarioError(f"K has {outputs} outputs: give one with one output, u, such as K[0, :]")
+        raise ScenarioError(
+            f"K has {outputs} outputs: give one with one output, u, such as K[0, :]"
+        )
     if n > MAX_STATES:
-        raise ScenarioError(f"K has {n} states: give {MAX_STATES} at most, by control.balred or control.minreal")
+        raise ScenarioError(
+            f"K has {n} states: give {MAX_STATES} at most, by control.balred or control.minreal"
+        )
     if K.dt is True:
         return K
-    dt = 0.0 if K.dt is None else errors.number("dt of K", K.dt, low=0.0)
+    if K.dt is None:
+        dt = 0.0
+    else:
+        dt = errors.number("dt of K", K.dt, low=0.0)
     return K._replace(dt=dt or None)
 
 

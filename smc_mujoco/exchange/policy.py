@@ -2,9 +2,10 @@
 
     trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(network)))
 
-A policy observes the same positions and velocities as in an environment. On a plant of several channels it is called
-once per channel, with that channel's observation. State that a plain function keeps elsewhere is shared by all runs. A
-policy is Python, so its runs take the reference loop. A file is first read in another process.
+A policy observes the same positions and velocities as in an environment. On a plant of several
+channels it is called once per channel, with that channel's observation. State that a plain function
+keeps elsewhere is shared by all runs. A policy is Python, so its runs take the reference loop. A
+file is first read in another process.
 """
 
 import copy
@@ -39,7 +40,11 @@ FORMATS = {  # suffix of a file -> library that reads it, cure if it does not
 }
 UNITS = "u_max", "SI"  # of an action: a fraction of u_max, or N and N m
 LOAD_TIMEOUT = 120.0  # s in which a library must read a file; chosen
-ONNX_DTYPES = {"tensor(float)": np.float32, "tensor(double)": np.float64, "tensor(float16)": np.float16}
+ONNX_DTYPES = {
+    "tensor(float)": np.float32,
+    "tensor(double)": np.float64,
+    "tensor(float16)": np.float16,
+}
 
 _arithmetic = functools.cache(Arithmetic)  # of this process
 
@@ -64,15 +69,22 @@ class Policy(Uncompiled):
         """Return u, and 0 for s."""
         scale = y.limit if self.units == "u_max" else 1.0
         if math.isinf(scale):
-            raise ValueError('its action is a fraction of u_max, and u_max is inf: give u_max, or units="SI"')
-        state = [y.x, y.q, y.v, y.dq] if any((y.q, y.dq, y.fq, y.gq)) else [y.x, y.v]
+            raise ValueError(
+                'its action is a fraction of u_max, and u_max is inf: give u_max, or units="SI"'
+            )
+        if any((y.q, y.dq, y.fq, y.gq)):
+            state = [y.x, y.q, y.v, y.dq]
+        else:
+            state = [y.x, y.v]
         observation = np.array([*state, y.r, y.dr, y.ddr] if self.reference else state)
         arithmetic = _arithmetic()
         u = np.asarray(self.act(observation), float).ravel()
         if arithmetic.changed():
             raise ArithmeticError(f"{self.name} {ALTERS}")
         if len(u) != 1:
-            raise ValueError(f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel")
+            raise ValueError(
+                f"{self.name} gave an action of {len(u)} numbers; a law gives one a channel"
+            )
         return float(u[0]) * scale, 0.0
 
     def fresh(self) -> "Policy":
@@ -89,7 +101,8 @@ class Policy(Uncompiled):
 
 
 class Controller(Policy):
-    """The function of the law of an object with opensmc's method compute(t, x, xref), which gives u, or u and a dict.
+    """The function of the law of an object with opensmc's method compute(t, x, xref), which gives
+    u, or u and a dict.
 
     xref is (r, r', r''), u is in N or N m, and the entry "s" of the dict is the law's s.
     """
@@ -100,7 +113,10 @@ class Controller(Policy):
         answer = self.act.compute(y.t, np.array([y.x, y.v]), np.array([y.r, y.dr, y.ddr]))  # pyright: ignore[reportFunctionMemberAccess]
         if arithmetic.changed():
             raise ArithmeticError(f"{self.name} {ALTERS}")
-        u, told = answer if isinstance(answer, tuple) else (answer, {})
+        if isinstance(answer, tuple):
+            u, told = answer
+        else:
+            u, told = (answer, {})
         return float(np.asarray(u, float).item()), float(told.get("s", 0.0))
 
 
@@ -138,7 +154,9 @@ def load_network(file: File) -> Act:
     except ScenarioError:
         raise
     except Exception as error:
-        raise ScenarioError(f"policy {path.name!r} cannot be read ({one_line(str(error))}): {cure}") from error
+        raise ScenarioError(
+            f"policy {path.name!r} cannot be read ({one_line(str(error))}): {cure}"
+        ) from error
 
 
 def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
@@ -148,10 +166,19 @@ def _onnx(onnxruntime: ModuleType, path: Path) -> Act:
     session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     inputs = session.get_inputs()
     dtype, shape = ONNX_DTYPES.get(inputs[0].type), list(inputs[0].shape)
-    if len(inputs) != 1 or dtype is None or len(shape) != 2 or (shape[0] != 1 and isinstance(shape[0], int)):
+    if (
+        len(inputs) != 1
+        or dtype is None
+        or len(shape) != 2
+        or (shape[0] != 1 and isinstance(shape[0], int))
+    ):
         text = ", ".join(f"{tensor.name} {tensor.type} {tensor.shape}" for tensor in inputs)
-        raise ScenarioError(f"policy {path.name!r} takes {text}: export it for one input of floats, of shape (1, n)")
-    return lambda observation: session.run(None, {inputs[0].name: observation[None].astype(dtype)})[0]
+        raise ScenarioError(
+            f"policy {path.name!r} takes {text}: export it for one input of floats, of shape (1, n)"
+        )
+    return lambda observation: session.run(None, {inputs[0].name: observation[None].astype(dtype)})[
+        0
+    ]
 
 
 def _torch(torch: ModuleType, path: Path) -> Act:
@@ -161,10 +188,15 @@ def _torch(torch: ModuleType, path: Path) -> Act:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Network:
-    """A copy of a torch module, on the CPU and in evaluation mode. Further training does not change it."""
+    """A copy of a torch module, on the CPU and in evaluation mode.
+
+    Further training does not change it.
+    """
 
     module: Any  # the copy
-    predicts: bool = False  # whether to call its method `predict`, as of a policy of stable-baselines3
+    predicts: bool = (
+        False  # whether to call its method `predict`, as of a policy of stable-baselines3
+    )
 
     def __call__(self, observation: np.ndarray) -> Any:
         """Return the action."""
@@ -178,7 +210,9 @@ class Network:
         return Network(copy.deepcopy(self.module, memo), self.predicts)
 
     def __reduce__(self) -> tuple:
-        """Return what pickle and run keys contain: the module's bytes, its classes, and torch's version."""
+        """Return what pickle and run keys contain: the module's bytes, its classes, and torch's
+        version.
+        """
         torch, file = sys.modules["torch"], io.BytesIO()
         _reset_distribution(self.module)
         torch.save(self.module, file)
@@ -188,7 +222,9 @@ class Network:
 
 
 def _unpickled(content: bytes, classes: tuple[type, ...], version: str, predicts: bool) -> Network:
-    return Network(_library("torch", "network").load(io.BytesIO(content), weights_only=False), predicts)
+    return Network(
+        _library("torch", "network").load(io.BytesIO(content), weights_only=False), predicts
+    )
 
 
 @constrained
@@ -204,19 +240,22 @@ def policy(
     Args:
       act: one of
         - a callable from an observation to an action;
-        - an object with a method `predict`, such as a model of stable-baselines3, called for its deterministic action;
+        - an object with a method `predict`, such as a model of stable-baselines3, called for its
+          deterministic action;
         - a torch module, which is copied and put in evaluation mode, as is the policy of a model;
         - the path of a file of ONNX (.onnx) or of torch.export (.pt2).
       reference: whether r, r' and r'' are at the end of the observation, as in the task `track`.
       name: of the law; default: the object's name.
-      units: of the action: "u_max", a fraction of u_max; or "SI", N or N m. Either is clipped to the bound.
+      units: of the action: "u_max", a fraction of u_max; or "SI", N or N m. Either is clipped to
+        the bound.
 
-    The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array of a single channel.
-    ONNX and torch get it as a batch of one in the network's own type. An object that keeps state, such as an adaptive
-    gain, is copied for each channel of each run, which starts from it as it was given.
+    The observation is (x, v), or (x, q, v, q') for a joint that moves another one: a float64 array
+    of a single channel. ONNX and torch get it as a batch of one in the network's own type. An
+    object that keeps state, such as an adaptive gain, is copied for each channel of each run, which
+    starts from it as it was given.
 
-    A policy that simulates ahead must make and step its environments in the thread that calls it. In another thread
-    they and the run would wait for each other forever.
+    A policy that simulates ahead must make and step its environments in the thread that calls it.
+    In another thread they and the run would wait for each other forever.
 
     Raises:
       ScenarioError: none of these, no such file, a library that is not installed, or other units.
@@ -231,7 +270,9 @@ def policy(
 
 
 def controller(act: Any, *, name: str | None = None) -> Law:
-    """Return an object with opensmc's method `compute` as a law; each channel of each run has its own copy."""
+    """Return an object with opensmc's method `compute` as a law; each channel of each run has its
+    own copy.
+    """
     return law_function(Controller(act, name or type(act).__name__, reference=True, units="SI"))()
 
 
@@ -240,7 +281,9 @@ def _callable(act: Any) -> tuple[Act, str]:
     if isinstance(act, str | os.PathLike):
         path = Path(act)
         if path.suffix not in FORMATS:
-            raise ScenarioError(f"policy is {path.name!r}: give a callable, or a file of {', '.join(FORMATS)}")
+            raise ScenarioError(
+                f"policy is {path.name!r}: give a callable, or a file of {', '.join(FORMATS)}"
+            )
         with reading(path, "policy", "give the path of a file that a library wrote"):
             file = File(str(path.resolve()), _digest(path))
         try:
@@ -250,43 +293,57 @@ def _callable(act: Any) -> tuple[Act, str]:
         return file, path.stem
     torch, control, name = sys.modules.get("torch"), sys.modules.get("control"), type(act).__name__
     if control is not None and isinstance(act, control.InputOutputSystem):
-        raise ScenarioError(f"policy is a {name} of python-control: give smc.exchange.law_from_control(...) as the law")
+        raise ScenarioError(
+            f"policy is a {name} of python-control: give smc.exchange.law_from_control(...) as the law"
+        )
     predicts = callable(getattr(act, "predict", None))
     if predicts and not callable(act):  # a model of stable-baselines3 predicts by its policy
         act = getattr(act, "policy", act)
     elif not callable(act):
         raise ScenarioError(f"policy is {shown(act)}: {CALLABLE_CURE}")
     if torch is None or not isinstance(act, torch.nn.Module):
-        return (act if callable(act) else functools.partial(_predict, act)), getattr(act, "__name__", name)
+        return (act if callable(act) else functools.partial(_predict, act)), getattr(
+            act, "__name__", name
+        )
     try:
         _reset_distribution(act)
         module: Any = copy.deepcopy(act)
         return Network(module.to("cpu").eval(), predicts), name
     except Exception as error:
         cure = "give a file, by torch.onnx.export"
-        raise ScenarioError(f"policy {name!r} cannot be copied ({one_line(str(error))}): {cure}") from error
+        raise ScenarioError(
+            f"policy {name!r} cannot be copied ({one_line(str(error))}): {cure}"
+        ) from error
 
 
 def _predict(model: Any, observation: np.ndarray) -> Any:
     """Return the action that a model predicts: the result of `predict`, or the first of a pair."""
     action = model.predict(observation, deterministic=True)
-    return action[0] if isinstance(action, tuple) else action
+    if isinstance(action, tuple):
+        return action[0]
+    return action
 
 
 def _forward(torch: ModuleType, module: Any, observation: np.ndarray) -> np.ndarray:
-    """Return the output of a torch module for an observation, converted to the type of its parameters."""
+    """Return the output of a torch module for an observation, converted to the type of its
+    parameters.
+    """
     dtype = next((p.dtype for p in module.parameters() if p.is_floating_point()), torch.float32)
     with torch.no_grad():
         action = module(torch.as_tensor(observation[None], dtype=dtype))
     if isinstance(action, tuple | list | dict):
-        raise TypeError(f"it gave a {type(action).__name__}, not an action: wrap it in one that gives only the action")
+        raise TypeError(
+            f"it gave a {type(action).__name__}, not an action: wrap it in one that gives only the action"
+        )
     return action.double().numpy()
 
 
 def _reset_distribution(module: Any) -> None:
-    """Let a policy of stable-baselines3 predict at 0, because it stores the distribution of its last action.
+    """Let a policy of stable-baselines3 predict at 0, because it stores the distribution of its
+    last action.
 
-    After training that distribution has a graph, which cannot be copied. After a run it depends on the run.
+    After training that distribution has a graph, which cannot be copied. After a run it depends on
+    the run.
     """
     space = getattr(module, "observation_space", None)
     if space is not None and hasattr(module, "predict"):
@@ -302,4 +359,6 @@ def _library(name: str, what: str) -> ModuleType:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        raise ScenarioError(f"policy {what!r} needs {name} ({error}): pip install {name}") from error
+        raise ScenarioError(
+            f"policy {what!r} needs {name} ({error}): pip install {name}"
+        ) from error

@@ -16,10 +16,11 @@ SEED = 0
 
 @constrained
 def deviation(plant: Plant | str, mechanism: str, reach: Positive | None = None) -> float:
-    """Return the largest |x'' - f| over the largest |f|, for states with |x| and |v| up to `reach`, without a command.
+    """Return the largest |x'' - f| over the largest |f|, for states with |x| and |v| up to `reach`,
+    without a command.
 
-    x'' is the mechanism's, f the plant's equation with the same parameters. The states of one channel lie on a grid,
-    those of a network are random.
+    x'' is the mechanism's, f the plant's equation with the same parameters. The states of one
+    channel lie on a grid, those of a network are random.
 
     Args:
       plant: the plant with its parameters, or its name.
@@ -28,7 +29,8 @@ def deviation(plant: Plant | str, mechanism: str, reach: Positive | None = None)
     """
     plant = as_plant(plant)
     variant = find(f"mechanism of {plant.name}", mechanism, plant.mechanisms)
-    reach = max(map(abs, plant.x0)) if reach is None else reach
+    if reach is None:
+        reach = max(map(abs, plant.x0))
     spec = plant.spec()
     variant.edit(spec)
     model = compiled(spec)

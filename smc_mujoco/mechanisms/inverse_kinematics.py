@@ -1,9 +1,10 @@
 """Inverse kinematics: positions of joints at which a tip (a site or a body) is where it should be.
 
-Levenberg's method with MuJoCo's Jacobians: dx = J' (J J' + mu)^-1 e, mu = |e|^2 / 100, at most 0.3 rad or m a step.
-It converges quadratically where J has full rank, and stays bounded where the arm is stretched. MuJoCo's Jacobians are
-exact and at hand; a package such as mink would add a solver of quadratic programs, which this problem does not need.
-Joints stay within their ranges. Joints without a channel stay in the pose in which runs start.
+Levenberg's method with MuJoCo's Jacobians: dx = J' (J J' + mu)^-1 e, mu = |e|^2 / 100, at most 0.3
+rad or m a step. It converges quadratically where J has full rank, and stays bounded where the arm
+is stretched. MuJoCo's Jacobians are exact and at hand; a package such as mink would add a solver of
+quadratic programs, which this problem does not need. Joints stay within their ranges. Joints
+without a channel stay in the pose in which runs start.
 """
 
 from collections.abc import Sequence
@@ -20,20 +21,33 @@ MAX_STEPS = 200  # of the iteration, for each point
 MAX_MOVE = 0.3  # rad or m, of any joint in a step
 
 
-def solve(plant: Plant, kind: str, name: str, points: np.ndarray, start: Sequence[float]) -> np.ndarray:
-    """Return the channels' positions, (N, n), with the tip, a "site" or "body" of this name, at points, (N, 3), m.
+def solve(
+    plant: Plant, kind: str, name: str, points: np.ndarray, start: Sequence[float]
+) -> np.ndarray:
+    """Return the channels' positions, (N, n), with the tip, a "site" or "body" of this name, at
+    points, (N, 3), m.
 
     Each search starts where the last ended.
     """
     model = plant.load()
     data = mujoco.MjData(model)
     data.qpos[:] = initial_pose(model)
-    names = [getattr(model, kind)(i).name for i in range(model.nsite if kind == "site" else model.nbody)]
-    tip = find(f"{kind} of {plant.name}", name, {known: i for i, known in enumerate(names) if known})
-    places, jacobian = (data.site_xpos, mujoco.mj_jacSite) if kind == "site" else (data.xpos, mujoco.mj_jacBody)
+    names = [
+        getattr(model, kind)(i).name for i in range(model.nsite if kind == "site" else model.nbody)
+    ]
+    tip = find(
+        f"{kind} of {plant.name}", name, {known: i for i, known in enumerate(names) if known}
+    )
+    if kind == "site":
+        places, jacobian = (data.site_xpos, mujoco.mj_jacSite)
+    else:
+        places, jacobian = (data.xpos, mujoco.mj_jacBody)
     ids, moves = joint_ids(model), np.zeros((3, model.nv))
     limited = model.jnt_limited[ids].astype(bool)
-    low, high = (np.where(limited, model.jnt_range[ids, side], end) for side, end in enumerate((-np.inf, np.inf)))
+    low, high = (
+        np.where(limited, model.jnt_range[ids, side], end)
+        for side, end in enumerate((-np.inf, np.inf))
+    )
     x, path, away = np.array(start, float), [], np.zeros(3)
     for i, point in enumerate(points):
         for _ in range(MAX_STEPS):

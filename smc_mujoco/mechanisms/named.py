@@ -15,7 +15,8 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.mechanisms.plant import Plant, plant
 
 MODEL = re.compile(
-    r"(?P<path>.*\.(xml|mjcf|urdf))(?::(?P<joints>.*?)(?:@(?P<keyframe>[^@()]*))?)?", re.DOTALL | re.IGNORECASE
+    r"(?P<path>.*\.(xml|mjcf|urdf))(?::(?P<joints>.*?)(?:@(?P<keyframe>[^@()]*))?)?",
+    re.DOTALL | re.IGNORECASE,
 )
 BETWEEN_JOINTS = re.compile(r"[+,](?![^(]*\))")
 JOINT = re.compile(r"\s*(?P<joint>[^(]*?)\s*(?:\((?P<fields>.*)\))?\s*", re.DOTALL)
@@ -24,8 +25,13 @@ JOINT = re.compile(r"\s*(?P<joint>[^(]*?)\s*(?:\((?P<fields>.*)\))?\s*", re.DOTA
 def as_plant(value: object) -> Plant:
     """Return a plant: itself, by its name, or from "FILE.xml:joint,joint"."""
     if isinstance(value, str) and value.lstrip().startswith("<"):
-        raise ScenarioError("plant is the text of a model: give smc.plant_from(text, channels=['joint'])")
-    made = from_text(value) if isinstance(value, str) else value
+        raise ScenarioError(
+            "plant is the text of a model: give smc.plant_from(text, channels=['joint'])"
+        )
+    if isinstance(value, str):
+        made = from_text(value)
+    else:
+        made = value
     if not isinstance(made, Plant):
         raise ScenarioError(
             f"plant is {shown(made)}: give a name that smc.plants() lists, smc.plant(...), or FILE.xml:joint,joint"
@@ -34,30 +40,44 @@ def as_plant(value: object) -> Plant:
 
 
 def jointed(value: object, analysis: str) -> Plant:
-    """Return a plant as `as_plant` does. Refuse a free body, whose channels are no joints, to an analysis of joints."""
+    """Return a plant as `as_plant` does.
+
+    Refuse a free body, whose channels are no joints, to an analysis of joints.
+    """
     made = as_plant(value)
     if made.pose:
-        raise ScenarioError(f"{made.name} is a free body, and {analysis} is for joints: give another plant")
+        raise ScenarioError(
+            f"{made.name} is a free body, and {analysis} is for joints: give another plant"
+        )
     return made
 
 
 def from_text(text: str, folder: Path = Path(), **values: Any) -> Plant:
-    """Return a plant by its name and parameters, or from FILE.xml:joint,joint in a folder and `plant_from`'s arguments.
+    """Return a plant by its name and parameters, or from FILE.xml:joint,joint in a folder and
+    `plant_from`'s arguments.
 
-    A comma or a plus sign is between the joints: plants are separated by commas on the command line. Fields of a
-    `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2). The law of a channel and its reference are those
-    of the scenario. The keyframe of the start is last, after @.
+    A comma or a plus sign is between the joints: plants are separated by commas on the command
+    line. Fields of a `Channel` follow a joint in brackets: lift(motor,u_max=30,x0=0.2). The law of
+    a channel and its reference are those of the scenario. The keyframe of the start is last, after
+    @.
     """
     if not (model := MODEL.fullmatch(text)):
         if set(text) & set(":./\\"):
             file = text.partition(":")[0]
-            raise ScenarioError(f"plant {text!r}: {file!r} ends in none of .xml, .mjcf and .urdf: give FILE.xml:joint")
+            raise ScenarioError(
+                f"plant {text!r}: {file!r} ends in none of .xml, .mjcf and .urdf: give FILE.xml:joint"
+            )
         return plant(text, **values)
     from smc_mujoco.mechanisms.custom.plant_from import plant_from
 
-    path, joints = model["path"], list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or "")))
+    path, joints = (
+        model["path"],
+        list(filter(str.strip, BETWEEN_JOINTS.split(model["joints"] or ""))),
+    )
     if not joints:
-        raise ScenarioError(f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow")
+        raise ScenarioError(
+            f"plant {text!r} names no joints: say which are controlled, as {path}:shoulder+elbow"
+        )
     channels = dict(map(_channel, joints))
     if len(channels) < len(joints):
         raise ScenarioError(f"plant {text!r} names a joint twice: give each once")
@@ -72,9 +92,14 @@ def _channel(text: str) -> tuple[str, Any]:
 
     read = JOINT.fullmatch(text)
     if read is None:
-        raise ScenarioError(f"channel {text!r} cannot be read: write it as lift(motor,u_max=30,x0=0.2)")
+        raise ScenarioError(
+            f"channel {text!r} cannot be read: write it as lift(motor,u_max=30,x0=0.2)"
+        )
     fields: dict[str, Any] = {}
-    known = {field.name: field for field in dataclasses.fields(Channel) if field.name not in ("law", "reference")}
+    known = {}
+    for field in dataclasses.fields(Channel):
+        if field.name not in ("law", "reference"):
+            known[field.name] = field
     for item in filter(str.strip, (read["fields"] or "").split(",")):
         name, _, value = (part.strip() for part in item.partition("="))
         find(f"field of channel {read['joint']!r}", name, known)

@@ -1,9 +1,10 @@
 """A plant: a MuJoCo mechanism, its equation x'' = f(x, v) + g u, and the map between them.
 
-A plant's file describes the mechanism in three ways, and tests check that they agree: its MJCF (what MuJoCo simulates),
-`fields` (which model fields a parameter sets) and `nominal` (the f and g that a model-based law uses). A channel is one
-measured degree of freedom: first those with an actuator, then the free joints, which have none. Its actuator, its two
-sensors and its body are found in the compiled model.
+A plant's file describes the mechanism in three ways, and tests check that they agree: its MJCF
+(what MuJoCo simulates), `fields` (which model fields a parameter sets) and `nominal` (the f and g
+that a model-based law uses). A channel is one measured degree of freedom: first those with an
+actuator, then the free joints, which have none. Its actuator, its two sensors and its body are
+found in the compiled model.
 """
 
 import dataclasses
@@ -25,7 +26,8 @@ from smc_mujoco.common.mjcb import compiled
 
 DIRECT_TEXT = "smc:direct"  # name of a text in models on whose joints, not bodies, disturbances act
 EFFORT = {"rad": "N m", "m": "N"}  # unit of a force, from that of x
-MAX_EXCESS = 1e-3  # rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
+# rad or m, chosen: how far beyond its range a joint may start, because MuJoCo's limits are soft
+MAX_EXCESS = 1e-3
 TINY = 1e-12  # SI units; least value of a parameter above 0 that is neither a mass nor a length
 MAX_PARAMETER = 1e15  # SI units; no parameter of a mechanism is larger
 
@@ -34,7 +36,9 @@ Range = tuple[str, float, float]  # joint, least and largest position, rad or m
 
 
 class Field(NamedTuple):
-    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option), or += where it adds."""
+    """One write into an MjModel: model.<name>[at] = value ('opt.gravity' for an option), or +=
+    where it adds.
+    """
 
     name: str
     at: Any
@@ -43,9 +47,14 @@ class Field(NamedTuple):
 
 
 def geom_fields(
-    model: mujoco.MjModel, name: str, pos: tuple[float, ...] = (), size: tuple[int, float] | None = None
+    model: mujoco.MjModel,
+    name: str,
+    pos: tuple[float, ...] = (),
+    size: tuple[int, float] | None = None,
 ) -> Iterator[Field]:
-    """Yield the fields of a geom, its place and one of its sizes (index, value); none in a run that leaves it out."""
+    """Yield the fields of a geom, its place and one of its sizes (index, value); none in a run that
+    leaves it out.
+    """
     if (at := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)) < 0:
         return
     if pos:
@@ -55,19 +64,24 @@ def geom_fields(
 
 
 class Variant(NamedTuple):
-    """An alternative mechanism of a plant: an edit of its MjSpec, and the fields that its parameters then set."""
+    """An alternative mechanism of a plant: an edit of its MjSpec, and the fields that its
+    parameters then set.
+    """
 
     edit: Callable[[mujoco.MjSpec], None]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
 
 
 class Nominal(Protocol):
-    """Function that returns f and g of channel i, from x and v of all channels, (n,) each, and nominal parameters p."""
+    """Function that returns f and g of channel i, from x and v of all channels, (n,) each, and
+    nominal parameters p.
+    """
 
     def __call__(self, x: np.ndarray, v: np.ndarray, i: int, p: Any, /) -> tuple[float, float]: ...
 
 
-# What a nominal model reads: a channel i, their number n, the addresses of measured x, v and of the last u, (n,) each.
+# What a nominal model reads: a channel i, their number n, the addresses of measured x, v and of the
+# last u, (n,) each.
 SEEN = np.dtype([(name, "i8") for name in ("i", "n", "x", "v", "u")])
 
 
@@ -80,7 +94,10 @@ class Native(NamedTuple):
 
 
 class Dynamics(NamedTuple):
-    """The nominal M x'' + h = force of all channels: M (n, n), h (n,), and g (n,), the h at rest."""
+    """The nominal M x'' + h = force of all channels:
+
+    M (n, n), h (n,), and g (n,), the h at rest.
+    """
 
     M: np.ndarray
     h: np.ndarray
@@ -92,7 +109,9 @@ class Plant:
     """A mechanism with n channels obeying x'' = f(x, v) + g(x) (u + d)."""
 
     name: str  # as in `smc.plants()`
-    parameters: Mapping[str, float]  # name -> value, SI units; the nominal ones, which laws may know
+    parameters: Mapping[
+        str, float
+    ]  # name -> value, SI units; the nominal ones, which laws may know
     mass: str  # parameter that is meant by "mass" in a mismatch or a jump
     unit: str  # of x, "rad" or "m"; that of the first channel if they differ
     x0: tuple[float, ...]  # default initial positions, those of the paper study, (n,)
@@ -100,38 +119,64 @@ class Plant:
     n: int = 1  # number of channels
     sizes: tuple[int, int] = (1, 1)  # smallest and largest n that `smc.plant(name, n=...)` takes
     build: Callable[[int], mujoco.MjSpec]  # n -> the ideal mechanism with the default parameters
-    fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]  # the model fields which the parameters set
+    fields: Callable[
+        [mujoco.MjModel, Values], Iterator[Field]
+    ]  # the model fields which the parameters set
     nominal: Nominal  # f and g of the plant's equation
     lane: tuple[float, float, float]  # m, offset between machines that stand side by side in a film
     # Kind of contact -> edit of the MjSpec that adds its obstacles and contact pairs
-    contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(default_factory=dict)
+    contacts: Mapping[str, Callable[[mujoco.MjSpec], None]] = dataclasses.field(
+        default_factory=dict
+    )
     # Name -> another mechanism, which realises the equation, or a part of it, by other means
     mechanisms: Mapping[str, Variant] = dataclasses.field(default_factory=dict)
-    mixed: tuple[str, ...] = ()  # units of all channels if they differ, (n,); `units` has them in both cases
-    underactuated: bool = False  # whether it has channels without an actuator, which come after those with one
-    goal: tuple[float, ...] = ()  # where its free joints should come to rest, (free,), rad or m; empty: at 0
+    mixed: tuple[
+        str, ...
+    ] = ()  # units of all channels if they differ, (n,); `units` has them in both cases
+    underactuated: bool = (
+        False  # whether it has channels without an actuator, which come after those with one
+    )
+    goal: tuple[
+        float, ...
+    ] = ()  # where its free joints should come to rest, (free,), rad or m; empty: at 0
     # Parameter -> the only value that fits the geometry of the contacts
     placed: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch or a jump adds its
-    # number to such a parameter, in this unit, instead of multiplying it
+    # Name -> unit ("": none) of the parameters that are 0 by default, such as a payload: a mismatch
+    # or a jump adds its number to such a parameter, in this unit, instead of multiplying it
     added: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    # Of a free body, whose channels are its pose: x, y, z, and its rotation vector. "all": its actuators exert any
-    # force and torque; "heading": they do not, as rotors that push one way, so its tilt follows from the force. Else ""
+    # Of a free body, whose channels are its pose: x, y, z, and its rotation vector. "all": its
+    # actuators exert any force and torque; "heading": they do not, as rotors that push one way, so
+    # its tilt follows from the force. Else ""
     pose: Literal["", "all", "heading"] = ""
-    direct: bool = False  # whether disturbances act on its joints, not on the bodies that they carry
-    smooth: bool = True  # whether its model has no limits, contacts, dry friction and equality constraints
-    # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user may meet.
-    # `smc.worst_case` varies these parameters if it is given no class
-    uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict, compare=False, repr=False)
-    dry: tuple[str, ...] = ()  # parameters that are dry friction. A plant with one that is not 0 is not smooth
+    direct: bool = (
+        False  # whether disturbances act on its joints, not on the bodies that they carry
+    )
+    smooth: bool = (
+        True  # whether its model has no limits, contacts, dry friction and equality constraints
+    )
+    # Parameter -> lowest and highest factor (or number to add, for those in `added`) that a user
+    # may meet. `smc.worst_case` varies these parameters if it is given no class
+    uncertain: Mapping[str, tuple[float, float]] = dataclasses.field(
+        default_factory=dict, compare=False, repr=False
+    )
+    dry: tuple[
+        str, ...
+    ] = ()  # parameters that are dry friction. A plant with one that is not 0 is not smooth
     unmodelled: str = ""  # why there is no nominal model; "" if there is one
-    friction: Any = None  # hardware.part.Friction of its joints according to its source, for a scenario; or None
-    limits: tuple[float, ...] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
-    reach: Callable[[Values], tuple[float, ...]] | None = None  # `limits` of other parameters, if they depend on them
+    # hardware.part.Friction of its joints according to its source, for a scenario; or None
+    friction: Any = None
+    limits: tuple[
+        float, ...
+    ] = ()  # N m or N, largest force of each driven channel's motor; empty: no limits
+    reach: Callable[[Values], tuple[float, ...]] | None = (
+        None  # `limits` of other parameters, if they depend on them
+    )
     sets: Mapping[str, Mapping[str, float]] = dataclasses.field(
         default_factory=dict
     )  # name -> parameters, a published set
-    above_zero: tuple[str, ...] = ()  # parameters that must be greater than 0, beside masses and lengths
+    above_zero: tuple[
+        str, ...
+    ] = ()  # parameters that must be greater than 0, beside masses and lengths
     ranges: tuple[Range, ...] = ()  # joint, lowest and highest x of each channel; empty: no limits
     label: str = ""  # long and short name in figures; "": made from its name
     short: str = ""
@@ -139,14 +184,19 @@ class Plant:
     # "mild" or "hard" -> parameter -> factor of the jump in the suite's condition of that size
     jumps: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
     tip: str = ""  # site that the mechanism moves: where an arm's tool is
-    # "law", "u_max" or "reference" -> what each driven channel suggests to a scenario that leaves it out
-    suggested: Mapping[str, tuple] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+    # "law", "u_max" or "reference" -> what each driven channel suggests to a scenario that leaves
+    # it out
+    suggested: Mapping[str, tuple] = dataclasses.field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def __post_init__(self):
         for name in ("parameters", "contacts", "mechanisms", "placed", "added"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         for name in ("jumps", "sets"):
-            object.__setattr__(self, name, frozen({key: frozen(part) for key, part in getattr(self, name).items()}))
+            object.__setattr__(
+                self, name, frozen({key: frozen(part) for key, part in getattr(self, name).items()})
+            )
 
     def __repr__(self) -> str:
         values = [f"{name}={value:g}" for name, value in self.parameters.items()]
@@ -161,13 +211,18 @@ class Plant:
         """Return what a parameter may be."""
         if parameter in self.positive:
             low = TINY if parameter in self.above_zero else 1e-6
+        elif parameter in (*self.dry, *self.added):
+            low = 0.0
         else:
-            low = 0.0 if parameter in (*self.dry, *self.added) else -MAX_PARAMETER
+            low = -MAX_PARAMETER
         return Number(low=low, high=MAX_PARAMETER)
 
     @property
     def driven(self) -> int:
-        """The number of channels with an actuator, which come first. Each has at most one partner without actuator."""
+        """The number of channels with an actuator, which come first.
+
+        Each has at most one partner without actuator.
+        """
         return self.n // 2 if self.underactuated else self.n
 
     @property
@@ -177,8 +232,12 @@ class Plant:
 
     @property
     def judged(self) -> tuple[int, ...]:
-        """The channels whose errors count: all, but not the tilt of a free body that follows from the force."""
-        return (0, 1, 2, 5) if self.pose == "heading" else tuple(range(self.n))
+        """The channels whose errors count: all, but not the tilt of a free body that follows from
+        the force.
+        """
+        if self.pose == "heading":
+            return (0, 1, 2, 5)
+        return tuple(range(self.n))
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -192,7 +251,9 @@ class Plant:
 
     @property
     def network(self) -> bool:
-        """Whether several channels have an actuator and the same unit, so that they can be compared with each other."""
+        """Whether several channels have an actuator and the same unit, so that they can be compared
+        with each other.
+        """
         return self.driven > 1 and len(set(self.units[: self.driven])) == 1
 
     @property
@@ -202,7 +263,9 @@ class Plant:
 
     @property
     def on_stage(self) -> bool:
-        """Whether its MJCF is built on models/common/theme.xml: films put such machines on one floor, in one light."""
+        """Whether its MJCF is built on models/common/theme.xml: films put such machines on one
+        floor, in one light.
+        """
         return not self.own and _on_stage(self.build, self.n)
 
     @property
@@ -215,21 +278,31 @@ class Plant:
         """Why tuning cannot derive its scales from the plant, or ""."""
         if self.mixed and not self.pose:
             return "its channels have two units: choose a plant whose channels have one"
-        return f"it has no nominal model, which tuning takes its scales from: {self.unmodelled}" * bool(self.unmodelled)
+        return (
+            f"it has no nominal model, which tuning takes its scales from: {self.unmodelled}"
+            * bool(self.unmodelled)
+        )
 
     def spec(self) -> mujoco.MjSpec:
         """Return the mechanism as an editable MjSpec, with default parameters."""
         return self.build(self.n)
 
-    def load(self, factors: Mapping[str, float] | None = None, nuserdata: int = 0) -> mujoco.MjModel:
-        """Compile the ideal plant, with factors on its parameters by name, and mjData.userdata of length nuserdata."""
+    def load(
+        self, factors: Mapping[str, float] | None = None, nuserdata: int = 0
+    ) -> mujoco.MjModel:
+        """Compile the ideal plant, with factors on its parameters by name, and mjData.userdata of
+        length nuserdata.
+        """
         model = compiled_for_runs(self.spec(), whole("nuserdata", nuserdata, 0, MAX_ITEMS))
         write(model, self.fields(model, self.values(factors or {})))
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
     def change(self, factors: Mapping[str, float]) -> str:
-        """Return a change of the parameters in words: "m × 1.3, payload + 2 kg". Factors are those of `values`."""
+        """Return a change of the parameters in words: "m × 1.3, payload + 2 kg".
+
+        Factors are those of `values`.
+        """
         return ", ".join(
             f"{name} {'−' if factor < 0.0 else '+'} {abs(factor):g} {self.added[name]}".rstrip()
             if name in self.added
@@ -238,27 +311,45 @@ class Plant:
         )
 
     def values(self, factors: Mapping[str, float]) -> Values:
-        """Return the parameters, each times its factor, or with it added; `mass` stands for the plant's mass."""
+        """Return the parameters, each times its factor, or with it added; `mass` stands for the
+        plant's mass.
+        """
         values = dict(self.parameters)
         for key, factor in factors.items():
             name = self.mass if key == "mass" else key
             if name not in values:
                 raise unknown(f"parameter of {self.name}", key, [*values, "mass"])
             if factor <= 0.0 and name in self.positive:
-                raise ScenarioError(f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0")
-            values[name] = values[name] + factor if name in self.added else values[name] * factor
+                raise ScenarioError(
+                    f"factor {factor:g} on {self.name}'s {key}: give a number greater than 0"
+                )
+            if name in self.added:
+                values[name] = values[name] + factor
+            else:
+                values[name] = values[name] * factor
         for name, value in values.items():
-            too_low = (value <= 0.0 and name in self.positive) or (value < 0.0 and name in self.added)
+            too_low = (value <= 0.0 and name in self.positive) or (
+                value < 0.0 and name in self.added
+            )
             if not abs(value) <= MAX_PARAMETER or too_low:
-                raise ScenarioError(f"{self.name}'s true {name} becomes {value:g}: give other factors")
+                raise ScenarioError(
+                    f"{self.name}'s true {name} becomes {value:g}: give other factors"
+                )
         return Values(**values)
 
 
 @functools.cache
 def _on_stage(build: Callable[[int], mujoco.MjSpec], n: int) -> bool:
-    """Return whether a mechanism has the floor and the accent of the theme, and a body `machine` with all else."""
+    """Return whether a mechanism has the floor and the accent of the theme, and a body `machine`
+    with all else.
+    """
     spec = build(n)
-    return None not in (spec.body("machine"), spec.geom("floor"), spec.material("floor"), spec.material("accent"))
+    return None not in (
+        spec.body("machine"),
+        spec.geom("floor"),
+        spec.material("floor"),
+        spec.material("accent"),
+    )
 
 
 def compiled_for_runs(spec: mujoco.MjSpec, nuserdata: int) -> mujoco.MjModel:
@@ -278,7 +369,10 @@ def write(model: mujoco.MjModel, fields: Iterator[Field]) -> None:
 
 def field_array(model: mujoco.MjModel, name: str) -> np.ndarray:
     """Return the array of a model or option field that a Field names."""
-    owner = model.opt if name.startswith("opt.") else model
+    if name.startswith("opt."):
+        owner = model.opt
+    else:
+        owner = model
     return getattr(owner, name.removeprefix("opt."))
 
 
@@ -287,7 +381,9 @@ def check_ranges(plant: str, ranges: Iterable[Range], x0: Iterable[float]) -> No
     for (joint, low, high), x in zip(ranges, x0, strict=False):
         if not low - MAX_EXCESS <= x <= high + MAX_EXCESS:
             outside = f"outside its range from {low:g} to {high:g}"
-            raise ScenarioError(f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0")
+            raise ScenarioError(
+                f"x0 of joint {joint!r} of {plant} is {x:g}, {outside}: give another x0"
+            )
 
 
 def model_path(name: str) -> Path:
@@ -302,9 +398,11 @@ def catalogue() -> Catalogue[Plant]:
 
 
 def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
-    """Return the plant `name`, with some of its parameters (or its size n) changed, else a ScenarioError.
+    """Return the plant `name`, with some of its parameters (or its size n) changed, else a
+    ScenarioError.
 
-    `set` is the name of one of the plant's `sets` of numbers, such as plant("quadrotor", set="gym").
+    `set` is the name of one of the plant's `sets` of numbers, such as plant("quadrotor",
+    set="gym").
     """
     base = find("plant", name, catalogue())
     n = whole(f"n of {name}", parameters.pop("n", base.n), *base.sizes)
@@ -315,8 +413,14 @@ def plant(name: str, *, set: Any = None, **parameters: float) -> Plant:
             raise unknown(f"parameter of {name}", key, [*values, "n"])
         values[key] = base.constraint(key)(f"{name}'s {key}", value)
     x0 = tuple(base.x0[i % len(base.x0)] for i in range(n))
-    smooth = not any(values[key] for key in base.dry) if base.dry else base.smooth
-    limits = base.reach(Values(**values)) if base.reach else base.limits
+    if base.dry:
+        smooth = not any(values[key] for key in base.dry)
+    else:
+        smooth = base.smooth
+    if base.reach:
+        limits = base.reach(Values(**values))
+    else:
+        limits = base.limits
     return dataclasses.replace(base, parameters=values, n=n, x0=x0, smooth=smooth, limits=limits)
 
 

@@ -1,7 +1,9 @@
-"""Attitudes: unit quaternions (w, x, y, z), body to world, and rotation vectors, the axis times the angle in rad.
+"""Attitudes: unit quaternions (w, x, y, z), body to world, and rotation vectors, the axis times the
+angle in rad.
 
-The rotation vector of an attitude has an angle of 0 to pi, and is the same for q and -q: a pose has six numbers, as a
-velocity has. Angular velocities are in the axes of the body, as those of MuJoCo's free joint.
+The rotation vector of an attitude has an angle of 0 to pi, and is the same for q and -q: a pose has
+six numbers, as a velocity has. Angular velocities are in the axes of the body, as those of MuJoCo's
+free joint.
 """
 
 import math
@@ -25,7 +27,10 @@ def rotation_vector(w, x, y, z):
 def quaternion(x, y, z):
     """Return the quaternion of a rotation vector."""
     angle = math.sqrt(x * x + y * y + z * z)
-    scale = 0.5 if angle == 0.0 else math.sin(0.5 * angle) / angle
+    if angle == 0.0:
+        scale = 0.5
+    else:
+        scale = math.sin(0.5 * angle) / angle
     return math.cos(0.5 * angle), scale * x, scale * y, scale * z
 
 
@@ -56,22 +61,35 @@ def turned_back(q, x, y, z):
 
 @njit(error_model="numpy")
 def rate(x, y, z, dx, dy, dz):
-    """Return the angular velocity of an attitude whose rotation vector (x, y, z) changes by (dx, dy, dz) per second."""
+    """Return the angular velocity of an attitude whose rotation vector (x, y, z) changes by (dx,
+    dy, dz) per second.
+    """
     angle = math.sqrt(x * x + y * y + z * z)
     half = math.sin(0.5 * angle)
-    first = 0.5 if angle < 1e-4 else 2.0 * half * half / (angle * angle)
-    second = (1.0 - angle * angle / 20.0) / 6.0 if angle < 1e-2 else (angle - math.sin(angle)) / angle**3
+    if angle < 1e-4:
+        first = 0.5
+    else:
+        first = 2.0 * half * half / (angle * angle)
+    if angle < 1e-2:
+        second = (1.0 - angle * angle / 20.0) / 6.0
+    else:
+        second = (angle - math.sin(angle)) / angle**3
     ax, ay, az = y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
     bx, by, bz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
-    return dx - first * ax + second * bx, dy - first * ay + second * by, dz - first * az + second * bz
+    return (
+        dx - first * ax + second * bx,
+        dy - first * ay + second * by,
+        dz - first * az + second * bz,
+    )
 
 
 @njit(error_model="numpy")
 def put_attitude_error(x, v, r, dr, e, de):
-    """Write the last three numbers of the errors e and de of a pose x, v from a reference r, dr, (6,) each.
+    """Write the last three numbers of the errors e and de of a pose x, v from a reference r, dr,
+    (6,) each.
 
-    e is the rotation vector from the reference's attitude to the body's. de is the angular velocity relative to the
-    reference's, both in the axes of the body.
+    e is the rotation vector from the reference's attitude to the body's. de is the angular velocity
+    relative to the reference's, both in the axes of the body.
     """
     error = relative(quaternion(r[3], r[4], r[5]), quaternion(x[3], x[4], x[5]))
     e[3], e[4], e[5] = rotation_vector(error[0], error[1], error[2], error[3])
@@ -82,12 +100,13 @@ def put_attitude_error(x, v, r, dr, e, de):
 
 @njit(error_model="numpy")
 def mix(x, u, rows, actuators, keeps_torques, controls):
-    """Write the controls of a free body's actuators for the force u[:3], in the axes of the world, and torque u[3:].
+    """Write the controls of a free body's actuators for the force u[:3], in the axes of the world,
+    and torque u[3:].
 
-    The force is turned into the axes of the body by its pose x. An actuator has 8 numbers in `rows`: what it gets of
-    the force and of the torque, and its bounds. Where all actuators push one way and alike, as rotors do, the excess of
-    the largest over its bound is taken from all: that keeps the torques, and gives up thrust, as the Crazyflie's
-    firmware does.
+    The force is turned into the axes of the body by its pose x. An actuator has 8 numbers in
+    `rows`: what it gets of the force and of the torque, and its bounds. Where all actuators push
+    one way and alike, as rotors do, the excess of the largest over its bound is taken from all:
+    that keeps the torques, and gives up thrust, as the Crazyflie's firmware does.
     """
     fx, fy, fz = turned_back(quaternion(x[3], x[4], x[5]), u[0], u[1], u[2])
     excess = 0.0
@@ -102,7 +121,9 @@ def mix(x, u, rows, actuators, keeps_torques, controls):
 
 
 def pose_errors(x: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """Return the errors of poses x from references r, (K, 6) each: of an attitude the rotation vector between both."""
+    """Return the errors of poses x from references r, (K, 6) each: of an attitude the rotation
+    vector between both.
+    """
     e = x - r
     e[:, 3:] = attitude_errors(x[:, 3:], r[:, 3:])
     return e
@@ -110,9 +131,15 @@ def pose_errors(x: np.ndarray, r: np.ndarray) -> np.ndarray:
 
 @njit(error_model="numpy")
 def attitude_errors(x, r):
-    """Return the rotation vectors, (K, 3), from attitudes r to attitudes x, both as rotation vectors (K, 3)."""
+    """Return the rotation vectors, (K, 3), from attitudes r to attitudes x, both as rotation
+    vectors (K, 3).
+    """
     errors = np.empty(x.shape)
     for k in range(len(x)):
-        error = relative(quaternion(r[k, 0], r[k, 1], r[k, 2]), quaternion(x[k, 0], x[k, 1], x[k, 2]))
-        errors[k, 0], errors[k, 1], errors[k, 2] = rotation_vector(error[0], error[1], error[2], error[3])
+        error = relative(
+            quaternion(r[k, 0], r[k, 1], r[k, 2]), quaternion(x[k, 0], x[k, 1], x[k, 2])
+        )
+        errors[k, 0], errors[k, 1], errors[k, 2] = rotation_vector(
+            error[0], error[1], error[2], error[3]
+        )
     return errors

@@ -1,8 +1,9 @@
 """Metrics: numbers that say how well a run went, each a function Trace -> float.
 
-Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters are those of
-`conventions`. A metric is one decorated function here; `score` and all tables then include it. Every metric refuses a
-trace that diverged or has a NaN (ScenarioError). inf means "never".
+Conventions (groups, e, scale, settling band, last part, approach, worst channel or sum) and letters
+are those of `conventions`. A metric is one decorated function here; `score` and all tables then
+include it. Every metric refuses a trace that diverged or has a NaN (ScenarioError). inf means
+"never".
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 
 TRANSIENT_SHARE = 0.25  # of the run, which rms_error leaves out
 RISE_LEVELS = (0.1, 0.9)  # shares of the way from the start of an approach to the reference
-HIGH_FREQUENCY = 50.0  # Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
+# Hz, chosen: above the bandwidth of plants and laws, below the chattering at 1 kHz sampling
+HIGH_FREQUENCY = 50.0
 ROUNDING_SHARE = 1e-12  # of max |u|, and of a frequency: smaller differences are rounding
 
 
@@ -45,8 +47,9 @@ def metrics() -> tuple[Metric, ...]:
 def score(trace: Trace) -> dict[str, float]:
     """Return name -> value of every metric that has a single value for the plant.
 
-    Metrics that compare channels are for networks only. For a cart with a pole, times and percentages of the motion are
-    the worse of the two; metrics with a unit of length are the cart's.
+    Metrics that compare channels are for networks only. For a cart with a pole, times and
+    percentages of the motion are the worse of the two; metrics with a unit of length are the
+    cart's.
 
     Raises:
       ScenarioError: the run diverged, failed or holds NaN.
@@ -57,10 +60,11 @@ def score(trace: Trace) -> dict[str, float]:
 
 
 def scores(trace: Trace) -> dict[str, dict[str, float]]:
-    """Return the metrics of each group of channels by itself: {"driven": {...}, "free": {...}} for a cart with a pole.
+    """Return the metrics of each group of channels by itself: {"driven": {...}, "free": {...}} for
+    a cart with a pole.
 
-    Joints without an actuator are free. If channels of a kind have several units, each unit is a group, such as "driven
-    m". Raises like `score`.
+    Joints without an actuator are free. If channels of a kind have several units, each unit is a
+    group, such as "driven m". Raises like `score`.
     """
     refuse(trace)
     return {
@@ -70,16 +74,20 @@ def scores(trace: Trace) -> dict[str, dict[str, float]]:
 
 
 def trends(trace: Trace) -> dict[str, float]:
-    """Return name -> rho of the metrics of the last part: their value over that of the run without its last fifth.
+    """Return name -> rho of the metrics of the last part: their value over that of the run without
+    its last fifth.
 
-    A run in which such a metric falls has not yet reached its end. Metrics that are 0 in either part are left out.
+    A run in which such a metric falls has not yet reached its end. Metrics that are 0 in either
+    part are left out.
 
     Raises:
       ScenarioError: the run diverged, failed or holds NaN.
     """
     refuse(trace)
     count = last_part(trace).start + 1
-    first = dataclasses.replace(trace, **{name: array[:count] for name, array in trace.arrays().items()})
+    first = dataclasses.replace(
+        trace, **{name: array[:count] for name, array in trace.arrays().items()}
+    )
     earlier, whole = conventions.by_group(first), conventions.by_group(trace)
     found = {}
     for m in metrics():
@@ -94,18 +102,22 @@ def trends(trace: Trace) -> dict[str, float]:
 def settling_time(trace: Trace) -> float:
     """Time from which every channel stays in the settling band.
 
-    Last exit of max_i |e_i| from 2 % of the scale. The time counts from t[0], even if r steps later.
+    Last exit of max_i |e_i| from 2 % of the scale. The time counts from t[0], even if r steps
+    later.
     """
-    return last_exit(trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace))
+    return last_exit(
+        trace.t, conventions.row_max(np.abs(error(trace))), SETTLING_BAND * scale(trace)
+    )
 
 
 @metric("s")
 def rise_time(trace: Trace) -> float:
     """Time from 10 % to 90 % of the way to the reference, slowest channel.
 
-    It is taken on a channel's first approach whose e at the start, e_b, is not 0: the time from the first sample with
-    1 - e/e_b >= 0.1 to the first with >= 0.9 (Ogata, Modern Control Engineering, transient response), inf if there is
-    none. A channel without such an approach is left out; 0 if all are.
+    It is taken on a channel's first approach whose e at the start, e_b, is not 0: the time from the
+    first sample with 1 - e/e_b >= 0.1 to the first with >= 0.9 (Ogata, Modern Control Engineering,
+    transient response), inf if there is none. A channel without such an approach is left out; 0 if
+    all are.
     """
     e, t = error(trace), trace.t
     times = [0.0]
@@ -122,14 +134,18 @@ def rise_time(trace: Trace) -> float:
 def overshoot(trace: Trace) -> float:
     """How far a channel goes beyond its reference, in percent of the scale.
 
-    Maximum of 100 max(0, -sign(e_b) e) / scale over all channels and approaches, with e_b the e at the approach's
-    start: only the far side of the reference counts. If e_b = 0, both sides count: 100 |e| / scale.
+    Maximum of 100 max(0, -sign(e_b) e) / scale over all channels and approaches, with e_b the e at
+    the approach's start: only the far side of the reference counts. If e_b = 0, both sides count:
+    100 |e| / scale.
     """
     e, worst = error(trace), 0.0
     for i, parts in enumerate(approaches(trace)):
         for part in parts:
             side = np.sign(e[part.start, i])
-            beyond = -side * e[part, i] if side else np.abs(e[part, i])
+            if side:
+                beyond = -side * e[part, i]
+            else:
+                beyond = np.abs(e[part, i])
             worst = max(worst, beyond.max())
     return 100 * worst / scale(trace)
 
@@ -162,7 +178,8 @@ def ripple(trace: Trace) -> float:
 def rms_error(trace: Trace) -> float:
     """Root mean square of e from a quarter of the run on, worst channel.
 
-    Samples t >= t0 + 0.25 (tK - t0) have equal weights. `worst_case` maximises it, because its square is smooth.
+    Samples t >= t0 + 0.25 (tK - t0) have equal weights. `worst_case` maximises it, because its
+    square is smooth.
     """
     late = trace.t >= trace.t[0] + TRANSIENT_SHARE * (1.0 - ROUNDING) * (trace.t[-1] - trace.t[0])
     return np.sqrt((error(trace)[late] ** 2).mean(axis=0)).max()
@@ -191,9 +208,10 @@ def itae(trace: Trace) -> float:
 def reaching_time(trace: Trace) -> float:
     """Time from which |s| stays within 2 % of its start.
 
-    Last exit of max_i |s_i| from 2 % of max_i |s_i(0)|: permanent entry, not first touch. A run that starts
-    on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0 throughout, as for a law
-    without a surface. s is what the law computed from its measurement: under noise it may never stay.
+    Last exit of max_i |s_i| from 2 % of max_i |s_i(0)|: permanent entry, not first touch. A run
+    that starts on the surface, s(0) = 0, is measured against the largest |s| of the run. 0 if s = 0
+    throughout, as for a law without a surface. s is what the law computed from its measurement:
+    under noise it may never stay.
     """
     magnitude = conventions.row_max(np.abs(trace.s))
     return last_exit(trace.t, magnitude, SETTLING_BAND * (magnitude[0] or magnitude.max()))
@@ -221,8 +239,8 @@ def tv(trace: Trace) -> float:
 def tv_rate(trace: Trace) -> float:
     """Total variation of u per second in the last part, worst channel.
 
-    Sum of |u[k+1] - u[k]| between samples of the last part, divided by the time from its first to its last sample; 0
-    for a single sample.
+    Sum of |u[k+1] - u[k]| between samples of the last part, divided by the time from its first to
+    its last sample; 0 for a single sample.
     """
     part = last_part(trace)
     u, t = trace.u[part], trace.t[part]
@@ -235,7 +253,8 @@ def tv_rate(trace: Trace) -> float:
 def energy(trace: Trace) -> float:
     """Integral of u^2 dt, summed over the channels.
 
-    Sum of u[k]^2 (t[k+1] - t[k]), k < K: exact for the held command. Control effort, not mechanical work.
+    Sum of u[k]^2 (t[k+1] - t[k]), k < K: exact for the held command. Control effort, not mechanical
+    work.
     """
     return (trace.u[:-1] ** 2).sum(axis=1) @ np.diff(trace.t)
 
@@ -244,9 +263,10 @@ def energy(trace: Trace) -> float:
 def hf_share(trace: Trace) -> float:
     """Share of the variance of u above 50 Hz, 0 to 1.
 
-    U is the discrete Fourier transform of u[0..K-1], without a window. The share is the sum of |U(f)|^2 at |f| > 50 Hz
-    divided by the sum at all f except 0 (by Parseval, K^2 times the variance). Powers are pooled over the channels,
-    so that a channel at rest does not count. 0 if u is constant, and if half the sampling rate is 50 Hz or less.
+    U is the discrete Fourier transform of u[0..K-1], without a window. The share is the sum of
+    |U(f)|^2 at |f| > 50 Hz divided by the sum at all f except 0 (by Parseval, K^2 times the
+    variance). Powers are pooled over the channels, so that a channel at rest does not count. 0 if u
+    is constant, and if half the sampling rate is 50 Hz or less.
     """
     u, t = trace.u[:-1], trace.t
     if u.size == 0 or np.ptp(u, axis=0).max() <= ROUNDING_SHARE * np.abs(u).max():
@@ -260,17 +280,19 @@ def hf_share(trace: Trace) -> float:
 
 @metric(UNIT_OF_S, command=True, absent=0.0)
 def chattering_amplitude(trace: Trace) -> float:
-    """Amplitude of the limit cycle of s in the last part, in the unit of s, worst channel; NaN without one.
+    """Amplitude of the limit cycle of s in the last part, in the unit of s, worst channel; NaN
+    without one.
 
-    Half the range of s within a period, without slow waves. `limit_cycle` says what counts as a limit cycle. Laws
-    without one are compared with the value 0.
+    Half the range of s within a period, without slow waves. `limit_cycle` says what counts as a
+    limit cycle. Laws without one are compared with the value 0.
     """
     return limit_cycle.largest_cycle(trace)[0]
 
 
 @metric("Hz", command=True)
 def chattering_frequency(trace: Trace) -> float:
-    """Frequency of the limit cycle of s in the last part, of the channel with the largest; NaN without one.
+    """Frequency of the limit cycle of s in the last part, of the channel with the largest; NaN
+    without one.
 
     A limit cycle has at least five periods in the last part.
     """
@@ -281,29 +303,37 @@ def chattering_frequency(trace: Trace) -> float:
 def stick_time(trace: Trace) -> float:
     """Time for which a channel is at rest, with a reaction of friction or contact; longest channel.
 
-    Where dry friction ran by its moments, it is the time for which it held the joint, also within a control period.
+    Where dry friction ran by its moments, it is the time for which it held the joint, also within a
+    control period.
     """
     if trace.held is not None:
         return trace.held.sum(axis=0).max()
-    rest = conventions.at_rest(trace)  # a sample's reaction is the mean over the control period before it
+    rest = conventions.at_rest(
+        trace
+    )  # a sample's reaction is the mean over the control period before it
     return (np.diff(trace.t) @ (rest[:-1] & rest[1:] & (trace.reaction[1:] != 0.0))).max()
 
 
 @metric("{force}", realistic=True)
 def peak_reaction(trace: Trace) -> float:
-    """Largest force of friction, contacts, stops and backlash on a joint, worst channel, at the samples."""
+    """Largest force of friction, contacts, stops and backlash on a joint, worst channel, at the
+    samples.
+    """
     return np.abs(trace.reaction).max()
 
 
 @metric("1/s", realistic=True)
 def reversal_rate(trace: Trace) -> float:
-    """How often e turns back in the last part, per second, worst channel: twice the frequency of a limit cycle.
+    """How often e turns back in the last part, per second, worst channel: twice the frequency of a
+    limit cycle.
 
-    Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle longer than the last
-    part is not seen.
+    Only swings of at least half the ripple count; 0 for a ripple up to 1e-6 of the scale. A cycle
+    longer than the last part is not seen.
     """
     part, threshold = last_part(trace), 1e-6 * scale(trace)
-    return max(conventions.turns(e, threshold) for e in error(trace)[part].T) / (np.ptp(trace.t[part]) or np.inf)
+    return max(conventions.turns(e, threshold) for e in error(trace)[part].T) / (
+        np.ptp(trace.t[part]) or np.inf
+    )
 
 
 @metric("s", network=True)

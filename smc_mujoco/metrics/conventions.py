@@ -1,30 +1,37 @@
 """Conventions of all metrics, the refusal of broken traces, and the decorator `@metric`.
 
-Groups: a metric compares channels of one kind and one unit, a group of the plant's `groups`, because metres and radians
-have no common maximum or sum. Driven channels and free joints, which have no actuator, are different groups, even if
-their units agree. If a plant has several groups, `score` and each metric return the worst group for a time, a
-percentage or a share of the motion: a law that drops the pole has settled nothing. A metric with x's unit, or of the
-command, counts only driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
+Groups: a metric compares channels of one kind and one unit, a group of the plant's `groups`,
+because metres and radians have no common maximum or sum. Driven channels and free joints, which
+have no actuator, are different groups, even if their units agree. If a plant has several groups,
+`score` and each metric return the worst group for a time, a percentage or a share of the motion: a
+law that drops the pole has settled nothing. A metric with x's unit, or of the command, counts only
+driven channels; if these have several units, a metric with x's or u's unit is refused. `scores`
 returns every group by itself.
 
-Of a free body a metric with x's or u's unit is of the position, and its u are the forces of its actuators, N. Of the
-attitude only the heading counts where tilt follows from the force, as with rotors that push one way.
+Of a free body a metric with x's or u's unit is of the position, and its u are the forces of its
+actuators, N. Of the attitude only the heading counts where tilt follows from the force, as with
+rotors that push one way.
 
-Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the law's
-sliding variable; h the time between samples. The conventions, all chosen, one for the whole project:
+Letters: t (K+1,) s, x (K+1, n) true position, r its reference, e = x - r, u the command, s the
+law's
+sliding variable; h the time between samples. The conventions, all chosen, one for the whole
+project:
 
-- scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over them
-  if that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
+- scale: the largest |e(0)| over the group's channels, or the largest peak-to-peak range of r over
+  them if that is larger; 1 (rad or m) if both are zero. Percentages are percentages of the scale.
 - settling band: |e| <= 2 % of the scale.
-- settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which a
-  signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is outside.
+- settled: the last exit counts, not the first entry. The time, since t[0], of the sample from which
+  a signal stays in its band until the end; 0 if it never leaves the band; inf if its last sample is
+  outside.
 - last part: the last 20 % of the run, the samples with t >= t0 + 0.8 (tK - t0), at least one.
-- approach: the part of one channel's run towards one reference. It begins at t[0], and again at each
-  sample at which r has jumped by more than the settling band; the side it comes from is the sign of e there.
-- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Joints held by Coulomb
-  friction or contacts creep at 1e-6 or less; with LuGre friction they move as the bristles bend.
-- channels: errors and efforts that are integrals over time are summed over the group's channels; every other
-  metric takes its worst channel, so that it does not grow with n.
+- approach: the part of one channel's run towards one reference. It begins at t[0], and again at
+  each sample at which r has jumped by more than the settling band; the side it comes from is the
+  sign of e there.
+- at rest: |v| <= 0.1 % of the group's largest |v|, or 1e-5 rad/s or m/s if that is larger. Joints
+  held by Coulomb friction or contacts creep at 1e-6 or less; with LuGre friction they move as the
+  bristles bend.
+- channels: errors and efforts that are integrals over time are summed over the group's channels;
+  every other metric takes its worst channel, so that it does not grow with n.
 - commands are held between samples; states are not, their integrals use the trapezoid rule.
 """
 
@@ -51,7 +58,9 @@ if TYPE_CHECKING:
 SETTLING_BAND = 0.02  # of the scale
 LAST_PART = 0.2  # of the run's duration
 ROUNDING = 1e-9  # of the duration: a sample that is so little before the last part belongs to it
-UNIT_OF_S = "unit of s"  # the law's; it follows from that of x, so that metres and radians do not mix
+UNIT_OF_S = (
+    "unit of s"  # the law's; it follows from that of x, so that metres and radians do not mix
+)
 REST_SHARE = 1e-3  # of the run's largest |v|
 REST_SPEED = 1e-5  # rad/s or m/s: above the creep of stuck joints, see friction.py
 
@@ -70,8 +79,14 @@ class Group:
 
 
 def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
-    """Return the groups of a plant, or of a scenario's plant, driven groups first. A scenario's u may be a voltage."""
-    plant = machine if isinstance(machine, Plant) else machine.plant
+    """Return the groups of a plant, or of a scenario's plant, driven groups first.
+
+    A scenario's u may be a voltage.
+    """
+    if isinstance(machine, Plant):
+        plant = machine
+    else:
+        plant = machine.plant
     members: dict[tuple[bool, str], list[int]] = {}
     for i, unit in enumerate(plant.units):
         members.setdefault((i < plant.driven, unit), []).append(i)
@@ -89,7 +104,10 @@ def groups(machine: Plant | Scenario) -> tuple[Group, ...]:
 
 
 def group_trace(trace: Trace, group: Group) -> Trace:
-    """Return the trace of a group's channels; the same trace if these are all. Its scenario has all channels."""
+    """Return the trace of a group's channels; the same trace if these are all.
+
+    Its scenario has all channels.
+    """
     if len(group.channels) == trace.x.shape[1]:
         return trace
     plant, whole = trace.scenario.plant, trace.arrays()
@@ -97,7 +115,9 @@ def group_trace(trace: Trace, group: Group) -> Trace:
         whole["x"] = trace.r + trace.e
     columns = [i for i in group.channels if i in plant.judged]
     arrays = {name: array[:, columns] for name, array in whole.items() if name != "t"}
-    if plant.pose and group.unit == "m" and trace.x.shape[1] == plant.n:  # forces are of the actuators
+    if (
+        plant.pose and group.unit == "m" and trace.x.shape[1] == plant.n
+    ):  # forces are of the actuators
         arrays["u"] = trace.applied
     return dataclasses.replace(trace, **arrays)
 
@@ -107,14 +127,18 @@ class Metric:
     """A metric's entry in the catalogue."""
 
     name: str  # the function's name
-    # "s", "%", ...; {x} stands for the unit of x, {u} for that of u, {force} for that of a force, see `unit_for`
+    # "s", "%", ...; {x} stands for the unit of x, {u} for that of u, {force} for that of a force,
+    # see `unit_for`
     unit: str
     summary: str  # first line of the docstring
     formula: Callable[[Trace], float]  # Trace of one group's channels -> float, without the checks
     label: str  # its name in tables and figures
-    need: str = ""  # what somebody asks for who wants this number small, such as "fast"; "" if there is none
+    # what somebody asks for who wants this number small, such as "fast"; "" if there is none
+    need: str = ""
     network: bool = False  # whether it compares channels, and so needs several of a kind
-    realistic: bool = False  # whether it is meaningful only for mechanisms with friction, contacts or other parts
+    realistic: bool = (
+        False  # whether it is meaningful only for mechanisms with friction, contacts or other parts
+    )
     command: bool = False  # whether it is computed from u or s, which free joints do not have
     late: bool = False  # whether it is of the last part alone, so that it has a trend, see `trends`
     # Value with which laws are compared where the metric is NaN; NaN for a metric that is never NaN
@@ -132,7 +156,9 @@ class Metric:
 
     @property
     def shared(self) -> bool:
-        """Whether its single value includes free joints: it follows from the motion, and its unit is not that of x."""
+        """Whether its single value includes free joints: it follows from the motion, and its unit
+        is not that of x.
+        """
         return not self.command and "{" not in self.unit
 
     def of(self, trace: Trace) -> float:
@@ -141,10 +167,20 @@ class Metric:
 
     def worst(self, traces: Mapping[Group, Trace]) -> float:
         """Return the value of the worst group, from the result of `by_group`."""
-        counted = [trace for group, trace in traces.items() if self.applies_to(group) and (group.driven or self.shared)]
-        counted = counted[:1] if "{" in self.unit or self.unit == UNIT_OF_S else counted  # of a pose the position
-        values = [value for value in (float(self.formula(trace)) for trace in counted) if not math.isnan(value)]
-        return max(values, default=math.nan)  # a group without the value, such as a limit cycle, hides no other
+        counted = []
+        for group, trace in traces.items():
+            if self.applies_to(group) and (group.driven or self.shared):
+                counted.append(trace)
+        # of a pose the position
+        if "{" in self.unit or self.unit == UNIT_OF_S:
+            counted = counted[:1]
+        values = []
+        for value in (float(self.formula(trace)) for trace in counted):
+            if not math.isnan(value):
+                values.append(value)
+        return max(
+            values, default=math.nan
+        )  # a group without the value, such as a limit cycle, hides no other
 
     def applies_to(self, group: Group) -> bool:
         """Return whether the metric applies to a group by itself."""
@@ -152,21 +188,30 @@ class Metric:
 
     def text(self, value: float) -> str:
         """Return a value as text; inf is "never" for a time and "fails" for anything else."""
-        return "fails" if value == math.inf and self.unit != "s" else number(value)
+        if value == math.inf and self.unit != "s":
+            return "fails"
+        return number(value)
 
     def unit_for(self, x: str, u: str = "") -> str:
-        """Return the unit where positions are in x, "rad" or "m", and commands in u; u="" for forces."""
+        """Return the unit where positions are in x, "rad" or "m", and commands in u; u="" for
+        forces.
+        """
         u = u or EFFORT[x]
         text = self.unit.replace("({x})", x).replace("({u})", f"({u})" if " " in u else u)
         return text.format(x=x, u=u, force=EFFORT[x])
 
     def heading(self, x: str) -> str:
         """Return the label with the unit where positions are in x; x="" where that is not known."""
-        unit = self.unit_for(x) if x else "" if "{" in self.unit else self.unit
+        if x:
+            unit = self.unit_for(x)
+        else:
+            unit = "" if "{" in self.unit else self.unit
         return self.label + f" ({unit})" * (unit not in ("", "1"))
 
     def unit_in(self, machine: Plant | Scenario, group: str = "") -> str:
-        """Return the unit in the group of that name, such as "free"; without a name, that of the first driven group."""
+        """Return the unit in the group of that name, such as "free"; without a name, that of the
+        first driven group.
+        """
         of_plant = groups(machine)
         chosen = next((known for known in of_plant if known.name == group), of_plant[0])
         return self.unit_for(chosen.unit, chosen.effort)
@@ -175,14 +220,20 @@ class Metric:
 def metric(
     unit: str, *, label: str = "", need: str = "", **flags: Any
 ) -> Callable[[Callable[[Trace], float]], Callable[[Trace], float]]:
-    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse broken traces.
+    """Return a decorator that enters a function Trace -> float in the catalogue and makes it refuse
+    broken traces.
 
     Flags are fields of `Metric`; the label is by default the function's name with spaces.
     """
 
     def enter(formula: Callable[[Trace], float]) -> Callable[[Trace], float]:
         name, summary = formula.__name__, (inspect.getdoc(formula) or "").partition("\n")[0]
-        fields = {"summary": summary, "formula": formula, "label": label or name.replace("_", " "), "need": need}
+        fields = {
+            "summary": summary,
+            "formula": formula,
+            "label": label or name.replace("_", " "),
+            "need": need,
+        }
         entry = CATALOGUE[name] = Metric(name=name, unit=unit, **fields, **flags)
 
         @functools.wraps(formula)
@@ -208,12 +259,17 @@ def refuse(trace: Trace) -> None:
     elif trace.diverged_at is not None:
         why = f"it diverged at t = {trace.diverged_at:g} s"
     elif not whole:
-        finite = np.all([np.isfinite(trace.t), *(np.isfinite(signal).all(axis=1) for signal in signals)], axis=0)
+        finite = np.all(
+            [np.isfinite(trace.t), *(np.isfinite(signal).all(axis=1) for signal in signals)], axis=0
+        )
         why = f"it is not finite from t = {trace.t[np.argmin(finite)]:g} s"
     else:
         return
     fault = trace.failure is not None and not trace.plant_diverged
-    cure = "correct the law or signal" if fault else "change the gains or u_max, or end the run earlier"
+    if fault:
+        cure = "correct the law or signal"
+    else:
+        cure = "change the gains or u_max, or end the run earlier"
     run = f"{trace.scenario.plant.name} under {trace.scenario.law.name}"
     raise ScenarioError(f"{run} has no score, {why}: {cure}")
 
@@ -235,18 +291,24 @@ def scale(trace: Trace) -> float:
 
 
 def at_rest(trace: Trace) -> np.ndarray:
-    """Return where each channel of a group's trace is at rest, (K+1, n); see the module's conventions."""
+    """Return where each channel of a group's trace is at rest, (K+1, n); see the module's
+    conventions.
+    """
     return np.abs(trace.v) <= max(REST_SHARE * float(np.abs(trace.v).max()), REST_SPEED)
 
 
 def last_part(trace: Trace) -> slice:
     """Return the samples of the last part."""
     start, end = trace.t[[0, -1]]
-    return slice(int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None)
+    return slice(
+        int(np.searchsorted(trace.t, end - LAST_PART * (1 + ROUNDING) * (end - start))), None
+    )
 
 
 def last_exit(t: np.ndarray, magnitude: np.ndarray, band: float) -> float:
-    """Return the time since t[0], s, from which magnitude, (K+1,), stays <= band; 0 if always, inf if never."""
+    """Return the time since t[0], s, from which magnitude, (K+1,), stays <= band; 0 if always, inf
+    if never.
+    """
     outside = np.flatnonzero(magnitude > band)
     if outside.size == 0:
         return 0.0

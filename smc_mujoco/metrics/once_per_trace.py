@@ -14,10 +14,14 @@ V = TypeVar("V")
 
 
 class once_per_trace(Generic[V]):
-    """Decorator for a function of a trace: a result is computed once, and kept as long as its trace exists."""
+    """Decorator for a function of a trace: a result is computed once, and kept as long as its trace
+    exists.
+    """
 
     def __init__(self, function: Callable[[Trace], V]):
-        functools.update_wrapper(self, function)  # hashes of code follow __wrapped__ and do not see the results
+        functools.update_wrapper(
+            self, function
+        )  # hashes of code follow __wrapped__ and do not see the results
         self._function = function
         self._results: weakref.WeakKeyDictionary[Trace, V] = weakref.WeakKeyDictionary()
 

@@ -1,12 +1,14 @@
-"""Scores of arms: where the tip is and how hard it presses, and every metric of each joint by itself.
+"""Scores of arms: where the tip is and how hard it presses, and every metric of each joint by
+itself.
 
-The tip is the site that `plant.tip` names. Its path follows from the joints' positions. A joint without a channel is
-assumed to stay where it starts.
+The tip is the site that `plant.tip` names. Its path follows from the joints' positions. A joint
+without a channel is assumed to stay where it starts.
 
-MuJoCo computes the forces of contact at the logged state, command and disturbances of each sample. So they are not
-means over a control period. They are unknown if an actuator has a state that a trace lacks, such as a motor's current,
-or the rotor behind a backlash. LuGre friction, friction by a formula and a motor's ripple are left out. That does not
-matter on an arm: a sliding contact's spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
+MuJoCo computes the forces of contact at the logged state, command and disturbances of each sample.
+So they are not means over a control period. They are unknown if an actuator has a state that a
+trace lacks, such as a motor's current, or the rotor behind a backlash. LuGre friction, friction by
+a formula and a motor's ripple are left out. That does not matter on an arm: a sliding contact's
+spring carries 99 % of a change of load, see `mechanisms.hardware.contact`.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ if TYPE_CHECKING:
     from smc_mujoco.simulation.scenario import Scenario
     from smc_mujoco.simulation.trace import Trace
 
-FORCE_START = 0.2  # share of a run after which forces are scored; chosen, so that the tip has touched the surface
+# share of a run after which forces are scored; chosen, so that the tip has touched the surface
+FORCE_START = 0.2
 
 
 class Contacts(NamedTuple):
@@ -57,7 +60,9 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
       ScenarioError: the plant has no tip.
     """
     if not plant.tip:
-        raise ScenarioError(f"{plant.name} has no tip: make it with smc.plant_from(..., tip='SITE')")
+        raise ScenarioError(
+            f"{plant.name} has no tip: make it with smc.plant_from(..., tip='SITE')"
+        )
     model = plant.load(factors)
     data, site = mujoco.MjData(model), model.site(plant.tip).id
     data.qpos[:] = initial_pose(model)
@@ -71,10 +76,14 @@ def tip_path(plant: Plant, x: np.ndarray, factors: Mapping[str, float] | None = 
 
 @once_per_trace
 def tip_paths(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Return the actual path of the tip (true plant) and the wanted one (nominal plant), m, (K + 1, 3), read-only."""
+    """Return the actual path of the tip (true plant) and the wanted one (nominal plant), m, (K + 1,
+    3), read-only.
+    """
     scenario, jump = trace.scenario, _jump_sample(trace)
     parts = (trace.x[:jump], 0), (trace.x[jump:], scenario.jump_step)
-    actual = np.concatenate([tip_path(scenario.plant, x, scenario.factors(step)) for x, step in parts if len(x)])
+    actual = np.concatenate(
+        [tip_path(scenario.plant, x, scenario.factors(step)) for x, step in parts if len(x)]
+    )
     paths = actual, tip_path(scenario.plant, trace.r)
     for path in paths:
         path.flags.writeable = False
@@ -94,8 +103,12 @@ def knows_contacts(scenario: Scenario) -> bool:
 
 def _with_hidden_state(scenario: Scenario) -> list:
     """Return the actuators with a state that a trace lacks."""
-    hidden = (part.in_callback or part.delay or isinstance(part, Stepper) for part in scenario.actuator)
-    return [part for part, has in zip(scenario.actuator, hidden, strict=True) if has or not part.drives]
+    hidden = (
+        part.in_callback or part.delay or isinstance(part, Stepper) for part in scenario.actuator
+    )
+    return [
+        part for part, has in zip(scenario.actuator, hidden, strict=True) if has or not part.drives
+    ]
 
 
 @once_per_trace
@@ -106,14 +119,19 @@ def contacts(trace: Trace) -> Contacts:
         raise ScenarioError(f"the scenario of {scenario.plant.name} has no contact: give contact=")
     if hidden := _with_hidden_state(scenario):
         part = type(hidden[0]).__name__
-        raise ScenarioError(f"the state of {part} is not in a trace, so its contacts are unknown: run without {part}")
+        raise ScenarioError(
+            f"the state of {part} is not in a trace, so its contacts are unknown: run without {part}"
+        )
     compiled = models.compile_model(scenario)
     model = models.with_values(compiled, scenario)
     data, joints = mujoco.MjData(model), joint_ids(model)
     positions, rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
     drives, n = model.actuator_ctrladr[drive_ids(model)], scenario.plant.driven
     scale = math.prod(part.scale for part in scenario.actuator)
-    pushes = [(model.body(d.body).id, d) for d in scenario.disturbance if isinstance(d, Push) and scenario.plant.direct]
+    pushes = []
+    for d in scenario.disturbance:
+        if isinstance(d, Push) and scenario.plant.direct:
+            pushes.append((model.body(d.body).id, d))
     contacts = Contacts(np.zeros(len(trace.t)), np.zeros(len(trace.t)), np.zeros((len(trace.t), 3)))
     data.qpos[:] = initial_pose(model)
     jump = _jump_sample(trace)
@@ -125,11 +143,17 @@ def contacts(trace: Trace) -> Contacts:
         if k == jump:
             models.put_values(model, compiled, scenario, scenario.jump_step)
             mujoco.mj_setConst(model, mujoco.MjData(model))
-        data.qpos[positions], data.qvel[rates], data.qfrc_applied[rates] = trace.x[k], trace.v[k], trace.d[k]
+        data.qpos[positions], data.qvel[rates], data.qfrc_applied[rates] = (
+            trace.x[k],
+            trace.v[k],
+            trace.d[k],
+        )
         data.ctrl[drives] = scale * trace.applied[k, :n]
         data.xfrc_applied[:] = 0.0
         for body, push in pushes:
-            data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * np.array([push.x, push.y, push.z])
+            data.xfrc_applied[body, :3] += evaluate(push, trace.t[k])[0] * np.array(
+                [push.x, push.y, push.z]
+            )
         mujoco.mj_forward(model, data)
         _add_contacts(model, data, contacts, k)
     for values in contacts:
@@ -145,14 +169,20 @@ def _add_contacts(model: mujoco.MjModel, data: mujoco.MjData, contacts: Contacts
         contacts.force[k] += wrench[0]
         contacts.depth[k] = max(contacts.depth[k], -data.contact.dist[i])
         # 1 for a geom that moves, 0 for a fixed one; the normal points from the first to the second
-        first, second = (model.body_weldid[model.geom_bodyid[data.contact.geom[i]]] != 0).astype(float)
+        first, second = (model.body_weldid[model.geom_bodyid[data.contact.geom[i]]] != 0).astype(
+            float
+        )
         contacts.push[k] += (second - first) * wrench[0] * data.contact.frame[i, :3]
 
 
 def _jump_sample(trace: Trace) -> int:
-    """Return the first sample at or after the jump of a trace's scenario, or the number of samples without a jump."""
+    """Return the first sample at or after the jump of a trace's scenario, or the number of samples
+    without a jump.
+    """
     scenario = trace.scenario
-    return len(trace.t) if scenario.jump is None else -(-scenario.jump_step // scenario.steps)
+    if scenario.jump is None:
+        return len(trace.t)
+    return -(-scenario.jump_step // scenario.steps)
 
 
 @constrained
@@ -160,35 +190,56 @@ def tip_scores(trace: Trace, force: Positive | None = None) -> dict[str, float]:
     """Return scores of an arm's tip, by name.
 
     Args:
-      force: the force with which it should press, N; None: the gain `force` of its law, if there is one.
+      force: the force with which it should press, N; None: the gain `force` of its law, if there is
+        one.
 
     Returns:
-      max_error, rms_error, last_error, m: the distance of the tip from where the references want it. With a contact
-      whose forces `contacts` knows, over the last 80 % of the run: mean_force, N; force_error, by which it exceeds the
-      wanted force, % of that; force_ripple, the force's standard deviation, N; touching, the share of the time in
-      contact, %; and depth, the deepest penetration in the whole run, m.
+      max_error, rms_error, last_error, m: the distance of the tip from where the references want
+        it. With a contact
+      whose forces `contacts` knows, over the last 80 % of the run: mean_force, N; force_error, by
+      which it exceeds the wanted force, % of that; force_ripple, the force's standard deviation, N;
+      touching, the share of the time in contact, %; and depth, the deepest penetration in the whole
+      run, m.
 
     Raises:
       ScenarioError: the plant has no tip, or the run failed.
     """
     conventions.refuse(trace)
     error = tip_error(trace)
-    values = {"max_error": error.max(), "rms_error": np.sqrt((error**2).mean()), "last_error": error[-1]}
+    values = {
+        "max_error": error.max(),
+        "rms_error": np.sqrt((error**2).mean()),
+        "last_error": error[-1],
+    }
     if knows_contacts(trace.scenario):
-        wanted = trace.scenario.law.gains.get("force") if force is None else force
+        if force is None:
+            wanted = trace.scenario.law.gains.get("force")
+        else:
+            wanted = force
         pressed = contacts(trace)
-        late = pressed.force[trace.t >= trace.t[0] + FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)]
+        late = pressed.force[
+            trace.t >= trace.t[0] + FORCE_START * (1.0 - conventions.ROUNDING) * np.ptp(trace.t)
+        ]
         values["mean_force"] = late.mean()
-        values |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)} if wanted else {}
-        values |= {"force_ripple": late.std(), "touching": 100.0 * (late > 0.0).mean(), "depth": pressed.depth.max()}
+        if wanted:
+            values |= {"force_error": 100.0 * (late.mean() / wanted - 1.0)}
+        else:
+            values |= {}
+        values |= {
+            "force_ripple": late.std(),
+            "touching": 100.0 * (late > 0.0).mean(),
+            "depth": pressed.depth.max(),
+        }
     return {name: float(value) for name, value in values.items()}
 
 
 def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
-    """Return the metrics of each joint by itself, {"joint1": {"settling_time": ...}, ...}, in the channels' order.
+    """Return the metrics of each joint by itself, {"joint1": {"settling_time": ...}, ...}, in the
+    channels' order.
 
-    In addition to the catalogue's metrics there are peak_power, the largest |force of the drive times velocity|, W, and
-    work, the integral of |force times velocity|, J. Raises like `smc.score`.
+    In addition to the catalogue's metrics there are peak_power, the largest |force of the drive
+    times velocity|, W, and work, the integral of |force times velocity|, J. Raises like
+    `smc.score`.
     """
     conventions.refuse(trace)
     values, names = {}, joint_names(trace.scenario.plant)
@@ -196,6 +247,11 @@ def joint_scores(trace: Trace) -> dict[str, dict[str, float]]:
         for i in group.channels:
             joint = dataclasses.replace(group, channels=(i,))
             part, power = group_trace(trace, joint), np.abs(trace.force[:, i] * trace.v[:, i])
-            values[names[i]] = {m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)}
-            values[names[i]] |= {"peak_power": float(power.max()), "work": float(np.trapezoid(power, trace.t))}
+            values[names[i]] = {
+                m.name: float(m.formula(part)) for m in metrics() if m.applies_to(joint)
+            }
+            values[names[i]] |= {
+                "peak_power": float(power.max()),
+                "work": float(np.trapezoid(power, trace.t)),
+            }
     return {name: values[name] for name in names}

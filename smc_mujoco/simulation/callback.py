@@ -3,12 +3,14 @@
     with installed():
         batch.step(nstep=1000)
 
-The callback is global to the process, so `installed` holds a lock, and restores the callback that was there before. The
-callback acts only in this package's simulations, which it recognises by the magic number in their userdata.
+The callback is global to the process, so `installed` holds a lock, and restores the callback that
+was there before. The callback acts only in this package's simulations, which it recognises by the
+magic number in their userdata.
 
-It reads and writes fields of mjModel and mjData at byte offsets. MuJoCo's introspection gives the C type of every field
-of a struct, and the alignment rules of C give the offsets. `offsets` compares each with a live MjData, so that a MuJoCo
-with another layout is refused instead of being read wrongly.
+It reads and writes fields of mjModel and mjData at byte offsets. MuJoCo's introspection gives the C
+type of every field of a struct, and the alignment rules of C give the offsets. `offsets` compares
+each with a live MjData, so that a MuJoCo with another layout is refused instead of being read
+wrongly.
 """
 
 # pyright: reportCallIssue=false
@@ -35,25 +37,40 @@ from smc_mujoco.simulation.controller import control as run_simulation
 from smc_mujoco.simulation.model import USERDATA
 from smc_mujoco.simulation.state import simulation_at
 
-with mjcb.installed(None):  # this import compiles a model; during a run it would wait for the run's end
+with mjcb.installed(
+    None
+):  # this import compiles a model; during a run it would wait for the run's end
     import mujoco.batch
 
 C_TYPES = {
-    "mjtNum": ctypes.c_double, "mjtSize": ctypes.c_int64, "mjtBool": ctypes.c_bool, "mjtByte": ctypes.c_ubyte,
-    "int": ctypes.c_int, "float": ctypes.c_float, "size_t": ctypes.c_size_t, "uintptr_t": ctypes.c_size_t,
+    "mjtNum": ctypes.c_double,
+    "mjtSize": ctypes.c_int64,
+    "mjtBool": ctypes.c_bool,
+    "mjtByte": ctypes.c_ubyte,
+    "int": ctypes.c_int,
+    "float": ctypes.c_float,
+    "size_t": ctypes.c_size_t,
+    "uintptr_t": ctypes.c_size_t,
     "uint64_t": ctypes.c_uint64,
-}  # fmt: skip
+}
 PROBE_MODEL = """<mujoco><size nuserdata="12345" nuser_actuator="1" nuser_body="1"/>
   <worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
   <actuator><motor joint="j"/></actuator><sensor><jointpos joint="j"/></sensor></mujoco>"""
 
-OF_MODEL = "nuserdata", "dof_frictionloss", "actuator_user", "body_user"  # fields of mjModel; all others are of mjData
+OF_MODEL = (
+    "nuserdata",
+    "dof_frictionloss",
+    "actuator_user",
+    "body_user",
+)  # fields of mjModel; all others are of mjData
 # Bytes from the start of mjModel or mjData to the fields. All but nuserdata are pointers.
 Offsets = namedtuple("Offsets", ("nuserdata", "userdata", *Arrays._fields))
 
 
 class LayoutError(ScenarioError):
-    """The installed MuJoCo has a memory layout of mjModel or mjData that the callback does not know."""
+    """The installed MuJoCo has a memory layout of mjModel or mjData that the callback does not
+    know.
+    """
 
     def __init__(self, problem: str):
         super().__init__(f"mujoco {mujoco.__version__} {problem}: install mujoco 3.17")
@@ -65,7 +82,9 @@ def _ctype(node: object) -> Any:
         case ast_nodes.PointerType():
             return ctypes.c_void_p
         case ast_nodes.ArrayType():
-            return functools.reduce(lambda item, extent: item * extent, reversed(node.extents), _ctype(node.inner_type))
+            return functools.reduce(
+                lambda item, extent: item * extent, reversed(node.extents), _ctype(node.inner_type)
+            )
         case ast_nodes.ValueType() if node.name in C_TYPES:
             return C_TYPES[node.name]
         case ast_nodes.ValueType() if node.name in structs.STRUCTS:
@@ -83,13 +102,18 @@ def checked_offsets(model: mujoco.MjModel, data: mujoco.MjData) -> Offsets:
     offsets = {}
     kinds = {struct: _ctype(structs.STRUCTS[struct]) for struct in ("mjModel", "mjData")}
     for name in Offsets._fields:
-        struct, live = ("mjModel", model) if name in OF_MODEL else ("mjData", data)
+        if name in OF_MODEL:
+            struct, live = ("mjModel", model)
+        else:
+            struct, live = ("mjData", data)
         if not (field := getattr(kinds[struct], name, None)):
             raise LayoutError(f"lacks the field {struct}.{name}")
         value = getattr(live, name)
         in_memory = ctypes.c_int64.from_address(live._address + field.offset).value
         if in_memory != (value.ctypes.data if isinstance(value, np.ndarray) else value):
-            raise LayoutError(f"does not have {struct}.{name} at byte {field.offset}, where introspection puts it")
+            raise LayoutError(
+                f"does not have {struct}.{name} at byte {field.offset}, where introspection puts it"
+            )
         offsets[name] = field.offset
     return Offsets(**offsets)
 
@@ -105,17 +129,25 @@ def offsets() -> Offsets:
 def magic() -> float:
     """Return the magic number that marks this package's userdata.
 
-    It is a hash of the sources, so that an outdated compiled callback ignores a record written by newer code.
+    It is a hash of the sources, so that an outdated compiled callback ignores a record written by
+    newer code.
     """
     package = Path(__file__).parents[1]
-    folders = (package / name for name in ("simulation", "common", "control", "mechanisms", "mechanisms/hardware"))
-    sources = b"".join(path.read_bytes() for folder in folders for path in sorted(folder.glob("*.py")))
+    folders = (
+        package / name
+        for name in ("simulation", "common", "control", "mechanisms", "mechanisms/hardware")
+    )
+    sources = b"".join(
+        path.read_bytes() for folder in folders for path in sorted(folder.glob("*.py"))
+    )
     return float(int.from_bytes(hashlib.sha256(sources).digest()[:6]))
 
 
 @functools.cache
 def callback():
-    """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it is there."""
+    """Return the compiled callback void(const mjModel*, mjData*), from numba's cache on disk if it
+    is there.
+    """
     at, ours = offsets(), magic()
 
     def control(model, data):
@@ -126,17 +158,26 @@ def callback():
             return
         address = int(userdata[1])
         arrays = Arrays(
-            pointer(integers(data + at.qpos)[0]), pointer(integers(data + at.qvel)[0]),
-            pointer(integers(data + at.ctrl)[0]), pointer(integers(data + at.xfrc_applied)[0]),
-            pointer(integers(data + at.qfrc_applied)[0]), pointer(integers(data + at.sensordata)[0]),
-            pointer(integers(data + at.xipos)[0]), pointer(integers(data + at.xanchor)[0]),
-            pointer(integers(data + at.xaxis)[0]), pointer(integers(data + at.actuator_force)[0]),
-            pointer(integers(data + at.qfrc_constraint)[0]), pointer(integers(data + at.qfrc_bias)[0]),
-            pointer(integers(data + at.qfrc_spring)[0]), pointer(integers(data + at.qfrc_passive)[0]),
-            pointer(integers(data + at.qfrc_actuator)[0]), pointer(integers(data + at.qLDiagInv)[0]),
-            pointer(integers(model + at.dof_frictionloss)[0]), integers(model + at.actuator_user)[0],
+            pointer(integers(data + at.qpos)[0]),
+            pointer(integers(data + at.qvel)[0]),
+            pointer(integers(data + at.ctrl)[0]),
+            pointer(integers(data + at.xfrc_applied)[0]),
+            pointer(integers(data + at.qfrc_applied)[0]),
+            pointer(integers(data + at.sensordata)[0]),
+            pointer(integers(data + at.xipos)[0]),
+            pointer(integers(data + at.xanchor)[0]),
+            pointer(integers(data + at.xaxis)[0]),
+            pointer(integers(data + at.actuator_force)[0]),
+            pointer(integers(data + at.qfrc_constraint)[0]),
+            pointer(integers(data + at.qfrc_bias)[0]),
+            pointer(integers(data + at.qfrc_spring)[0]),
+            pointer(integers(data + at.qfrc_passive)[0]),
+            pointer(integers(data + at.qfrc_actuator)[0]),
+            pointer(integers(data + at.qLDiagInv)[0]),
+            pointer(integers(model + at.dof_frictionloss)[0]),
+            integers(model + at.actuator_user)[0],
             integers(model + at.body_user)[0],
-        )  # fmt: skip
+        )
         run_simulation(address, simulation_at(address, 0), arrays)
 
     return compiled(types.void(types.intp, types.intp), control, cache=True)
@@ -144,7 +185,9 @@ def callback():
 
 @functools.cache
 def silence():
-    """Return a C function that ignores MuJoCo's warnings, which do not say which run they are about."""
+    """Return a C function that ignores MuJoCo's warnings, which do not say which run they are
+    about.
+    """
 
     def silent(message):
         return
@@ -154,7 +197,10 @@ def silence():
 
 @contextlib.contextmanager
 def installed(control=None) -> Iterator[None]:
-    """Install our control callback, or another one, for the length of a with block. Other threads wait."""
+    """Install our control callback, or another one, for the length of a with block.
+
+    Other threads wait.
+    """
     with mjcb.installed(None):
         function, silent = callback().ctypes if control is None else control, silence().ctypes
         before = mujoco.get_mju_user_warning()

@@ -4,10 +4,11 @@ Laws, estimators, signals and nominal models all become functions of one C type:
 
     int64 f(const double *inputs, const double *parameters, double *memory, double *outputs)
 
-It returns 0, or 1 if the function raised an exception. Array accesses are bounds-checked, also in compiled functions
-that a law calls, so a law that writes beyond its memory fails instead of overwriting other data. Functions of the
-math module do not raise in compiled code: they return NaN outside their domain, and inf beyond the largest float. If
-such a number reaches u or s, the run ends.
+It returns 0, or 1 if the function raised an exception. Array accesses are bounds-checked, also in
+compiled functions that a law calls, so a law that writes beyond its memory fails instead of
+overwriting other data. Functions of the math module do not raise in compiled code: they return NaN
+outside their domain, and inf beyond the largest float. If such a number reaches u or s, the run
+ends.
 """
 
 # pyright: reportCallIssue=false
@@ -47,13 +48,19 @@ from smc_mujoco.simulation.signals import Signal
 from smc_mujoco.simulation.state import FRICTION_INPUT, INSTANT
 
 SERIES = floats(("address", "count"))  # of a series' points; they follow its parameters
-instant_at, friction_input_at, seen_at, series_at = map(record_at, (INSTANT, FRICTION_INPUT, SEEN, SERIES))
+instant_at, friction_input_at, seen_at, series_at = map(
+    record_at, (INSTANT, FRICTION_INPUT, SEEN, SERIES)
+)
 
 
 @functools.cache
 def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory: int) -> Function:
     """Compile (y, gains, memory) -> two numbers; an estimator may return only the velocity."""
-    body, inputs, values = jit(function), loader(Reading if kind == "estimator" else Measurement), loader(named(gains))
+    body, inputs, values = (
+        jit(function),
+        loader(Reading if kind == "estimator" else Measurement),
+        loader(named(gains)),
+    )
     attempt = attempting(2, kind == "estimator")
 
     def native(y, g, m, out):
@@ -63,10 +70,13 @@ def _compile_pair(function: Callable, kind: str, gains: tuple[str, ...], memory:
 
 
 @functools.cache
-def _compile_joint_law(function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], memory: int) -> Function:
+def _compile_joint_law(
+    function: Callable, gains: tuple[str, ...], shared: tuple[str, ...], memory: int
+) -> Function:
     """Compile (y, gains, memory) -> two vectors, of a law of many joints.
 
-    Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u and s, (n,) each.
+    Its inputs are the numbers of a JointMeasurement, its parameters n numbers a gain, its outputs u
+    and s, (n,) each.
     """
     body, values, attempt = jit(function), _joint_gains(gains, shared), attempting(0)
 
@@ -90,9 +100,13 @@ def _compile_joint_law(function: Callable, gains: tuple[str, ...], shared: tuple
 
 @functools.cache
 def _joint_gains(names: tuple[str, ...], shared: tuple[str, ...]) -> Callable:
-    """Return a compiled function (address, n) -> gains by name: vectors (n,), but numbers for shared gains."""
+    """Return a compiled function (address, n) -> gains by name: vectors (n,), but numbers for
+    shared gains.
+    """
     vector = "carray(pointer(address + 8 * n * {0}), (n,))"
-    read = [(vector + "[0]" * (name in shared)).format(i) for i, name in enumerate(names or ("unused",))]
+    read = []
+    for i, name in enumerate(names or ("unused",)):
+        read.append((vector + "[0]" * (name in shared)).format(i))
     space = {"carray": carray, "pointer": pointer, "Gains": named(names)}
     exec(f"def gains_at(address, n): return Gains({', '.join(read)})", space)
     return checked(space["gains_at"])
@@ -105,7 +119,12 @@ def _compile_signal(kind: type[Signal], names: tuple[str, ...]) -> Function:
     The parameters of a series are followed by the address and the number of its points.
     """
     body, values, attempt = jit(kind.value), loader(named(names)), attempting(3)
-    random, series, memory, parameter_bytes = kind.random, kind.series, max(kind.memory, 1), 8 * len(names)
+    random, series, memory, parameter_bytes = (
+        kind.random,
+        kind.series,
+        max(kind.memory, 1),
+        8 * len(names),
+    )
     rows, sees = kind.rows, kind.sees
 
     def native(y, p, m, out):
@@ -142,7 +161,9 @@ def compile_nominal(function: Callable, names: tuple[str, ...]) -> Function:
 
 @functools.cache
 def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
-    """Compile a friction by a formula: v, motor, load -> sliding friction, and both bounds of the static friction."""
+    """Compile a friction by a formula: v, motor, load -> sliding friction, and both bounds of the
+    static friction.
+    """
     body, values, attempt = jit(function), loader(named(names)), attempting(3)
 
     def native(y, p, m, out):
@@ -153,14 +174,20 @@ def _compile_friction(function: Callable, names: tuple[str, ...]) -> Function:
 
 
 def _stored(native: Callable, function: Callable, *arguments: object) -> Function:
-    """Return the C function of a user's function. It is kept on disk under its hash and these arguments."""
+    """Return the C function of a user's function.
+
+    It is kept on disk under its hash and these arguments.
+    """
     compiled = Function(native, _disk_key(function, *arguments))
     fingerprint.keep(function)
     return compiled
 
 
 def cached(function: Callable) -> Callable:
-    """Compile a function of numbers and arrays at its first call. The code is kept on disk, as for C functions."""
+    """Compile a function of numbers and arrays at its first call.
+
+    The code is kept on disk, as for C functions.
+    """
     made = njit(error_model="numpy")(function)
 
     @functools.wraps(function)
@@ -175,7 +202,8 @@ def cached(function: Callable) -> Callable:
 def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:
     """Return the name and the hash of a compiled function on disk.
 
-    Return False, for none, if there is no hash, or if a global has changed since the first compilation.
+    Return False, for none, if there is no hash, or if a global has changed since the first
+    compilation.
     """
     function_name = getattr(function, "__qualname__", function.__name__)
     name = re.sub(r"\W+", "-", f"{function.__module__}.{function_name}")
@@ -187,7 +215,9 @@ def _disk_key(function: Callable, *arguments: object) -> tuple[str, str] | bool:
 
 
 def compile_component(c: Component) -> Function | AtAddress:
-    """Return a law, a surface or an estimator as a C function; NotCompilable has its name and the reason."""
+    """Return a law, a surface or an estimator as a C function; NotCompilable has its name and the
+    reason.
+    """
     if isinstance(c.function, AtAddress):
         return c.function
     name = f"{c.kind} {c.name!r}"
@@ -219,12 +249,19 @@ def _compile(name: str, compiler: Callable[..., Function], *arguments: object) -
 
 
 def signal_values(s: Signal) -> tuple[float, ...]:
-    """Return the numbers that a compiled signal reads as its parameters, valid as long as the signal exists."""
+    """Return the numbers that a compiled signal reads as its parameters, valid as long as the
+    signal exists.
+    """
     values = tuple(s.parameters().values())
     if not s.series:
         return values
     data = s.data
-    if data.shape[:1] != (s.rows,) or data.ndim != 2 or data.dtype != float or not data.flags.c_contiguous:
+    if (
+        data.shape[:1] != (s.rows,)
+        or data.ndim != 2
+        or data.dtype != float
+        or not data.flags.c_contiguous
+    ):
         raise ScenarioError(
             f"{type(s).__name__}'s data are {data.dtype} of shape {data.shape}: give float64, ({s.rows}, N), "
             "C-contiguous"

@@ -7,27 +7,42 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.scenario import Scenario
 
 PACKAGE = "smc_mujoco."
-# Plant -> hashes of its code and files, shared by the runs of a study. Each study has a new dict: files may change.
+# Plant -> hashes of its code and files, shared by the runs of a study. Each study has a new dict:
+# files may change.
 Hashes = dict[Plant, list[str]]
 
 
 def code_hashes(s: Scenario, plants: Hashes) -> list[str]:
-    """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's parts and plant."""
-    functions = [part.function for part in (*s.law.parts, s.velocity, s.surface) if part is not None]
+    """Return hashes of the code that a run calls: law, estimator, surface, signals, and a user's
+    parts and plant.
+    """
+    functions = []
+    for part in (*s.law.parts, s.velocity, s.surface):
+        if part is not None:
+            functions.append(part.function)
     known = (*dict.fromkeys(s.references), s.feedforward, *s.disturbance)
     signals = [type(signal) for signal in known if signal is not None]
     parts = [type(part) for part in (*s.friction, s.contact, *s.actuator, s.sensor)]
-    foreign = [kind for kind in parts if not kind.__module__.startswith(PACKAGE) and kind is not type(None)]
+    foreign = []
+    for kind in parts:
+        if not kind.__module__.startswith(PACKAGE) and kind is not type(None):
+            foreign.append(kind)
     if s.plant not in plants:
         plants[s.plant] = _plant_codes(s.plant)
     return [fingerprint.of(thing) for thing in (*functions, *signals, *foreign)] + plants[s.plant]
 
 
 def _plant_codes(plant: Plant) -> list[str]:
-    """Return hashes of a user's parts of a plant: functions, and the model, which `build` may read from a file."""
+    """Return hashes of a user's parts of a plant: functions, and the model, which `build` may read
+    from a file.
+    """
     builds = *plant.contacts.items(), *plant.mechanisms.items()
     if plant.build.__module__.startswith(PACKAGE):
-        return [fingerprint.of(thing) for thing in (plant.fields, plant.nominal, *builds) if _of_a_user(thing)]
+        return [
+            fingerprint.of(thing)
+            for thing in (plant.fields, plant.nominal, *builds)
+            if _of_a_user(thing)
+        ]
     from smc_mujoco.mechanisms.custom.mjcf import digest_of
 
     functions = plant.build, plant.fields, plant.nominal, builds
@@ -38,4 +53,6 @@ def _of_a_user(thing: Any) -> bool:
     """Return whether a function is not of this package, or any function in nested tuples is not."""
     if isinstance(thing, tuple):
         return any(map(_of_a_user, thing))
-    return callable(thing) and not (thing.__module__ or "").startswith(PACKAGE)  # generated code has no module
+    return callable(thing) and not (thing.__module__ or "").startswith(
+        PACKAGE
+    )  # generated code has no module

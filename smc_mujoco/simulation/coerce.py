@@ -1,7 +1,8 @@
 """Converters from what users give for a scenario's fields to what the fields hold.
 
-A converter takes the field's name, what the user gave, and the scenario, whose fields before this one are converted
-already. It raises ScenarioError, one sentence with the field, the value and the cure, for what it cannot convert.
+A converter takes the field's name, what the user gave, and the scenario, whose fields before this
+one are converted already. It raises ScenarioError, one sentence with the field, the value and the
+cure, for what it cannot convert.
 """
 
 import itertools
@@ -32,7 +33,9 @@ MODELS = ("none", "nominal", "true")
 MIN_TIME = 1e-9  # s, of periods
 REST = Constant(0.0)
 
-ByChannel = Mapping[str, T] | Sequence[T]  # joint -> value, or values in the order of the driven channels
+ByChannel = (
+    Mapping[str, T] | Sequence[T]
+)  # joint -> value, or values in the order of the driven channels
 Laws = Law | Template | str | ByChannel[Law | Template | str]
 
 
@@ -47,8 +50,11 @@ def law(value: Law | Template | str) -> Law:
 
 
 def laws(name: str, value: Laws | None, s: Any) -> Law:
-    """Return the law of a plant's driven channels, from one law, one for each channel, or None for the suggested."""
-    value = s.plant.suggested.get("law") if value is None else value
+    """Return the law of a plant's driven channels, from one law, one for each channel, or None for
+    the suggested.
+    """
+    if value is None:
+        value = s.plant.suggested.get("law")
     if not isinstance(value, Mapping | list | tuple):
         return law(value)  # pyright: ignore[reportArgumentType]
     return by_channel([law(item) for item in one_per_channel(name, value, s.plant)])  # pyright: ignore[reportArgumentType]
@@ -58,26 +64,35 @@ def surface(name: str, value: object, s: Any) -> Any:
     """Return a surface, from itself, its template or its text, as "linear(c=3)"."""
     if isinstance(value, str):
         return from_text.component(name, value, surfaces(), "linear(c=3)")
-    return None if value is None else _component("surface", value)
+    if value is None:
+        return None
+    return _component("surface", value)
 
 
 def velocity(name: str, value: object, s: Any) -> Any:
     """Return an estimator, from itself, its template or its text, as "levant(L=4800)"."""
     if isinstance(value, str):
         return from_text.component("velocity estimator", value, estimators(), "levant(L=4800)")
-    return None if value is None else _component("estimator", value)
+    if value is None:
+        return None
+    return _component("estimator", value)
 
 
 def _component(kind: str, value: object) -> Component:
     """Return a component of one kind, from itself or its template."""
-    value = value() if isinstance(value, Template) else value
+    if isinstance(value, Template):
+        value = value()
     if isinstance(value, Component) and value.kind == kind:
         return value
     field = "velocity" if kind == "estimator" else kind
     if callable(value):
         made = ", or smc.law_from(function) for a policy of an observation" * (kind == "law")
-        raise ScenarioError(f"{field} is a bare {type(value).__name__}: give smc.{kind}_function(function){made}")
-    raise ScenarioError(f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name")
+        raise ScenarioError(
+            f"{field} is a bare {type(value).__name__}: give smc.{kind}_function(function){made}"
+        )
+    raise ScenarioError(
+        f"{field} is {shown(value)}: give smc.{kind}(...), your own {kind}, or a name"
+    )
 
 
 def input_delay(name: str, value: float, s: Any) -> float:
@@ -86,7 +101,9 @@ def input_delay(name: str, value: float, s: Any) -> float:
 
 
 def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
-    """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping by joint."""
+    """Return one value for each driven channel of a plant, in order, from a sequence, or a mapping
+    by joint.
+    """
     if isinstance(value, Mapping):
         joints = joint_names(plant)[: plant.driven]
         for joint in value:
@@ -94,7 +111,9 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
                 raise unknown(f"driven joint of {plant.name} in {name}", joint, joints)
         for joint in joints:
             if joint not in value:
-                raise ScenarioError(f"{name} has nothing for joint {joint!r} of {plant.name}: give one for each")
+                raise ScenarioError(
+                    f"{name} has nothing for joint {joint!r} of {plant.name}: give one for each"
+                )
         return [value[joint] for joint in joints]
     if len(value) != plant.driven:
         raise ScenarioError(
@@ -104,26 +123,43 @@ def one_per_channel(name: str, value: ByChannel[T], plant: Plant) -> list[T]:
     return list(value)
 
 
-def bound(name: str, value: float | ByChannel[float] | None, s: Any) -> float | tuple[float, ...] | None:
+def bound(
+    name: str, value: float | ByChannel[float] | None, s: Any
+) -> float | tuple[float, ...] | None:
     """Return the bound on |u| of all channels, or of each driven one if they differ."""
-    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     if value is None:
         return None
-    items = one_per_channel(name, value, s.plant) if isinstance(value, Mapping | list | tuple) else [value]
+    if isinstance(value, Mapping | list | tuple):
+        items = one_per_channel(name, value, s.plant)
+    else:
+        items = [value]
     bounds = tuple(number(name, item, above=0.0, infinite=True) for item in items)
     return bounds[0] if len(set(bounds)) == 1 else bounds
 
 
 def state(name: str, value: float | Sequence[float] | None, s: Any) -> tuple[float, ...] | None:
-    """Return n positions or velocities, from n numbers or one. Beyond MAX_STATE a run would have diverged."""
-    value = value.tolist() if isinstance(value, np.ndarray) else value
+    """Return n positions or velocities, from n numbers or one.
+
+    Beyond MAX_STATE a run would have diverged.
+    """
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     if value is None:
         return None
-    values = items_of(name, value) if isinstance(value, Sequence) and not isinstance(value, str | bytes) else [value]
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        values = items_of(name, value)
+    else:
+        values = [value]
     n = s.plant.n
     if len(values) not in (1, n):
-        raise ScenarioError(f"{name} has {len(values)} values for {n} channels: give one number or {n}")
-    return tuple(number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values * (n // len(values)))
+        raise ScenarioError(
+            f"{name} has {len(values)} values for {n} channels: give one number or {n}"
+        )
+    return tuple(
+        number(name, item, low=-MAX_STATE, high=MAX_STATE) for item in values * (n // len(values))
+    )
 
 
 def physics_step(name: str, value: float | None, s: Any) -> float | None:
@@ -133,7 +169,9 @@ def physics_step(name: str, value: float | None, s: Any) -> float | None:
     h, period = number(name, value, above=0.0, low=MIN_TIME), s.control_period
     count = period / h
     if not 1.0 - 1e-9 <= count < math.inf or abs(count - round(count)) > 1e-6 * count:
-        raise ScenarioError(f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N")
+        raise ScenarioError(
+            f"physics_step {h:g} s does not divide the control period {period:g} s: give {period:g}/N"
+        )
     return period / round(count)
 
 
@@ -162,7 +200,9 @@ def several(kind: type[T], example: str) -> Callable[[str, object, Any], tuple[T
     def convert(name: str, value: object, s: Any) -> tuple[T, ...]:
         for item in (items := as_tuple(value)):
             if not isinstance(item, kind):
-                raise ScenarioError(f"{name} is {shown(item)}: give one such as {example}, or several, or None")
+                raise ScenarioError(
+                    f"{name} is {shown(item)}: give one such as {example}, or several, or None"
+                )
         return items
 
     return convert
@@ -174,37 +214,61 @@ def mismatch(name: str, value: Mapping[str, float] | None, s: Any) -> Mapping[st
 
 
 def suggested_reference(plant: Plant) -> Signal:
-    """Return the reference that the plant's channels suggest; a channel that suggests none gets the plant's rest."""
+    """Return the reference that the plant's channels suggest; a channel that suggests none gets the
+    plant's rest.
+    """
     at_rest = [Constant(x) for x in plant.rest] or [REST]
     suggested = plant.suggested.get("reference", (None,) * len(at_rest))
-    signals = [signal or rest for rest, signal in zip(itertools.cycle(at_rest), suggested, strict=False)]
+    signals = []
+    for rest, signal in zip(itertools.cycle(at_rest), suggested, strict=False):
+        signals.append(signal or rest)
     return _reference(signals, plant)
 
 
 def reference(name: str, value: Signal | ByChannel[Signal] | None, s: Any) -> Signal | None:
     """Return the reference of a plant's driven channels, from one signal or one for each channel."""
-    return None if value is None else _reference(value, s.plant)
+    if value is None:
+        return None
+    return _reference(value, s.plant)
 
 
 def _reference(value: Signal | ByChannel[Signal], plant: Plant) -> Signal:
-    """Return the reference of a plant's driven channels. A list of one signal counts as the signal."""
-    value = value.signals if isinstance(value, PerChannel) else value
-    value = value[0] if isinstance(value, list | tuple) and len(value) == 1 else value
+    """Return the reference of a plant's driven channels.
+
+    A list of one signal counts as the signal.
+    """
+    if isinstance(value, PerChannel):
+        value = value.signals
+    if isinstance(value, list | tuple) and len(value) == 1:
+        value = value[0]
     several = isinstance(value, Mapping | list | tuple)
-    items: list[Any] = one_per_channel("reference", value, plant) if several else [value]
+    items: list[Any]
+    if several:
+        items = one_per_channel("reference", value, plant)
+    else:
+        items = [value]
     for item in items:
         if not isinstance(item, Signal):
-            amplitude = shown(item) if isinstance(item, int | float) else "0.0"
+            if isinstance(item, int | float):
+                amplitude = shown(item)
+            else:
+                amplitude = "0.0"
             cure = f"give one signal, such as smc.Constant({amplitude})"
-            cure = "give its samples, smc.signals.TimeSeries(times, values)" if callable(item) else cure
+            if callable(item):
+                cure = "give its samples, smc.signals.TimeSeries(times, values)"
             raise ScenarioError(f"reference is {shown(item)}: {cure}")
-    return items[0] if all(item == items[0] for item in items) else PerChannel(tuple(items))
+    if all(item == items[0] for item in items):
+        return items[0]
+    return PerChannel(tuple(items))
 
 
 def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
     """Return a contact that the plant offers, from itself or its kind; None means "none"."""
     value = "none" if value is None else value
-    contact = Contact(value) if isinstance(value, str) else value
+    if isinstance(value, str):
+        contact = Contact(value)
+    else:
+        contact = value
     if not isinstance(contact, Contact):
         kinds = ", ".join(["none", *s.plant.contacts])
         raise ScenarioError(f"{name} is {shown(contact)}: give smc.Contact(...) or one of {kinds}")
@@ -212,8 +276,13 @@ def contact(name: str, value: Contact | str | None, s: Any) -> Contact:
     return contact
 
 
-def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> tuple[Friction, ...]:
-    """Return frictions sorted by kind, from one, several or None. Kinds must differ, and one at most has bristles."""
+def friction(
+    name: str, value: Friction | Sequence[Friction] | None, s: Any
+) -> tuple[Friction, ...]:
+    """Return frictions sorted by kind, from one, several or None.
+
+    Kinds must differ, and one at most has bristles.
+    """
     items = several(Friction, "smc.Coulomb(0.05)")(name, value, s)
     _check_kinds_differ(name, items)
     if len(bristles := [part for part in items if part.bristles]) > 1:
@@ -222,13 +291,19 @@ def friction(name: str, value: Friction | Sequence[Friction] | None, s: Any) -> 
     return tuple(sorted(items, key=lambda part: type(part).__name__))
 
 
-def actuator(name: str, value: Actuator | Sequence[Actuator] | None, s: Any) -> tuple[Actuator, ...]:
-    """Return the actuators, from one, several or None: at most two drives in the given order, then a Backlash."""
+def actuator(
+    name: str, value: Actuator | Sequence[Actuator] | None, s: Any
+) -> tuple[Actuator, ...]:
+    """Return the actuators, from one, several or None: at most two drives in the given order, then
+    a Backlash.
+    """
     items = several(Actuator, "smc.Lag(0.01)")(name, value, s)
     drives = [part for part in items if part.drives]
     _check_kinds_differ(name, [part for part in items if not part.drives])
     if len(drives) > 2 or (len(drives) == 2 and not isinstance(drives[0], Lag)):
-        raise ScenarioError(f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), another)")
+        raise ScenarioError(
+            f"{name} has the drives {shown(drives)}: give one drive, or (smc.Lag(0.01), another)"
+        )
     return tuple(sorted(items, key=lambda part: not part.drives))
 
 
@@ -241,4 +316,8 @@ def _check_kinds_differ(name: str, items: Sequence[Part]) -> None:
 
 def as_tuple(value: object) -> tuple[Any, ...]:
     """Return one value, several or None as a tuple."""
-    return () if value is None else tuple(value) if isinstance(value, tuple | list) else (value,)
+    if value is None:
+        return ()
+    if isinstance(value, tuple | list):
+        return tuple(value)
+    return (value,)

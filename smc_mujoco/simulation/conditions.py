@@ -1,23 +1,26 @@
-"""Conditions: noise, disturbances, delays and other circumstances of a run, as named fields of a Scenario.
+"""Conditions: noise, disturbances, delays and other circumstances of a run, as named fields of a
+Scenario.
 
     worn = smc.condition("worn gear", friction=smc.Coulomb(0.05), actuator=smc.Backlash(0.02))
     smc.grid(["duffing"], ["classical"], ["nominal", worn, "noise + delay_10ms"], seeds=16)
 
-A condition applies to any plant. Those of the suite are in `NAMED`, under names such as "noise". Names joined by "+"
-apply together. As text, a condition is its name, a colon and its fields, written as in Python. Such a text is parsed;
+A condition applies to any plant. Those of the suite are in `NAMED`, under names such as "noise".
+Names joined by "+" apply together. As text, a condition is its name, a colon and its fields,
+written as in Python. Such a text is parsed;
 nothing in it is run:
 
     worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)
 
-The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N is u_max / 60. The
-viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is that of a worn gear, the lag that of a
-hydraulic valve, and the counts, per revolution or metre, are those of an inexpensive encoder. On a free body, whose
-size may be any, a disturbance is the same share of the largest force as it is of u_max in the study. The pulse of
-"contact" is as strong as u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of
-the suite's control period. Under "missed" one sample in ten does not run. Under "stepper" u is the wanted acceleration,
-so gains for a force do not suit it: tune under it. Its rates are those of the firmware of rig stepper_furuta; it is 30
-times as strong as other drives, near that machine's ratio of torque to inertia, as one of their strength loses steps
-here.
+The levels of the suite are those of a machine of the study's size. The dry friction of 0.1 N m or N
+is u_max / 60. The viscous friction of "friction" is half as much at 1 rad/s or m/s. The backlash is
+that of a worn gear, the lag that of a hydraulic valve, and the counts, per revolution or metre, are
+those of an inexpensive encoder. On a free body, whose size may be any, a disturbance is the same
+share of the largest force as it is of u_max in the study. The pulse of "contact" is as strong as
+u_max, so that it moves whatever can move. Under "jitter" samples are late by up to half of the
+suite's control period. Under "missed" one sample in ten does not run. Under "stepper" u is the
+wanted acceleration, so gains for a force do not suit it: tune under it. Its rates are those of the
+firmware of rig stepper_furuta; it is 30 times as strong as other drives, near that machine's ratio
+of torque to inertia, as one of their strength loses steps here.
 """
 
 import ast
@@ -50,15 +53,31 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import NOT_OF_FREE_BODIES, U_MAX, Scenario, default_u_max
-from smc_mujoco.simulation.signals import Clock, Constant, Jump, Noise, OrnsteinUhlenbeck, Pulse, Signal, Sine, Step
+from smc_mujoco.simulation.signals import (
+    Clock,
+    Constant,
+    Jump,
+    Noise,
+    OrnsteinUhlenbeck,
+    Pulse,
+    Signal,
+    Sine,
+    Step,
+)
 
 Fields = Mapping[str, Any]
-Recipe = Fields | Callable[[Plant, float], Fields]  # fields, or a function of plant and duration that returns them
+Recipe = (
+    Fields | Callable[[Plant, float], Fields]
+)  # fields, or a function of plant and duration that returns them
 
 MAX_JOINED = 20  # conditions in one name: chosen
 GRID_FIELDS = ("plant", "law", "model", "surface", "seed", "duration")  # that a grid sets itself
 CONDITION_FIELDS = [name for name in Scenario.fields() if name not in GRID_FIELDS]
-ADDITIVE_FIELDS = ("disturbance", "friction", "actuator")  # their values add up when conditions are joined
+ADDITIVE_FIELDS = (
+    "disturbance",
+    "friction",
+    "actuator",
+)  # their values add up when conditions are joined
 ABSTRACT = (Part, Friction, Actuator, Signal)  # classes that a text cannot name
 CONSTANTS = {"inf": math.inf, "pi": math.pi}
 
@@ -80,10 +99,17 @@ class Condition:
 
     def __post_init__(self):
         if not callable(self.fields):
-            object.__setattr__(self, "fields", frozen({name: _frozen(value) for name, value in self.fields.items()}))
+            object.__setattr__(
+                self,
+                "fields",
+                frozen({name: _frozen(value) for name, value in self.fields.items()}),
+            )
 
     def on(self, plant: Plant, duration: float) -> dict[str, Any]:
-        """Return the Scenario fields for a plant and a duration, s. Single events happen at half of the duration."""
+        """Return the Scenario fields for a plant and a duration, s.
+
+        Single events happen at half of the duration.
+        """
         length = number("duration", duration, above=0.0)
         fields = dict(self.fields(plant, length) if callable(self.fields) else self.fields)
         if plant.pose and (refused := [name for name in NOT_OF_FREE_BODIES if fields.get(name)]):
@@ -94,9 +120,15 @@ class Condition:
         return fields
 
     def __add__(self, other: "Condition | str") -> "Condition":
-        """Return both at once. Disturbances, frictions and actuators add up; other fields must not differ."""
+        """Return both at once.
+
+        Disturbances, frictions and actuators add up; other fields must not differ.
+        """
         pair = self, find_condition(other)
-        return Condition(f"{self.name} + {pair[1].name}", lambda plant, duration: _joined_fields(pair, plant, duration))
+        return Condition(
+            f"{self.name} + {pair[1].name}",
+            lambda plant, duration: _joined_fields(pair, plant, duration),
+        )
 
     def __str__(self) -> str:
         """Return the text that `parse` reads, or the name alone for a condition of the suite."""
@@ -104,14 +136,19 @@ class Condition:
             return self.name
         try:
             texts = [f"{name}={_as_text(value)}" for name, value in self.fields.items()]
-        except Exception:  # the repr of a value that no scenario takes may fail; this text is for the error about it
+        # the repr of a value that no scenario takes may fail; this text is for the error about it
+        except Exception:
             texts = [f"{name}={shown(value)}" for name, value in self.fields.items()]
         return f"{self.name}: {', '.join(texts)}"
 
     def brief(self, plant: Plant, duration: float) -> str:
-        """Return the fields on a plant as text, without values that are defaults; arguments and errors as in `on`."""
+        """Return the fields on a plant as text, without values that are defaults; arguments and
+        errors as in `on`.
+        """
         fields = self.on(plant, duration)
-        return ", ".join(f"{name}={_as_text(value, defaults=False)}" for name, value in fields.items())
+        return ", ".join(
+            f"{name}={_as_text(value, defaults=False)}" for name, value in fields.items()
+        )
 
 
 def condition(name: str, **fields: Any) -> Condition:
@@ -119,27 +156,35 @@ def condition(name: str, **fields: Any) -> Condition:
 
     Args:
       name: its name in tables and figures; not a name of the suite.
-      fields: fields of a Scenario, such as friction=smc.Coulomb(0.05), except plant, law, model, surface, seed and
-        duration.
+      fields: fields of a Scenario, such as friction=smc.Coulomb(0.05), except plant, law, model,
+        surface, seed and duration.
 
     Raises:
-      ScenarioError: the name is one of the suite's, a field does not exist or belongs to no condition, or there is no
-        field at all.
+      ScenarioError: the name is one of the suite's, a field does not exist or belongs to no
+        condition, or there is no field at all.
     """
     if errors.name("a condition's name", name) in NAMED or set(":+,") & set(name):
-        raise ScenarioError(f"condition {shown(name)} is a name of the suite, or has one of : + , in it: give another")
+        raise ScenarioError(
+            f"condition {shown(name)} is a name of the suite, or has one of : + , in it: give another"
+        )
     if not fields:
-        raise ScenarioError(f"condition {name!r} has no fields: give some, such as friction=smc.Coulomb(0.05)")
+        raise ScenarioError(
+            f"condition {name!r} has no fields: give some, such as friction=smc.Coulomb(0.05)"
+        )
     for field in fields:
         if field in GRID_FIELDS:
-            raise ScenarioError(f"condition {name!r} sets {field}, which the grid sets itself: leave it out")
+            raise ScenarioError(
+                f"condition {name!r} sets {field}, which the grid sets itself: leave it out"
+            )
         if field not in CONDITION_FIELDS:
             raise unknown("field of a Scenario", field, CONDITION_FIELDS)
     return Condition(name, fields)
 
 
 def find_condition(value: Condition | str) -> Condition:
-    """Return the Condition for a Condition, a name, several names joined by "+", or the text of a condition."""
+    """Return the Condition for a Condition, a name, several names joined by "+", or the text of a
+    condition.
+    """
     if isinstance(value, Condition):
         return value
     if not isinstance(value, str):
@@ -147,9 +192,13 @@ def find_condition(value: Condition | str) -> Condition:
     if ":" in value:
         return parse(value)
     if set("=(") & set(value):
-        raise ScenarioError(f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3")
+        raise ScenarioError(
+            f"condition {shown(value)} has no colon: write a name, a colon and fields, as worn: x0=0.3"
+        )
     if (count := value.count("+") + 1) > MAX_JOINED:
-        raise ScenarioError(f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_JOINED}")
+        raise ScenarioError(
+            f"condition {shown(value)} joins {count:,} conditions: give at most {MAX_JOINED}"
+        )
     first, *others = [find("condition", part.strip(), NAMED) for part in value.split("+")]
     return sum(others, start=first)
 
@@ -166,7 +215,10 @@ def applicable(names: Iterable[str], plants: Sequence[Plant], duration: float) -
 
 
 def parse(text: str) -> Condition:
-    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)". No text is run."""
+    """Return the condition that a text describes, such as "worn gear: friction=Coulomb(0.05)".
+
+    No text is run.
+    """
     name, _, fields = text.partition(":")
     try:
         values = read_fields(fields)
@@ -182,19 +234,29 @@ def read_fields(text: str) -> dict[str, Any]:
         call = ast.parse(f"_({text})", mode="eval").body
     except (ValueError, RecursionError, MemoryError):
         call = None
-    if not isinstance(call, ast.Call) or call.args or any(word.arg is None for word in call.keywords):
+    if (
+        not isinstance(call, ast.Call)
+        or call.args
+        or any(word.arg is None for word in call.keywords)
+    ):
         raise SyntaxError
     return _keywords(call)
 
 
 def from_file(path: Path) -> list[Condition]:
-    """Return the conditions in a text file, one per line. Empty lines and lines that begin with # are skipped."""
+    """Return the conditions in a text file, one per line.
+
+    Empty lines and lines that begin with # are skipped.
+    """
     with reading(path, "file of conditions", "give a text file, a condition a line") as file:
         lines = [line.strip() for line in file.read_text(encoding="utf-8").splitlines()]
     conditions = []
     for count, line in enumerate(lines, 1):
         try:
-            conditions += [find_condition(line)] if line and not line.startswith("#") else []
+            if line and not line.startswith("#"):
+                conditions += [find_condition(line)]
+            else:
+                conditions += []
         except ScenarioError as error:
             raise ScenarioError(f"line {count} of {str(path)!r}: {error}") from None
     return conditions
@@ -212,7 +274,11 @@ def _parsed(node: ast.expr) -> Any:
         case ast.Tuple(elts=items) | ast.List(elts=items):
             return tuple(map(_parsed, items))
         case ast.Dict(keys=keys, values=values) if None not in keys:
-            return {_parsed(key): _parsed(value) for key, value in zip(keys, values, strict=True) if key is not None}
+            return {
+                _parsed(key): _parsed(value)
+                for key, value in zip(keys, values, strict=True)
+                if key is not None
+            }
         case ast.Call():
             return _call(node)
     raise ScenarioError(
@@ -228,7 +294,10 @@ def _call(node: ast.Call) -> Any:
     try:
         return kind(*values, **keywords)
     except TypeError:
-        parameters = list(inspect.signature(kind).parameters) if isinstance(kind, type) else list(kind.defaults)
+        if isinstance(kind, type):
+            parameters = list(inspect.signature(kind).parameters)
+        else:
+            parameters = list(kind.defaults)
         cure = f"it takes {', '.join(parameters) or 'nothing'}"
         raise ScenarioError(f"condition has {shown(ast.unparse(node))}: {cure}") from None
 
@@ -245,7 +314,10 @@ def _keywords(node: ast.Call) -> dict[str, Any]:
 
 
 def _kinds() -> dict[str, Any]:
-    """Return name -> class of all parts and signals, also users'. If two have one name, the suite's is returned."""
+    """Return name -> class of all parts and signals, also users'.
+
+    If two have one name, the suite's is returned.
+    """
     from smc_mujoco.mechanisms.hardware import servos  # noqa: F401
     from smc_mujoco.simulation import time_series  # noqa: F401
 
@@ -260,7 +332,10 @@ def _as_text(value: Any, defaults: bool = True) -> str:
     if isinstance(value, Component):
         return f"{value.name}({', '.join(f'{gain}={number!r}' for gain, number in value.gains.items())})"
     if isinstance(value, Part | Signal | Noise | Jump | Clock):
-        written = [f for f in dataclasses.fields(value) if f.init and (defaults or getattr(value, f.name) != f.default)]
+        written = []
+        for f in dataclasses.fields(value):
+            if f.init and (defaults or getattr(value, f.name) != f.default):
+                written.append(f)
         texts = [f"{f.name}={_as_text(getattr(value, f.name), defaults)}" for f in written]
         return f"{type(value).__name__}({', '.join(texts)})"
     if isinstance(value, tuple):
@@ -272,19 +347,26 @@ def _frozen(value: Any) -> Any:
     """Return an immutable copy of a field's value."""
     if isinstance(value, Mapping):
         return frozen(value)
-    value = value.tolist() if isinstance(value, np.ndarray) else value
-    return tuple(value) if isinstance(value, list) else value
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list):
+        return tuple(value)
+    return value
 
 
 def _differ(first: Any, second: Any) -> bool:
     """Return whether two values of a field differ, as those do that cannot be compared."""
     try:
         return bool(first != second)
-    except Exception:  # no scenario takes a value whose comparison fails; the caller's sentence names the field
+    except (
+        Exception
+    ):  # no scenario takes a value whose comparison fails; the caller's sentence names the field
         return True
 
 
-def _joined_fields(pair: tuple[Condition, Condition], plant: Plant, duration: float) -> dict[str, Any]:
+def _joined_fields(
+    pair: tuple[Condition, Condition], plant: Plant, duration: float
+) -> dict[str, Any]:
     """Return the fields of two conditions at once."""
     first, second = (condition.on(plant, duration) for condition in pair)
     for field in [name for name in second if name in first]:
@@ -292,7 +374,9 @@ def _joined_fields(pair: tuple[Condition, Condition], plant: Plant, duration: fl
             second[field] = *coerce.as_tuple(first[field]), *coerce.as_tuple(second[field])
         elif _differ(first[field], second[field]):
             names = " and ".join(repr(condition.name) for condition in pair)
-            raise ScenarioError(f"conditions {names} both set {field}: give one of them, or smc.condition(...)")
+            raise ScenarioError(
+                f"conditions {names} both set {field}: give one of them, or smc.condition(...)"
+            )
     return first | second
 
 
@@ -303,8 +387,13 @@ def _jump(size: str) -> Recipe:
         if size not in plant.jumps:
             with_jump = [name for name, other in plants().items() if size in other.jumps]
             cure = f"choose another condition, or one of {', '.join(with_jump)}"
-            raise ScenarioError(f"condition 'jump_{size}' has no numbers for plant {plant.name!r}: {cure}")
-        return {"disturbance": _sized(SINE, plant), "jump": Jump(time=duration / 2, factors=plant.jumps[size])}
+            raise ScenarioError(
+                f"condition 'jump_{size}' has no numbers for plant {plant.name!r}: {cure}"
+            )
+        return {
+            "disturbance": _sized(SINE, plant),
+            "jump": Jump(time=duration / 2, factors=plant.jumps[size]),
+        }
 
     return fields
 
@@ -313,13 +402,20 @@ def _contact(plant: Plant, duration: float) -> Fields:
     """Return a pulse that drives a plant against its obstacles: its neighbours, or stops."""
     if kinds := [kind for kind in ("bobs", "stops") if kind in plant.contacts]:
         return {"contact": kinds[0], "disturbance": Pulse(6.0, time=duration / 2, width=0.2)}
-    raise ScenarioError(f"condition 'contact' needs stops, and plant {plant.name!r} has none: choose another")
+    raise ScenarioError(
+        f"condition 'contact' needs stops, and plant {plant.name!r} has none: choose another"
+    )
 
 
 def _stepper(plant: Plant, duration: float) -> Fields:
     """Return a stepper motor with the pulse generator of rig stepper_furuta."""
     rate = math.tau / 1600.0  # rad/s of a hinge or m/s of a slide at a step a second
-    motor = Stepper(torque=30.0 * default_u_max(plant), speed=15e3 * rate, ramp=20e3 * rate, stop_band=50.0 * rate)
+    motor = Stepper(
+        torque=30.0 * default_u_max(plant),
+        speed=15e3 * rate,
+        ramp=20e3 * rate,
+        stop_band=50.0 * rate,
+    )
     return {"actuator": motor, "u_max": motor.ramp}
 
 
@@ -327,8 +423,13 @@ def _sized(signal: Signal, plant: Plant) -> Signal:
     """Return a disturbance of the study's plants; for a free body that share of its largest force."""
     if not plant.pose:
         return signal
-    name = "sigma" if isinstance(signal, OrnsteinUhlenbeck) else "amplitude"
-    return dataclasses.replace(signal, **{name: getattr(signal, name) * default_u_max(plant) / U_MAX})
+    if isinstance(signal, OrnsteinUhlenbeck):
+        name = "sigma"
+    else:
+        name = "amplitude"
+    return dataclasses.replace(
+        signal, **{name: getattr(signal, name) * default_u_max(plant) / U_MAX}
+    )
 
 
 def _disturbed(make: Callable[[float], Signal]) -> Recipe:
@@ -367,4 +468,6 @@ REAL: dict[str, Recipe] = {
     "contact": _contact,
 }
 
-NAMED: dict[str, Condition] = {name: Condition(name, fields) for name, fields in (IDEAL | REAL).items()}
+NAMED: dict[str, Condition] = {
+    name: Condition(name, fields) for name, fields in (IDEAL | REAL).items()
+}

@@ -4,18 +4,20 @@ At the first stage of a control sample, for each channel:
 
     sensors -> noise, encoder -> velocity estimator -> law -> saturation -> delay buffer
 
-A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of the sample before.
-At the first stage of a physics step, the command whose delay has passed goes to ctrl, through lags and rate limits. At
-every stage, disturbance(t) goes to xfrc_applied. Then a friction by a formula goes to ctrl; its steps have one stage.
-Coulomb friction on joints that move alone goes to qfrc_applied, at every stage of RK4.
-Each sample is logged with the mean forces since the last one.
+A sample may come late in its period, or be missed, see `Clock`. The log then repeats the command of
+the sample before. At the first stage of a physics step, the command whose delay has passed goes to
+ctrl, through lags and rate limits. At every stage, disturbance(t) goes to xfrc_applied. Then a
+friction by a formula goes to ctrl; its steps have one stage. Coulomb friction on joints that move
+alone goes to qfrc_applied, at every stage of RK4. Each sample is logged with the mean forces since
+the last one.
 
-The controller counts its calls, because mjData.time does not tell the last stage of a step from the start of the next:
-RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h again. A run that diverges, or whose law
-raises an exception, is marked in its record and gets no more control. The other simulations of the batch continue.
+The controller counts its calls, because mjData.time does not tell the last stage of a step from the
+start of the next: RK4 calls at t, t + h/2, t + h/2 and t + h, and the next step begins at t + h
+again. A run that diverges, or whose law raises an exception, is marked in its record and gets no
+more control. The other simulations of the batch continue.
 
-Private functions take the address of the record, the record `sim`, and `data`, the Arrays of its mjData. Those that
-can fail return a failure code of state.py, unless they say otherwise.
+Private functions take the address of the record, the record `sim`, and `data`, the Arrays of its
+mjData. Those that can fail return a failure code of state.py, unless they say otherwise.
 """
 
 # pyright: reportCallIssue=false
@@ -37,15 +39,26 @@ from smc_mujoco.mechanisms.hardware.sliding import STICKING_SPEED
 from smc_mujoco.simulation import philox
 from smc_mujoco.simulation import state as record
 from smc_mujoco.simulation.signals import after_pauses
-from smc_mujoco.simulation.state import channel_at, disturbance_at, function_at, log_at, motor_at, state_at
+from smc_mujoco.simulation.state import (
+    channel_at,
+    disturbance_at,
+    function_at,
+    log_at,
+    motor_at,
+    state_at,
+)
 
-MAX_STATE = 1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
-LAST_STAGE = 1.0 - 1e-8  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
+MAX_STATE = (
+    1e6  # SI units: a run with larger |x| or |v| has diverged; MuJoCo itself gives up at 1e10
+)
+LAST_STAGE = (
+    1.0 - 1e-8
+)  # of a step: where RK4's last stage evaluates signals, just before a jump at the step's end
 MAX_CONTROL = 1e10  # MuJoCo drops all controls if one is larger
 
 
-# Arrays of one mjData, as pointers to their numbers; of its mjModel the levels of dry friction, and the addresses of
-# what rotors and drag have.
+# Arrays of one mjData, as pointers to their numbers; of its mjModel the levels of dry friction, and
+# the addresses of what rotors and drag have.
 Arrays = namedtuple(
     "Arrays",
     """qpos qvel ctrl xfrc_applied qfrc_applied sensordata xipos xanchor xaxis actuator_force qfrc_constraint qfrc_bias
@@ -79,9 +92,14 @@ def control(address, sim, data):
     if sim.rotors != 0:
         _fly(sim, data, step, stage)
     if sim.disturbance_count != 0 and failure == record.FINE:
-        fraction = 0.0 if stage == 0 else (LAST_STAGE if stage == 3 else 0.5)
+        if stage == 0:
+            fraction = 0.0
+        else:
+            fraction = LAST_STAGE if stage == 3 else 0.5
         sample = k if stage + within == 0 else -1
-        failure = _apply_disturbances(address, sim, data, k * sim.period + (within + fraction) * sim.step, sample)
+        failure = _apply_disturbances(
+            address, sim, data, k * sim.period + (within + fraction) * sim.step, sample
+        )
     if sim.frictions != 0 and failure == record.FINE:  # an integrator of one stage
         failure = _apply_friction(address, sim, data)
     if failure != record.FINE:
@@ -118,7 +136,9 @@ def _late(sim, k):
 
 @njit(error_model="numpy", inline="always")
 def _sample(address, sim, data, k, within):
-    """Run the law at sample k, if the sample comes in this physics step, `within` steps into its period."""
+    """Run the law at sample k, if the sample comes in this physics step, `within` steps into its
+    period.
+    """
     late = _late(sim, k)
     if within == 0 and late != 0:
         _repeat_command(sim, k)
@@ -136,7 +156,10 @@ def _sample(address, sim, data, k, within):
 @njit(error_model="numpy")
 def _repeat_command(sim, k):
     """Give sample k the command of the sample before, with its u, s and r in the log."""
-    buffer, last_u = pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)), pointer(sim.seen.u)
+    buffer, last_u = (
+        pointer(sim.delay_buffer + 8 * sim.n * (k % sim.delay_slots)),
+        pointer(sim.seen.u),
+    )
     for i in range(sim.n):
         sample, before = log_at(sim.log, k * sim.n + i), log_at(sim.log, (k - 1) * sim.n + i)
         sample.u, sample.s, sample.r, buffer[i] = before.u, before.s, before.r, last_u[i]
@@ -156,13 +179,24 @@ def _diverged(sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _call(function, i, inputs, outputs):
-    """Call a function for channel i, with the addresses of its inputs and outputs. Return 1 if it raised, or 0."""
-    return call(function.address, inputs, function.parameters, function.memory + i * function.stride, outputs)
+    """Call a function for channel i, with the addresses of its inputs and outputs.
+
+    Return 1 if it raised, or 0.
+    """
+    return call(
+        function.address,
+        inputs,
+        function.parameters,
+        function.memory + i * function.stride,
+        outputs,
+    )
 
 
 @njit(error_model="numpy", inline="always")
 def _read_sensor(sim, state, i, x, v, j, hinge):
-    """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and loss."""
+    """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and
+    loss.
+    """
     if sim.sigma_x != 0.0 or sim.sigma_v != 0.0:
         z = philox.normals(sim.seed, i, philox.MEASUREMENT, j)
         x, v = x + sim.sigma_x * z[0], v + sim.sigma_v * z[1]
@@ -180,7 +214,10 @@ def _read_sensor(sim, state, i, x, v, j, hinge):
 
 @njit(error_model="numpy", inline="always")
 def _measurement_error(address, sim, function, t):
-    """Return a measurement error at time t, s: NaN if its signal raised, -0 (which changes no bit) without a signal."""
+    """Return a measurement error at time t, s:
+
+    NaN if its signal raised, -0 (which changes no bit) without a signal.
+    """
     if function.address == 0:
         return -0.0
     sim.instant.t = t
@@ -191,16 +228,24 @@ def _measurement_error(address, sim, function, t):
 
 @njit(error_model="numpy", inline="always")
 def _position(numbers, at, turn):
-    """Return a number, or of the quaternion that begins there, number `turn` of its rotation vector."""
+    """Return a number, or of the quaternion that begins there, number `turn` of its rotation
+    vector.
+    """
     if turn < 0:
         return numbers[at]
-    vector = rotation.rotation_vector(numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3])
-    return vector[0] if turn == 0 else (vector[1] if turn == 1 else vector[2])
+    vector = rotation.rotation_vector(
+        numbers[at], numbers[at + 1], numbers[at + 2], numbers[at + 3]
+    )
+    if turn == 0:
+        return vector[0]
+    return vector[1] if turn == 1 else vector[2]
 
 
 @njit(error_model="numpy")
 def _measure(address, sim, data, k, t):
-    """Measure position, and estimate velocity and acceleration, of every channel at sample k, at time t, s."""
+    """Measure position, and estimate velocity and acceleration, of every channel at sample k, at
+    time t, s.
+    """
     j, x, v, a = k, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a)
     if sim.read_period != 0.0:
         j = max(0, math.floor((t - sim.read_delay) / sim.read_period + 1e-6))
@@ -212,13 +257,17 @@ def _measure(address, sim, data, k, t):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         position = _position(data.sensordata, channel.x_sensor, channel.turn) + x_error
         velocity = data.sensordata[channel.v_sensor] + v_error
-        reading.x, reading.v = _read_sensor(sim, state, i, position, velocity, j, channel.hinge_body >= 0)
+        reading.x, reading.v = _read_sensor(
+            sim, state, i, position, velocity, j, channel.hinge_body >= 0
+        )
         sim.seen.i = i
         if _call(sim.estimator, i, address + record.AT.reading, address + record.AT.estimate) != 0:
             return record.RAISED
         x[i], v[i], a[i] = reading.x, estimate.v, estimate.a
         if sim.told != 0:
-            pointer(sim.told)[i] = _generalised_disturbance(data, channel) + state.reaction / sim.steps
+            pointer(sim.told)[i] = (
+                _generalised_disturbance(data, channel) + state.reaction / sim.steps
+            )
     return record.FINE
 
 
@@ -231,11 +280,19 @@ def _evaluate_model(address, sim, i):
 
 @njit(error_model="numpy")
 def update_law(address, sim, k, t):
-    """Run the law at sample k, at time t, s: once for each driven channel, or once for all. Return a failure code.
+    """Run the law at sample k, at time t, s: once for each driven channel, or once for all.
+
+    Return a failure code.
 
     A channel's nominal model may depend on the new commands of the channels before it.
     """
-    n, width, last_u, limits, feedforward = sim.n, sim.width, pointer(sim.seen.u), pointer(sim.limits), 0.0
+    n, width, last_u, limits, feedforward = (
+        sim.n,
+        sim.width,
+        pointer(sim.seen.u),
+        pointer(sim.limits),
+        0.0,
+    )
     joint, commands = sim.joint.head != 0, pointer(sim.commands)
     y = sim.joint.head if joint else address + record.AT.y
     buffer = pointer(sim.delay_buffer + 8 * n * (k % sim.delay_slots))
@@ -247,17 +304,31 @@ def update_law(address, sim, k, t):
             return record.RAISED
         feedforward = sim.motion.value
     for first in range(0, sim.driven, width):
-        failure = _measure_joints(address, sim, k, t) if joint else _measure_channel(address, sim, k, t, first)
+        if joint:
+            failure = _measure_joints(address, sim, k, t)
+        else:
+            failure = _measure_channel(address, sim, k, t, first)
         if failure != record.FINE:
             return failure
-        law = sim.law if sim.laws == 0 else function_at(sim.laws, first)
+        if sim.laws == 0:
+            law = sim.law
+        else:
+            law = function_at(sim.laws, first)
         if _call(law, first, y, sim.commands) != 0:
             return record.LAW_RAISED
         for j in range(width):
             i, limit = first + j, limits[first + j]
-            command, s, sample = commands[j] + feedforward, commands[width + j], log_at(sim.log, k * n + i)
+            command, s, sample = (
+                commands[j] + feedforward,
+                commands[width + j],
+                log_at(sim.log, k * n + i),
+            )
             u = min(max(command, -limit), limit)
-            if not (math.isfinite(command) and math.isfinite(s) and abs(u) * max(1.0, sim.scale) < MAX_CONTROL):
+            if not (
+                math.isfinite(command)
+                and math.isfinite(s)
+                and abs(u) * max(1.0, sim.scale) < MAX_CONTROL
+            ):
                 sim.seen.i = i
                 return record.NOT_FINITE
             buffer[i], sample.u, sample.s, last_u[i] = u, u, s, u
@@ -275,19 +346,34 @@ def update_law(address, sim, k, t):
 
 @njit(error_model="numpy")
 def _mix(sim, u, controls):
-    """Write the controls of a free body's actuators for its force and torque u, (6,), by the measured attitude."""
+    """Write the controls of a free body's actuators for its force and torque u, (6,), by the
+    measured attitude.
+    """
     for j in range(sim.n):
         controls[j] = 0.0
-    rotation.mix(pointer(sim.seen.x), u, pointer(sim.mixer), sim.actuators, sim.keeps_torques, controls)
+    rotation.mix(
+        pointer(sim.seen.x), u, pointer(sim.mixer), sim.actuators, sim.keeps_torques, controls
+    )
 
 
 @njit(error_model="numpy", inline="always")
 def _evaluate_reference(address, sim, k, i):
     """Write the reference of channel i into the record and the log. Return 1 if it raised, or 0."""
     if sim.references != 0:
-        if _call(function_at(sim.references, i), 0, address + record.AT.instant, address + record.AT.motion) != 0:
+        if (
+            _call(
+                function_at(sim.references, i),
+                0,
+                address + record.AT.instant,
+                address + record.AT.motion,
+            )
+            != 0
+        ):
             return 1
-    elif i == 0 and _call(sim.reference, 0, address + record.AT.instant, address + record.AT.motion) != 0:
+    elif (
+        i == 0
+        and _call(sim.reference, 0, address + record.AT.instant, address + record.AT.motion) != 0
+    ):
         return 1
     log_at(sim.log, k * sim.n + i).r = sim.motion.value
     return 0
@@ -295,10 +381,20 @@ def _evaluate_reference(address, sim, k, i):
 
 @njit(error_model="numpy", inline="always")
 def _measure_channel(address, sim, k, t, i):
-    """Write what the law of channel i reads. The force in its nominal model is that of the drive, gain u - drag v."""
+    """Write what the law of channel i reads.
+
+    The force in its nominal model is that of the drive, gain u - drag v.
+    """
     if _evaluate_reference(address, sim, k, i) != 0:
         return record.RAISED
-    y, x, v, a, motion, model = sim.y, pointer(sim.seen.x), pointer(sim.seen.v), pointer(sim.a), sim.motion, sim.model
+    y, x, v, a, motion, model = (
+        sim.y,
+        pointer(sim.seen.x),
+        pointer(sim.seen.v),
+        pointer(sim.a),
+        sim.motion,
+        sim.model,
+    )
     y.t, y.dt, y.r, y.dr, y.ddr = t, sim.period, motion.value, motion.rate, motion.acceleration
     y.q, y.dq, y.fq, y.gq = 0.0, 0.0, 0.0, 0.0
     partner = i + sim.driven  # a joint without actuator, which moves with channel i
@@ -334,15 +430,25 @@ def _measure_joints(address, sim, k, t):
     y, n, motion, seen = sim.joint, sim.n, sim.motion, sim.seen
     head = head_at(y.head, 0)
     head.t, head.dt, head.model, head.n = t, sim.period, sim.uses_model, n
-    head.dynamics = address + record.AT.handle if sim.handle.coriolis != 0.0 else 0
+    if sim.handle.coriolis != 0.0:
+        head.dynamics = address + record.AT.handle
+    else:
+        head.dynamics = 0
     for i in range(n):
         if _evaluate_reference(address, sim, k, i) != 0:
             return record.RAISED
         x, v, a = pointer(seen.x)[i], pointer(seen.v)[i], pointer(sim.a)[i]
         pointer(y.x)[i], pointer(y.v)[i] = x, v
         pointer(y.e)[i], pointer(y.de)[i] = x - motion.value, v - motion.rate
-        pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = motion.value, motion.rate, motion.acceleration
-        pointer(y.a)[i], pointer(y.limit)[i] = motion.acceleration if math.isnan(a) else a, pointer(sim.limits)[i]
+        pointer(y.r)[i], pointer(y.dr)[i], pointer(y.ddr)[i] = (
+            motion.value,
+            motion.rate,
+            motion.acceleration,
+        )
+        pointer(y.a)[i], pointer(y.limit)[i] = (
+            motion.acceleration if math.isnan(a) else a,
+            pointer(sim.limits)[i],
+        )
     if sim.mixer != 0:
         rotation.put_attitude_error(
             pointer(y.x), pointer(y.v), pointer(y.r), pointer(y.dr), pointer(y.e), pointer(y.de)
@@ -353,7 +459,13 @@ def _measure_joints(address, sim, k, t):
 @njit(error_model="numpy")
 def _measure_dynamics(address, sim):
     """Write nominal M, h and g of all channels, per unit of u, into a joint measurement."""
-    n, v, M, h, g = sim.n, pointer(sim.seen.v), pointer(sim.joint.M), pointer(sim.joint.h), pointer(sim.joint.g)
+    n, v, M, h, g = (
+        sim.n,
+        pointer(sim.seen.v),
+        pointer(sim.joint.M),
+        pointer(sim.joint.h),
+        pointer(sim.joint.g),
+    )
     failure = record.FINE
     if sim.uses_model == 0.0:
         for i in range(n * n):
@@ -374,7 +486,10 @@ def _measure_dynamics(address, sim):
 
 @njit(error_model="numpy")
 def _separate_equations(address, sim, M, h, g):
-    """Write M, h and g of channels that each have their own equation x'' = f + g u: M is diagonal."""
+    """Write M, h and g of channels that each have their own equation x'' = f + g u:
+
+    M is diagonal.
+    """
     n, v, measured = sim.n, pointer(sim.seen.v), pointer(sim.joint.v)
     for i in range(n * n):
         M[i] = 0.0
@@ -446,12 +561,21 @@ def _queue_of(sim, i):
 
 @njit(error_model="numpy")
 def _apply_steppers(sim, data, stage):
-    """Give every motor its torque at a stage, in the field whose stages have its mean and moment over the step."""
+    """Give every motor its torque at a stage, in the field whose stages have its mean and moment
+    over the step.
+    """
     for i in range(sim.driven):
-        channel, state, motor = channel_at(sim.channels, i), state_at(sim.states, i), _motor_at(sim, i)
+        channel, state, motor = (
+            channel_at(sim.channels, i),
+            state_at(sim.states, i),
+            _motor_at(sim, i),
+        )
         moved, weight = motor.middle, 1.0
         if sim.stages > 1:  # RK4
-            moved += motor.rise if stage == 3 else (-motor.rise if stage == 0 else 0.0)
+            if stage == 3:
+                moved += motor.rise
+            else:
+                moved += -motor.rise if stage == 0 else 0.0
             weight = 6.0 if stage % 3 == 0 else 3.0
         force = _stepper_torque(motor, sim.stepper, data.qpos[channel.shaft_qpos], moved)
         data.ctrl[channel.ctrl] = force
@@ -460,17 +584,25 @@ def _apply_steppers(sim, data, stage):
 
 @njit(error_model="numpy", inline="always")
 def _give_moment(sim, data, stage):
-    """Give the later stages of an RK4 step the force that has its mean and first moment, see `drives._rise`."""
+    """Give the later stages of an RK4 step the force that has its mean and first moment, see
+    `drives._rise`.
+    """
     for i in range(sim.driven):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
-        data.ctrl[channel.ctrl] = state.middle + state.rise if stage == 3 else state.middle
+        if stage == 3:
+            data.ctrl[channel.ctrl] = state.middle + state.rise
+        else:
+            data.ctrl[channel.ctrl] = state.middle
         if stage == 3:  # what the actuators did in the stage before, with the mean force
             state.force += data.actuator_force[channel.force]
 
 
 @njit(error_model="numpy", inline="always")
 def _step_drives(factors, state, v):
-    """Advance a channel's drives by a physics step, see DriveStep. Return the mean force. v: speed of the drive."""
+    """Advance a channel's drives by a physics step, see DriveStep.
+
+    Return the mean force. v: speed of the drive.
+    """
     u, second = state.delayed, state.second
     a, b = state.first - u, second - u
     force = u + factors.force_first * a
@@ -478,7 +610,10 @@ def _step_drives(factors, state, v):
     state.rise = factors.rise_first * a
     if factors.voltage != 0.0:
         bound, torque = factors.voltage, second - factors.drag * v
-        mean, end = min(max(force, -bound), bound), min(max(u + factors.second_first * a, -bound), bound)
+        mean, end = (
+            min(max(force, -bound), bound),
+            min(max(u + factors.second_first * a, -bound), bound),
+        )
         state.second = end + factors.second_left * (torque - end) - factors.second_drag * v
         return mean + factors.force_second * (torque - mean) - factors.force_drag * v
     if factors.reach == 0.0:
@@ -497,7 +632,9 @@ _rippled = njit(error_model="numpy", inline="always")(rippled)
 
 @njit(error_model="numpy")
 def _fly(sim, data, step, stage):
-    """Give a free body its rotors' thrust, their gyroscopic torque and its drag at a stage, see hardware/rotors.py."""
+    """Give a free body its rotors' thrust, their gyroscopic torque and its drag at a stage, see
+    hardware/rotors.py.
+    """
     if stage == 0:
         lifted = 0.0
         for j in range(sim.actuators):
@@ -530,7 +667,10 @@ def _drag(sim, data, x, y, z):
     """Return R diag(drag) R' times a velocity (x, y, z) in the axes of the world, N."""
     place, first = channel_at(sim.channels, 0), channel_at(sim.channels, 3).qpos
     q = data.qpos[first], data.qpos[first + 1], data.qpos[first + 2], data.qpos[first + 3]
-    along, drag = rotation.turned_back(q, x, y, z), pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6))
+    along, drag = (
+        rotation.turned_back(q, x, y, z),
+        pointer(data.body_user + 8 * DRAG_AXES * (place.xfrc // 6)),
+    )
     return rotation.turned(q, drag[0] * along[0], drag[1] * along[1], drag[2] * along[2])
 
 
@@ -566,7 +706,10 @@ def _apply_pushes(address, sim, data):
     for j in range(sim.disturbance_count):
         signal = disturbance_at(sim.disturbances, j)
         if signal.body >= 0:
-            if _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion) != 0:
+            if (
+                _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion)
+                != 0
+            ):
                 return record.RAISED
             for k in range(3):
                 data.xfrc_applied[signal.body + k] += sim.motion.value * signal.peak[k]
@@ -582,7 +725,10 @@ def _apply_wind(address, sim, data):
         sim.instant.stream = signal.stream
         for i in range(3 if signal.air != 0 else 0):
             sim.instant.channel = i
-            if _call(signal.function, i, address + record.AT.instant, address + record.AT.motion) != 0:
+            if (
+                _call(signal.function, i, address + record.AT.instant, address + record.AT.motion)
+                != 0
+            ):
                 return record.RAISED
             part = sim.motion.value * signal.peak[i]
             x, y, z = x + part * (i == 0), y + part * (i == 1), z + part * (i == 2)
@@ -594,7 +740,9 @@ def _apply_wind(address, sim, data):
 
 @njit(error_model="numpy", inline="always")
 def _add_force(data, channel, force, cartesian):
-    """Add a force to a channel: a horizontal one on its body, or one on its joint, if an actuator acts there."""
+    """Add a force to a channel: a horizontal one on its body, or one on its joint, if an actuator
+    acts there.
+    """
     if cartesian:
         data.xfrc_applied[channel.horizontal] += force
     elif channel.ctrl >= 0 and channel.qfrc >= 0:
@@ -605,12 +753,18 @@ def _add_force(data, channel, force, cartesian):
 
 @njit(error_model="numpy")
 def _evaluate_feedback(address, sim, data, signal, i, k):
-    """Write the force of a disturbance that sees the loop: the last one again if k < 0. Return 1 if it raised, or 0."""
+    """Write the force of a disturbance that sees the loop: the last one again if k < 0.
+
+    Return 1 if it raised, or 0.
+    """
     if i > 0 or k < 0:
         sim.motion.value = pointer(signal.function.memory)[0]
         return 0
     channel, sample, instant = channel_at(sim.channels, 0), log_at(sim.log, k * sim.n), sim.instant
-    before = sample.r if k == 0 else log_at(sim.log, (k - 1) * sim.n).r
+    if k == 0:
+        before = sample.r
+    else:
+        before = log_at(sim.log, (k - 1) * sim.n).r
     instant.e = data.qpos[channel.qpos] - sample.r
     instant.de, instant.s = data.qvel[channel.qvel] - (sample.r - before) / sim.period, sample.s
     return _call(signal.function, 0, address + record.AT.instant, address + record.AT.motion)
@@ -618,7 +772,9 @@ def _evaluate_feedback(address, sim, data, signal, i, k):
 
 @njit(error_model="numpy")
 def _apply_disturbances(address, sim, data, t, k):
-    """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at all others."""
+    """Apply the sum of the disturbances at time t, s; k is the sample at its first stage, and -1 at
+    all others.
+    """
     instant, motion = sim.instant, sim.motion
     instant.t, instant.seed = t, sim.seed
     if _apply_pushes(address, sim, data) != record.FINE:
@@ -634,9 +790,13 @@ def _apply_disturbances(address, sim, data, t, k):
             channel = channel_at(sim.channels, i)
             if signal.sees != 0:
                 raised = _evaluate_feedback(address, sim, data, signal, i, k)
-            elif signal.stream != 0.0 or i == 0:  # without random numbers it is the same in every channel
+            elif (
+                signal.stream != 0.0 or i == 0
+            ):  # without random numbers it is the same in every channel
                 instant.channel = i
-                raised = _call(signal.function, i, address + record.AT.instant, address + record.AT.motion)
+                raised = _call(
+                    signal.function, i, address + record.AT.instant, address + record.AT.motion
+                )
             else:
                 raised = 0
             if raised != 0:
@@ -644,7 +804,10 @@ def _apply_disturbances(address, sim, data, t, k):
             _add_force(data, channel, motion.value, signal.cartesian != 0)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
-        on_joint, horizontal = data.xfrc_applied[channel.xfrc], data.xfrc_applied[channel.horizontal]
+        on_joint, horizontal = (
+            data.xfrc_applied[channel.xfrc],
+            data.xfrc_applied[channel.horizontal],
+        )
         if not (math.isfinite(on_joint) and math.isfinite(horizontal)):
             return record.DISTURBANCE_NOT_FINITE
         if channel.qfrc >= 0 and not math.isfinite(data.qfrc_applied[channel.qfrc]):
@@ -654,7 +817,10 @@ def _apply_disturbances(address, sim, data, t, k):
 
 @njit(error_model="numpy", inline="always")
 def lever(channel, xipos, xanchor, xaxis):
-    """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force). All are flat arrays."""
+    """Return the torque of a horizontal force of 1 N about a hinge, m: axis . (arm x force).
+
+    All are flat arrays.
+    """
     j, k = channel.axis + 1, (channel.axis + 2) % 3
     arm_j = xipos[channel.hinge_body + j] - xanchor[channel.anchor + j]
     arm_k = xipos[channel.hinge_body + k] - xanchor[channel.anchor + k]
@@ -668,7 +834,10 @@ def _generalised_disturbance(data, channel):
         return data.qfrc_applied[channel.qfrc]
     d = channel.sign * data.xfrc_applied[channel.xfrc]
     if channel.hinge_body >= 0:
-        d += lever(channel, data.xipos, data.xanchor, data.xaxis) * data.xfrc_applied[channel.horizontal]
+        d += (
+            lever(channel, data.xipos, data.xanchor, data.xaxis)
+            * data.xfrc_applied[channel.horizontal]
+        )
     return d
 
 
@@ -677,13 +846,25 @@ def _apply_friction(address, sim, data):
     """Give every joint its friction by a formula for a physics step, see hardware/sliding.py."""
     inputs, outputs = sim.friction_input, sim.friction_output
     for i in range(sim.n):
-        channel, state, function = channel_at(sim.channels, i), state_at(sim.states, i), function_at(sim.frictions, i)
+        channel, state, function = (
+            channel_at(sim.channels, i),
+            state_at(sim.states, i),
+            function_at(sim.frictions, i),
+        )
         x, v, joint = data.qpos[channel.qpos], data.qvel[channel.qvel], channel.qvel
-        inputs.v, inputs.motor = v, data.actuator_force[channel.force] if channel.force >= 0 else 0.0
+        inputs.v, inputs.motor = (
+            v,
+            data.actuator_force[channel.force] if channel.force >= 0 else 0.0,
+        )
         inputs.load = data.qfrc_spring[joint] - data.qfrc_bias[joint]
         inputs.load += data.qfrc_constraint[joint] + _generalised_disturbance(data, channel)
         sim.seen.i = i
-        if _call(function, 0, address + record.AT.friction_input, address + record.AT.friction_output) != 0:
+        if (
+            _call(
+                function, 0, address + record.AT.friction_input, address + record.AT.friction_output
+            )
+            != 0
+        ):
             return record.RAISED
         f, low, high = outputs.f, outputs.low, outputs.high
         if state.stuck == 0.0:
@@ -722,18 +903,32 @@ def _apply_exact_friction(sim, data, stage):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         joint, drive = channel.qvel, data.ctrl[channel.ctrl] if channel.ctrl >= 0 else 0.0
         level = data.dof_frictionloss[joint]
-        others = data.qfrc_passive[joint] - data.qfrc_bias[joint] + _generalised_disturbance(data, channel)
+        others = (
+            data.qfrc_passive[joint]
+            - data.qfrc_bias[joint]
+            + _generalised_disturbance(data, channel)
+        )
         if stage == 0:
             state.smooth = others + (state.middle if sim.drive_step.rise_first != 0.0 else drive)
             v, mobility = data.qvel[joint], data.qLDiagInv[joint]
-            state.friction, state.friction_rise, held = _coulomb_step(v, state.smooth, level, mobility, sim.step)
+            state.friction, state.friction_rise, held = _coulomb_step(
+                v, state.smooth, level, mobility, sim.step
+            )
             sliding = 1.0 - held / sim.step
-            state.holding = 1.0 - sliding * sliding if held > 0.0 else 0.0
+            if held > 0.0:
+                state.holding = 1.0 - sliding * sliding
+            else:
+                state.holding = 0.0
             state.held += held
-        force = min(max(state.friction - state.holding * (others + drive - state.smooth), -level), level)
+        force = min(
+            max(state.friction - state.holding * (others + drive - state.smooth), -level), level
+        )
         weight = 3.0
         if stage % 3 == 0:  # the first stage, or the last
-            force += -state.friction_rise if stage == 0 else state.friction_rise
+            if stage == 0:
+                force += -state.friction_rise
+            else:
+                force += state.friction_rise
             weight = 6.0
         data.qfrc_applied[joint] += force
         state.reaction += force / weight
@@ -741,7 +936,9 @@ def _apply_exact_friction(sim, data, stage):
 
 @njit(error_model="numpy", inline="always")
 def _sum_forces(sim, data):
-    """Add the forces of the last physics step on each joint: of the drive, and of friction and contacts."""
+    """Add the forces of the last physics step on each joint: of the drive, and of friction and
+    contacts.
+    """
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         if channel.force >= 0 and sim.drive_step.rise_first == 0.0 and sim.motors == 0:
@@ -759,15 +956,24 @@ def _log(sim, data, k):
     for i in range(sim.n):
         channel, state = channel_at(sim.channels, i), state_at(sim.states, i)
         sample = log_at(sim.log, k * sim.n + i)
-        sample.x, sample.v = _position(data.qpos, channel.qpos, channel.turn), data.qvel[channel.qvel]
+        sample.x, sample.v = (
+            _position(data.qpos, channel.qpos, channel.turn),
+            data.qvel[channel.qvel],
+        )
         if channel.ctrl < 0:
             sample.applied = 0.0
         elif sim.mixer != 0:
-            sample.applied = state.delayed if sim.rotors != 0 else data.ctrl[channel.ctrl]
+            if sim.rotors != 0:
+                sample.applied = state.delayed
+            else:
+                sample.applied = data.ctrl[channel.ctrl]
         else:
             applied, limit = data.ctrl[channel.ctrl] / sim.scale, pointer(sim.limits)[i]
             # the quotient may round to just beyond the limit
-            sample.applied = min(max(applied, -limit), limit) if sim.has_drives == 0 else state.delayed
+            if sim.has_drives == 0:
+                sample.applied = min(max(applied, -limit), limit)
+            else:
+                sample.applied = state.delayed
         sample.d = _generalised_disturbance(data, channel)
         sample.force, sample.reaction = state.force / sim.steps, state.reaction / sim.steps
         sample.held = state.held

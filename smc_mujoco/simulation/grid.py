@@ -2,16 +2,16 @@
 
     scenarios = smc.grid(["duffing", arm], ["classical", my_law], ["noise", worn_gear], seeds=16)
 
-Plants, laws and conditions are names in the suite, or the user's objects. A seed gives all laws and conditions the same
-start. Seed 0 is x0 itself. Seed s starts channel i from
+Plants, laws and conditions are names in the suite, or the user's objects. A seed gives all laws and
+conditions the same start. Seed 0 is x0 itself. Seed s starts channel i from
 
     x_i = x0_i (1 + spread z_i) + by z_i,    z_i uniform in [-1, 1], drawn from (s, i)
 
-A free body may rest anywhere, so that x0 is no scale. It starts at x_i = x0_i + (spread + by) z_i, in m and rad, also
-from seed 0.
+A free body may rest anywhere, so that x0 is no scale. It starts at x_i = x0_i + (spread + by) z_i,
+in m and rad, also from seed 0.
 
-A run with contacts must start clear of its obstacles. There -|z_i| replaces z_i, which moves the start inwards, and
-pendulums that may touch each other ("bobs") start in order from left to right.
+A run with contacts must start clear of its obstacles. There -|z_i| replaces z_i, which moves the
+start inwards, and pendulums that may touch each other ("bobs") start in order from left to right.
 """
 
 import dataclasses
@@ -53,7 +53,8 @@ LawOfSeed = Callable[[int], Law]  # seed -> the law of that run
 MAX_REST_ACCELERATION = 1e-9  # rad/s^2 or m/s^2; chosen: rounding stays below
 SPREAD = 0.2  # of x0, to either side; chosen
 GRID_SEEDS = 2**52  # number of a grid's seeds; tuning takes larger ones
-START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"  # where a plant starts at 0
+# where a plant starts at 0
+START_CURE = "say where its runs begin, with starts=smc.starts(x0=0.5) or --x0 0.5"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -65,19 +66,27 @@ class Starts:
     by: float = 0.0
 
     def largest(self, scenario: Scenario) -> float:
-        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0, rad or m.
+        """Return the largest |x| of any channel at the middle of the starts, or `by` if all are 0,
+        rad or m.
 
-        Of a free body it is the largest distance from rest along an axis, m, from which a run may start.
+        Of a free body it is the largest distance from rest along an axis, m, from which a run may
+        start.
         """
         middle, plant = scenario.resolved.x0 if self.x0 is None else self.x0, scenario.plant
         if plant.pose:
-            return max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False)) + self.spread + self.by
+            return (
+                max(abs(x - r) for x, r in zip(middle[:3], plant.rest, strict=False))
+                + self.spread
+                + self.by
+            )
         return max(abs(x) for x in middle) or self.by
 
     def check_condition(self, name: str, fields: Mapping[str, Any]) -> None:
         """Raise ScenarioError if both the starts and the fields of a condition set x0."""
         if self.x0 is not None and "x0" in fields:
-            raise ScenarioError(f"condition {name!r} and the starts, or --x0, both set x0: give one of them")
+            raise ScenarioError(
+                f"condition {name!r} and the starts, or --x0, both set x0: give one of them"
+            )
 
     def place(self, scenario: Scenario, seed: int) -> Scenario:
         """Return a scenario with a seed, from the start that belongs to the seed."""
@@ -87,32 +96,46 @@ class Starts:
             return dataclasses.replace(scenario, seed=0)
         kind = scenario.contact.kind
         z = [np.random.default_rng([seed, i]).uniform(-1.0, 1.0) for i in range(scenario.plant.n)]
-        z = z if kind == "none" else [-abs(factor) for factor in z]
+        if kind != "none":
+            z = [-abs(factor) for factor in z]
         if scenario.plant.pose:
-            moved = [x + (self.spread + self.by) * factor for x, factor in zip(scenario.resolved.x0, z, strict=True)]
+            moved = [
+                x + (self.spread + self.by) * factor
+                for x, factor in zip(scenario.resolved.x0, z, strict=True)
+            ]
             return dataclasses.replace(scenario, seed=seed, x0=moved)
-        x0 = [
-            x * (1.0 + self.spread * factor) + (self.by if x >= 0.0 else -self.by) * factor
-            for x, factor in zip(scenario.resolved.x0, z, strict=True)
-        ]
+        x0 = []
+        for x, factor in zip(scenario.resolved.x0, z, strict=True):
+            x0.append(
+                x * (1.0 + self.spread * factor) + (self.by if x >= 0.0 else -self.by) * factor
+            )
         return dataclasses.replace(scenario, seed=seed, x0=sorted(x0) if kind == "bobs" else x0)
 
 
 @constrained
-def starts(x0: float | Sequence[float] | None = None, spread: Natural = SPREAD, by: Natural = 0.0) -> Starts:
+def starts(
+    x0: float | Sequence[float] | None = None, spread: Natural = SPREAD, by: Natural = 0.0
+) -> Starts:
     """Return where the runs of a grid begin, by seed.
 
     Args:
-      x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default: the plant's x0.
-      spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more; of a free body in m and
-        rad.
+      x0: the middle of all starts, rad or m: one number for all channels, or one for each. Default:
+        the plant's x0.
+      spread: how far starts lie to either side of the middle, as a fraction of it, 0 or more; of a
+        free body in m and rad.
       by: a distance that is added to it, rad or m, 0 or more; for a plant that rests at 0.
 
     Raises:
       ScenarioError: a number out of its range.
     """
-    items = items_of("x0", x0) if isinstance(x0, Sequence) and not isinstance(x0, str) else [x0]
-    middle = None if x0 is None else tuple(number("x0", item) for item in items)
+    if isinstance(x0, Sequence) and not isinstance(x0, str):
+        items = items_of("x0", x0)
+    else:
+        items = [x0]
+    if x0 is None:
+        middle = None
+    else:
+        middle = tuple(number("x0", item) for item in items)
     return Starts(x0=middle, spread=spread, by=by)
 
 
@@ -126,37 +149,52 @@ def grid(
     duration: float = DURATION,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Return scenarios of every plant, condition, law and seed. The plant varies slowest, then condition, law and seed.
+    """Return scenarios of every plant, condition, law and seed.
+
+    The plant varies slowest, then condition, law and seed.
 
     Args:
       plants: names or Plants, one or several.
-      laws: names, which get their gains from the set `gains`, or laws with their own gains, also as text, see `law`.
-      conditions: names, such as "noise" or "noise + coulomb", or your own conditions, see `condition`.
-      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise, the same in every
-        condition and under every law; see `starts`. If a law was tuned several times, the seed also selects which of
-        its gains are used.
+      laws: names, which get their gains from the set `gains`, or laws with their own gains, also as
+        text, see `law`.
+      conditions: names, such as "noise" or "noise + coulomb", or your own conditions, see
+        `condition`.
+      seeds: a number of seeds, 0, 1, ..., or the seeds themselves. A seed is a start and a noise,
+        the same in every condition and under every law; see `starts`. If a law was tuned several
+        times, the seed also selects which of its gains are used.
       gains: "study", "tuned", "tracking" or "default", see `gains`.
       duration: of each run, s.
       starts: where runs begin, by seed. Default: within 20 % of the plant's own x0.
 
     Raises:
-      ScenarioError: an unknown name, different plants, laws or conditions of the same name, no gains in the set, runs
-        that begin at rest at 0 and stay there, or more than a million runs.
+      ScenarioError: an unknown name, different plants, laws or conditions of the same name, no
+        gains in the set, runs that begin at rest at 0 and stay there, or more than a million runs.
 
     Warns:
       ScenarioWarning: gains of a set that were tuned for other parameters of the plant.
     """
-    seeds = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)))
-    plants, laws, conditions = listed("plants", plants), listed_laws(laws), listed("conditions", conditions)
+    seeds = listed(
+        "seeds",
+        seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_ITEMS)),
+    )
+    plants, laws, conditions = (
+        listed("plants", plants),
+        listed_laws(laws),
+        listed("conditions", conditions),
+    )
     if (runs := len(plants) * len(laws) * len(conditions) * len(seeds)) > MAX_ITEMS:
-        raise ScenarioError(f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most")
+        raise ScenarioError(
+            f"the grid has {runs:,} runs: give fewer seeds, {MAX_ITEMS:,} runs at most"
+        )
     conditions = [find_condition(condition) for condition in conditions]
     check_names(plants, laws, conditions)
 
     def laws_on(plant: Plant) -> list[LawOfSeed]:
         return [lambda seed, law=law: _law(plant, law, gains, seed) for law in laws]
 
-    return all_combinations([as_plant(plant) for plant in plants], laws_on, conditions, seeds, duration, starts)
+    return all_combinations(
+        [as_plant(plant) for plant in plants], laws_on, conditions, seeds, duration, starts
+    )
 
 
 def all_combinations(
@@ -167,14 +205,21 @@ def all_combinations(
     duration: float,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Return scenarios as `grid` does. `laws` returns, for a plant, functions seed -> law, one for each law."""
+    """Return scenarios as `grid` does.
+
+    `laws` returns, for a plant, functions seed -> law, one for each law.
+    """
     scenarios = []
     for plant in plants:
         for condition in conditions:
-            runs = [
-                [case(plant, law(seed), condition, duration, seed=seed, starts=starts) for seed in seeds]
-                for law in laws(plant)
-            ]
+            runs = []
+            for law in laws(plant):
+                runs.append(
+                    [
+                        case(plant, law(seed), condition, duration, seed=seed, starts=starts)
+                        for seed in seeds
+                    ]
+                )
             check_moving(runs[0])
             scenarios += itertools.chain.from_iterable(runs)
     return scenarios
@@ -193,10 +238,17 @@ def case(
 ) -> Scenario:
     """Return one run of a grid, with `changes` of the fields that its condition sets."""
     plant, condition = as_plant(plant), find_condition(condition)
-    fields: dict[str, Any] = {"plant": plant, "law": _law(plant, law, gains, seed), "duration": duration}
+    fields: dict[str, Any] = {
+        "plant": plant,
+        "law": _law(plant, law, gains, seed),
+        "duration": duration,
+    }
     if plant.name in sets.STUDY:
         fields |= {"control_period": CONTROL_PERIOD, "u_max": U_MAX}
-    of_condition, starts = condition.on(plant, duration), checked_starts(Starts() if starts is None else starts)
+    of_condition, starts = (
+        condition.on(plant, duration),
+        checked_starts(Starts() if starts is None else starts),
+    )
     starts.check_condition(condition.name, of_condition)
     scenario = Scenario(**fields | of_condition | dict(changes))
     return starts.place(scenario, seed).named(condition.name)
@@ -210,7 +262,9 @@ def checked_starts(given: object) -> Starts:
 
 
 def check_moving(runs: Sequence[Scenario]) -> None:
-    """Raise ScenarioError if none of the runs, which differ only in their seeds, moves under any law."""
+    """Raise ScenarioError if none of the runs, which differ only in their seeds, moves under any
+    law.
+    """
     if all(map(_stays_at_rest, runs)):
         first = runs[0]
         raise ScenarioError(
@@ -220,9 +274,21 @@ def check_moving(runs: Sequence[Scenario]) -> None:
 
 
 def _stays_at_rest(scenario: Scenario) -> bool:
-    """Return whether a run begins at rest at its reference 0, and neither a force nor a sensor ever moves it."""
-    moved = any(scenario.resolved.x0) or any(scenario.resolved.v0) or scenario.disturbance or scenario.sensor
-    if moved or scenario.feedforward or scenario.noise != Noise() or scenario.resolved.reference != REST:
+    """Return whether a run begins at rest at its reference 0, and neither a force nor a sensor ever
+    moves it.
+    """
+    moved = (
+        any(scenario.resolved.x0)
+        or any(scenario.resolved.v0)
+        or scenario.disturbance
+        or scenario.sensor
+    )
+    if (
+        moved
+        or scenario.feedforward
+        or scenario.noise != Noise()
+        or scenario.resolved.reference != REST
+    ):
         return False
     model = with_values(compile_model(scenario), scenario)
     data = mujoco.MjData(model)
@@ -232,14 +298,22 @@ def _stays_at_rest(scenario: Scenario) -> bool:
 
 
 def check_names(
-    plants: Sequence[str | Plant], laws: Sequence[str | Law | Template], conditions: Sequence[Condition]
+    plants: Sequence[str | Plant],
+    laws: Sequence[str | Law | Template],
+    conditions: Sequence[Condition],
 ) -> None:
-    """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables show only names."""
+    """Raise ScenarioError if two different plants, laws or conditions have the same name, as tables
+    show only names.
+    """
     chosen_plants = [as_plant(plant) for plant in plants]
     chosen_laws = [law if isinstance(law, str) else coerce.law(law) for law in laws]
     # each thing with its name and what distinguishes it from others
     for what, cure, things in (
-        ("plants", "give each its own grid", [(p.name, p, (p.build, p.parameters, p.n)) for p in chosen_plants]),
+        (
+            "plants",
+            "give each its own grid",
+            [(p.name, p, (p.build, p.parameters, p.n)) for p in chosen_plants],
+        ),
         (
             "laws",
             "name one of them, as smc.law(...).named('slow') or --law \"slow: classical(k=2)\"",
@@ -262,7 +336,10 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
     gains = "default" if law == "none" else gains
     with_gains, standard = sets.law(plant, law, gains, seed), catalogue().get(plant.name)
     if gains != "default" and standard is not None and plant.parameters != standard.parameters:
-        changed = [f"{name} = {v:g}" for name, v in plant.parameters.items() if v != standard.parameters[name]]
+        changed = []
+        for name, v in plant.parameters.items():
+            if v != standard.parameters[name]:
+                changed.append(f"{name} = {v:g}")
         warnings.warn(
             f"gains of set {gains!r} were tuned for {plant.name} with its default parameters, and this one has "
             f"{', '.join(changed)}: tune the law on it, or give the law's gains yourself",
@@ -273,15 +350,26 @@ def _law(plant: Plant, law: str | Law | Template, gains: str, seed: int) -> Comp
 
 
 def listed_laws(laws: object) -> list[str | Law | Template]:
-    """Return one or several laws as a list. Names of the library's laws stay names; other texts become laws."""
+    """Return one or several laws as a list.
+
+    Names of the library's laws stay names; other texts become laws.
+    """
     values = listed("laws", laws)
-    return [law for value in values for law in (from_text.laws(value) if isinstance(value, str) else [value])]
+    return [
+        law
+        for value in values
+        for law in (from_text.laws(value) if isinstance(value, str) else [value])
+    ]
 
 
 def listed(what: str, values: object) -> list:
     """Return one or several values as a list."""
     if isinstance(values, str | Plant | Component | Template | Condition):
         return [values]
-    if isinstance(values, bytes | Mapping) or not isinstance(values, Iterable) or not (items := items_of(what, values)):
+    if (
+        isinstance(values, bytes | Mapping)
+        or not isinstance(values, Iterable)
+        or not (items := items_of(what, values))
+    ):
         raise ScenarioError(f"{what} is {shown(values)}: give several, such as a list")
     return items

@@ -1,7 +1,9 @@
-"""A scenario's plant and parts as one compiled MuJoCo model, and the model fields that its numbers set.
+"""A scenario's plant and parts as one compiled MuJoCo model, and the model fields that its numbers
+set.
 
-Scenarios of the same `structure` share a `Mechanism`, with one compiled base model. Their mechanisms differ only in
-values of model fields. A Batch has those values separately for each simulation.
+Scenarios of the same `structure` share a `Mechanism`, with one compiled base model. Their
+mechanisms differ only in values of model fields. A Batch has those values separately for each
+simulation.
 """
 
 import collections
@@ -36,18 +38,33 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.state import CHANNEL
 
-USERDATA = 2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
+USERDATA = (
+    2  # numbers in mjData.userdata: callback.magic() and the address of the simulation's record
+)
 PATH_POINTS = 400  # points that are checked on the path to a start: 1 cm apart on the longest rail
-SENSORS = {"x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS, "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL}
-POSE_SENSORS = {"x_sensor": (":x", ":q"), "v_sensor": (":v", ":w")}  # ends of the names of a free body's sensors
+SENSORS = {
+    "x_sensor": mujoco.mjtSensor.mjSENS_JOINTPOS,
+    "v_sensor": mujoco.mjtSensor.mjSENS_JOINTVEL,
+}
+POSE_SENSORS = {
+    "x_sensor": (":x", ":q"),
+    "v_sensor": (":v", ":w"),
+}  # ends of the names of a free body's sensors
 MAX_RECENT = 16  # mechanisms that are kept for later runs, as those of a search for gains; chosen
-MAX_OVERLAP = 1e-3  # m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
+# m, at a start; chosen: bodies in contact overlap by less, so a deeper start begins with a blow
+MAX_OVERLAP = 1e-3
 
 
 def parts(scenario: Scenario) -> tuple[Part, ...]:
     """Return the scenario's parts, in the order in which they are added to the model."""
-    contact = () if scenario.contact.kind == "none" else (scenario.contact,)
-    sensor = () if scenario.sensor is None else (scenario.sensor,)
+    if scenario.contact.kind == "none":
+        contact = ()
+    else:
+        contact = (scenario.contact,)
+    if scenario.sensor is None:
+        sensor = ()
+    else:
+        sensor = (scenario.sensor,)
     actuator = tuple(part for part in scenario.actuator if not part.in_callback)
     return (*contact, *scenario.friction, *actuator, *sensor)
 
@@ -58,7 +75,16 @@ def structure(scenario: Scenario) -> Hashable:
     of_parts = tuple(part.structure() for part in parts(scenario))
     edits = plant.contacts.get(scenario.contact.kind), plant.mechanisms.get(scenario.mechanism)
     stepping = scenario.resolved.integrator, scenario.resolved.physics_step, scenario.exact_friction
-    return plant.build, plant.fields, plant.n, edits, of_parts, scenario.readings, pushed(scenario), *stepping
+    return (
+        plant.build,
+        plant.fields,
+        plant.n,
+        edits,
+        of_parts,
+        scenario.readings,
+        pushed(scenario),
+        *stepping,
+    )
 
 
 def pushed(scenario: Scenario) -> frozenset[str]:
@@ -72,15 +98,22 @@ class Mechanism:
 
     model: mujoco.MjModel  # the base model, without the values of a scenario and without scenery
     channels: np.ndarray  # the indices of the channels in it, (n,) CHANNEL
-    free_starts: set[Hashable] = dataclasses.field(default_factory=set)  # those that `check_start` has passed
+    free_starts: set[Hashable] = dataclasses.field(
+        default_factory=set
+    )  # those that `check_start` has passed
 
 
-_mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = weakref.WeakValueDictionary()  # by structure
+_mechanisms: weakref.WeakValueDictionary[Hashable, Mechanism] = (
+    weakref.WeakValueDictionary()
+)  # by structure
 _recent: collections.deque[Mechanism] = collections.deque(maxlen=MAX_RECENT)
 
 
 def mechanism(scenario: Scenario) -> Mechanism:
-    """Return the Mechanism of a scenario. It is kept while a prepared scenario uses it, or it is a recent one."""
+    """Return the Mechanism of a scenario.
+
+    It is kept while a prepared scenario uses it, or it is a recent one.
+    """
     key = structure(scenario)
     if (shared := _mechanisms.get(key)) is None:
         base = compile_model(scenario, USERDATA, scenery=False)
@@ -91,65 +124,101 @@ def mechanism(scenario: Scenario) -> Mechanism:
 
 
 def channels(model: mujoco.MjModel) -> np.ndarray:
-    """Return the channels, (n,) CHANNEL: one for each actuator that takes commands, then one for each other joint.
+    """Return the channels, (n,) CHANNEL: one for each actuator that takes commands, then one for
+    each other joint.
 
-    A disturbance d acts on the body of the joint, as a force along the axis of a slide or a torque about the axis of a
-    hinge, so that its generalised force is d. A horizontal force acts on the body's centre of mass.
+    A disturbance d acts on the body of the joint, as a force along the axis of a slide or a torque
+    about the axis of a hinge, so that its generalised force is d. A horizontal force acts on the
+    body's centre of mass.
     """
     if free_joint(model) >= 0:
         return _pose_channels(model)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     for i in drive_ids(model):
-        if model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT or model.actuator_gear[i, 0] != 1.0:
-            raise ScenarioError(f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one")
+        if (
+            model.actuator_trntype[i] != mujoco.mjtTrn.mjTRN_JOINT
+            or model.actuator_gear[i, 0] != 1.0
+        ):
+            raise ScenarioError(
+                f"actuator {model.actuator(i).name!r} does not drive a joint with gear 1: give it one"
+            )
     joints, drives = joint_ids(model).tolist(), drive_ids(model).tolist()
     drives += [-1] * (len(joints) - len(drives))
-    rows = [_channel(model, data, drive, joint) for drive, joint in zip(drives, joints, strict=True)]
+    rows = []
+    for drive, joint in zip(drives, joints, strict=True):
+        rows.append(_channel(model, data, drive, joint))
     return np.array([tuple(one[name] for name in CHANNEL.names or ()) for one in rows], CHANNEL)
 
 
 def _channel(model: mujoco.MjModel, data: mujoco.MjData, drive: int, joint: int) -> dict[str, int]:
     """Return the fields of a CHANNEL; `drive` is -1 for a joint without an actuator."""
     body = int(model.jnt_bodyid[joint])
-    name = f"actuator {model.actuator(drive).name!r}" if drive >= 0 else f"sensor of joint {model.joint(joint).name!r}"
+    if drive >= 0:
+        name = f"actuator {model.actuator(drive).name!r}"
+    else:
+        name = f"sensor of joint {model.joint(joint).name!r}"
     hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
     if not hinge and model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
         raise ScenarioError(f"{name} is not on a hinge or slide joint: give it one")
     direct = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, DIRECT_TEXT) >= 0
-    axis = np.array([0.0, 0.0, 1.0]) if direct else data.xaxis[joint].round(12)  # a direct channel may have any axis
+    # a direct channel may have any axis
+    if direct:
+        axis = np.array([0.0, 0.0, 1.0])
+    else:
+        axis = data.xaxis[joint].round(12)
     if np.count_nonzero(axis) != 1:
         raise ScenarioError(f"the joint of {name} has axis {axis}: align it with a world axis")
     component = int(np.argmax(np.abs(axis)))
-    friction = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name)
+    friction = mujoco.mj_name2id(
+        model, mujoco.mjtObj.mjOBJ_ACTUATOR, PASSIVE + model.joint(joint).name
+    )
     computed = friction >= 0 and model.actuator_ctrlnum[friction] > 0  # a friction by a formula
     xfrc, sign = 6 * body + component + 3 * hinge, int(np.sign(axis[component]))
     indices = {
-        "turn": -1, "gathered": -1, "qpos": model.jnt_qposadr[joint], "qvel": model.jnt_dofadr[joint], "xfrc": xfrc,
-        "sign": sign, "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
+        "turn": -1,
+        "gathered": -1,
+        "qpos": model.jnt_qposadr[joint],
+        "qvel": model.jnt_dofadr[joint],
+        "xfrc": xfrc,
+        "sign": sign,
+        "ctrl": model.actuator_ctrladr[drive] if drive >= 0 else -1,
         "force": model.actuator_outadr[drive] if drive >= 0 else -1,
         "shaft": model.jnt_dofadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
-        "shaft_qpos": model.jnt_qposadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1, "horizontal": xfrc,
-        "axis": 0, "hinge_body": -1, "anchor": -1,
+        "shaft_qpos": model.jnt_qposadr[model.actuator_trnid[drive, 0]] if drive >= 0 else -1,
+        "horizontal": xfrc,
+        "axis": 0,
+        "hinge_body": -1,
+        "anchor": -1,
         "friction_force": -1 if friction < 0 else model.actuator_outadr[friction],
         "friction_ctrl": model.actuator_ctrladr[friction] if computed else -1,
         "qfrc": model.jnt_dofadr[joint] if direct else -1,
-    }  # fmt: skip
+    }
     if hinge:
         across = int(component == 0)  # a horizontal axis across that of the hinge
-        indices |= {"horizontal": 6 * body + across, "axis": across, "hinge_body": 3 * body, "anchor": 3 * joint}
+        indices |= {
+            "horizontal": 6 * body + across,
+            "axis": across,
+            "hinge_body": 3 * body,
+            "anchor": 3 * joint,
+        }
     for field, kind in SENSORS.items():
         sensors = np.flatnonzero((model.sensor_type == kind) & (model.sensor_objid == joint))
         if not len(sensors):
-            raise ScenarioError(f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one")
+            raise ScenarioError(
+                f"the joint of {name} has no {kind.name[7:].lower()} sensor: add one"
+            )
         indices[field] = model.sensor_adr[sensors[0]]
     return indices
 
 
 def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
-    """Return the channels of a free body, (6,) CHANNEL. The first ones have the ctrl of the actuators.
+    """Return the channels of a free body, (6,) CHANNEL.
 
-    A disturbance is a force on its centre of mass, the same along each axis of the world; a horizontal one is along x.
+    The first ones have the ctrl of the actuators.
+
+    A disturbance is a force on its centre of mass, the same along each axis of the world; a
+    horizontal one is along x.
     """
     joint, drives = free_joint(model), drive_ids(model)
     table = np.full(len(PLACES), -1, [(name, "i8") for name in CHANNEL.names or ()])
@@ -160,7 +229,9 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
     table["qpos"] = model.jnt_qposadr[joint] + np.minimum(at, 3)
     table["qvel"] = table["gathered"] = model.jnt_dofadr[joint] + at
     table["xfrc"] = 6 * model.jnt_bodyid[joint] + at
-    table["horizontal"] = np.where(at == 0, table["xfrc"], 0)  # 0 is of the world, which no force moves
+    table["horizontal"] = np.where(
+        at == 0, table["xfrc"], 0
+    )  # 0 is of the world, which no force moves
     table["turn"], table["sign"] = np.where(turns < 0, -1, turns), np.where(turns < 0, 1, 0)
     table["ctrl"][: len(drives)] = model.actuator_ctrladr[drives]
     return table.astype(CHANNEL)
@@ -168,9 +239,11 @@ def _pose_channels(model: mujoco.MjModel) -> np.ndarray:
 
 @functools.lru_cache(maxsize=32)
 def mixer(plant: Plant) -> np.ndarray:
-    """Return what the actuators of a free body get of a force and a torque, and their bounds, (actuators, 8).
+    """Return what the actuators of a free body get of a force and a torque, and their bounds,
+    (actuators, 8).
 
-    It is the pseudoinverse of what they nominally exert: exact for what they can exert together, else nearest to it.
+    It is the pseudoinverse of what they nominally exert: exact for what they can exert together,
+    else nearest to it.
     """
     model = plant.load()
     drives = drive_ids(model)
@@ -199,21 +272,30 @@ def spec(scenario: Scenario) -> mujoco.MjSpec:
 
 
 def without_scenery(spec: mujoco.MjSpec, pushed: Collection[str] = ()) -> None:
-    """Delete cameras, lights, the geoms that touch nothing, and fixed bodies that then have nothing, unless pushed.
+    """Delete cameras, lights, the geoms that touch nothing, and fixed bodies that then have
+    nothing, unless pushed.
 
-    MuJoCo computes their poses at every step, in up to 28 % of its time. What something refers to stays, and so do
-    geoms from which a moving body has its inertia.
+    MuJoCo computes their poses at every step, in up to 28 % of its time. What something refers to
+    stays, and so do geoms from which a moving body has its inertia.
     """
-    needed = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+    needed = set()
+    for pair in spec.pairs:
+        for name in (pair.geomname1, pair.geomname2):
+            needed.add(name)
     needed |= {name for sensor in spec.sensors for name in (sensor.objname, sensor.refname)}
     needed |= {wrap.target.name for tendon in spec.tendons for wrap in tendon.path if wrap.target}
-    untouched = [geom for geom in spec.geoms if not geom.contype and not geom.conaffinity and geom.name not in needed]
+    untouched = []
+    for geom in spec.geoms:
+        if not geom.contype and not geom.conaffinity and geom.name not in needed:
+            untouched.append(geom)
     scenery = [geom for geom in untouched if geom.parent.explicitinertial or _is_fixed(geom.parent)]
     for element in (*spec.cameras, *spec.lights, *spec.skins, *scenery):
         spec.delete(element)
     needed.update(pushed)
     for body in reversed(spec.bodies[1:]):
-        empty = not any((*body.geoms, *body.sites, *body.bodies, *body.frames, body.explicitinertial))
+        empty = not any(
+            (*body.geoms, *body.sites, *body.bodies, *body.frames, body.explicitinertial)
+        )
         if empty and _is_fixed(body) and body.name not in needed:
             spec.delete(body)
 
@@ -226,8 +308,9 @@ def _is_fixed(body: mujoco.MjsBody | None) -> bool:
 def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) -> mujoco.MjModel:
     """Return the base model of a scenario's structure: compiled, without the scenario's values.
 
-    It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at each compilation,
-    in three quarters of its time. Users' models always keep their scenery: a fixed part may be a floor.
+    It is not for pictures. Its procedural textures have a few pixels, because MuJoCo paints them at
+    each compilation, in three quarters of its time. Users' models always keep their scenery: a
+    fixed part may be a floor.
     """
     edited = spec(scenario)
     if not (scenery or scenario.plant.direct):
@@ -238,7 +321,9 @@ def compile_model(scenario: Scenario, nuserdata: int = 0, scenery: bool = True) 
 
 
 def compiled(spec: mujoco.MjSpec, scenario: Scenario, nuserdata: int = 0) -> mujoco.MjModel:
-    """Return the model of a mechanism, with the step and the integrator of a scenario, and without its values."""
+    """Return the model of a mechanism, with the step and the integrator of a scenario, and without
+    its values.
+    """
     model, resolved = compiled_for_runs(spec, nuserdata), scenario.resolved
     model.opt.timestep = resolved.physics_step
     model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{resolved.integrator.upper()}")
@@ -255,8 +340,13 @@ def with_values(base: mujoco.MjModel, scenario: Scenario, step: int = 0) -> mujo
     return model
 
 
-def put_values(model: mujoco.MjModel, base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Write a scenario's field values into a copy of the base model, and return them. The caller calls mj_setConst."""
+def put_values(
+    model: mujoco.MjModel, base: mujoco.MjModel, scenario: Scenario, step: int
+) -> dict[str, np.ndarray]:
+    """Write a scenario's field values into a copy of the base model, and return them.
+
+    The caller calls mj_setConst.
+    """
     values = field_values(base, scenario, step)
     for name, value in values.items():
         field_array(model, name)[:] = value
@@ -264,13 +354,23 @@ def put_values(model: mujoco.MjModel, base: mujoco.MjModel, scenario: Scenario, 
 
 
 def field_values(base: mujoco.MjModel, scenario: Scenario, step: int) -> dict[str, np.ndarray]:
-    """Return model field -> its values from a physics step on, for every field that the scenario sets."""
+    """Return model field -> its values from a physics step on, for every field that the scenario
+    sets.
+    """
     plant, written = scenario.plant, {}
-    fields = plant.fields if scenario.mechanism == "equation" else plant.mechanisms[scenario.mechanism].fields
+    if scenario.mechanism == "equation":
+        fields = plant.fields
+    else:
+        fields = plant.mechanisms[scenario.mechanism].fields
     of_parts = (part.fields(base) for part in parts(scenario))
-    for name, index, value, adds in itertools.chain(fields(base, plant.values(scenario.factors(step))), *of_parts):
+    for name, index, value, adds in itertools.chain(
+        fields(base, plant.values(scenario.factors(step))), *of_parts
+    ):
         values = written.setdefault(name, field_array(base, name).copy())
-        values[index] = values[index] + value if adds else value
+        if adds:
+            values[index] = values[index] + value
+        else:
+            values[index] = value
     return written
 
 
@@ -280,15 +380,21 @@ def initial_state(model: mujoco.MjModel, scenario: Scenario) -> tuple[np.ndarray
 
 
 def moving_joints(model: mujoco.MjModel) -> np.ndarray:
-    """Return the joints of the channels and those that their actuators drive, rotors or the same joints, (2, n)."""
+    """Return the joints of the channels and those that their actuators drive, rotors or the same
+    joints, (2, n).
+    """
     if free_joint(model) >= 0:
         return np.array([joint_ids(model)] * 2)
     joints, driven = joint_ids(model), model.actuator_trnid[drive_ids(model), 0]
     return np.array([joints, [*driven, *joints[len(driven) :]]])
 
 
-def state_with(model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in `initial_pose`."""
+def state_with(
+    model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return qpos and qvel with `moving_joints` at the channels' x and v, and other joints as in
+    `initial_pose`.
+    """
     qpos, qvel = initial_pose(model), np.zeros(model.nv)
     if (free := free_joint(model)) >= 0:
         first, dof = model.jnt_qposadr[free], model.jnt_dofadr[free]
@@ -299,7 +405,9 @@ def state_with(model: mujoco.MjModel, joints: np.ndarray, x: Any, v: Any) -> tup
 
 
 def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scenario) -> None:
-    """Write a scenario's state at t = 0 into the data of its model, with the past readings of delayed sensors."""
+    """Write a scenario's state at t = 0 into the data of its model, with the past readings of
+    delayed sensors.
+    """
     data.qpos[:], data.qvel[:] = initial_state(model, scenario)
     if scenario.plant.pose and model.nkey:  # thrust behind a lag
         data.act[:] = model.key_act[0]
@@ -308,9 +416,11 @@ def put_initial_state(model: mujoco.MjModel, data: mujoco.MjData, scenario: Scen
 
 
 def check_start(shared: Mechanism, scenario: Scenario) -> None:
-    """Raise ScenarioError if a scenario starts inside an obstacle, or beyond a stop that it could not pass.
+    """Raise ScenarioError if a scenario starts inside an obstacle, or beyond a stop that it could
+    not pass.
 
-    A check of many pendulums takes 40 ms, and most runs of a grid share their starts, so free ones are remembered.
+    A check of many pendulums takes 40 ms, and most runs of a grid share their starts, so free ones
+    are remembered.
     """
     inputs = scenario.plant, scenario.contact, scenario.resolved.x0, frozen(scenario.factors(0))
     if scenario.contact.kind == "none" or inputs in shared.free_starts:
@@ -322,14 +432,22 @@ def check_start(shared: Mechanism, scenario: Scenario) -> None:
 
 
 def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
-    """Check that the path from the plant's default start, or from 0 if that is not free, crosses no obstacle."""
+    """Check that the path from the plant's default start, or from 0 if that is not free, crosses no
+    obstacle.
+    """
     data, qpos = mujoco.MjData(model), initial_state(model, scenario)[0]
     inside, beyond = _overlap(model, data, qpos), None
-    moves_around = scenario.plant.tip  # an arm: the straight line in its joints may cross what the arm goes around
+    moves_around = (
+        scenario.plant.tip
+    )  # an arm: the straight line in its joints may cross what the arm goes around
     if not inside and scenario.resolved.x0 != scenario.plant.x0 and not moves_around:
         free = initial_state(model, dataclasses.replace(scenario, x0=scenario.plant.x0))[0]
-        free = model.qpos0 if _overlap(model, data, free) else free
-        path = (_overlap(model, data, (1 - part) * free + part * qpos) for part in np.linspace(0, 1, PATH_POINTS))
+        if _overlap(model, data, free):
+            free = model.qpos0
+        path = (
+            _overlap(model, data, (1 - part) * free + part * qpos)
+            for part in np.linspace(0, 1, PATH_POINTS)
+        )
         beyond = next(filter(None, path), None)
     if overlap := inside or beyond:
         raise ScenarioError(
@@ -338,7 +456,9 @@ def _check_path(model: mujoco.MjModel, scenario: Scenario) -> None:
         )
 
 
-def _overlap(model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> tuple[str, str] | None:
+def _overlap(
+    model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray
+) -> tuple[str, str] | None:
     """Return the names of two geoms that overlap at qpos by more than MAX_OVERLAP, or None."""
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)

@@ -1,8 +1,9 @@
-"""Counter-based normal numbers: no generator state, the same numbers in any order and on any thread.
+"""Counter-based normal numbers: no generator state, the same numbers in any order and on any
+thread.
 
-Philox4x64-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011), bit for bit
-numpy.random.Philox(key=(seed, channel), counter=(k - 1, stream, 0, 0)).random_raw(4), and the Box-Muller
-transform (Box & Muller 1958, Ann. Math. Stat. 29:610) of its words.
+Philox4x64-10 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011),
+bit for bit numpy.random.Philox(key=(seed, channel), counter=(k - 1, stream, 0, 0)).random_raw(4),
+and the Box-Muller transform (Box & Muller 1958, Ann. Math. Stat. 29:610) of its words.
 """
 
 # pyright: reportCallIssue=false
@@ -13,9 +14,15 @@ import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
 
-MEASUREMENT, PROCESS = 0, 1  # streams of sensor noise and of the first process noise; the second has 2, and so on
+MEASUREMENT, PROCESS = (
+    0,
+    1,
+)  # streams of sensor noise and of the first process noise; the second has 2, and so on
 DROPOUT = 1 << 32  # stream that decides which readings are lost
-JITTER, MISSED = 1 << 33, 1 << 34  # streams that decide which samples are late, and which are missed
+JITTER, MISSED = (
+    1 << 33,
+    1 << 34,
+)  # streams that decide which samples are late, and which are missed
 PAUSE = 1 << 36  # stream that decides when the controller has its first pause
 REFILL = 1 << 35  # stream that decides when the generators of stepper motors look at their queues
 
@@ -43,7 +50,12 @@ def block(seed, channel, stream, k):
     c0, c1, c2, c3 = np.uint64(k), np.uint64(stream), np.uint64(0), np.uint64(0)
     key0, key1 = np.uint64(seed), np.uint64(channel)
     for _ in range(10):
-        c0, c1, c2, c3 = (_mulhi(_M1, c2) ^ c1 ^ key0, _M1 * c2, _mulhi(_M0, c0) ^ c3 ^ key1, _M0 * c0)
+        c0, c1, c2, c3 = (
+            _mulhi(_M1, c2) ^ c1 ^ key0,
+            _M1 * c2,
+            _mulhi(_M0, c0) ^ c3 ^ key1,
+            _M0 * c0,
+        )
         key0, key1 = key0 + _W0, key1 + _W1
     return c0, c1, c2, c3
 

@@ -1,4 +1,5 @@
-"""Preparation of a run: its functions and its model, compiled, and the record that the callback reads.
+"""Preparation of a run: its functions and its model, compiled, and the record that the callback
+reads.
 
     prepared = prepare(scenario)              # functions, mechanism, key
     record[i], arrays = pack(prepared, log)   # see state.py
@@ -25,7 +26,11 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.joint_law import JointMeasurement
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.control.properties import read_by
-from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, native_coriolis, native_jacobian
+from smc_mujoco.mechanisms.custom.nominal_model import (
+    NominalModel,
+    native_coriolis,
+    native_jacobian,
+)
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.rotors import has_rotors, speeds_at_start
 from smc_mujoco.mechanisms.hardware.stepper import GENERATOR, pulsing
@@ -44,11 +49,19 @@ from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import PerChannel, Push, Signal
 
 IDEAL_SENSOR = Encoder(counts=math.inf)
-DATA_BYTES, CHANNEL_BYTES = 176 * 2**10, 2 * 2**10  # of an mjData without channels, and per channel; measured
-RETURNS_OTHERS = re.compile(r"it returns (\d+) numbers instead of")  # of numba, and of jit.attempting
-UNKNOWN_FIELD = re.compile(r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b")
+DATA_BYTES, CHANNEL_BYTES = (
+    176 * 2**10,
+    2 * 2**10,
+)  # of an mjData without channels, and per channel; measured
+RETURNS_OTHERS = re.compile(
+    r"it returns (\d+) numbers instead of"
+)  # of numba, and of jit.attempting
+UNKNOWN_FIELD = re.compile(
+    r"Unknown attribute '(\w+)' of type (Measurement|JointMeasurement|Reading|Parameters)\b"
+)
 FIELDS = {record.__name__: record._fields for record in (Measurement, JointMeasurement, Reading)}
-READING_BYTES = 67  # of a delayed sensor's history, per channel and reading, in mjData and in the Batch; measured
+# of a delayed sensor's history, per channel and reading, in mjData and in the Batch; measured
+READING_BYTES = 67
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -67,20 +80,29 @@ class Prepared:
         surface = 0 if s.surface is None else s.surface.memory
         memories = s.law.memory + surface + s.velocity.memory + sum(d.memory for d in s.disturbance)
         numbers = 200 + s.plant.n * (memories + s.input_delay / s.control_period + 20)
-        numbers += joint_law.stored_dtype(s.plant.n).itemsize / 8 if s.law.joint else 0
-        per_channel = state.LOG.itemsize * (s.samples + 1) + CHANNEL_BYTES + READING_BYTES * s.readings
+        if s.law.joint:
+            numbers += joint_law.stored_dtype(s.plant.n).itemsize / 8
+        else:
+            numbers += 0
+        per_channel = (
+            state.LOG.itemsize * (s.samples + 1) + CHANNEL_BYTES + READING_BYTES * s.readings
+        )
         return int(per_channel * s.plant.n + 8 * numbers + state.SIMULATION.itemsize + DATA_BYTES)
 
 
 def prepare(scenario: object) -> Prepared:
-    """Return a scenario with its functions and its mechanism compiled, after a check of its start and its code."""
+    """Return a scenario with its functions and its mechanism compiled, after a check of its start
+    and its code.
+    """
     if isinstance(scenario, Prepared):
         return scenario
     if not isinstance(scenario, Scenario):
         raise ScenarioError(f"cannot run {shown(scenario)}: give a smc.Scenario")
     for part in (*scenario.law.parts, scenario.surface, scenario.resolved.velocity):
         if part is not None and part.function is None:
-            raise ScenarioError(f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}")
+            raise ScenarioError(
+                f"{part.kind} {part.name!r} came from a file without its code: give the {part.kind}"
+            )
     shared = mechanism(scenario)
     check_start(shared, scenario)
     key = shared, scenario.control_period, scenario.samples
@@ -99,13 +121,20 @@ def why_not(scenario: Scenario) -> str:
 
 
 def _refuse_mistakes(s: Resolved, reason: str) -> None:
-    """Raise BrokenLawError if a component does not compile for a reason that would end each run in Python, too."""
+    """Raise BrokenLawError if a component does not compile for a reason that would end each run in
+    Python, too.
+    """
     components = [part for part in (*s.law.parts, s.surface, s.velocity) if part is not None]
     about = reason.partition(" does not compile: ")[0]
     of = next((part for part in components if about == f"{part.kind} {part.name!r}"), None)
     if of is not None and (mistake := RETURNS_OTHERS.search(reason)):
-        count, wanted = mistake[1], {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity")
-        raise BrokenLawError(f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}")
+        count, wanted = (
+            mistake[1],
+            {"law": "u and s", "surface": "s and v_eq"}.get(of.kind, "a velocity"),
+        )
+        raise BrokenLawError(
+            f"{about} returns {count} number{'s' * (count != '1')}: return {wanted}"
+        )
     if of is not None and (mistake := UNKNOWN_FIELD.search(reason)):
         record = FIELDS.get(mistake[2], ()) or of.gains
         kind = f"{'field of y' if mistake[2] in FIELDS else 'gain'} in {about}"
@@ -113,8 +142,14 @@ def _refuse_mistakes(s: Resolved, reason: str) -> None:
 
 
 def _compile(s: Resolved) -> None:
-    """Compile every function of a scenario, for `pack`; NotCompilable names the first that numba refuses."""
-    signals = *dict.fromkeys(s.references), *filter(None, (s.feedforward, *s.noise.errors)), *s.disturbance
+    """Compile every function of a scenario, for `pack`; NotCompilable names the first that numba
+    refuses.
+    """
+    signals = (
+        *dict.fromkeys(s.references),
+        *filter(None, (s.feedforward, *s.noise.errors)),
+        *s.disturbance,
+    )
     for signal in signals:
         cfunctions.signal_values(signal)  # refuses data that compiled code would misread
     for component in filter(None, (*s.law.parts, s.surface, s.velocity)):
@@ -135,12 +170,17 @@ def _compiled_nominal(plant: Plant) -> Function | None:
 
 def references(s: Resolved) -> tuple[Signal, ...]:
     """Return the reference of all channels, or those of the driven channels if they differ."""
-    return s.references if isinstance(s.reference, PerChannel) else (s.reference,)
+    if isinstance(s.reference, PerChannel):
+        return s.references
+    return (s.reference,)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Packed:
-    """The arrays whose addresses are in a simulation's record. They must exist as long as the simulation."""
+    """The arrays whose addresses are in a simulation's record.
+
+    They must exist as long as the simulation.
+    """
 
     numbers: np.ndarray  # gains, memories and all else that is float64
     disturbances: np.ndarray  # (m,) DISTURBANCE
@@ -153,27 +193,46 @@ class Packed:
 
 
 def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tuple, Packed]:
-    """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it points to.
+    """Return a simulation's record, as a tuple for an array of SIMULATION, and the arrays that it
+    points to.
 
     The log, (K + 1, n) LOG, is written at samples. It and `prepared` must outlive the run.
     """
-    s, mechanism, buffer = prepared.scenario.resolved, prepared.mechanism, Functions(prepared.scenario.resolved, python)
+    s, mechanism, buffer = (
+        prepared.scenario.resolved,
+        prepared.mechanism,
+        Functions(prepared.scenario.resolved, python),
+    )
     nominal = _native_nominal(s)
     tables = _tables(prepared, buffer)
-    values = _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, mechanism.model, buffer)
+    values = (
+        _shared_functions(s, nominal, buffer) | _settings(s) | _arrays(s, mechanism.model, buffer)
+    )
     if s.law.joint:
         values |= _joint_measurement(s, nominal, values, buffer)
     for name, shared in (("laws", "law"), ("references", "reference")):
         values[shared] = tables[name][0]
-        tables[name] = tables[name] if len(tables[name]) > 1 else []
+        if not (len(tables[name]) > 1):
+            tables[name] = []
     numbers = buffer.array()
     arrays = {}
     for name, rows in tables.items():
-        kind = state.DISTURBANCE if name == "disturbances" else state.FUNCTION
+        if name == "disturbances":
+            kind = state.DISTURBANCE
+        else:
+            kind = state.FUNCTION
         arrays[name] = np.array([buffer.as_tuple(kind, row) for row in rows], kind)
     values |= {name: state.address(array) for name, array in arrays.items() if len(array)}
-    values |= {"n": s.plant.n, "driven": s.plant.driven, "nq": mechanism.model.nq, "nv": mechanism.model.nv}
-    rows = mixer(s.plant) if s.plant.pose else np.zeros((0, 8))
+    values |= {
+        "n": s.plant.n,
+        "driven": s.plant.driven,
+        "nq": mechanism.model.nq,
+        "nv": mechanism.model.nv,
+    }
+    if s.plant.pose:
+        rows = mixer(s.plant)
+    else:
+        rows = np.zeros((0, 8))
     values |= {"actuators": len(rows), "mixer": state.address(rows) if len(rows) else 0}
     values["keeps_torques"] = keeps_torques(rows)
     values |= {"rotors": has_rotors(mechanism.model)}
@@ -185,7 +244,9 @@ def pack(prepared: Prepared, log: np.ndarray, python: bool = False) -> tuple[tup
 
 
 class Functions(state.Buffer):
-    """The buffer of a run, and its functions: compiled, or in `python` if they do not compile or that is wanted."""
+    """The buffer of a run, and its functions: compiled, or in `python` if they do not compile or
+    that is wanted.
+    """
 
     def __init__(self, s: Resolved, python: bool):
         from smc_mujoco.simulation import python_functions
@@ -202,33 +263,58 @@ class Functions(state.Buffer):
         return self.python[-1]
 
     def component(self, c: Any) -> Any:
-        return self._found(cfunctions.compile_component, c, self.wrap.of_component, self.s.plant.n, self.s)
+        return self._found(
+            cfunctions.compile_component, c, self.wrap.of_component, self.s.plant.n, self.s
+        )
 
     def signal(self, signal: Signal) -> Any:
         return self._found(cfunctions.compile_signal, signal, self.wrap.of_signal)
 
     def laws(self) -> list[Any]:
-        """The laws of the driven channels, or one for all; one each if they may keep state in Python."""
+        """The laws of the driven channels, or one for all; one each if they may keep state in
+        Python.
+        """
         law = self.s.law
         each = isinstance(law.function, Uncompiled) and not law.joint
-        return [law] * self.s.plant.driven if each else law.of_channels(self.s.plant.driven)
+        if each:
+            return [law] * self.s.plant.driven
+        return law.of_channels(self.s.plant.driven)
 
 
-def _function(compiled: Any, values: Any, buffer: "Functions", memory: int = 0, channels: int = 1) -> dict[str, int]:
-    """Return the fields of a FUNCTION. Its parameters, and its memory in each channel, go into the buffer."""
+def _function(
+    compiled: Any, values: Any, buffer: "Functions", memory: int = 0, channels: int = 1
+) -> dict[str, int]:
+    """Return the fields of a FUNCTION.
+
+    Its parameters, and its memory in each channel, go into the buffer.
+    """
     parameters, first = buffer.put(values), buffer.reserve(memory * channels)
-    return {"address": compiled.address, "parameters": parameters, "memory": first, "stride": 8 * memory}
+    return {
+        "address": compiled.address,
+        "parameters": parameters,
+        "memory": first,
+        "stride": 8 * memory,
+    }
 
 
 def _tables(prepared: Prepared, buffer: "Functions") -> dict[str, list[dict[str, Any]]]:
-    """Return the laws, references and frictions of the channels, and the disturbances, as fields of records."""
+    """Return the laws, references and frictions of the channels, and the disturbances, as fields of
+    records.
+    """
     s = prepared.scenario.resolved
-    n, memory = s.plant.n, {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory}
+    n, memory = (
+        s.plant.n,
+        {"memory": buffer.reserve(s.law.memory * s.plant.n), "stride": 8 * s.law.memory},
+    )
     each = range(n if s.law.joint else 1)  # numbers of a gain
-    laws = [
-        (buffer.component(law), [gain_at(value, i) for value in law.gains.values() for i in each])
-        for law in buffer.laws()
-    ]
+    laws = []
+    for law in buffer.laws():
+        laws.append(
+            (
+                buffer.component(law),
+                [gain_at(value, i) for value in law.gains.values() for i in each],
+            )
+        )
     return {
         "laws": [_function(compiled, gains, buffer) | memory for compiled, gains in laws],
         "references": [_signal(signal, buffer) for signal in references(s)],
@@ -249,7 +335,9 @@ def _shared_functions(s: Resolved, nominal: Native | None, buffer: "Functions") 
         compiled = buffer.component(c)
         fields[c.kind] = _function(compiled, c.gains.values(), buffer, c.memory, s.plant.n)
     if nominal is not None:
-        fields["dynamics" if s.law.joint else "nominal"] = _function(nominal, nominal.values, buffer)
+        fields["dynamics" if s.law.joint else "nominal"] = _function(
+            nominal, nominal.values, buffer
+        )
     elif compiled := _compiled_nominal(s.plant):
         fields["nominal"] = _function(compiled, known_values(s), buffer)
     signals = {"feedforward": s.feedforward}
@@ -268,17 +356,33 @@ def _settings(s: Resolved) -> dict[str, Any]:
     sensor, drives = s.sensor or IDEAL_SENSOR, s.drive_step
     pause, samples = s.clock.pauses(s.control_period, s.physics_step)
     return {
-        "steps": s.steps, "stages": s.stages, "step": s.physics_step, "period": s.control_period,
-        "jitter": s.clock.jitter_steps(s.physics_step), "pause": pause, "pause_samples": samples,
-        "pause_phase": pause_phase(s), "missed": s.clock.missed, "delay": s.delay_steps,
+        "steps": s.steps,
+        "stages": s.stages,
+        "step": s.physics_step,
+        "period": s.control_period,
+        "jitter": s.clock.jitter_steps(s.physics_step),
+        "pause": pause,
+        "pause_samples": samples,
+        "pause_phase": pause_phase(s),
+        "missed": s.clock.missed,
+        "delay": s.delay_steps,
         "scale": math.prod(part.scale for part in s.actuator),
-        "has_drives": drives is not None or s.stepper is not None, "drive_step": drives._asdict() if drives else {},
-        "stepper": pulsing(s.stepper)._asdict() if s.stepper else {}, "exact_friction": s.exact_friction,
-        "seed": s.seed, "sigma_x": s.noise.position, "sigma_v": s.noise.velocity, "bias": sensor.bias,
-        "counts": 0.0 if sensor.counts == math.inf else sensor.counts, "dropout": sensor.dropout,
-        "read_period": sensor.period or 0.0, "read_delay": sensor.delay, "uses_model": s.model != "none",
-        "drive_gain": s.nominal_drive.gain, "drive_drag": s.nominal_drive.drag,
-    }  # fmt: skip
+        "has_drives": drives is not None or s.stepper is not None,
+        "drive_step": drives._asdict() if drives else {},
+        "stepper": pulsing(s.stepper)._asdict() if s.stepper else {},
+        "exact_friction": s.exact_friction,
+        "seed": s.seed,
+        "sigma_x": s.noise.position,
+        "sigma_v": s.noise.velocity,
+        "bias": sensor.bias,
+        "counts": 0.0 if sensor.counts == math.inf else sensor.counts,
+        "dropout": sensor.dropout,
+        "read_period": sensor.period or 0.0,
+        "read_delay": sensor.delay,
+        "uses_model": s.model != "none",
+        "drive_gain": s.nominal_drive.gain,
+        "drive_drag": s.nominal_drive.drag,
+    }
 
 
 def _arrays(s: Resolved, model: mujoco.MjModel, buffer: "Functions") -> dict[str, Any]:
@@ -297,16 +401,26 @@ def _arrays(s: Resolved, model: mujoco.MjModel, buffer: "Functions") -> dict[str
         speeds = speeds_at_start(model, field_values(model, s, 0)["actuator_user"])
         states["first"][: len(speeds)] = states["second"][: len(speeds)] = speeds
     return motors | {
-        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")}, "a": buffer.reserve(n),
-        "told": buffer.reserve(n) if s.model == "true" else 0, "width": width, "commands": buffer.reserve(2 * width),
-        "states": buffer.put(states.view(float).tolist()), "limits": buffer.put(s.limits), "delay_slots": slots,
+        "seen": {"n": n} | {name: buffer.reserve(n) for name in ("x", "v", "u")},
+        "a": buffer.reserve(n),
+        "told": buffer.reserve(n) if s.model == "true" else 0,
+        "width": width,
+        "commands": buffer.reserve(2 * width),
+        "states": buffer.put(states.view(float).tolist()),
+        "limits": buffer.put(s.limits),
+        "delay_slots": slots,
         "delay_buffer": buffer.reserve(slots * n),
-    }  # fmt: skip
+    }
 
 
 def known_values(s: Resolved) -> list[float]:
-    """Return the values of the plant's parameters as the law's model has them: true ones in the model "true"."""
-    known = s.plant.parameters if s.model != "true" else vars(s.plant.values(s.factors(0)))
+    """Return the values of the plant's parameters as the law's model has them: true ones in the
+    model "true".
+    """
+    if s.model != "true":
+        known = s.plant.parameters
+    else:
+        known = vars(s.plant.values(s.factors(0)))
     return [known[name] for name in s.plant.parameters]
 
 
@@ -319,7 +433,10 @@ def pause_phase(s: Resolved) -> int:
 def motors_at_start(s: Resolved) -> list[dict[str, float]]:
     """Return each stepper motor at the start of a run: at rest, with its field at its joint."""
     zero = dict.fromkeys(GENERATOR, 0.0) | {"stepped": -math.inf, "until": math.inf}
-    phases = (philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53 for i in range(s.plant.driven))
+    phases = (
+        philox.random_words(s.seed, i, philox.REFILL, 0)[0] * 2.0**-53
+        for i in range(s.plant.driven)
+    )
     return [zero | {"phase": phase, "origin": s.x0[i]} for i, phase in enumerate(phases)]
 
 
@@ -329,16 +446,23 @@ def _joint_measurement(
     """Return the fields of a record that only a law of many joints has."""
     stored = joint_law.stored_dtype(s.plant.n)
     head = buffer.reserve(stored.itemsize // 8)
-    arrays = {name: state.Index(head + offset // 8) for name, (_, offset, *_) in (stored.fields or {}).items()}
+    arrays = {}
+    for name, (_, offset, *_) in (stored.fields or {}).items():
+        arrays[name] = state.Index(head + offset // 8)
     fields: dict[str, Any] = {"joint": arrays | {"head": head}}
     if nominal is not None:
         shared = {"parameters": functions["dynamics"]["parameters"], "unit": s.nominal_drive.gain}
-        fields["handle"] = {"coriolis": native_coriolis().address, "jacobian": native_jacobian().address} | shared
+        fields["handle"] = {
+            "coriolis": native_coriolis().address,
+            "jacobian": native_jacobian().address,
+        } | shared
     return fields
 
 
 def _native_nominal(s: Resolved) -> Native | None:
-    """Return the nominal model for one simulation if MuJoCo computes it and the law uses it, else None."""
+    """Return the nominal model for one simulation if MuJoCo computes it and the law uses it, else
+    None.
+    """
     if not isinstance(s.plant.nominal, NominalModel):
         return None
     if not s.law.joint:
@@ -350,10 +474,18 @@ def _native_nominal(s: Resolved) -> Native | None:
 
 
 def _frictions(prepared: Prepared, buffer: "Functions") -> list[dict[str, int]]:
-    """Return the FUNCTIONs of a friction by a formula, one for each joint. Their numbers go into the buffer."""
+    """Return the FUNCTIONs of a friction by a formula, one for each joint.
+
+    Their numbers go into the buffer.
+    """
     if (friction := prepared.scenario.formula_friction) is None:
         return []
     compiled, shared = cfunctions.compile_friction(friction), prepared.mechanism
     inertia = with_values(shared.model, prepared.scenario).dof_M0[shared.channels["qvel"]]
-    numbers = [(buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))) for i, a in enumerate(inertia)]
-    return [{"address": compiled.address, "parameters": first, "memory": second} for first, second in numbers]
+    numbers = []
+    for i, a in enumerate(inertia):
+        numbers.append((buffer.put(friction.parameters(i)), buffer.put(friction.bristle(i, a))))
+    return [
+        {"address": compiled.address, "parameters": first, "memory": second}
+        for first, second in numbers
+    ]

@@ -1,9 +1,10 @@
-"""The controller of a run in Python: measured positions and velocities in, u and s out, without a simulator.
+"""The controller of a run in Python: measured positions and velocities in, u and s out, without a
+simulator.
 
     readings -> noise, encoder -> velocity estimator -> law -> saturation
 
-It calls laws, estimators and signals as the Python functions they are, and has none of the callback's code. The
-reference loop and agents control by it.
+It calls laws, estimators and signals as the Python functions they are, and has none of the
+callback's code. The reference loop and agents control by it.
 """
 
 import math
@@ -39,25 +40,47 @@ class Failure(Exception):
 
 
 class Controller:
-    """The law of a scenario with its sensors, estimator and surface, and their memories; a new one is a new run."""
+    """The law of a scenario with its sensors, estimator and surface, and their memories; a new one
+    is a new run.
+    """
 
     def __init__(self, scenario: Scenario):
         self.scenario, n = scenario.resolved, scenario.plant.n
         if scenario.plant.pose:
-            raise ScenarioError(f"{scenario.plant.name} is a free body, which only smc.run moves: give it to smc.run")
-        self.law, self.estimator = (PythonComponent(c, n) for c in (self.scenario.law, self.scenario.velocity))
+            raise ScenarioError(
+                f"{scenario.plant.name} is a free body, which only smc.run moves: give it to smc.run"
+            )
+        self.law, self.estimator = (
+            PythonComponent(c, n) for c in (self.scenario.law, self.scenario.velocity)
+        )
         self.surface = scenario.surface and PythonComponent(scenario.surface, n)
-        self.limits, self.scale = np.array(scenario.limits), math.prod(part.scale for part in scenario.actuator)
-        self.values = Values(**dict(zip(scenario.plant.parameters, known_values(self.scenario), strict=True)))
-        if isinstance(scenario.plant.nominal, NominalModel):  # compiles, while there is no Python callback
+        self.limits, self.scale = (
+            np.array(scenario.limits),
+            math.prod(part.scale for part in scenario.actuator),
+        )
+        self.values = Values(
+            **dict(zip(scenario.plant.parameters, known_values(self.scenario), strict=True))
+        )
+        if isinstance(
+            scenario.plant.nominal, NominalModel
+        ):  # compiles, while there is no Python callback
             scenario.plant.nominal(np.zeros(n), np.zeros(n), 0, self.values)
         self.last_u = np.zeros(n)  # commands of the last sample
         self.told = np.zeros(n)  # other forces on the joints, for a law with the true model
-        self.s, self.r, self.a = np.zeros(n), np.zeros(n), np.zeros(n)  # a: estimated accelerations, or NaN
-        self.last_reading = np.zeros((n, 2))  # positions and velocities, of the last readings that were not lost
+        self.s, self.r, self.a = (
+            np.zeros(n),
+            np.zeros(n),
+            np.zeros(n),
+        )  # a: estimated accelerations, or NaN
+        self.last_reading = np.zeros(
+            (n, 2)
+        )  # positions and velocities, of the last readings that were not lost
 
-    def __call__(self, k: int, t: float, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return u within its bound and s, (n,) each, at sample k, at time t, s, of what the sensors read, (n,) each.
+    def __call__(
+        self, k: int, t: float, x: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return u within its bound and s, (n,) each, at sample k, at time t, s, of what the
+        sensors read, (n,) each.
 
         The references and s of this sample remain in `r` and `s`.
 
@@ -71,20 +94,30 @@ class Controller:
         """Go on with the gains of another law of the same function; all memories stay."""
         self.law.gains = PythonComponent(law, len(self.last_u)).gains
 
-    def measure(self, k: int, t: float, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions with their errors and estimated velocities, (n,) each, at sample k, at time t, s."""
+    def measure(
+        self, k: int, t: float, x: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions with their errors and estimated velocities, (n,) each, at sample k, at
+        time t, s.
+        """
         x, v = np.array(x, float), np.array(v, float)
         j, sensor = k, self.scenario.sensor
         if sensor is not None and sensor.period is not None:
             j = max(0, math.floor((t - sensor.delay) / sensor.period + 1e-6))
-        errors = [-0.0 if signal is None else evaluate(signal, t)[0] for signal in self.scenario.noise.errors]
+        errors = []
+        for signal in self.scenario.noise.errors:
+            errors.append(-0.0 if signal is None else evaluate(signal, t)[0])
         for i in range(len(x)):
             x[i], v[i] = self.read(i, x[i] + errors[0], v[i] + errors[1], j)
-            v[i], self.a[i] = self.estimator(i, Reading(self.scenario.control_period, float(x[i]), float(v[i])))
+            v[i], self.a[i] = self.estimator(
+                i, Reading(self.scenario.control_period, float(x[i]), float(v[i]))
+            )
         return x, v
 
     def read(self, i: int, x: float, v: float, j: int) -> tuple[float, float]:
-        """Return reading j of channel i: true position x and velocity v with noise, bias, rounding and loss."""
+        """Return reading j of channel i: true position x and velocity v with noise, bias, rounding
+        and loss.
+        """
         sigma, sensor, seed = self.scenario.noise, self.scenario.sensor, self.scenario.seed
         if sigma.position or sigma.velocity:
             z = normals(seed, i, philox.MEASUREMENT, j)
@@ -100,29 +133,57 @@ class Controller:
         return x, v
 
     def command(self, x: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return saturated commands and sliding variables, (n,) each, for measured x and v at time t, s."""
+        """Return saturated commands and sliding variables, (n,) each, for measured x and v at time
+        t, s.
+        """
         scenario, n, driven = self.scenario, len(x), len(self.limits)
-        feedforward = 0.0 if scenario.feedforward is None else evaluate(scenario.feedforward, t)[0]
-        values = [evaluate(signal, t) for signal in references(scenario)]  # one for all channels, or one for each
+        if scenario.feedforward is None:
+            feedforward = 0.0
+        else:
+            feedforward = evaluate(scenario.feedforward, t)[0]
+        # one for all channels, or one for each
+        values = []
+        for signal in references(scenario):
+            values.append(evaluate(signal, t))
         motion = np.array([values[i % len(values)] for i in range(n)]).T.copy()
         self.r, u, s = np.where(np.arange(n) < driven, motion[0], 0.0), np.zeros(n), np.zeros(n)
         if scenario.law.joint:
             u, s = self.law.call_joint(self.joint_measurement(x, v, t, motion))
-            return np.array([self.bounded_command(i, u[i] + feedforward, s[i]) for i in range(n)]), s
+            return np.array(
+                [self.bounded_command(i, u[i] + feedforward, s[i]) for i in range(n)]
+            ), s
         for i in range(driven):
             u[i], s[i] = self.law(i, self.measurement(x, v, t, motion, i))
             u[i] = self.bounded_command(i, u[i] + feedforward, s[i])
         return u, s
 
-    def measurement(self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray, i: int) -> Measurement:
-        """Return what the law of channel i reads; `motion` has the references and two derivatives, (3, n)."""
+    def measurement(
+        self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray, i: int
+    ) -> Measurement:
+        """Return what the law of channel i reads; `motion` has the references and two derivatives,
+        (3, n).
+        """
         scenario, r, dr, ddr = self.scenario, *motion[:, i].tolist()
         xi, vi, (f, g) = float(x[i]), float(v[i]), self.model_at(x, v, i, i)
         y = Measurement(
-            t, scenario.control_period, xi, vi, xi - r, vi - dr, r, dr, ddr, float(f), float(g),
-            float(ddr if math.isnan(self.a[i]) else self.a[i]), scenario.limits[i], float(scenario.model != "none"),
-        )  # fmt: skip
-        if (j := i + len(scenario.limits)) < len(x):  # a joint without actuator, which moves with channel i
+            t,
+            scenario.control_period,
+            xi,
+            vi,
+            xi - r,
+            vi - dr,
+            r,
+            dr,
+            ddr,
+            float(f),
+            float(g),
+            float(ddr if math.isnan(self.a[i]) else self.a[i]),
+            scenario.limits[i],
+            float(scenario.model != "none"),
+        )
+        if (j := i + len(scenario.limits)) < len(
+            x
+        ):  # a joint without actuator, which moves with channel i
             fq, gq = self.model_at(x, v, j, i)
             y = y._replace(q=float(x[j]), dq=float(v[j]), fq=float(fq), gq=float(gq))
         if scenario.stepper is not None:  # u is the acceleration x''
@@ -133,20 +194,37 @@ class Controller:
             y = y._replace(has_surface=1.0, s=sliding, v_eq=v_eq)
         return y
 
-    def joint_measurement(self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray) -> JointMeasurement:
+    def joint_measurement(
+        self, x: np.ndarray, v: np.ndarray, t: float, motion: np.ndarray
+    ) -> JointMeasurement:
         """Return what a law of many joints reads, as `measurement` does for one."""
         scenario, (r, dr, ddr) = self.scenario, motion
         return JointMeasurement(
-            t, scenario.control_period, float(scenario.model != "none"), NominalDynamics(scenario, x, v), x.copy(),
-            v.copy(), x - r, v - dr, r, dr, ddr, np.where(np.isnan(self.a), ddr, self.a), self.limits.copy(),
+            t,
+            scenario.control_period,
+            float(scenario.model != "none"),
+            NominalDynamics(scenario, x, v),
+            x.copy(),
+            v.copy(),
+            x - r,
+            v - dr,
+            r,
+            dr,
+            ddr,
+            np.where(np.isnan(self.a), ddr, self.a),
+            self.limits.copy(),
             *dynamics(scenario, x, v),
-        )  # fmt: skip
+        )
 
     def bounded_command(self, i: int, u: float, s: float) -> float:
         """Return the command u of channel i within its bound, and keep it in `last_u`."""
         limit = self.limits[i]
         self.last_u[i] = min(max(u, -limit), limit)
-        if not (math.isfinite(u) and math.isfinite(s) and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL):
+        if not (
+            math.isfinite(u)
+            and math.isfinite(s)
+            and min(abs(u), limit) * max(1.0, self.scale) < MAX_CONTROL
+        ):
             raise Failure(f"{self.law.name} returned u = {u:g}, s = {s:g} in channel {i}")
         return self.last_u[i]
 
@@ -158,32 +236,52 @@ class Controller:
 
 
 def gains_of(c: Component, n: int = 1) -> tuple:
-    """Return the gains of a component as the record that its function reads: vectors (n,) for a law of many joints."""
+    """Return the gains of a component as the record that its function reads: vectors (n,) for a law
+    of many joints.
+    """
     values: list[Any] = list(c.gains.values())
     if c.joint:
         each = [[gain_at(value, i) for i in range(n)] for value in values]
-        values = [one[0] if name in c.shared else np.array(one) for name, one in zip(c.gains, each, strict=True)]
+        values = []
+        for name, one in zip(c.gains, each, strict=True):
+            values.append(one[0] if name in c.shared else np.array(one))
     return jit.named(tuple(c.gains))(*(values or [0.0]))
 
 
 class PythonComponent:
-    """A law, surface or estimator as the Python function that its author wrote, with a memory, (n, c.memory)."""
+    """A law, surface or estimator as the Python function that its author wrote, with a memory, (n,
+    c.memory).
+    """
 
     def __init__(self, c: Component, n: int, memory: np.ndarray | None = None):
         self.name, self.returns = f"{c.kind} {c.name!r}", RETURN_VALUES[c.kind]
-        self.memory = np.zeros((n, c.memory)) if memory is None else memory
+        if memory is None:
+            self.memory = np.zeros((n, c.memory))
+        else:
+            self.memory = memory
         parts = c.of_channels(n)  # one for each channel, or one for all
         parts = parts * n if len(parts) == 1 else parts
-        functions = {id(part.function): part.function for part in parts}  # a callable object may have no hash
-        uncompiled = {key: rebuild(function, lambda inner: inner) for key, function in functions.items()}
+        functions = {
+            id(part.function): part.function for part in parts
+        }  # a callable object may have no hash
+        uncompiled = {
+            key: rebuild(function, lambda inner: inner) for key, function in functions.items()
+        }
         own = [uncompiled[id(part.function)] for part in parts]
-        self.functions = [function.fresh() if isinstance(function, jit.Uncompiled) else function for function in own]
+        self.functions = [
+            function.fresh() if isinstance(function, jit.Uncompiled) else function
+            for function in own
+        ]
         self.sizes = [part.memory for part in parts]
-        gains = {id(part): gains_of(part, n) for part in {id(part): part for part in parts}.values()}
+        gains = {}
+        for part in {id(part): part for part in parts}.values():
+            gains[id(part)] = gains_of(part, n)
         self.gains = [gains[id(part)] for part in parts]  # the record that each reads
 
     def __call__(self, i: int, y: tuple) -> list[float]:
-        """Return its two numbers for channel i, of a Reading or a Measurement; NaN for a missing acceleration."""
+        """Return its two numbers for channel i, of a Reading or a Measurement; NaN for a missing
+        acceleration.
+        """
         try:
             out = self.functions[i](y, self.gains[i], self.memory[i, : self.sizes[i]])
         except USER_EXCEPTIONS as error:
@@ -204,12 +302,16 @@ class PythonComponent:
         except (TypeError, ValueError, OverflowError):
             u = s = np.empty(())
         if u.shape != (n,) or s.shape != (n,):
-            raise Failure(f"{self.name} returned {shown(out)} instead of two vectors u, s of {n} numbers each")
+            raise Failure(
+                f"{self.name} returned {shown(out)} instead of two vectors u, s of {n} numbers each"
+            )
         return u, s
 
 
 class NominalDynamics:
-    """The nominal mechanism, as `coriolis` and `jacobian` of control.joint_law call it in the reference loop."""
+    """The nominal mechanism, as `coriolis` and `jacobian` of control.joint_law call it in the
+    reference loop.
+    """
 
     def __init__(self, scenario: Scenario, x: np.ndarray, v: np.ndarray):
         self.scenario, self.x, self.v = scenario, x, v
@@ -219,24 +321,33 @@ class NominalDynamics:
         plant, nominal = self.scenario.plant, self.nominal
         if nominal is None:
             return np.zeros(len(self.x))
-        return nominal.coriolis(self.x, self.v, w, Values(**plant.parameters)) / self.scenario.nominal_drive.gain
+        return (
+            nominal.coriolis(self.x, self.v, w, Values(**plant.parameters))
+            / self.scenario.nominal_drive.gain
+        )
 
     def jacobian(self) -> np.ndarray:
         """Return the tip's Jacobian, (3, n)."""
         plant, nominal = self.scenario.plant, self.nominal
         if nominal is None or not plant.tip:
-            raise ValueError("there is no tip, or the law has no model: give the plant a tip, and the law the model")
+            raise ValueError(
+                "there is no tip, or the law has no model: give the plant a tip, and the law the model"
+            )
         return nominal.jacobian(self.x, Values(**plant.parameters), plant.tip)
 
     @property
     def nominal(self) -> NominalModel | None:
         """The nominal model of all joints, if the plant has one and the law may use it."""
         model = self.scenario.plant.nominal
-        return model if isinstance(model, NominalModel) and self.scenario.resolved.model != "none" else None
+        if isinstance(model, NominalModel) and self.scenario.resolved.model != "none":
+            return model
+        return None
 
 
 def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
-    """Return the M, h and g that a law of many joints sees at measured x and v, (n,) each, per unit of u."""
+    """Return the M, h and g that a law of many joints sees at measured x and v, (n,) each, per unit
+    of u.
+    """
     plant, n, (gain, drag) = scenario.plant, len(x), scenario.nominal_drive
     if scenario.resolved.model == "none":
         return Dynamics(np.eye(n), np.zeros(n), np.zeros(n))
@@ -251,28 +362,43 @@ def dynamics(scenario: Scenario, x: np.ndarray, v: np.ndarray) -> Dynamics:
             np.array([nominal(plant, x, rate, i, values, np.zeros(n)) for i in range(n)], float)
             for rate in (v, np.zeros(n))
         )
-        terms = Dynamics(np.diag(1.0 / moving[:, 1]), -moving[:, 0] / moving[:, 1], -resting[:, 0] / resting[:, 1])
+        terms = Dynamics(
+            np.diag(1.0 / moving[:, 1]),
+            -moving[:, 0] / moving[:, 1],
+            -resting[:, 0] / resting[:, 1],
+        )
     return Dynamics(terms.M / gain, (terms.h + drag * v) / gain, terms.g / gain)
 
 
 def evaluate(signal: Signal, t: float, *state: Any) -> list[float]:
     """Return a signal and its two derivatives at time t, s.
 
-    The state is memory, seed, channel and stream for process noise, and memory, e, e' and s for one that sees the loop.
+    The state is memory, seed, channel and stream for process noise, and memory, e, e' and s for one
+    that sees the loop.
     """
     name = type(signal).__name__
     try:
-        inputs = state if signal.random or signal.sees else (signal.data,) if signal.series else ()
+        if signal.random or signal.sees:
+            inputs = state
+        else:
+            inputs = (signal.data,) if signal.series else ()
         out = type(signal).value(t, signal, *inputs)
     except USER_EXCEPTIONS as error:
         raise failure_of(name, error) from error
     return as_floats(name, out, "a value and two derivatives", 3)
 
 
-def nominal(plant: Plant, x: np.ndarray, v: np.ndarray, i: int, values: Values, u: np.ndarray) -> tuple[float, float]:
-    """Return nominal f and g of channel i. The model of coupled channels also depends on the last commands u, (n,)."""
+def nominal(
+    plant: Plant, x: np.ndarray, v: np.ndarray, i: int, values: Values, u: np.ndarray
+) -> tuple[float, float]:
+    """Return nominal f and g of channel i.
+
+    The model of coupled channels also depends on the last commands u, (n,).
+    """
     try:
-        return plant.nominal(x, v, i, values, *((u,) if isinstance(plant.nominal, NominalModel) else ()))
+        return plant.nominal(
+            x, v, i, values, *((u,) if isinstance(plant.nominal, NominalModel) else ())
+        )
     except USER_EXCEPTIONS as error:
         raise failure_of(f"the nominal model of {plant.name}", error) from error
 
@@ -287,7 +413,9 @@ def failure_of(name: str, error: BaseException, where: str = "") -> Failure:
 
 
 def as_floats(name: str, out: Any, expected: str, count: int) -> list[float]:
-    """Return the result of a user's function as `count` floats; raise Failure if it is anything else."""
+    """Return the result of a user's function as `count` floats; raise Failure if it is anything
+    else.
+    """
     try:
         values = [float(value) for value in out]
     except (TypeError, ValueError, OverflowError):

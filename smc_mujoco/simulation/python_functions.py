@@ -1,6 +1,8 @@
-"""Functions that do not compile, as C functions which the callback calls like compiled ones: through ctypes, in Python.
+"""Functions that do not compile, as C functions which the callback calls like compiled ones:
+through ctypes, in Python.
 
-A call takes some microseconds and the interpreter's lock. The text of an exception is kept for the trace's `failure`.
+A call takes some microseconds and the interpreter's lock. The text of an exception is kept for the
+trace's `failure`.
 """
 
 import ctypes
@@ -21,7 +23,9 @@ C_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)
 
 
 class PythonFunction:
-    """A C function that calls `body(y, memory)`, which returns the outputs; `error` is its last exception."""
+    """A C function that calls `body(y, memory)`, which returns the outputs; `error` is its last
+    exception.
+    """
 
     def __init__(self, body: Callable[[Any, Any], Any]):
         self.error: Exception | None = None
@@ -40,18 +44,24 @@ class PythonFunction:
 
 
 class Memories(dict[int, np.ndarray]):
-    """The memories of a function by address: the same array at each call, which lives as long as the run."""
+    """The memories of a function by address: the same array at each call, which lives as long as
+    the run.
+    """
 
     def at(self, m: Any, shape: tuple[int, int]) -> np.ndarray:
         """Return the memory at a pointer."""
         if not shape[1]:
             return np.empty(shape)
         place = ctypes.addressof(m.contents)
-        return self[place] if place in self else self.setdefault(place, np.ctypeslib.as_array(m, shape))
+        if place in self:
+            return self[place]
+        return self.setdefault(place, np.ctypeslib.as_array(m, shape))
 
 
 def of_component(c: Component, n: int, s: Any) -> PythonFunction:
-    """Return a law, a surface or an estimator of one run; a law of many joints needs the scenario s."""
+    """Return a law, a surface or an estimator of one run; a law of many joints needs the scenario
+    s.
+    """
     memories = Memories()
     if c.joint:
         dtype = stored_dtype(n)
@@ -60,7 +70,9 @@ def of_component(c: Component, n: int, s: Any) -> PythonFunction:
         def joint(y, m):
             seen = np.ctypeslib.as_array(y, (dtype.itemsize // 8,)).view(dtype)[0]
             function.memory = memories.at(m, (n, c.memory))
-            return np.concatenate(function.call_joint(measurement_of(seen, NominalDynamics(s, seen["x"], seen["v"]))))
+            return np.concatenate(
+                function.call_joint(measurement_of(seen, NominalDynamics(s, seen["x"], seen["v"])))
+            )
 
         return PythonFunction(joint)
     record, function = Reading if c.kind == "estimator" else Measurement, PythonComponent(c, 1)
@@ -77,8 +89,14 @@ def of_signal(signal: Signal) -> PythonFunction:
 
     def value(y, m):
         t, seed, channel, stream, *loop = y[:7]
-        memory = np.ctypeslib.as_array(m, (max(signal.memory, 1),)) if signal.random or signal.sees else None
-        state = (memory, int(seed), int(channel), stream) if signal.random else (memory, *loop) if signal.sees else ()
+        if signal.random or signal.sees:
+            memory = np.ctypeslib.as_array(m, (max(signal.memory, 1),))
+        else:
+            memory = None
+        if signal.random:
+            state = (memory, int(seed), int(channel), stream)
+        else:
+            state = (memory, *loop) if signal.sees else ()
         return evaluate(signal, t, *state)
 
     return PythonFunction(value)

@@ -1,9 +1,9 @@
 """From scenarios to traces, in batches of bounded memory.
 
-The scenarios of a group have the same plant, size, kinds of parts (not the same numbers), integrator, physics step and
-number of steps. They may differ in parameters, friction levels, laws, gains, signals, delays and
-seeds. Functions that do not compile run in the reference loop. The results do not depend on the number of threads, the
-grouping or the other runs.
+The scenarios of a group have the same plant, size, kinds of parts (not the same numbers),
+integrator, physics step and number of steps. They may differ in parameters, friction levels, laws,
+gains, signals, delays and seeds. Functions that do not compile run in the reference loop. The
+results do not depend on the number of threads, the grouping or the other runs.
 """
 
 import contextlib
@@ -38,19 +38,27 @@ from smc_mujoco.simulation.trace import Trace, from_log
 from mujoco.batch import Batch, SimulationError  # by now imported by callback
 
 BATCH_BYTES = 256 * 2**20  # of logs and records in one Batch
-MIN_TRIM_RUNS = 64  # after a batch of fewer runs, freed memory is not returned to the system; chosen
+MIN_TRIM_RUNS = (
+    64  # after a batch of fewer runs, freed memory is not returned to the system; chosen
+)
 SLICE_STEPS = 400_000  # physics steps times channels in a slice, about a second
-USER_MODEL_STEPS = 200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
+USER_MODEL_STEPS = (
+    200  # in a slice: a user's model with contacts takes 0.1 s and more a step once it has diverged
+)
 FULL_WARNINGS = mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL
 DRY_FRICTION = "dof_frictionloss", "tendon_frictionloss"  # fields of a model
-LOST_CONTACTS = "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
+LOST_CONTACTS = (
+    "MuJoCo had no room for all contacts in the model's memory: give its <size> more memory"
+)
 
 DISTURBANCE_NOT_FINITE = "the disturbance became NaN or inf"
 PLANT_DIVERGED = f"{PLANT_DIVERGED_SHORT} (|x| or |v| above {MAX_STATE:g}, or NaN)"
 
 
 def interrupted(name: str) -> str:
-    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the control callback."""
+    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the
+    control callback.
+    """
     name = name or "control"
     so = ", so that its law was not called" * (name == "control")
     return (
@@ -63,7 +71,9 @@ Report = Callable[[int], None]  # called with the number of steps since its last
 
 
 class PlainLoopWarning(UserWarning):
-    """A warning: a law or signal does not compile and is called in Python, which takes several times longer."""
+    """A warning: a law or signal does not compile and is called in Python, which takes several
+    times longer.
+    """
 
 
 @overload
@@ -73,7 +83,9 @@ def run(
     scenarios: Iterable[Scenario | Prepared], threads: int | None = None, progress: bool = False
 ) -> list[Trace]: ...
 def run(
-    scenarios: Scenario | Iterable[Scenario | Prepared], threads: int | None = None, progress: bool = False
+    scenarios: Scenario | Iterable[Scenario | Prepared],
+    threads: int | None = None,
+    progress: bool = False,
 ) -> Trace | list[Trace]:
     """Run one scenario or many.
 
@@ -83,33 +95,43 @@ def run(
       progress: whether to show a progress bar.
 
     Returns:
-      The Trace, or a list of them in the order of the scenarios. A run fails if its law raises or returns NaN, or if
-      the plant diverges. Its Trace says so in `diverged_at` and `failure`; the other runs continue.
+      The Trace, or a list of them in the order of the scenarios. A run fails if its law raises or
+      returns NaN, or if the plant diverges. Its Trace says so in `diverged_at` and `failure`; the
+      other runs continue.
 
     Raises:
       ScenarioError: not a Scenario, or threads below 1.
 
-    MuJoCo's eight callbacks are global to the process. During a run no other callback is called, and a run fails if
-    other code has set one at its end, or has taken its control callback away meanwhile.
+    MuJoCo's eight callbacks are global to the process. During a run no other callback is called,
+    and a run fails if other code has set one at its end, or has taken its control callback away
+    meanwhile.
     """
     if isinstance(scenarios, str):
-        raise ScenarioError(f"cannot run {scenarios!r}: give smc.Scenario(plant={scenarios!r}, law='pid')")
+        raise ScenarioError(
+            f"cannot run {scenarios!r}: give smc.Scenario(plant={scenarios!r}, law='pid')"
+        )
     prepared = list(map(prepare, [scenarios] if isinstance(scenarios, Scenario) else scenarios))
     work, count = sum(item.scenario.work for item in prepared), len(prepared)
     with bar(f"{count} run{'s' * (count != 1)}", work, shown=progress) as progress_bar:
         traces = dict(stream(prepared, threads, progress_bar.advance))
-    return traces[0] if isinstance(scenarios, Scenario) else [traces[i] for i in range(count)]
+    if isinstance(scenarios, Scenario):
+        return traces[0]
+    return [traces[i] for i in range(count)]
 
 
 def stream(
-    scenarios: Iterable[Scenario | Prepared], threads: int | None = None, report: Report = lambda steps: None
+    scenarios: Iterable[Scenario | Prepared],
+    threads: int | None = None,
+    report: Report = lambda steps: None,
 ) -> Iterator[tuple[int, Trace]]:
     """Yield pairs (index, Trace) as soon as their batch is done. At most one batch is in memory."""
     threads = cores(threads)
     groups: dict[Hashable, list[tuple[int, Prepared]]] = {}
     for index, prepared in enumerate(map(prepare, scenarios)):
         if prepared.why_not:
-            warnings.warn(f"{prepared.why_not}; it is called in Python", PlainLoopWarning, users_stacklevel())
+            warnings.warn(
+                f"{prepared.why_not}; it is called in Python", PlainLoopWarning, users_stacklevel()
+            )
         groups.setdefault(prepared.key, []).append((index, prepared))
     for group in groups.values():
         for batch in _batches(group, threads):
@@ -137,12 +159,17 @@ def memory_for(prepared: Sequence[Prepared]) -> Iterator[None]:
 
 
 def return_freed_memory() -> None:
-    """Return freed memory to the system, if the C library is glibc. Without it, a run leaves 45 to 100 kB allocated."""
+    """Return freed memory to the system, if the C library is glibc.
+
+    Without it, a run leaves 45 to 100 kB allocated.
+    """
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None:
         trim(0)
 
 
-def _batches(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[list[tuple[int, Prepared]]]:
+def _batches(
+    group: Sequence[tuple[int, Prepared]], threads: int
+) -> Iterator[list[tuple[int, Prepared]]]:
     """Yield a group in batches of at most BATCH_BYTES, but of at least one run for each thread."""
     batch: list[tuple[int, Prepared]] = []
     size = 0
@@ -159,21 +186,29 @@ def _batches(group: Sequence[tuple[int, Prepared]], threads: int) -> Iterator[li
 
 @constrained
 def cores(threads: Annotated[int, Whole(low=1, high=1024)] | None = None) -> int:
-    """Return how many simulations to step at once: `threads`, or one for each core that this process may use."""
+    """Return how many simulations to step at once:
+
+    `threads`, or one for each core that this process may use.
+    """
     if threads is None:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        if hasattr(os, "sched_getaffinity"):
+            return len(os.sched_getaffinity(0))
+        return os.cpu_count() or 1
     return threads
 
 
 def poses(trace: Trace, times: np.ndarray) -> np.ndarray:
-    """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the last one.
+    """Return qpos at times in s, (times, nq), each at the physics step before; after a failure the
+    last one.
 
     A trace has the channels only, so the run is simulated again.
     """
     prepared = prepare(trace.scenario)
     scenario = trace.scenario.resolved
     total = scenario.samples * scenario.steps
-    wanted: list[int] = np.clip(np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total).tolist()
+    wanted: list[int] = np.clip(
+        np.floor(times / scenario.physics_step + 1e-6).astype(int), 0, total
+    ).tolist()
     qpos_at: dict[int, np.ndarray] = {}
     with callback.installed():
         batch = ScenarioBatch([prepared], threads=1)
@@ -188,12 +223,20 @@ def poses(trace: Trace, times: np.ndarray) -> np.ndarray:
 
 
 class ScenarioBatch:
-    """Scenarios of one key (`Prepared.key`) in one Batch. Make and run it while the callback is installed.
+    """Scenarios of one key (`Prepared.key`) in one Batch.
+
+    Make and run it while the callback is installed.
 
     Without `constraints`, no limit, contact, dry friction or equality constraint acts.
     """
 
-    def __init__(self, prepared: Sequence[Prepared], threads: int, constraints: bool = True, python: bool = False):
+    def __init__(
+        self,
+        prepared: Sequence[Prepared],
+        threads: int,
+        constraints: bool = True,
+        python: bool = False,
+    ):
         self.prepared, self.python = prepared, python
         self.scenarios = scenarios = [item.scenario.resolved for item in prepared]
         first, count = scenarios[0], len(scenarios)
@@ -203,9 +246,12 @@ class ScenarioBatch:
         set_fields = models.put_values(self.model, self.base, first, 0)
         self.scratch = mujoco.MjData(self.model)
         mujoco.mj_setConst(self.model, self.scratch)
-        # The shared model has the first scenario's values. Scenarios that do not set these fields need the base values.
+        # The shared model has the first scenario's values. Scenarios that do not set these fields
+        # need the base values.
         self.base_values = {name: field_array(self.base, name) for name in set_fields}
-        self.logs = [np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios]
+        self.logs = [
+            np.full((first.samples + 1, first.plant.n), np.nan, state.LOG) for _ in scenarios
+        ]
         self.records = np.zeros(count, state.SIMULATION)
         self.packed = []  # the arrays whose addresses are in the records
         for i, (item, log) in enumerate(zip(prepared, self.logs, strict=True)):
@@ -222,19 +268,29 @@ class ScenarioBatch:
         self.set_parameters(0, range(count))
 
     def may_have_constraints(self) -> bool:
-        """Return whether any simulation may ever have a limit, contact, dry friction or equality constraint.
+        """Return whether any simulation may ever have a limit, contact, dry friction or equality
+        constraint.
 
-        Without, MuJoCo need not look for them, which takes a tenth of its step. No bit of a trace depends on it.
+        Without, MuJoCo need not look for them, which takes a tenth of its step. No bit of a trace
+        depends on it.
         """
         model = self.base
         touching = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-        touching = touching and (model.npair or (np.any(model.geom_contype) and np.any(model.geom_conaffinity)))
+        touching = touching and (
+            model.npair or (np.any(model.geom_contype) and np.any(model.geom_conaffinity))
+        )
         if touching or model.neq or np.any(model.jnt_limited) or np.any(model.tendon_limited):
             return True
-        if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS.value:  # the callback has the friction
+        if (
+            model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS.value
+        ):  # the callback has the friction
             return False
-        values = (models.field_values(model, s, step) for s in self.scenarios for step in {0, s.jump_step})
-        return any(np.any(its.get(name, getattr(model, name))) for its in values for name in DRY_FRICTION)
+        values = (
+            models.field_values(model, s, step) for s in self.scenarios for step in {0, s.jump_step}
+        )
+        return any(
+            np.any(its.get(name, getattr(model, name))) for its in values for name in DRY_FRICTION
+        )
 
     def reset(self) -> None:
         """Put MuJoCo's states at the model's defaults, and tell the callback which record is whose."""
@@ -242,7 +298,9 @@ class ScenarioBatch:
         self.step = 0  # physics steps done
         self.batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE.value)
         addresses = state.address(self.records) + np.arange(count) * self.records.itemsize
-        self.batch.bind("userdata")[:] = np.column_stack([np.full(count, callback.magic()), addresses])
+        self.batch.bind("userdata")[:] = np.column_stack(
+            [np.full(count, callback.magic()), addresses]
+        )
 
     def run(self, report: Report) -> list[Trace]:
         """Simulate all scenarios to the end, and return their traces."""
@@ -255,19 +313,30 @@ class ScenarioBatch:
         self.run_alive(self.batch.forward, 1)  # the last sample, at the end of the run
 
     def advance_to(self, end: int, report: Report = lambda steps: None) -> None:
-        """Step all scenarios to a physics step, each with the parameters that hold from its jump on."""
-        for stop in sorted({end, *(s.jump_step for s in self.scenarios if self.step < s.jump_step <= end)}):
+        """Step all scenarios to a physics step, each with the parameters that hold from its jump
+        on.
+        """
+        for stop in sorted(
+            {end, *(s.jump_step for s in self.scenarios if self.step < s.jump_step <= end)}
+        ):
             self.advance(stop - self.step, report)
             self.step = stop
-            self.set_parameters(stop, [i for i, s in enumerate(self.scenarios) if s.jump_step == stop > 0])
+            self.set_parameters(
+                stop, [i for i, s in enumerate(self.scenarios) if s.jump_step == stop > 0]
+            )
 
     def set_parameters(self, step: int, indices: Sequence[int]) -> None:
-        """Set the true parameters that hold from a physics step on, in the simulations of these indices."""
+        """Set the true parameters that hold from a physics step on, in the simulations of these
+        indices.
+        """
         changed = []
         for i in indices:
             values = self.base_values | models.field_values(self.base, self.scenarios[i], step)
             for name, value in values.items():
-                before = self.fields[name][i] if name in self.fields else field_array(self.model, name)
+                if name in self.fields:
+                    before = self.fields[name][i]
+                else:
+                    before = field_array(self.model, name)
                 if np.any(before != value):
                     self.fields[name] = self.batch.expand(name)
                     self.fields[name][i] = value
@@ -277,7 +346,9 @@ class ScenarioBatch:
 
     @property
     def started(self) -> dict[str, np.ndarray]:
-        """The arrays of all simulations whose start is not MuJoCo's: states, and the past of delayed sensors."""
+        """The arrays of all simulations whose start is not MuJoCo's: states, and the past of
+        delayed sensors.
+        """
         lagged = ["act"] * bool(self.scenarios[0].plant.pose and self.model.na)
         names = ("qpos", "qvel", *lagged, *["history"] * bool(self.model.nhistory))
         return {name: self.batch.bind(name) for name in names}
@@ -294,20 +365,28 @@ class ScenarioBatch:
                 array[i] = getattr(data, name)
 
     def advance(self, steps: int, report: Report) -> None:
-        """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C works."""
+        """Step the simulations that still run, in slices, so that the progress bar moves and Ctrl-C
+        works.
+        """
         first = self.scenarios[0]
         channels = len(self.scenarios) * first.plant.n
-        slice_steps = USER_MODEL_STEPS if first.plant.own else max(1, SLICE_STEPS // channels)
+        if first.plant.own:
+            slice_steps = USER_MODEL_STEPS
+        else:
+            slice_steps = max(1, SLICE_STEPS // channels)
         while steps:
             count = min(steps, slice_steps)
-            self.run_alive(lambda alive, count=count: self.batch.step(alive, nstep=count), count * first.stages)
+            self.run_alive(
+                lambda alive, count=count: self.batch.step(alive, nstep=count), count * first.stages
+            )
             report(count * channels)
             steps -= count
 
     def run_alive(self, action: Callable[[np.ndarray], None], calls: int) -> None:
         """Apply an action to the simulations that still run, and mark those that fail.
 
-        The action is a function of their indices; MuJoCo should call the callback `calls` times in each.
+        The action is a function of their indices; MuJoCo should call the callback `calls` times in
+        each.
         """
         records = self.records
         alive = np.flatnonzero(records["failure"] == state.FINE).astype(np.int32)
@@ -325,14 +404,21 @@ class ScenarioBatch:
             # another Python callback replaced ours; the comparison shows it below
         other = mjcb.replaced()
         self.replaced = self.replaced or other
-        interrupted = [i for i in alive if i not in self.errors and (other or records["calls"][i] != self.calls)]
+        interrupted = [
+            i
+            for i in alive
+            if i not in self.errors and (other or records["calls"][i] != self.calls)
+        ]
         records["failure"][interrupted] = state.INTERRUPTED
         records["failed_step"][interrupted] = before // self.scenarios[0].stages
 
     def trace(self, i: int) -> Trace:
         """Return the Trace of simulation i."""
         code, step = int(self.records["failure"][i]), int(self.records["failed_step"][i])
-        failure = None if code == state.FINE else self.failure(i, code)
+        if code == state.FINE:
+            failure = None
+        else:
+            failure = self.failure(i, code)
         if failure is None and self.lost_contacts(i):
             failure, step = LOST_CONTACTS, 0
         return from_log(self.prepared[i].scenario, self.logs[i], step, failure)
@@ -353,14 +439,18 @@ class ScenarioBatch:
         if code == state.DISTURBANCE_NOT_FINITE:
             return DISTURBANCE_NOT_FINITE
         if told := [str(one.error) for one in self.packed[i].python if one.error]:
-            return told[0].replace("in channel 0", f"in channel {int(self.records['seen']['i'][i])}")
+            return told[0].replace(
+                "in channel 0", f"in channel {int(self.records['seen']['i'][i])}"
+            )
         scenario = self.scenarios[i]
         of_law = code in (state.LAW_RAISED, state.NOT_FINITE)
         if of_law and (told := law_failure(scenario, self.records[i], self.packed[i])):
             return told
         if self.python:
             return "a function of the run failed, though not in Python"
-        again = ScenarioBatch([self.prepared[i]], 1, python=True)  # compiled code keeps no text of an exception
+        again = ScenarioBatch(
+            [self.prepared[i]], 1, python=True
+        )  # compiled code keeps no text of an exception
         again.simulate(lambda steps: None)
         return again.failure(0, int(again.records["failure"][0]))
 
@@ -368,7 +458,8 @@ class ScenarioBatch:
 def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     """Return in words why a law failed: its exception, or the u and s in the record.
 
-    Compiled code keeps no text of an exception, so the law is called again in Python. Return None if that raises none.
+    Compiled code keeps no text of an exception, so the law is called again in Python. Return None
+    if that raises none.
     """
     n, i, width = s.plant.n, int(record["seen"]["i"]), int(record["width"])
     memory = state.view(packed.numbers, int(record["law"]["memory"]), (n, s.law.memory)).copy()
@@ -376,7 +467,9 @@ def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
     try:
         if s.law.joint:
             dtype = joint_law.stored_dtype(n)
-            numbers = state.view(packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,))
+            numbers = state.view(
+                packed.numbers, int(record["joint"]["head"]), (dtype.itemsize // 8,)
+            )
             stored = numbers.copy().view(dtype)[0]
             dynamics = NominalDynamics(s, stored["x"], stored["v"])
             function.call_joint(joint_law.measurement_of(stored, dynamics))
@@ -386,5 +479,7 @@ def law_failure(s: Resolved, record: np.ndarray, packed: Packed) -> str | None:
         return str(failure)
     if record["failure"] == state.LAW_RAISED:  # the law had changed its memory before it raised
         return None
-    u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[:, i % width].tolist()
+    u, sliding = state.view(packed.numbers, int(record["commands"]), (2, width))[
+        :, i % width
+    ].tolist()
     return f"law {s.law.name!r} returned u = {u:g}, s = {sliding:g} in channel {i}"

@@ -1,8 +1,8 @@
 """A scenario: everything that defines a run, as plain data, checked when it is made.
 
-A field that was left out is None if its default depends on other fields; `scenario.resolved` has the default. The
-fields plant, mismatch, jump, friction, contact, actuator and sensor set the true mechanism. The law knows at most the
-plant's nominal parameters.
+A field that was left out is None if its default depends on other fields; `scenario.resolved` has
+the default. The fields plant, mismatch, jump, friction, contact, actuator and sensor set the true
+mechanism. The law knows at most the plant's nominal parameters.
 """
 
 import copy
@@ -31,7 +31,13 @@ from smc_mujoco.mechanisms.hardware.contact import Contact
 from smc_mujoco.mechanisms.hardware.drives import DCMotor, DriveStep, Lag, drive_step
 from smc_mujoco.mechanisms.hardware.encoder import Encoder
 from smc_mujoco.mechanisms.hardware.friction import Coulomb, Viscous
-from smc_mujoco.mechanisms.hardware.part import Actuator, Friction, NominalDrive, joint_names, moves_alone
+from smc_mujoco.mechanisms.hardware.part import (
+    Actuator,
+    Friction,
+    NominalDrive,
+    joint_names,
+    moves_alone,
+)
 from smc_mujoco.mechanisms.hardware.rotors import flies
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
 from smc_mujoco.mechanisms.hardware.stepper import Stepper
@@ -55,19 +61,31 @@ MAX_TIME = 1e9  # s, of runs
 U_MAX = 6.0  # N or N m, chosen: the bound of every study here
 # Fields that no scenario of a free body sets, with their words
 NOT_OF_FREE_BODIES = {
-    "friction": "friction", "actuator": "actuator", "sensor": "sensor", "feedforward": "feedforward",
-    "clock": "clock with late or missed samples", "velocity": "estimated velocity",
-}  # fmt: skip
+    "friction": "friction",
+    "actuator": "actuator",
+    "sensor": "sensor",
+    "feedforward": "feedforward",
+    "clock": "clock with late or missed samples",
+    "velocity": "estimated velocity",
+}
 MAX_STEP = 1e-3  # s; the ideal plants under RK4 follow their equations to 1e-9 at this step
-REALISTIC_STEP = 2.5e-4  # s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
-PLAY_STEP = 1.25e-4  # s, with a Backlash; tests/mechanisms/hardware/test_play.py compares with plastic stops
-MIN_JITTER_STEPS = 4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more
-MIN_RESOLVED_LAG = 0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+# s; tests/simulation/test_convergence.py measures what halving it changes, see docs/design.md
+REALISTIC_STEP = 2.5e-4
+# s, with a Backlash; tests/mechanisms/hardware/test_play.py compares with plastic stops
+PLAY_STEP = 1.25e-4
+MIN_JITTER_STEPS = (
+    4  # physics steps in the clock's jitter; chosen: the delay of a sample has five values or more
+)
+MIN_RESOLVED_LAG = (
+    0.02  # control periods: a shorter lag needs no shorter physics step, see `longest_step`
+)
 DRIVE_STEPS = 4  # physics steps per control period: enough behind any drive, see `longest_step`
 MAX_DEFAULT_STEPS = 100_000  # per control period, if no physics step is given
 MAX_STEPS = 100_000_000  # per run: minutes of computing
 MAX_VALUES = 20_000_000  # control samples times channels: a trace of about 1 GB
-MAX_ANGLE = 3.0 * math.pi  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
+MAX_ANGLE = (
+    3.0 * math.pi
+)  # rad: chosen; swing-ups stay below 1.5 turns, and a larger number may be degrees
 MAX_DEGREES = 720.0  # chosen; a number above this is not taken for degrees
 MAX_CONDITION_NUMBER = 1e12  # of a mass matrix; chosen: its inverse has 4 digits
 
@@ -75,7 +93,9 @@ Out = TypeVar("Out")
 
 
 def field(convert: Callable[..., Out], default: Any = dataclasses.MISSING) -> Out:
-    """Return a dataclass field; `convert`, a function of `coerce`, makes its value from what the user gives."""
+    """Return a dataclass field; `convert`, a function of `coerce`, makes its value from what the
+    user gives.
+    """
     return dataclasses.field(default=default, metadata={"convert": convert})
 
 
@@ -86,55 +106,68 @@ class Scenario:
 
     Attributes:
       plant: a Plant or the name of one.
-      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. To give each driven channel its own, give a
-        list in the channels' order, or a mapping from the joints' names; u_max and reference take these forms, too.
-        Default of all three: what the plant's channels suggest, see `smc.Channel`.
-      model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g u. Default: "nominal"
-        for a law that requires it, else "none". "true" is for controls, as no controller knows it: f and g of the true
-        parameters, with the forces of disturbances, friction and contacts on the joint in f.
+      law: a Law (`smc.law(name, **gains)` or your own), or the name of one. To give each driven
+        channel its own, give a list in the channels' order, or a mapping from the joints' names;
+        u_max and reference take these forms, too. Default of all three: what the plant's channels
+        suggest, see `smc.Channel`.
+      model: what the law may know of the plant: "none", or its "nominal" f and g, for x'' = f + g
+        u. Default: "nominal" for a law that requires it, else "none". "true" is for controls, as no
+        controller knows it: f and g of the true parameters, with the forces of disturbances,
+        friction and contacts on the joint in f.
       surface: a Surface or the name of one, for laws that take one. None: the law's own, de + c e.
       duration: s. The run lasts as many whole control periods as fit into it.
       control_period: s between two runs of the law. The command is held in between.
-      physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms with friction
-        (without `exact_friction`), contact, a mechanism or a plant that is not `smooth`, half of that with a Backlash,
-        else up to 1 ms; always up to a quarter of the clock's jitter. Where 1 ms holds, a drive whose force changes
-        within a control period may lower it, to a quarter of that period or half of the drive's time constant,
-        whichever is longer.
-      u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest motor of your own model.
-        A motor's own limit holds too: see `limits`. If u is a voltage, the bound is in V; its default is the motor's.
-      x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the plant's x0; v0 = 0.
-      reference: r(t), the same for every channel, or one for each driven channel. Default: the plant's `rest`, or 0.
-      feedforward: a known signal that is added to the law's u before its bound, the same for every driven channel: an
-        excitation, or the command of a recorded experiment (with the law "none"). None: nothing is added.
+      physics_step: s; must divide the control period. Default: the largest such step up to 0.25 ms
+        with friction (without `exact_friction`), contact, a mechanism or a plant that is not
+        `smooth`, half of that with a Backlash, else up to 1 ms; always up to a quarter of the
+        clock's jitter. Where 1 ms holds, a drive whose force changes within a control period may
+        lower it, to a quarter of that period or half of the drive's time constant, whichever is
+        longer.
+      u_max: bound on |u|, N or N m; may be infinite. Default: 6, or the limit of the strongest
+        motor of your own model. A motor's own limit holds too: see `limits`. If u is a voltage, the
+        bound is in V; its default is the motor's.
+      x0, v0: initial state, rad or m and rad/s or m/s: one number, or one per channel. Default: the
+        plant's x0; v0 = 0.
+      reference: r(t), the same for every channel, or one for each driven channel. Default: the
+        plant's `rest`, or 0.
+      feedforward: a known signal that is added to the law's u before its bound, the same for every
+        driven channel: an excitation, or the command of a recorded experiment (with the law
+        "none"). None: nothing is added.
       disturbance: d(t), one signal or several to be added, or None.
       noise: measurement noise, or None.
       input_delay: s; a whole number of physics steps. Before the first command arrives, u is 0.
       clock: the controller's Clock: its samples may come late or be missed. None: all are on time.
-      velocity: an Estimator of the velocity that the law sees, or the name of one. Default: "measured", or
-        "filtered_difference" with an encoder, which measures no velocity.
-      mismatch: parameter name -> factor on the true plant's parameter. For a parameter in `plant.added`, such as a
-        payload in kg, the value is added instead. `mass` is the plant's mass.
+      velocity: an Estimator of the velocity that the law sees, or the name of one. Default:
+        "measured", or "filtered_difference" with an encoder, which measures no velocity.
+      mismatch: parameter name -> factor on the true plant's parameter. For a parameter in
+        `plant.added`, such as a payload in kg, the value is added instead. `mass` is the plant's
+        mass.
       jump: a change of the true plant's parameters in mid-run, or None.
       seed: of every random number of the run, 0 .. 2^53 - 1.
-      integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation, also behind
-        a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
-      friction: on every joint, in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or several of them.
-      contact: what the mechanism touches: a Contact that the plant offers, the kind of one, or "none".
+      integrator: RK4, Euler, implicitfast or implicit. Default: RK4 for the plant's plain equation,
+        also behind a Lag, a RateLimit or a DCMotor, and with `exact_friction`, else implicitfast.
+      friction: on every joint, in addition to the plant's own: Viscous, Coulomb, LuGre, Sigmoid, or
+        several of them.
+      contact: what the mechanism touches: a Contact that the plant offers, the kind of one, or
+        "none".
       mechanism: "equation", or the name of another mechanism that the plant offers.
-      actuator: what is between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag and another drive; a
-        Backlash may follow. None: the command is the force. u is limited to u_max before the drives.
+      actuator: what is between command and joint: a drive (Lag, RateLimit, DCMotor), or a Lag and
+        another drive; a Backlash may follow. None: the command is the force. u is limited to u_max
+        before the drives.
       sensor: an Encoder, or None: position and velocity as they are, with `noise`.
-      condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops it.
+      condition: name of the run's condition in a grid, set by `named`; dataclasses.replace drops
+        it.
 
-    A field that is left out stays None, also under dataclasses.replace, so that its default follows the other fields.
-    `resolved` is the same scenario with its defaults. Scenarios whose resolved fields are equal are equal, and
-    give the same trace to the last bit.
+    A field that is left out stays None, also under dataclasses.replace, so that its default follows
+    the other fields. `resolved` is the same scenario with its defaults. Scenarios whose resolved
+    fields are equal are equal, and give the same trace to the last bit.
 
     Raises:
       ScenarioError: a value out of its range, or values that do not fit together, in one sentence.
 
     Warns:
-      ScenarioWarning: a start or a reference that may be in degrees; or a DCMotor that cannot hold a joint where it
+      ScenarioWarning: a start or a reference that may be in degrees; or a DCMotor that cannot hold
+      a joint where it
         starts, though a force of u_max could.
     """
 
@@ -153,8 +186,12 @@ class Scenario:
     feedforward: Signal | None = field(
         coerce.instance(Signal, "one signal, such as smc.signals.TimeSeries(times, values)"), None
     )
-    disturbance: tuple[Signal, ...] = field(coerce.several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)"), None)
-    noise: Noise = field(coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None)
+    disturbance: tuple[Signal, ...] = field(
+        coerce.several(Signal, "smc.Sine(amplitude=0.2, omega=5.0)"), None
+    )
+    noise: Noise = field(
+        coerce.instance(Noise, "smc.Noise(position=..., velocity=...)", Noise()), None
+    )
     input_delay: float = field(coerce.input_delay, 0.0)
     clock: Clock = field(coerce.instance(Clock, "smc.Clock(jitter=..., missed=...)", Clock()), None)
     velocity: Estimator | None = field(coerce.velocity, None)
@@ -213,9 +250,13 @@ class Scenario:
 
     @classmethod
     def recorded(cls, **fields: Any) -> "Scenario":
-        """Make the scenario of a recorded run, without warnings and without checks that are newer than the run."""
+        """Make the scenario of a recorded run, without warnings and without checks that are newer
+        than the run.
+        """
         scenario = object.__new__(cls)
-        vars(scenario).update({f.name: fields.get(f.name, f.default) for f in dataclasses.fields(cls)})
+        vars(scenario).update(
+            {f.name: fields.get(f.name, f.default) for f in dataclasses.fields(cls)}
+        )
         scenario._convert()
         check(scenario.resolved)
         return scenario
@@ -241,7 +282,9 @@ class Scenario:
         return tuple(getattr(self, name) for name in self.fields())
 
     def __getstate__(self) -> dict[str, Any]:
-        return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # a copy resolves again
+        return {
+            f.name: getattr(self, f.name) for f in dataclasses.fields(self)
+        }  # a copy resolves again
 
     @functools.cached_property
     def resolved(self) -> "Resolved":
@@ -252,12 +295,27 @@ class Scenario:
 
     def _repr_html_(self) -> html.Html:
         """Return plant, law, duration and the fields that differ from their defaults, in SI units."""
-        parameters = ", ".join(f"{name} = {value:g}" for name, value in self.plant.parameters.items())
-        rows = {"plant": f"{self.plant.name} ({parameters})", "law": self.law, "gains": self.law.source}
-        absent = None, (), {}, Noise(), Clock(), Contact("none")  # values of fields that were left out
+        parameters = ", ".join(
+            f"{name} = {value:g}" for name, value in self.plant.parameters.items()
+        )
+        rows = {
+            "plant": f"{self.plant.name} ({parameters})",
+            "law": self.law,
+            "gains": self.law.source,
+        }
+        absent = (
+            None,
+            (),
+            {},
+            Noise(),
+            Clock(),
+            Contact("none"),
+        )  # values of fields that were left out
         for f in dataclasses.fields(self):
             value = getattr(self, f.name)
-            if f.name == "duration" or (f.name not in rows and value != f.default and value not in absent):
+            if f.name == "duration" or (
+                f.name not in rows and value != f.default and value not in absent
+            ):
                 rows[f.name.replace("_", " ")] = shown(value)
         return html.fields(rows, "Scenario")
 
@@ -267,7 +325,10 @@ class Scenario:
         return tuple(f.name for f in dataclasses.fields(cls) if f.init)
 
     def named(self, condition: str | None) -> "Scenario":
-        """Return this scenario with a name for its condition. Tables show it; the run is the same."""
+        """Return this scenario with a name for its condition.
+
+        Tables show it; the run is the same.
+        """
         scenario = copy.copy(self)
         object.__setattr__(scenario, "condition", condition)
         return scenario
@@ -280,15 +341,18 @@ class Scenario:
     @property
     def plain_equation(self) -> bool:
         """Whether MuJoCo integrates only the plant's equation, with or without drives."""
-        without_parts = not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
+        without_parts = (
+            not self.friction and self.contact.kind == "none" and self.mechanism == "equation"
+        )
         return without_parts and self.plant.smooth and all(part.drives for part in self.actuator)
 
     @property
     def exact_friction(self) -> bool:
-        """Whether the callback gives RK4 the moments of Coulomb friction in each step, see `friction.coulomb_step`.
+        """Whether the callback gives RK4 the moments of Coulomb friction in each step, see
+        `friction.coulomb_step`.
 
-        It knows all other forces on joints that move alone, behind no drive but lags and rate limits. In other
-        scenarios Coulomb friction is MuJoCo's.
+        It knows all other forces on joints that move alone, behind no drive but lags and rate
+        limits. In other scenarios Coulomb friction is MuJoCo's.
         """
         parts = {type(part) for part in self.friction}
         without_parts = self.contact.kind == "none" and self.mechanism == "equation"
@@ -296,12 +360,20 @@ class Scenario:
             isinstance(d, Push) for d in self.disturbance
         )
         rk4 = self.integrator in (None, "RK4")
-        return rk4 and Coulomb in parts <= {Coulomb, Viscous} and without_parts and known and moves_alone(self.plant)
+        return (
+            rk4
+            and Coulomb in parts <= {Coulomb, Viscous}
+            and without_parts
+            and known
+            and moves_alone(self.plant)
+        )
 
     @property
     def voltage_motor(self) -> DCMotor | None:
         """The DC motor that has its voltage as u; None if u is a force."""
-        return next((part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None)
+        return next(
+            (part for part in self.actuator if isinstance(part, DCMotor) and part.unit), None
+        )
 
     @property
     def stepper(self) -> Stepper | None:
@@ -315,16 +387,25 @@ class Scenario:
 
     @property
     def efforts(self) -> tuple[str, ...]:
-        """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its acceleration."""
+        """Unit of u in each channel, (n,): that of the joint's force, "V", or that of its
+        acceleration.
+        """
         if self.stepper is not None:
             return tuple(f"{unit}/s^2" for unit in self.plant.units)
-        return self.plant.efforts if self.voltage_motor is None else (self.voltage_motor.unit,) * self.plant.n
+        if self.voltage_motor is None:
+            return self.plant.efforts
+        return (self.voltage_motor.unit,) * self.plant.n
 
     @functools.cached_property
     def limits(self) -> tuple[float, ...]:
-        """The bound on |u| of each driven channel, in the unit of u: the lesser of u_max and the motor's limit."""
+        """The bound on |u| of each driven channel, in the unit of u: the lesser of u_max and the
+        motor's limit.
+        """
         u_max = self.resolved.u_max
-        bounds = u_max if isinstance(u_max, tuple) else (u_max,) * self.plant.driven
+        if isinstance(u_max, tuple):
+            bounds = u_max
+        else:
+            bounds = (u_max,) * self.plant.driven
         if self.voltage_motor is not None:
             return tuple(min(bound, self.voltage_motor.voltage) for bound in bounds)
         if self.stepper is not None:  # the plant's limits are of a force
@@ -336,7 +417,9 @@ class Scenario:
     def references(self) -> tuple[Signal, ...]:
         """The reference of each driven channel."""
         reference = self.resolved.reference
-        return reference.signals if isinstance(reference, PerChannel) else (reference,) * self.plant.driven
+        if isinstance(reference, PerChannel):
+            return reference.signals
+        return (reference,) * self.plant.driven
 
     @functools.cached_property
     def steps(self) -> int:
@@ -356,7 +439,9 @@ class Scenario:
     @property
     def readings(self) -> int:
         """How many delayed readings of the sensor MuJoCo keeps."""
-        return 0 if self.sensor is None else self.sensor.readings(self.resolved.physics_step, self.plant.n)
+        if self.sensor is None:
+            return 0
+        return self.sensor.readings(self.resolved.physics_step, self.plant.n)
 
     @functools.cached_property
     def delay_steps(self) -> int:
@@ -366,7 +451,9 @@ class Scenario:
     @property
     def jump_step(self) -> int:
         """The first physics step with the parameters of the jump; -1 without a jump."""
-        return -1 if self.jump is None else math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
+        if self.jump is None:
+            return -1
+        return math.ceil(self.jump.time / self.resolved.physics_step - 1e-6)
 
     @property
     def formula_friction(self) -> Sliding | None:
@@ -376,7 +463,9 @@ class Scenario:
     @property
     def drive_step(self) -> DriveStep | None:
         """What the drives do in a physics step; None if the actuators get the command itself."""
-        return drive_step(self.actuator, self.resolved.physics_step, self.resolved.integrator == "RK4")
+        return drive_step(
+            self.actuator, self.resolved.physics_step, self.resolved.integrator == "RK4"
+        )
 
     @property
     def work(self) -> int:
@@ -391,15 +480,22 @@ class Scenario:
     @functools.cached_property
     def nominal_drive(self) -> NominalDrive:
         """The actuator in the nominal model: its force is gain u - drag v."""
-        return NominalDrive() if self.voltage_motor is None else self.voltage_motor.nominal
+        if self.voltage_motor is None:
+            return NominalDrive()
+        return self.voltage_motor.nominal
 
     def factors(self, step: int) -> dict[str, float]:
-        """Return parameter -> its factor at a physics step; for parameters in `plant.added`, the number added."""
+        """Return parameter -> its factor at a physics step; for parameters in `plant.added`, the
+        number added.
+        """
         factors = dict(self.mismatch)
         if self.jump is not None and step >= self.jump_step:
             for name, factor in self.jump.factors.items():
                 added = name in self.plant.added
-                factors[name] = factors.get(name, 0.0) + factor if added else factors.get(name, 1.0) * factor
+                if added:
+                    factors[name] = factors.get(name, 0.0) + factor
+                else:
+                    factors[name] = factors.get(name, 1.0) * factor
         return factors
 
 
@@ -426,15 +522,20 @@ class Resolved(Scenario):
 
 
 def _defaults(s: Scenario) -> dict[str, Any]:
-    """Return the defaults of the fields that are None, and the law with what it takes from the plant."""
+    """Return the defaults of the fields that are None, and the law with what it takes from the
+    plant.
+    """
     in_order = s.contact.kind == "bobs"  # pendulums in a row must not start beyond each other
     defaults = {
-        "model": "nominal" if s.law.requires_model else "none", "physics_step": s.control_period / _default_steps(s),
-        "u_max": _default_bound(s), "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
-        "v0": (0.0,) * s.plant.n, "reference": coerce.suggested_reference(s.plant),
+        "model": "nominal" if s.law.requires_model else "none",
+        "physics_step": s.control_period / _default_steps(s),
+        "u_max": _default_bound(s),
+        "x0": tuple(sorted(s.plant.x0)) if in_order else s.plant.x0,
+        "v0": (0.0,) * s.plant.n,
+        "reference": coerce.suggested_reference(s.plant),
         "velocity": estimator("measured" if s.sensor is None else "filtered_difference"),
         "integrator": "RK4" if s.plain_equation or s.exact_friction else "implicitfast",
-    }  # fmt: skip
+    }
     missing = {name: value for name, value in defaults.items() if getattr(s, name) is None}
     return missing | {"law": design.at_plant(s.law, s.plant)}
 
@@ -443,61 +544,91 @@ def _default_bound(s: Scenario) -> float | tuple[float, ...]:
     """Return the default of u_max: a motor's own, or what the plant suggests."""
     if s.voltage_motor is not None:
         return s.voltage_motor.voltage
-    return suggested_u_max(s.plant) if s.stepper is None else s.stepper.ramp
+    if s.stepper is None:
+        return suggested_u_max(s.plant)
+    return s.stepper.ramp
 
 
 def longest_step(s: Scenario) -> float:
     """Return the largest default physics step, s.
 
-    A drive's force changes within a step. Behind one Lag, RK4 gets its mean and its first moment, so that velocities
-    and positions at the ends of steps are exact. Behind other drives it gets the mean: velocities are exact, and
-    positions err by step^2/12 times the change of the acceleration: in a cycle of frequency omega, by (omega step)^2/12
-    of its amplitude. With four steps this is 5 % in the fastest cycle of a sampled law, which lasts two samples. Cycles
-    behind a long delay are slower: a step of half of it is enough. A force that follows u at once sets no limit.
+    A drive's force changes within a step. Behind one Lag, RK4 gets its mean and its first moment,
+    so that velocities and positions at the ends of steps are exact. Behind other drives it gets the
+    mean: velocities are exact, and positions err by step^2/12 times the change of the acceleration:
+    in a cycle of frequency omega, by (omega step)^2/12 of its amplitude. With four steps this is 5
+    % in the fastest cycle of a sampled law, which lasts two samples. Cycles behind a long delay are
+    slower: a step of half of it is enough. A force that follows u at once sets no limit.
     """
     jitter = s.clock.jitter / MIN_JITTER_STEPS or MAX_STEP
     if any(isinstance(part, Backlash) for part in s.actuator):
         return min(PLAY_STEP, jitter)
     if not (s.plain_equation or s.exact_friction) or s.stepper is not None:
         return min(REALISTIC_STEP, jitter)
-    one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(s.actuator[0], Lag)
-    moving = [part for part in s.actuator if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited]
+    one_lag = [part.drives for part in s.actuator].count(True) == 1 and isinstance(
+        s.actuator[0], Lag
+    )
+    moving = []
+    for part in s.actuator:
+        if part.delay >= MIN_RESOLVED_LAG * s.control_period or part.limited:
+            moving.append(part)
     moving = [] if one_lag else moving
-    return min(MAX_STEP, jitter, *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving))
+    return min(
+        MAX_STEP,
+        jitter,
+        *(max(0.5 * part.delay, s.control_period / DRIVE_STEPS) for part in moving),
+    )
 
 
 def stepped_by_mujoco(s: Scenario) -> Scenario:
     """Return the scenario with MuJoCo's Coulomb friction, for what runs without the callback's."""
-    return dataclasses.replace(s, integrator="implicitfast") if s.exact_friction else s
+    if s.exact_friction:
+        return dataclasses.replace(s, integrator="implicitfast")
+    return s
 
 
 def _default_steps(s: Scenario) -> int:
     """Return the default number of physics steps per control period.
 
-    Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the input delay is a
-    whole number of steps.
+    Behind a drive, and with `exact_friction`, up to four times as many steps are tried, until the
+    input delay is a whole number of steps.
     """
-    longest = max(longest_step(s), s.control_period / MAX_DEFAULT_STEPS)  # a scenario that needs less is refused later
+    longest = max(
+        longest_step(s), s.control_period / MAX_DEFAULT_STEPS
+    )  # a scenario that needs less is refused later
     minimum = math.ceil(s.control_period / longest - 1e-9)
     delay = s.input_delay / s.control_period
-    fitting = (n for n in range(minimum, 4 * minimum + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6)
-    return next(fitting, minimum) if s.actuator or s.exact_friction else minimum
+    fitting = (
+        n for n in range(minimum, 4 * minimum + 1) if abs(math.remainder(delay * n, 1.0)) < 1e-6
+    )
+    if s.actuator or s.exact_friction:
+        return next(fitting, minimum)
+    return minimum
 
 
 def suggested_u_max(plant: Plant) -> float | tuple[float, ...]:
-    """Return what the plant's channels suggest, or the default bound; one number if all channels have the same."""
+    """Return what the plant's channels suggest, or the default bound; one number if all channels
+    have the same.
+    """
     default = default_u_max(plant)
-    if plant.own and math.inf in plant.limits:  # the bound of one joint's motor is none of another's
+    if (
+        plant.own and math.inf in plant.limits
+    ):  # the bound of one joint's motor is none of another's
         given = plant.suggested.get("u_max", (None,) * plant.driven)
         each = [limit if limit < math.inf else U_MAX for limit in plant.limits]
-        bounds = tuple(limit if bound is None else bound for limit, bound in zip(each, given, strict=True))
+        bounds = tuple(
+            limit if bound is None else bound for limit, bound in zip(each, given, strict=True)
+        )
         return bounds if len(set(bounds)) > 1 else bounds[0]
-    bounds = tuple(default if bound is None else bound for bound in plant.suggested.get("u_max", (None,)))
+    bounds = tuple(
+        default if bound is None else bound for bound in plant.suggested.get("u_max", (None,))
+    )
     return bounds if len(set(bounds)) > 1 else bounds[0]
 
 
 def default_u_max(plant: Plant) -> float:
-    """Return the bound on |u| where none is given, N or N m: the limit of the plant's strongest motor, else 6."""
+    """Return the bound on |u| where none is given, N or N m: the limit of the plant's strongest
+    motor, else 6.
+    """
     return max((limit for limit in plant.limits if limit < math.inf), default=U_MAX)
 
 
@@ -510,7 +641,9 @@ def check(s: Resolved) -> None:
 
 
 def check_clock(s: Resolved) -> None:
-    """Check that the delay is a whole number of steps, the jump is within the run, and the trace fits into memory."""
+    """Check that the delay is a whole number of steps, the jump is within the run, and the trace
+    fits into memory.
+    """
     delay = s.input_delay / s.physics_step
     if abs(delay - round(delay)) > 1e-6:
         raise ScenarioError(
@@ -537,17 +670,25 @@ def check_clock(s: Resolved) -> None:
 
 
 def check_signals(s: Resolved) -> None:
-    """Check that the signals can be disturbances and a reference, and that none is shorter than a step."""
+    """Check that the signals can be disturbances and a reference, and that none is shorter than a
+    step.
+    """
     for d in s.disturbance:
-        shortest = s.plant.n * s.duration / max(MAX_STEPS, s.work)  # s between knots, of all channels
+        shortest = (
+            s.plant.n * s.duration / max(MAX_STEPS, s.work)
+        )  # s between knots, of all channels
         if isinstance(d, OrnsteinUhlenbeck | Dryden) and d.dt < shortest:
             raise ScenarioError(
                 f"{type(d).__name__}'s dt {d.dt:g} s makes too many knots: give {shortest:.3g} s or more"
             )
         if isinstance(d, Impulse) and d.width < s.physics_step:
-            raise ScenarioError(f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it")
+            raise ScenarioError(
+                f"{shown(d)} is shorter than a physics step of {s.physics_step:g} s: widen it"
+            )
     if any(isinstance(signal, PerChannel) for signal in (*s.disturbance, s.feedforward)):
-        raise ScenarioError("only a reference may have a signal for each channel: give one signal for all")
+        raise ScenarioError(
+            "only a reference may have a signal for each channel: give one signal for all"
+        )
     winds = [d for d in s.disturbance if d.air]
     if winds and not flies(s.plant):
         raise ScenarioError(
@@ -562,8 +703,13 @@ def check_signals(s: Resolved) -> None:
             f"disturbance {shown(forces[0])} is a force on a body, and disturbances of {s.plant.name} act on its "
             "joints: give another signal"
         )
-    functions_of_time = [("reference", signal, "a smooth signal") for signal in dict.fromkeys(s.references)]
-    functions_of_time += [("feedforward", s.feedforward, "a known signal of u")] if s.feedforward else []
+    functions_of_time = [
+        ("reference", signal, "a smooth signal") for signal in dict.fromkeys(s.references)
+    ]
+    if s.feedforward:
+        functions_of_time += [("feedforward", s.feedforward, "a known signal of u")]
+    else:
+        functions_of_time += []
     for name, signal, cure in functions_of_time:
         kinds = {
             "a force": signal.cartesian,
@@ -595,8 +741,13 @@ def check_law(s: Resolved) -> None:
         if not suits(law, s.plant):
             paired = dataclasses.replace(s.plant, underactuated=True)
             listed = f"smc-mujoco list --plant {s.plant.argument} lists those for it"
-            cure = "give each channel a partner" if s.plant.own and suits(law, paired) else listed
-            raise ScenarioError(f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}")
+            if s.plant.own and suits(law, paired):
+                cure = "give each channel a partner"
+            else:
+                cure = listed
+            raise ScenarioError(
+                f"law {law.name!r} is only for {', '.join(law.plants)}, not for {s.plant.name}: {cure}"
+            )
     if s.model != "none" and s.plant.unmodelled:
         raise ScenarioError(f"{s.plant.name} has no nominal model: {s.plant.unmodelled}")
     for law in s.law.parts:
@@ -620,7 +771,9 @@ def check_surface(surface: Surface, law: Law) -> None:
 
 
 def check_channels(s: Resolved) -> None:
-    """Check that the law has as many numbers of each gain as channels, and that a law of many joints can run."""
+    """Check that the law has as many numbers of each gain as channels, and that a law of many
+    joints can run.
+    """
     for name, value in s.law.gains.items():
         if isinstance(value, tuple) and len(value) != s.plant.driven:
             raise ScenarioError(
@@ -632,9 +785,18 @@ def check_channels(s: Resolved) -> None:
     plant, joints = s.plant, getattr(s.law.function, "joints", s.plant.n)
     sized = f"write it for {plant.n}, with SMC_JOINTS, or --joints of export-c"
     for refused, why in (
-        (plant.n == 1, f"{plant.name} has one: give a law of one channel, such as 'computed_torque'"),
-        (joints != plant.n, f"its C code is for {joints}, where {plant.name} has {plant.n}: {sized}"),
-        (plant.free, f"{plant.name} has {plant.free} without an actuator: give a law of one channel"),
+        (
+            plant.n == 1,
+            f"{plant.name} has one: give a law of one channel, such as 'computed_torque'",
+        ),
+        (
+            joints != plant.n,
+            f"its C code is for {joints}, where {plant.name} has {plant.n}: {sized}",
+        ),
+        (
+            plant.free,
+            f"{plant.name} has {plant.free} without an actuator: give a law of one channel",
+        ),
         (s.surface is not None, "has its own surface: leave the surface out"),
     ):
         if refused:
@@ -642,10 +804,14 @@ def check_channels(s: Resolved) -> None:
 
 
 def check_free_body(s: Resolved) -> None:
-    """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three numbers."""
+    """Check that a law, a signal or a part suits a free body, whose attitude is one thing of three
+    numbers.
+    """
     if not s.plant.pose:
         return
-    if not s.law.joint and s.law.name != "none" and s.law.function is not None:  # else of a trace, without code
+    if (
+        not s.law.joint and s.law.name != "none" and s.law.function is not None
+    ):  # else of a trace, without code
         raise ScenarioError(
             f"law {s.law.name!r} is of one channel, and {s.plant.name} is a free body, whose channels turn together: "
             "give a law of many joints, such as 'geometric'"
@@ -653,9 +819,14 @@ def check_free_body(s: Resolved) -> None:
     given = {name: (words, getattr(s, name)) for name, words in NOT_OF_FREE_BODIES.items()}
     taken = {"clock": not s.clock.regular, "velocity": s.velocity.name != "measured"}
     refused = [words for name, (words, value) in given.items() if taken.get(name, bool(value))]
-    refused += ["disturbance that sees the loop"] if any(d.sees for d in s.disturbance) else []
+    if any(d.sees for d in s.disturbance):
+        refused += ["disturbance that sees the loop"]
+    else:
+        refused += []
     if refused:
-        raise ScenarioError(f"{s.plant.name} is a free body, which takes no {refused[0]}: leave that out")
+        raise ScenarioError(
+            f"{s.plant.name} is a free body, which takes no {refused[0]}: leave that out"
+        )
 
 
 def check_inertia(s: Resolved) -> None:
@@ -674,17 +845,25 @@ def check_names(s: Resolved) -> None:
     for name, factors in (("mismatch", s.mismatch), ("Jump", s.jump.factors if s.jump else {})):
         if s.plant.mass != "mass" and {"mass", s.plant.mass} <= factors.keys():
             both = f"{s.plant.mass} {factors[s.plant.mass]:g} and mass {factors['mass']:g}"
-            raise ScenarioError(f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them")
+            raise ScenarioError(
+                f"{name} has {both}, which are the same parameter of {s.plant.name}: give one of them"
+            )
 
 
 def check_mechanism(s: Resolved) -> None:
-    """Check that the integrator suits the parts, and that mechanism and contact suit the parameters at any time."""
+    """Check that the integrator suits the parts, and that mechanism and contact suit the parameters
+    at any time.
+    """
     if s.integrator == "RK4" and (states := [p for p in s.friction if p.bristles]):
         raise ScenarioError(
             f"integrator RK4 does not integrate the state of {shown(states[0])}: leave the integrator out"
         )
-    if len(s.actuator) > 1 and any(isinstance(part, DCMotor) and part.ripple for part in s.actuator):
-        raise ScenarioError("DCMotor has a ripple beside another part: give the motor alone, or ripple=0")
+    if len(s.actuator) > 1 and any(
+        isinstance(part, DCMotor) and part.ripple for part in s.actuator
+    ):
+        raise ScenarioError(
+            "DCMotor has a ripple beside another part: give the motor alone, or ripple=0"
+        )
     if s.stepper is not None:
         check_stepper(s)
     for part in s.friction:
@@ -692,7 +871,11 @@ def check_mechanism(s: Resolved) -> None:
     for step in (0, s.samples * s.steps):
         values = s.plant.values(s.factors(step))  # raises for those that the plant cannot have
         if s.mechanism != "equation":
-            list(s.plant.mechanisms[s.mechanism].fields(mechanism_model(s.plant, s.mechanism), values))  # raises, too
+            list(
+                s.plant.mechanisms[s.mechanism].fields(
+                    mechanism_model(s.plant, s.mechanism), values
+                )
+            )  # raises, too
         for name, value in s.plant.placed.items() if s.contact.kind != "none" else ():
             if (present := getattr(values, name)) != value:
                 raise ScenarioError(
@@ -702,9 +885,13 @@ def check_mechanism(s: Resolved) -> None:
 
 
 def check_stepper(s: Resolved) -> None:
-    """Check that a stepper motor has the command itself, and a law of one channel or without a model."""
+    """Check that a stepper motor has the command itself, and a law of one channel or without a
+    model.
+    """
     if len([part for part in s.actuator if part.drives]) > 1:
-        raise ScenarioError(f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that out")
+        raise ScenarioError(
+            f"a Stepper is behind {shown(s.actuator[0])}, and takes no lagged command: leave that out"
+        )
     if s.law.joint and s.model != "none":
         raise ScenarioError(
             f"law {s.law.name!r} is of many joints with a nominal model, whose u is a force, and a Stepper's u is an "
@@ -722,7 +909,10 @@ def mechanism_model(plant: Plant, name: str) -> mujoco.MjModel:
 
 def _doubts(s: Resolved) -> Iterator[str]:
     """Yield a sentence about each number that may be in degrees, and each motor that is too weak."""
-    amplitudes = [signal.parameters().get("amplitude", 0.0) for signal in s.references]  # ramps may have many turns
+    # ramps may have many turns
+    amplitudes = []
+    for signal in s.references:
+        amplitudes.append(signal.parameters().get("amplitude", 0.0))
     for what, values in (("x0", s.x0), ("the reference's amplitude", amplitudes)):
         for unit, value in zip(s.plant.units, values, strict=False):
             if unit == "rad" and MAX_ANGLE < abs(value) <= MAX_DEGREES:
@@ -740,20 +930,31 @@ def _doubts(s: Resolved) -> Iterator[str]:
 
 
 def _made_up_bound(s: Scenario) -> str:
-    """Return a sentence about the joints of your own model whose force only a default bounds; "" if there are none."""
+    """Return a sentence about the joints of your own model whose force only a default bounds; "" if
+    there are none.
+    """
     if s.u_max is not None or not s.plant.own or not s.force_command or s.law.name == "none":
         return ""
     driven, u_max = range(s.plant.driven), s.resolved.u_max
-    taken = u_max if isinstance(u_max, tuple) else [u_max for _ in driven]
+    if isinstance(u_max, tuple):
+        taken = u_max
+    else:
+        taken = [u_max for _ in driven]
     limits = s.plant.limits or [math.inf for _ in driven]
     suggested = s.plant.suggested.get("u_max", [None for _ in driven])
     free = [i for i in driven if limits[i] == math.inf and suggested[i] is None]
     if not free:
         return ""
     *before, last = [repr(joint_names(s.plant)[i]) for i in free]
-    joints = f"joints {', '.join(before)} and {last}" if before else f"joint {last}"
+    if before:
+        joints = f"joints {', '.join(before)} and {last}"
+    else:
+        joints = f"joint {last}"
     bounds = list(dict.fromkeys(f"{taken[i]:g} {s.plant.efforts[i]}" for i in free))
     verb, number = "are" if len(bounds) > 1 else "is", f"{taken[free[0]]:g}"
     fact = f"nothing bounds the force on {joints} of {s.plant.name}, so that |u| <= {' and '.join(bounds)} {verb} taken"
-    example = f"u_max={number}" if len(driven) == 1 else f"smc.Channel(u_max={number}) for each"
+    if len(driven) == 1:
+        example = f"u_max={number}"
+    else:
+        example = f"smc.Channel(u_max={number}) for each"
     return f"{fact}: give u_max, what your motor gives, such as {example}"

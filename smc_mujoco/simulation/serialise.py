@@ -22,8 +22,13 @@ from smc_mujoco.mechanisms.plant import plant as find_plant
 from smc_mujoco.simulation.scenario import Resolved, Scenario
 from smc_mujoco.simulation.signals import Clock, Jump, Noise, PerChannel, Signal
 
-FOLDERS = ("smc_mujoco.mechanisms.hardware", "smc_mujoco.simulation")  # of the parts and signals of this package
-RESOLVED = tuple(Resolved.__annotations__)  # fields that are None if left out, with a default that `resolved` has
+FOLDERS = (
+    "smc_mujoco.mechanisms.hardware",
+    "smc_mujoco.simulation",
+)  # of the parts and signals of this package
+RESOLVED = tuple(
+    Resolved.__annotations__
+)  # fields that are None if left out, with a default that `resolved` has
 
 
 def describe(scenario: Scenario) -> dict:
@@ -41,7 +46,9 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
     """Return the value of a scenario's field as plain data."""
     match value:
         case Plant():
-            data = {"name": value.name, "n": value.n, "module": value.build.__module__} | dict(value.parameters)
+            data = {"name": value.name, "n": value.n, "module": value.build.__module__} | dict(
+                value.parameters
+            )
             about = getattr(value.build, "about", None)  # of a user's model
             return data | ({"mjcf": about()} if about else {})
         case Component():
@@ -50,7 +57,11 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
             return {"each": [_data(signal) for signal in value.signals]}
         case Signal() | Part():
             values = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if f.init}
-            return {"kind": type(value).__name__, "module": type(value).__module__, "values": values}
+            return {
+                "kind": type(value).__name__,
+                "module": type(value).__module__,
+                "values": values,
+            }
         case Noise() | Clock() | Jump():
             return {name: _data(item) for name, item in vars(value).items() if item is not None}
         case Mapping():
@@ -62,15 +73,21 @@ def _data(value: Any) -> Any:  # noqa: PLR0911  # a table
 
 @functools.cache
 def _versions() -> dict[str, str]:
-    """Return the versions of the packages that a trace depends on, and how the machine rounds. It takes 5 ms."""
-    packages = {"smc_mujoco": __version__} | {name: version(name) for name in ("mujoco", "numba", "numpy")}
+    """Return the versions of the packages that a trace depends on, and how the machine rounds.
+
+    It takes 5 ms.
+    """
+    packages = {"smc_mujoco": __version__} | {
+        name: version(name) for name in ("mujoco", "numba", "numpy")
+    }
     return packages | {"arithmetic": arithmetic()}
 
 
 def restore(data: dict, plant: Plant | None = None) -> Scenario:
     """Return the scenario that `describe` wrote. A law that is not installed here has no code.
 
-    `plant`: that of the scenario, if it is known; one that a script defines cannot be found by its name.
+    `plant`: that of the scenario, if it is known; one that a script defines cannot be found by its
+    name.
     """
     fields = {name: data[name] for name in Scenario.fields()} | ({"plant": plant} if plant else {})
     its = {name: value for name, value in fields.items() if value and value is not plant}
@@ -78,12 +95,18 @@ def restore(data: dict, plant: Plant | None = None) -> Scenario:
     fields["law"] = components.law(data["law"], data.get("source"))
     exact = Scenario.recorded(**fields)
     with_defaults = Scenario.recorded(**fields | dict.fromkeys(data.get("left_out", ())))
-    scenario = with_defaults if with_defaults == exact else exact  # other defaults do not change the recorded values
+    # other defaults do not change the recorded values
+    if with_defaults == exact:
+        scenario = with_defaults
+    else:
+        scenario = exact
     return scenario.named(data.get("condition"))
 
 
 def _restored(data: Any) -> Any:
-    """Return the signal or the part that plain data describe, several of them, or other data as they are."""
+    """Return the signal or the part that plain data describe, several of them, or other data as
+    they are.
+    """
     if isinstance(data, list):
         return tuple(map(_restored, data))
     if isinstance(data, dict) and "each" in data:
@@ -93,10 +116,21 @@ def _restored(data: Any) -> Any:
     if data["module"].rpartition(".")[0] in FOLDERS:  # else it is a user's, and imported already
         with contextlib.suppress(ImportError):
             importlib.import_module(data["module"])
-    kinds = {(kind.__name__, kind.__module__): kind for base in (Signal, Part) for kind in subclasses(base)}
+    kinds = {
+        (kind.__name__, kind.__module__): kind
+        for base in (Signal, Part)
+        for kind in subclasses(base)
+    }
     if (kind := kinds.get((data["kind"], data["module"]))) is None:
-        raise ScenarioError(f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it")
-    values = {name: tuple(value) if isinstance(value, list) else value for name, value in data["values"].items()}
+        raise ScenarioError(
+            f"{data['kind']!r} is unknown here: first import {data['module']}, which defines it"
+        )
+    values = {}
+    for name, value in data["values"].items():
+        if isinstance(value, list):
+            values[name] = tuple(value)
+        else:
+            values[name] = value
     return kind(**values)
 
 
@@ -109,7 +143,9 @@ def _restore_plant(data: dict) -> Plant:
         del plant["n"]
         return dataclasses.replace(restored(mjcf, name), parameters=plant)
     if module != find_plant(name).build.__module__:
-        raise ScenarioError(f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it")
+        raise ScenarioError(
+            f"plant {name!r} is not one of the library's: import {module}, which defines it, to run it"
+        )
     return find_plant(name, **plant)
 
 

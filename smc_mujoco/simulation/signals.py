@@ -1,14 +1,16 @@
-"""References r(t) and disturbances d(t), each with one pure function of time; noise, jumps and the clock.
+"""References r(t) and disturbances d(t), each with one pure function of time; noise, jumps and the
+clock.
 
-The float fields of a signal are its parameters p. Its function `value` is compiled, and has one of four forms:
+The float fields of a signal are its parameters p. Its function `value` is compiled, and has one of
+four forms:
 
     value(t, p) -> (r, r', r'')                       deterministic; a disturbance uses only the first number
     value(t, p, memory, seed, channel, stream)        process noise
     value(t, p, data)                                 a series, which holds an array
     value(t, p, memory, e, de, s)                     a disturbance that sees the loop
 
-The memory of process noise is its state in one channel. The stream number separates it from the other noises of a run.
-Times are in seconds. A reference is in m or rad, a disturbance in N or N m.
+The memory of process noise is its state in one channel. The stream number separates it from the
+other noises of a run. Times are in seconds. A reference is in m or rad, a disturbance in N or N m.
 """
 
 import dataclasses
@@ -26,28 +28,37 @@ from smc_mujoco.common.frozen import Frozen, frozen
 from smc_mujoco.simulation import philox
 
 FOOT = 0.3048  # m
-EARLY = 1.0 - 1e-15  # factor on a switching time, because sums of decimal times differ from it by an ulp or two
+EARLY = (
+    1.0 - 1e-15
+)  # factor on a switching time, because sums of decimal times differ from it by an ulp or two
 MAX_MISSED = 0.99  # probability; chosen: of a hundred samples one runs
-SINUSOIDS = 32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
+SINUSOIDS = (
+    32  # of band-limited noise; chosen: its kurtosis is 3 - 3/64, 1.6 % below that of a Gaussian
+)
 
 
 @dataclasses.dataclass(frozen=True)
 class Signal:
-    """Base of all signals, which checks that every parameter is a finite number, within the constraint of its type.
+    """Base of all signals, which checks that every parameter is a finite number, within the
+    constraint of its type.
 
-    If the class attribute `cartesian` is true, the signal is a force on bodies, N, not on joints: a `Push` on one body,
-    or else a horizontal force on the body of each channel.
+    If the class attribute `cartesian` is true, the signal is a force on bodies, N, not on joints: a
+    `Push` on one body, or else a horizontal force on the body of each channel.
     """
 
     memory: ClassVar[int] = 0  # floats of state in each channel
     random: ClassVar[bool] = False  # whether `value` takes memory, seed, channel and stream
     series: ClassVar[bool] = False  # whether `value` takes data
-    sees: ClassVar[bool] = False  # whether `value` takes e, de and s; then it is called once per control sample
+    sees: ClassVar[bool] = (
+        False  # whether `value` takes e, de and s; then it is called once per control sample
+    )
     rows: ClassVar[int] = 2  # of `data`
     cartesian: ClassVar[bool] = False
     air: ClassVar[bool] = False  # whether it is a wind, m/s
     data: ClassVar[np.ndarray]  # of a series, (rows, N) float64, C-contiguous
-    value: ClassVar[Callable[..., tuple[float, float, float]]]  # static: value, first and second derivative
+    value: ClassVar[
+        Callable[..., tuple[float, float, float]]
+    ]  # static: value, first and second derivative
 
     def __post_init__(self):
         constrain(self)
@@ -66,7 +77,10 @@ class Signal:
 
 @dataclasses.dataclass(frozen=True)
 class PerChannel(Signal):
-    """A separate reference for each driven channel. A scenario makes it when it is given several references."""
+    """A separate reference for each driven channel.
+
+    A scenario makes it when it is given several references.
+    """
 
     signals: tuple[Signal, ...]
 
@@ -128,11 +142,12 @@ class Ramp(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class MinimumJerk(Signal):
-    """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration clipped to 0 .. 1: from rest to rest.
+    """amplitude (10 a^3 - 15 a^4 + 6 a^5), a = (t - time)/duration clipped to 0 .. 1: from rest to
+    rest.
 
-    No other move in that time has a smaller integral of the squared jerk. Velocity and acceleration are 0 at both ends.
-    Source: T. Flash & N. Hogan, "The coordination of arm movements: an experimentally confirmed mathematical model",
-    J. Neuroscience 5(7):1688, 1985.
+    No other move in that time has a smaller integral of the squared jerk. Velocity and acceleration
+    are 0 at both ends. Source: T. Flash & N. Hogan, "The coordination of arm movements: an
+    experimentally confirmed mathematical model", J. Neuroscience 5(7):1688, 1985.
     """
 
     amplitude: float
@@ -144,7 +159,11 @@ class MinimumJerk(Signal):
         a = min(max((t - p.time) / p.duration, 0.0), 1.0)
         b, T = 1.0 - a, p.duration
         r = p.amplitude * a * a * a * (10.0 - a * (15.0 - 6.0 * a))
-        return r, p.amplitude * 30.0 * a * a * b * b / T, p.amplitude * 60.0 * a * b * (1.0 - 2.0 * a) / (T * T)
+        return (
+            r,
+            p.amplitude * 30.0 * a * a * b * b / T,
+            p.amplitude * 60.0 * a * b * (1.0 - 2.0 * a) / (T * T),
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,7 +182,8 @@ class Pulse(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class Impulse(Signal):
-    """impulse / width for time <= t < time + width, else 0: a blow with the time integral `impulse`, N s or N m s.
+    """impulse / width for time <= t < time + width, else 0: a blow with the time integral
+    `impulse`, N s or N m s.
 
     The integral is exact if width is a whole number of physics steps, as 5 ms is for default steps.
     """
@@ -184,11 +204,13 @@ class Impulse(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class Gust(Signal):
-    """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a horizontal force, N.
+    """amplitude/2 (1 - cos(2 pi (t - time)/width)) for time <= t <= time + width, else 0: a
+    horizontal force, N.
 
-    The discrete gust of 14 CFR 25.341(a)(2) and EASA CS-25.341(a)(2), U = U_ds/2 (1 - cos(pi s/H)) for 0 <= s <= 2H,
-    here as a force over time, where `width` stands for 2H. (The gust of MIL-F-8785C rises in the same way and stays.)
-    It acts on the centre of mass of every channel's body: the force on a slide is F, the torque on a bob F l cos x.
+    The discrete gust of 14 CFR 25.341(a)(2) and EASA CS-25.341(a)(2), U = U_ds/2 (1 - cos(pi s/H))
+    for 0 <= s <= 2H, here as a force over time, where `width` stands for 2H. (The gust of
+    MIL-F-8785C rises in the same way and stays.) It acts on the centre of mass of every channel's
+    body: the force on a slide is F, the torque on a bob F l cos x.
     """
 
     amplitude: float
@@ -207,12 +229,13 @@ class Gust(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class Push(Signal):
-    """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on the arm.
+    """A force in space on the centre of mass of one body, in the shape of a half sine: a blow on
+    the arm.
 
-    (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0. The impulse is 2 width / pi (x, y, z).
-    On plants whose disturbances act on joints, as on the panda and on users' models, a trace's d does not contain the
-    push. On others, d has its effect on the body's joint: the force along a slide, or the torque of its horizontal part
-    about a hinge.
+    (x, y, z) sin(pi (t - time) / width) for time <= t <= time + width, else 0. The impulse is 2
+    width / pi (x, y, z). On plants whose disturbances act on joints, as on the panda and on users'
+    models, a trace's d does not contain the push. On others, d has its effect on the body's joint:
+    the force along a slide, or the torque of its horizontal part about a hinge.
 
     Attributes:
       body: its name in the model.
@@ -242,9 +265,11 @@ class Push(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class Wind(Signal):
-    """Air that moves past a body with drag, such as the `quadrotor`; a trace's d has the force that it exerts.
+    """Air that moves past a body with drag, such as the `quadrotor`; a trace's d has the force that
+    it exerts.
 
-    (x, y, z) from `time` on, or with a width the gust (x, y, z) (1 - cos(2 pi (t - time) / width)) / 2 while it lasts.
+    (x, y, z) from `time` on, or with a width the gust (x, y, z) (1 - cos(2 pi (t - time) / width))
+    / 2 while it lasts.
 
     Attributes:
       x, y, z: speed in the axes of the world, m/s.
@@ -272,21 +297,25 @@ class Wind(Signal):
 
 @dataclasses.dataclass(frozen=True)
 class Dryden(Signal):
-    """Turbulence of MIL-F-8785C at low altitude: wind past a body with drag, of its own spectrum along x, y and z.
+    """Turbulence of MIL-F-8785C at low altitude: wind past a body with drag, of its own spectrum
+    along x, y and z.
 
-    The world's x is taken for the direction of the mean wind. With h the height in feet, b = 0.177 + 0.000823 h,
-    lengths L_z = h and L_x = L_y = h/b^1.2 feet, standard deviations s_z = 0.1 w20 and s_x = s_y = s_z/b^0.4, and T =
+    The world's x is taken for the direction of the mean wind. With h the height in feet, b = 0.177
+    + 0.000823 h, lengths L_z = h and L_x = L_y = h/b^1.2 feet, standard deviations s_z = 0.1 w20
+    and s_x = s_y = s_z/b^0.4, and T =
     L/speed:
 
         s sqrt(2 T)/(1 + T p) along x,    s sqrt(T) (1 + sqrt(3) T p)/(1 + T p)^2 along y and z
 
-    of white noise, with p of Laplace's transform. Both are discretised exactly on knots dt apart and are linear
-    between, so that the rms is s whatever the step. `Wind` gives the mean. Source: MIL-F-8785C (1980), 3.7.
+    of white noise, with p of Laplace's transform. Both are discretised exactly on knots dt apart
+    and are linear between, so that the rms is s whatever the step. `Wind` gives the mean. Source:
+    MIL-F-8785C (1980), 3.7.
 
     Attributes:
       w20: wind at 20 feet, m/s: 7.7 light, 15 moderate, 23 severe.
       height: m, from 3.05 to 305.
-      speed: of the air past the body, m/s. At hover in no wind the spectrum is singular: give 1 or more.
+      speed: of the air past the body, m/s. At hover in no wind the spectrum is singular: give 1 or
+        more.
       dt: s.
     """
 
@@ -314,7 +343,9 @@ class Dryden(Signal):
 
 @njit(error_model="numpy")
 def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
-    """Return the wind along one axis: of first order along the mean wind (channel 0), else of second."""
+    """Return the wind along one axis: of first order along the mean wind (channel 0), else of
+    second.
+    """
     root = math.sqrt(3.0)
     knot, x = t / dt, dt / T
     left = math.exp(-x)
@@ -322,7 +353,10 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
         z = philox.normals(seed, channel, stream, 0)
         memory[1] = sigma * (z[0] if channel == 0.0 else math.sqrt(0.5) * z[0])
         memory[2] = sigma * (math.sqrt(0.125) * z[0] + math.sqrt(0.125) * z[1])
-        memory[4] = memory[1] if channel == 0.0 else root * memory[1] + (1.0 - root) * memory[2]
+        if channel == 0.0:
+            memory[4] = memory[1]
+        else:
+            memory[4] = root * memory[1] + (1.0 - root) * memory[2]
     while memory[0] <= knot:
         memory[3] = memory[4]
         memory[0] += 1.0
@@ -345,12 +379,13 @@ def _dryden(t, sigma, T, dt, memory, seed, channel, stream):
 
 @dataclasses.dataclass(frozen=True)
 class Relay(Signal):
-    """A disturbance that sees the loop: it goes to `amplitude` if s sigma + rate e' + error e > 0, else to -amplitude.
+    """A disturbance that sees the loop: it goes to `amplitude` if s sigma + rate e' + error e > 0,
+    else to -amplitude.
 
-    It sees the true error e, its rate e' and the law's sliding variable sigma at a control sample. It is constant until
-    the next. With a positive `rate` alone it pushes along the motion: no other |d| <= amplitude gives the loop more
-    energy. With a `slope` above 0 it changes by at most `slope` from sample to sample. Before `start` it is 0. All
-    channels get the force of channel 0.
+    It sees the true error e, its rate e' and the law's sliding variable sigma at a control sample.
+    It is constant until the next. With a positive `rate` alone it pushes along the motion: no other
+    |d| <= amplitude gives the loop more energy. With a `slope` above 0 it changes by at most
+    `slope` from sample to sample. Before `start` it is 0. All channels get the force of channel 0.
 
     Attributes:
       amplitude: N or N m.
@@ -371,20 +406,28 @@ class Relay(Signal):
 
     @staticmethod
     def value(t, p, memory, e, de, s):
-        goal = p.amplitude if p.s * s + p.rate * de + p.error * e > 0.0 else -p.amplitude
+        if p.s * s + p.rate * de + p.error * e > 0.0:
+            goal = p.amplitude
+        else:
+            goal = -p.amplitude
         goal = 0.0 if t < p.start else goal
         step = goal - memory[0]
-        memory[0] = goal if p.slope == 0.0 else memory[0] + min(max(step, -p.slope), p.slope)
+        if p.slope == 0.0:
+            memory[0] = goal
+        else:
+            memory[0] = memory[0] + min(max(step, -p.slope), p.slope)
         return memory[0], 0.0, 0.0
 
 
 @dataclasses.dataclass(frozen=True)
 class OrnsteinUhlenbeck(Signal):
-    """Process noise with standard deviation sigma and correlation time tau, independent in every channel.
+    """Process noise with standard deviation sigma and correlation time tau, independent in every
+    channel.
 
-    d_(k+1) = a d_k + sigma sqrt(1 - a^2) n_k, a = exp(-dt/tau), on knots dt apart and linear between them: the exact
-    discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from the start. Neither knots nor path
-    depend on the physics step and the control period. `dt` defaults to 1 ms.
+    d_(k+1) = a d_k + sigma sqrt(1 - a^2) n_k, a = exp(-dt/tau), on knots dt apart and linear
+    between them: the exact discretisation (Gillespie 1996, Phys. Rev. E 54:2084), stationary from
+    the start. Neither knots nor path depend on the physics step and the control period. `dt`
+    defaults to 1 ms.
     """
 
     sigma: Natural
@@ -408,18 +451,23 @@ def _ornstein_uhlenbeck(t, sigma, tau, dt, memory, seed, channel, stream):
     while memory[0] <= knot:
         memory[1] = memory[2]
         memory[0] += 1.0
-        memory[2] = a * memory[1] + sigma * math.sqrt(1.0 - a * a) * philox.normals(seed, channel, stream, memory[0])[0]
+        memory[2] = (
+            a * memory[1]
+            + sigma * math.sqrt(1.0 - a * a) * philox.normals(seed, channel, stream, memory[0])[0]
+        )
     return memory[2] + (memory[0] - knot) * (memory[1] - memory[2])
 
 
 @dataclasses.dataclass(frozen=True)
 class BandLimited(Signal):
-    """Process noise of standard deviation sigma between the frequencies low and high, Hz, independent in every channel.
+    """Process noise of standard deviation sigma between the frequencies low and high, Hz,
+    independent in every channel.
 
-    d(t) = sigma sqrt(2/N) sum cos(2 pi f_i t + phi_i), N = 32, phi_i uniform: the spectral representation of a flat
-    spectrum (Shinozuka & Deodatis 1991, Appl. Mech. Rev. 44:191). f_i is uniform in the i-th of N equal parts of the
-    band, so that the path does not repeat after N/(high - low) seconds (Shinozuka & Jan 1972, J. Sound Vib. 25:111).
-    The path is the same under every physics step and control period.
+    d(t) = sigma sqrt(2/N) sum cos(2 pi f_i t + phi_i), N = 32, phi_i uniform: the spectral
+    representation of a flat spectrum (Shinozuka & Deodatis 1991, Appl. Mech. Rev. 44:191). f_i is
+    uniform in the i-th of N equal parts of the band, so that the path does not repeat after N/(high
+    - low) seconds (Shinozuka & Jan 1972, J. Sound Vib. 25:111). The path is the same under every
+    physics step and control period.
     """
 
     sigma: Natural
@@ -432,7 +480,9 @@ class BandLimited(Signal):
     def __post_init__(self):
         super().__post_init__()
         if self.high <= self.low:
-            raise ScenarioError(f"BandLimited's high is {self.high:g} Hz: give more than low, {self.low:g} Hz")
+            raise ScenarioError(
+                f"BandLimited's high is {self.high:g} Hz: give more than low, {self.low:g} Hz"
+            )
 
     @staticmethod
     def value(t, p, memory, seed, channel, stream):
@@ -468,11 +518,14 @@ def bounds_of(signal: Signal) -> tuple[float, float] | None:
 
 @dataclasses.dataclass(frozen=True)
 class Noise:
-    """Measurement noise: Gaussian with mean 0, plus errors that are known functions of time, equal in all channels.
+    """Measurement noise:
+
+    Gaussian with mean 0, plus errors that are known functions of time, equal in all channels.
 
     Attributes:
       position, velocity: standard deviations, in SI units.
-      position_error, velocity_error: signals that are added to what is measured, such as Held(times, values).
+      position_error, velocity_error: signals that are added to what is measured, such as
+        Held(times, values).
     """
 
     position: Natural = 0.0
@@ -484,7 +537,9 @@ class Noise:
         constrain(self)
         for error in self.errors:
             is_signal = isinstance(error, Signal | None) and not isinstance(error, PerChannel)
-            if not is_signal or (error and (error.random or error.cartesian or error.sees or error.air)):
+            if not is_signal or (
+                error and (error.random or error.cartesian or error.sees or error.air)
+            ):
                 cure = "give a known signal, such as smc.signals.Held(times, values)"
                 raise ScenarioError(f"Noise's error is {shown(error)}: {cure}")
 
@@ -498,8 +553,8 @@ class Noise:
 class Jump:
     """A change of the plant's parameters at `time`, s, for the rest of the run.
 
-    `factors` has parameter names with the factors that multiply them. For parameters in `plant.added`, such as a
-    payload, it has terms, which are added.
+    `factors` has parameter names with the factors that multiply them. For parameters in
+    `plant.added`, such as a payload, it has terms, which are added.
     """
 
     time: Natural
@@ -513,45 +568,56 @@ class Jump:
 def parameter_factors(name: str, value: object) -> Frozen[float]:
     """Return parameter name -> factor, checked; `name` is for errors."""
     if not isinstance(value, Mapping):
-        raise ScenarioError(f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}")
+        raise ScenarioError(
+            f"{name} is {shown(value)}: give parameter names with their factors, such as {{'M': 1.3}}"
+        )
     return frozen({str(key): number(f"{name} of {key}", factor) for key, factor in value.items()})
 
 
 @register_jitable
 def after_pauses(k, steps, length, samples, phase):
-    """Return by how many physics steps sample k of the grid is late in a loop with pauses; -1 if a pause covers it.
+    """Return by how many physics steps sample k of the grid is late in a loop with pauses; -1 if a
+    pause covers it.
 
-    A period has `steps` physics steps, a pause `length`; one follows every `samples` samples, the first `phase` fewer.
+    A period has `steps` physics steps, a pause `length`; one follows every `samples` samples, the
+    first `phase` fewer.
     """
     cycle, end = samples * steps + length, (k + 1 + phase) * steps - 1
     within = end % cycle
     sample = within // steps
-    return -1 if sample >= samples else steps - 1 - (within - sample * steps)
+    if sample >= samples:
+        return -1
+    return steps - 1 - (within - sample * steps)
 
 
 @dataclasses.dataclass(frozen=True)
 class Clock:
-    """The timer of the controller. A sensor with a clock of its own is an `Encoder` with a `period`.
+    """The timer of the controller.
+
+    A sensor with a clock of its own is an `Encoder` with a `period`.
 
     A real-time task is woken once in every control period T, a little late. Sample k runs at
 
         t_k = k T + late_k,    late_k uniform among the physics steps from 0 to `jitter`,
 
-    or not at all: then neither estimator nor law sees that sample. The first and the last sample are on time. Which
-    samples are late or missed depends on the seed and k alone.
+    or not at all: then neither estimator nor law sees that sample. The first and the last sample
+    are on time. Which samples are late or missed depends on the seed and k alone.
 
-    A loop without a real-time system waits until a period is over, and has a pause when it does something else, such as
-    writing a line of text. All later samples are then later by the pause: sample k T of the grid runs where the loop's
-    next sample falls, and one that a pause covers is missed.
+    A loop without a real-time system waits until a period is over, and has a pause when it does
+    something else, such as writing a line of text. All later samples are then later by the pause:
+    sample k T of the grid runs where the loop's next sample falls, and one that a pause covers is
+    missed.
 
     Attributes:
-      jitter: s, the largest delay of a sample; shorter than the control period. Each sample is late by a whole number
-        of physics steps, all equally probable. The law reads the true time in `y.t` and the nominal period in `y.dt`,
-        as on a machine whose task does not measure its period.
+      jitter: s, the largest delay of a sample; shorter than the control period. Each sample is late
+        by a whole number of physics steps, all equally probable. The law reads the true time in
+        `y.t` and the nominal period in `y.dt`, as on a machine whose task does not measure its
+        period.
       missed: probability that a sample is missed, 0 .. 0.99. The last command then stays.
-      pause: s of a pause, 0 (none) or more; not with `jitter`. Times are rounded to whole physics steps.
-      pause_every: s between two pauses, without these, at least a control period. The first comes after a part of it
-        that depends on the seed.
+      pause: s of a pause, 0 (none) or more; not with `jitter`. Times are rounded to whole physics
+        steps.
+      pause_every: s between two pauses, without these, at least a control period. The first comes
+        after a part of it that depends on the seed.
     """
 
     jitter: Natural = 0.0
@@ -562,7 +628,9 @@ class Clock:
     def __post_init__(self):
         constrain(self)
         if self.pause and self.jitter:
-            raise ScenarioError(f"Clock has jitter {self.jitter:g} and pause {self.pause:g} s: give one of them")
+            raise ScenarioError(
+                f"Clock has jitter {self.jitter:g} and pause {self.pause:g} s: give one of them"
+            )
 
     @property
     def regular(self) -> bool:
@@ -570,20 +638,32 @@ class Clock:
         return not (self.jitter or self.missed or self.pause)
 
     def pauses(self, control_period: float, physics_step: float) -> tuple[int, int]:
-        """Return the length of a pause in physics steps, and the samples from one to the next; 0, 1 without pauses."""
+        """Return the length of a pause in physics steps, and the samples from one to the next; 0, 1
+        without pauses.
+        """
         length = round(self.pause / physics_step)
-        return (length, max(1, round(self.pause_every / control_period))) if length else (0, 1)
+        if length:
+            return (length, max(1, round(self.pause_every / control_period)))
+        return (0, 1)
 
     def jitter_steps(self, physics_step: float) -> int:
         """Return the largest delay of a sample in physics steps."""
         return math.floor(self.jitter / physics_step + 1e-6)
 
     def check(self, control_period: float, physics_step: float) -> None:
-        """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a physics step."""
+        """Raise ScenarioError for a jitter that reaches the next sample, or is shorter than a
+        physics step.
+        """
         late = self.jitter >= control_period
-        if late or (self.jitter and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step)):
+        if late or (
+            self.jitter
+            and not 1 <= self.jitter_steps(physics_step) < round(control_period / physics_step)
+        ):
             room = round(control_period / physics_step) > 1
-            finer = "" if room else f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter of "
+            if room:
+                finer = ""
+            else:
+                finer = f"give a physics_step of {control_period / 4.0:g} s, for example, and a jitter of "
             raise ScenarioError(
                 f"Clock's jitter is {self.jitter:g} s: {finer or 'give '}at least a physics step"
                 f"{f', {physics_step:g} s' * room}, and less than the control period, {control_period:g} s, and "

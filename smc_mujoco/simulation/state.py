@@ -1,9 +1,9 @@
 """The record of one simulation: all that the callback needs besides MuJoCo's state.
 
-`mjData.userdata` holds two numbers: `callback.magic()` and the address of the record. Compiled code reads the record by
-names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of the same dtype. Inputs and outputs of
-users' functions are in the record, too. Arrays, such as gains and memories, are in one buffer outside of the record,
-which has their addresses.
+`mjData.userdata` holds two numbers: `callback.magic()` and the address of the record. Compiled code
+reads the record by names (`sim.period`, `sim.calls += 1`), Python as a NumPy structured array of
+the same dtype. Inputs and outputs of users' functions are in the record, too. Arrays, such as gains
+and memories, are in one buffer outside of the record, which has their addresses.
 """
 
 import itertools
@@ -24,20 +24,28 @@ from smc_mujoco.mechanisms.plant import SEEN
 # Inputs and outputs of functions.
 #   law: MEASUREMENT, or the numbers at JOINT_MEASUREMENT -> u and s, one or n of each
 #   surface: MEASUREMENT -> SLIDING; estimator: READING -> ESTIMATE; nominal model: SEEN -> MODEL
-#   reference and disturbance: INSTANT -> MOTION; friction by a formula: FRICTION_INPUT -> FRICTION_OUTPUT
+# reference and disturbance: INSTANT -> MOTION; friction by a formula: FRICTION_INPUT ->
+# FRICTION_OUTPUT
 MEASUREMENT, READING = floats(Measurement._fields), floats(Reading._fields)
 INSTANT = floats(("t", "seed", "channel", "stream", "e", "de", "s"))
 SLIDING, ESTIMATE = floats(("s", "v_eq")), floats(("v", "a"))
 MOTION, MODEL = floats(("value", "rate", "acceleration")), floats(("f", "g"))
-FRICTION_INPUT, FRICTION_OUTPUT = floats(("v", "motor", "load")), floats(("f", "low", "high"))  # see `Sliding.value`
+FRICTION_INPUT, FRICTION_OUTPUT = (
+    floats(("v", "motor", "load")),
+    floats(("f", "low", "high")),
+)  # see `Sliding.value`
 
 # Indices of a channel in arrays of mjData, -1 if there is none:
-#   qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in actuator_force
+# qpos, qvel, ctrl: in the arrays of these names; x_sensor and v_sensor: in sensordata; force: in
+# actuator_force
 #   shaft, shaft_qpos: in qvel and qpos, of what the actuator drives: the joint, or its rotor
-#   xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which d enters there
-#   horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of the world, 0 or 1
+# xfrc: of the body's force along the joint, in xfrc_applied; `sign` is 1 or -1, the sign with which
+# d enters there
+# horizontal: of the body's horizontal force, in xfrc_applied; for a hinge along the axis `axis` of
+# the world, 0 or 1
 #   hinge_body: of the body of a hinge, in xipos; anchor: of a hinge, in xanchor and xaxis
-#   friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the callback computes it
+# friction_force: of a friction's actuator, in actuator_force; friction_ctrl: in ctrl, if the
+# callback computes it
 #   qfrc: in qfrc_applied, of users' models, whose disturbances act on joints
 #   turn: 0 to 2, which number of the rotation vector; qpos and x_sensor are then of the quaternion
 #   gathered: in qfrc_actuator, of a free body, on which each actuator may act along every channel
@@ -45,103 +53,197 @@ CHANNEL = np.dtype(
     [
         (name, "i8")
         for name in (
-            "qpos", "qvel", "x_sensor", "v_sensor", "ctrl", "force", "shaft", "xfrc", "sign", "horizontal", "axis",
-            "hinge_body", "anchor", "friction_force", "friction_ctrl", "qfrc", "shaft_qpos", "turn", "gathered",
+            "qpos",
+            "qvel",
+            "x_sensor",
+            "v_sensor",
+            "ctrl",
+            "force",
+            "shaft",
+            "xfrc",
+            "sign",
+            "horizontal",
+            "axis",
+            "hinge_body",
+            "anchor",
+            "friction_force",
+            "friction_ctrl",
+            "qfrc",
+            "shaft_qpos",
+            "turn",
+            "gathered",
         )
     ]
-)  # fmt: skip
+)
 
 # The state of a channel between calls:
 #   last_x, last_v: the last reading that was not lost; delayed: the command after its delay
 #   first, second: the states of the drives, see `DriveStep`
 #   force, reaction: sums over a control period, of the drive's force, and of friction and contacts
-#   middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage, see `DriveStep`
-#   friction, friction_rise: mean of Coulomb friction in a step of RK4, and its rise to the last stage
-#   smooth, holding: the other forces for which these are right, and the share of their change that friction takes up
+# middle, rise: the mean force in a step of RK4, and its rise from the middle to the last stage, see
+# `DriveStep`
+# friction, friction_rise: mean of Coulomb friction in a step of RK4, and its rise to the last stage
+# smooth, holding: the other forces for which these are right, and the share of their change that
+# friction takes up
 #   held: s of a control period for which friction held the joint
-#   stuck, stuck_at, speed: whether a friction by a formula sticks, where, and the speed at the step before
+# stuck, stuck_at, speed: whether a friction by a formula sticks, where, and the speed at the step
+# before
 DRIVEN = "last_x", "last_v", "delayed", "first", "second", "force", "reaction", "middle", "rise"
 RUBBED = "friction", "friction_rise", "smooth", "holding", "held"
 CHANNEL_STATE = floats((*DRIVEN, *RUBBED, "stuck", "stuck_at", "speed"))
 DRIVE_STEP, PULSING, MOTOR = floats(DriveStep._fields), floats(Pulsing._fields), floats(GENERATOR)
-# Addresses of what a law of many joints measures, see control/joint_law.py: of its first number, and of its arrays.
+# Addresses of what a law of many joints measures, see control/joint_law.py: of its first number,
+# and of its arrays.
 JOINT_MEASUREMENT = np.dtype([(name, "i8") for name in ("head", *ARRAYS)])
 
-# A sample of a channel: position, velocity, command, command after its delay, sliding variable, disturbance, reference,
-# the drive's force, what friction and contacts exert.
+# A sample of a channel: position, velocity, command, command after its delay, sliding variable,
+# disturbance, reference, the drive's force, what friction and contacts exert.
 LOGGED = ("x", "v", "u", "applied", "s", "d", "r", "force", "reaction")
-LOG = floats((*LOGGED, "held"))  # and the time for which `exact_friction` held its joint since the sample before, s
+LOG = floats(
+    (*LOGGED, "held")
+)  # and the time for which `exact_friction` held its joint since the sample before, s
 
-# A compiled function: its address, those of its parameters and of its memory, and the bytes of memory a channel has.
-FUNCTION = np.dtype([(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True)
-# A disturbance: its stream of random numbers (0: none, and then it is the same in every channel), whether it is a
-# horizontal force on the body instead of a force on the joint, and whether it sees the loop. Of a `Push` also the index
-# of its body in xfrc_applied, and its peak; body is -1 for others. `air` tells whether it is a wind, m/s, with its peak
-# along each axis.
+# A compiled function: its address, those of its parameters and of its memory, and the bytes of
+# memory a channel has.
+FUNCTION = np.dtype(
+    [(name, "i8") for name in ("address", "parameters", "memory", "stride")], align=True
+)
+# A disturbance: its stream of random numbers (0: none, and then it is the same in every channel),
+# whether it is a horizontal force on the body instead of a force on the joint, and whether it sees
+# the loop. Of a `Push` also the index of its body in xfrc_applied, and its peak; body is -1 for
+# others. `air` tells whether it is a wind, m/s, with its peak along each axis.
 DISTURBANCE = np.dtype(
     [
-        ("function", FUNCTION), ("stream", "f8"), ("cartesian", "i8"), ("sees", "i8"), ("body", "i8"), ("air", "i8"),
+        ("function", FUNCTION),
+        ("stream", "f8"),
+        ("cartesian", "i8"),
+        ("sees", "i8"),
+        ("body", "i8"),
+        ("air", "i8"),
         ("peak", "f8", (3,)),
     ],
     align=True,
-)  # fmt: skip
+)
 
 SIMULATION = np.dtype(
     [
         # what has happened so far: calls of the callback, a failure and its physics step
-        ("calls", "i8"), ("failure", "i8"), ("failed_step", "i8"),
-        # sizes: channels, those of them that have an actuator, qpos, qvel, samples in the log, disturbances
-        ("n", "i8"), ("driven", "i8"), ("nq", "i8"), ("nv", "i8"), ("samples", "i8"), ("disturbance_count", "i8"),
-        # the clock: physics steps per control period, callbacks per physics step, lengths of step and period in s
-        ("steps", "i8"), ("stages", "i8"), ("step", "f8"), ("period", "f8"),
-        # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), DISTURBANCE (disturbance_count,)
-        ("channels", "i8"), ("states", "i8"), ("log", "i8"), ("disturbances", "i8"),
-        # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds (driven,), ctrl per u
-        ("delay", "i8"), ("delay_slots", "i8"), ("delay_buffer", "i8"), ("limits", "i8"), ("scale", "f8"),
-        # a free body: its actuators, the address of their rows for rotation.mix, 0 for others, and its keeps_torques
-        ("actuators", "i8"), ("mixer", "i8"), ("keeps_torques", "i8"),
-        # whether these are rotors, see hardware/rotors.py; `first` and `second` are then their speeds and those told
+        ("calls", "i8"),
+        ("failure", "i8"),
+        ("failed_step", "i8"),
+        # sizes: channels, those of them that have an actuator, qpos, qvel, samples in the log,
+        # disturbances
+        ("n", "i8"),
+        ("driven", "i8"),
+        ("nq", "i8"),
+        ("nv", "i8"),
+        ("samples", "i8"),
+        ("disturbance_count", "i8"),
+        # the clock: physics steps per control period, callbacks per physics step, lengths of step
+        # and period in s
+        ("steps", "i8"),
+        ("stages", "i8"),
+        ("step", "f8"),
+        ("period", "f8"),
+        # addresses of arrays: CHANNEL (n,), CHANNEL_STATE (n,), LOG (K + 1, n), DISTURBANCE
+        # (disturbance_count,)
+        ("channels", "i8"),
+        ("states", "i8"),
+        ("log", "i8"),
+        ("disturbances", "i8"),
+        # the command: delay in physics steps, a ring of (delay_slots, n) commands, bounds
+        # (driven,), ctrl per u
+        ("delay", "i8"),
+        ("delay_slots", "i8"),
+        ("delay_buffer", "i8"),
+        ("limits", "i8"),
+        ("scale", "f8"),
+        # a free body: its actuators, the address of their rows for rotation.mix, 0 for others, and
+        # its keeps_torques
+        ("actuators", "i8"),
+        ("mixer", "i8"),
+        ("keeps_torques", "i8"),
+        # whether these are rotors, see hardware/rotors.py; `first` and `second` are then their
+        # speeds and those told
         ("rotors", "i8"),
-        # the controller's timer: the largest delay of a sample in physics steps, the share of samples that are missed
-        ("jitter", "i8"), ("missed", "f8"),
-        # pauses: physics steps of one, samples from one to the next, and by how many the first comes earlier
-        ("pause", "i8"), ("pause_samples", "i8"), ("pause_phase", "i8"),
+        # the controller's timer: the largest delay of a sample in physics steps, the share of
+        # samples that are missed
+        ("jitter", "i8"),
+        ("missed", "f8"),
+        # pauses: physics steps of one, samples from one to the next, and by how many the first
+        # comes earlier
+        ("pause", "i8"),
+        ("pause_samples", "i8"),
+        ("pause_phase", "i8"),
         # drives in the callback: whether there are, and what a physics step does to them
-        ("has_drives", "i8"), ("drive_step", DRIVE_STEP),
-        # stepper motors: their numbers, the address of the first MOTOR, whose queue follows it, 0 without any, and the
-        # bytes from one to the next
-        ("stepper", PULSING), ("motors", "i8"), ("motor_stride", "i8"),
+        ("has_drives", "i8"),
+        ("drive_step", DRIVE_STEP),
+        # stepper motors: their numbers, the address of the first MOTOR, whose queue follows it, 0
+        # without any, and the bytes from one to the next
+        ("stepper", PULSING),
+        ("motors", "i8"),
+        ("motor_stride", "i8"),
         # whether the callback gives the joints their Coulomb friction
         ("exact_friction", "i8"),
         # the sensor: noise, encoder
-        ("seed", "f8"), ("sigma_x", "f8"), ("sigma_v", "f8"), ("bias", "f8"), ("counts", "f8"), ("dropout", "f8"),
-        ("read_period", "f8"), ("read_delay", "f8"), ("position_error", FUNCTION), ("velocity_error", FUNCTION),
+        ("seed", "f8"),
+        ("sigma_x", "f8"),
+        ("sigma_v", "f8"),
+        ("bias", "f8"),
+        ("counts", "f8"),
+        ("dropout", "f8"),
+        ("read_period", "f8"),
+        ("read_delay", "f8"),
+        ("position_error", FUNCTION),
+        ("velocity_error", FUNCTION),
         # functions, and whether the law may use the nominal model
-        ("law", FUNCTION), ("surface", FUNCTION), ("estimator", FUNCTION), ("nominal", FUNCTION),
-        ("reference", FUNCTION), ("feedforward", FUNCTION), ("uses_model", "f8"),
-        # address of the other forces on the joints, (n,), which a law with the true model is told; 0: it is not
+        ("law", FUNCTION),
+        ("surface", FUNCTION),
+        ("estimator", FUNCTION),
+        ("nominal", FUNCTION),
+        ("reference", FUNCTION),
+        ("feedforward", FUNCTION),
+        ("uses_model", "f8"),
+        # address of the other forces on the joints, (n,), which a law with the true model is told;
+        # 0: it is not
         ("told", "i8"),
-        # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`, or `reference`
-        ("laws", "i8"), ("references", "i8"),
-        # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and damping; 0: none
+        # addresses of the FUNCTIONs of the driven channels, where they differ; 0: all have `law`,
+        # or `reference`
+        ("laws", "i8"),
+        ("references", "i8"),
+        # address of the FUNCTIONs (n,) of a friction by a formula, whose memory is stiffness and
+        # damping; 0: none
         ("frictions", "i8"),
         # the drive as the nominal model knows it: force = gain u - drag v
-        ("drive_gain", "f8"), ("drive_drag", "f8"),
+        ("drive_gain", "f8"),
+        ("drive_drag", "f8"),
         # what has been measured, and the address of estimated accelerations, (n,)
-        ("seen", SEEN), ("a", "i8"),
-        # the law: how many channels it commands at a call, 1 or n, and the address of its u and s, (2, width)
-        ("width", "i8"), ("commands", "i8"),
-        # a law of many joints: its measurement, all 0 for a law of one channel; the nominal M, h and g (0: from
-        # `nominal`, one equation per channel), and the functions of C and of the tip's Jacobian (0: there are none)
-        ("joint", JOINT_MEASUREMENT), ("dynamics", FUNCTION), ("handle", HANDLE),
+        ("seen", SEEN),
+        ("a", "i8"),
+        # the law: how many channels it commands at a call, 1 or n, and the address of its u and s,
+        # (2, width)
+        ("width", "i8"),
+        ("commands", "i8"),
+        # a law of many joints: its measurement, all 0 for a law of one channel; the nominal M, h
+        # and g (0: from `nominal`, one equation per channel), and the functions of C and of the
+        # tip's Jacobian (0: there are none)
+        ("joint", JOINT_MEASUREMENT),
+        ("dynamics", FUNCTION),
+        ("handle", HANDLE),
         # inputs and outputs of functions
-        ("y", MEASUREMENT), ("reading", READING), ("instant", INSTANT), ("sliding", SLIDING),
-        ("estimate", ESTIMATE), ("motion", MOTION), ("model", MODEL),
-        ("friction_input", FRICTION_INPUT), ("friction_output", FRICTION_OUTPUT),
+        ("y", MEASUREMENT),
+        ("reading", READING),
+        ("instant", INSTANT),
+        ("sliding", SLIDING),
+        ("estimate", ESTIMATE),
+        ("motion", MOTION),
+        ("model", MODEL),
+        ("friction_input", FRICTION_INPUT),
+        ("friction_output", FRICTION_OUTPUT),
         ("unused", "f8", (8,)),  # so that no two simulations write to one cache line
     ],
     align=True,
-)  # fmt: skip
+)
 
 # How compiled code reads record i of an array at an address.
 simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_at = map(
@@ -149,7 +251,10 @@ simulation_at, channel_at, state_at, log_at, disturbance_at, function_at, motor_
 )
 
 # Bytes from the start of a simulation's record to the inputs and outputs of functions.
-At = namedtuple("At", "y reading instant sliding estimate motion model seen handle friction_input friction_output")
+At = namedtuple(
+    "At",
+    "y reading instant sliding estimate motion model seen handle friction_input friction_output",
+)
 AT = At(*(SIMULATION.fields[name][1] for name in At._fields))  # pyright: ignore[reportOptionalSubscript, reportArgumentType]
 
 # Values of `failure`. RAISED: another function than the law raised an exception.
@@ -163,7 +268,10 @@ class Index(int):
 
 
 class Buffer:
-    """Numbers that become one float64 array. They have indices at once, and addresses when the array is made."""
+    """Numbers that become one float64 array.
+
+    They have indices at once, and addresses when the array is made.
+    """
 
     def __init__(self) -> None:
         self.values: list[float] = []
@@ -186,7 +294,9 @@ class Buffer:
         return array
 
     def as_tuple(self, dtype: np.dtype, values: Mapping[str, Any]) -> tuple:
-        """Return the values of a record's fields in their order: an address for an Index, 0 for a missing value."""
+        """Return the values of a record's fields in their order: an address for an Index, 0 for a
+        missing value.
+        """
         fields = []
         for name in dtype.names or ():
             value = values.get(name, 0)

@@ -1,4 +1,6 @@
-"""Signals through points in time: of numbers, of a CSV file, of waypoints, and of a tip's path in space."""
+"""Signals through points in time: of numbers, of a CSV file, of waypoints, and of a tip's path in
+space.
+"""
 
 import dataclasses
 import math
@@ -16,10 +18,13 @@ from smc_mujoco.mechanisms.named import as_plant
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation.signals import EARLY, Signal
 
-MAX_GAP_STEPS = 1.5  # longest step over the median step; chosen: a logger's jitter is below, a missing row above
+# longest step over the median step; chosen: a logger's jitter is below, a missing row above
+MAX_GAP_STEPS = 1.5
 NAME_WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\]]*)\]")  # name of a column
 SECOND_SPELLINGS = ("s", "sec", "second", "seconds")
-KNOT_SPACING = 0.01  # s, of a path in space; chosen: between knots the tip leaves its path by micrometres
+KNOT_SPACING = (
+    0.01  # s, of a path in space; chosen: between knots the tip leaves its path by micrometres
+)
 MAX_KNOTS = 1_000_000  # of a path in space: minutes of computing
 
 
@@ -38,7 +43,8 @@ def last_before(data, t, end, early):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class TimeSeries(Signal):
-    """Straight lines between the points (times, values), and 0 before the first and after the last point.
+    """Straight lines between the points (times, values), and 0 before the first and after the last
+    point.
 
     Attributes:
       times: (N,), s, increasing, N >= 2.
@@ -66,7 +72,9 @@ class TimeSeries(Signal):
         with np.errstate(all="ignore"):
             curvature = np.diff(self.values) / np.diff(self.times) ** 2
         if not np.isfinite(curvature).all():
-            raise ScenarioError(f"{kind} is too steep for a float: give longer steps of time or smaller ones of value")
+            raise ScenarioError(
+                f"{kind} is too steep for a float: give longer steps of time or smaller ones of value"
+            )
         object.__setattr__(self, "data", self._data())
         self.data.flags.writeable = False
 
@@ -91,17 +99,21 @@ class TimeSeries(Signal):
         Commas separate the cells. If semicolons do, a comma is a decimal point.
 
         Args:
-          path: the file. Its first row may name the columns, perhaps with a unit: "d [N m]", as Trace.export writes it.
-            Times, s, are in the column "t" or "time", else in the first.
-          column: name of the column of values, with its unit or without. Default: the first besides time.
+          path: the file. Its first row may name the columns, perhaps with a unit: "d [N m]", as
+            Trace.export writes it. Times, s, are in the column "t" or "time", else in the first.
+          column: name of the column of values, with its unit or without. Default: the first besides
+            time.
 
         Raises:
-          ScenarioError: there is no such file or column, times are not in s or do not increase, a cell is empty or not
-            a finite number, or a step of time is longer than 1.5 median steps. The error names the line.
+          ScenarioError: there is no such file or column, times are not in s or do not increase, a
+            cell is empty or not a finite number, or a step of time is longer than 1.5 median steps.
+            The error names the line.
         """
         rows = csv_rows(path)
         if not rows or len(rows[0][1]) < 2:
-            raise ScenarioError(f"{path} has no two columns: give time and value, with commas between")
+            raise ScenarioError(
+                f"{path} has no two columns: give time and value, with commas between"
+            )
         names = rows[0][1]
         if all(_number(name) is None for name in names):
             rows = rows[1:]
@@ -110,15 +122,21 @@ class TimeSeries(Signal):
         places = _columns(path, names, column)
         for line, row in rows:
             if len(row) != len(names):
-                raise ScenarioError(f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give as many")
+                raise ScenarioError(
+                    f"{path}, line {line}: {len(row)} cells for {len(names)} columns: give as many"
+                )
             for i in places:
                 if (value := _number(row[i])) is None or not math.isfinite(value):
                     cure = "give a finite number, or cut the file there"
-                    raise ScenarioError(f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}")
+                    raise ScenarioError(
+                        f"{path}, line {line}: {names[i]} is {shown(row[i])}: {cure}"
+                    )
         times, values = ([float(row[i]) for _, row in rows] for i in places)
         _check(str(path), times, lambda i: f"line {rows[i][0]}")
         steps = np.diff(times)
-        median = np.quantile(steps, 0.5, method="lower")  # of two steps the shorter, because the other has the gap
+        median = np.quantile(
+            steps, 0.5, method="lower"
+        )  # of two steps the shorter, because the other has the gap
         for i in np.flatnonzero(steps > MAX_GAP_STEPS * median)[:1]:
             raise ScenarioError(
                 f"{path} has a gap after line {rows[i][0]}, from {times[i]:g} s to {times[i + 1]:g} s, where rows are "
@@ -141,7 +159,8 @@ class Held(TimeSeries):
     """Steps: 0 before the first point, then the value of the last point whose time has come.
 
     Attributes:
-      times: (N,), s, increasing, N >= 2. Runs are exact if all times are whole numbers of control periods.
+      times: (N,), s, increasing, N >= 2. Runs are exact if all times are whole numbers of control
+        periods.
       values: (N,), in the unit of what the signal is added to.
     """
 
@@ -154,12 +173,13 @@ class Held(TimeSeries):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Waypoints(TimeSeries):
-    """The minimum-jerk motion through the points (times, values), at rest before the first and after the last.
+    """The minimum-jerk motion through the points (times, values), at rest before the first and
+    after the last.
 
-    No other function through them, at rest at both ends, has a smaller integral of the squared jerk: it is the spline
-    of fifth degree whose fourth derivative is continuous. It does not stop at inner points. With two points it is
-    `MinimumJerk`.
-    Source: I. J. Schoenberg, "Spline functions and the problem of graduation", Proc. Natl. Acad. Sci. 52(4):947, 1964.
+    No other function through them, at rest at both ends, has a smaller integral of the squared
+    jerk: it is the spline of fifth degree whose fourth derivative is continuous. It does not stop
+    at inner points. With two points it is `MinimumJerk`. Source: I. J. Schoenberg, "Spline
+    functions and the problem of graduation", Proc. Natl. Acad. Sci. 52(4):947, 1964.
 
     Attributes:
       times: (N,), s, increasing, N >= 2.
@@ -186,7 +206,8 @@ class Waypoints(TimeSeries):
             return data[1, last], 0.0, 0.0
         low = last_before(data, t, last, 1.0)
         high = low + 1
-        # quintic through both ends: r = r0 + v0 T a + a0 T^2 a^2 / 2 + c3 a^3 + c4 a^4 + c5 a^5, a = (t - t0) / T
+        # quintic through both ends: r = r0 + v0 T a + a0 T^2 a^2 / 2 + c3 a^3 + c4 a^4 + c5 a^5, a
+        # = (t - t0) / T
         T = data[0, high] - data[0, low]
         a = (t - data[0, low]) / T
         v0, v1 = data[2, low] * T, data[2, high] * T
@@ -204,10 +225,14 @@ class Waypoints(TimeSeries):
 
 def _floats(what: str, items: object) -> tuple[float, ...]:
     """Return a user's sequence of finite numbers as floats."""
-    items = items.tolist() if isinstance(items, np.ndarray) else items
+    if isinstance(items, np.ndarray):
+        items = items.tolist()
     if not isinstance(items, Iterable) or isinstance(items, str | bytes | dict | set):
         raise ScenarioError(f"{what} are {shown(items)}: give a sequence of numbers")
-    return tuple(x if type(x) is float and math.isfinite(x) else number(f"{what}[{i}]", x) for i, x in enumerate(items))
+    return tuple(
+        x if type(x) is float and math.isfinite(x) else number(f"{what}[{i}]", x)
+        for i, x in enumerate(items)
+    )
 
 
 def _check(what: str, times: Sequence[float], where: Callable[[int], str]) -> None:
@@ -221,11 +246,15 @@ def _check(what: str, times: Sequence[float], where: Callable[[int], str]) -> No
 
 
 def _columns(path: str | os.PathLike[str], names: list[str], column: str | None) -> tuple[int, int]:
-    """Return the indices of the columns of times and values; `column` may leave out the unit in a name."""
+    """Return the indices of the columns of times and values; `column` may leave out the unit in a
+    name.
+    """
     plain = [NAME_WITH_UNIT.sub(r"\1", name) for name in names]
     at = next((plain.index(name) for name in ("t", "time") if name in plain), 0)
     if (unit := NAME_WITH_UNIT.fullmatch(names[at])) and unit[2] not in SECOND_SPELLINGS:
-        raise ScenarioError(f"time column {names[at]!r} of {path} is not in seconds: give times in s")
+        raise ScenarioError(
+            f"time column {names[at]!r} of {path} is not in seconds: give times in s"
+        )
     if column is None:
         return at, int(at == 0)
     if column not in (*names, *plain):
@@ -249,11 +278,13 @@ def cartesian_path(
     body: str | None = None,
     x0: Sequence[float] | None = None,
 ) -> list[Waypoints]:
-    """Return a reference for each channel, under which a tip moves through points in space with minimum jerk.
+    """Return a reference for each channel, under which a tip moves through points in space with
+    minimum jerk.
 
-    Inverse kinematics computes the joints' positions every 10 ms: least squares with MuJoCo's Jacobians, damped near
-    singular poses. If an arm has more joints than the task needs, each solution is the one nearest to the one before.
-    After a closed path of the tip, the joints may then be elsewhere than before.
+    Inverse kinematics computes the joints' positions every 10 ms: least squares with MuJoCo's
+    Jacobians, damped near singular poses. If an arm has more joints than the task needs, each
+    solution is the one nearest to the one before. After a closed path of the tip, the joints may
+    then be elsewhere than before.
 
     Args:
       plant: a plant or its name; its nominal model is used.
@@ -267,9 +298,13 @@ def cartesian_path(
     """
     plant = as_plant(plant)
     if plant.free:
-        raise ScenarioError(f"{plant.name} has joints without an actuator: a path in space needs all of them driven")
+        raise ScenarioError(
+            f"{plant.name} has joints without an actuator: a path in space needs all of them driven"
+        )
     if (site is None) == (body is None):
-        raise ScenarioError(f"site is {shown(site)} and body is {shown(body)}: give the name of one of them")
+        raise ScenarioError(
+            f"site is {shown(site)} and body is {shown(body)}: give the name of one of them"
+        )
     try:
         array = np.asarray(points, float)
     except (TypeError, ValueError, OverflowError):  # no numbers, or rows of unequal lengths
@@ -282,12 +317,20 @@ def cartesian_path(
     first, last = path[0].times[0], path[0].times[-1]
     steps = (last - first) / KNOT_SPACING
     if steps > MAX_KNOTS:
-        raise ScenarioError(f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most")
+        raise ScenarioError(
+            f"times span {last - first:g} s: give a path of {MAX_KNOTS * KNOT_SPACING:g} s at most"
+        )
     knots = np.linspace(first, last, max(2, int(np.ceil(steps - 1e-9)) + 1))
     positions = np.array([[Waypoints.value(t, None, axis.data)[0] for axis in path] for t in knots])
-    start = plant.x0 if x0 is None else tuple(number("x0", x) for x in x0)
+    if x0 is None:
+        start = plant.x0
+    else:
+        start = tuple(number("x0", x) for x in x0)
     if len(start) != plant.n:
         raise ScenarioError(f"x0 has {len(start)} values for {plant.n} channels: give {plant.n}")
-    kind, name = ("site", site) if site is not None else ("body", body)
+    if site is not None:
+        kind, name = ("site", site)
+    else:
+        kind, name = ("body", body)
     joints = solve(plant, kind, str(name), positions, start)
     return [Waypoints(knots.tolist(), joints[:, i].tolist()) for i in range(plant.n)]

@@ -14,7 +14,14 @@ import numpy as np
 from numpy.lib import format as npy
 
 from smc_mujoco.common import annexes, html
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, one_line, users_stacklevel, words
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    ScenarioWarning,
+    find,
+    one_line,
+    users_stacklevel,
+    words,
+)
 from smc_mujoco.common.extras import package
 from smc_mujoco.common.files import as_path, from_json, reading, replacing, to_json
 from smc_mujoco.mechanisms import rotation
@@ -32,34 +39,44 @@ ARRAYS = ("t", *LOGGED)
 PLANT_DIVERGED = "the plant diverged"  # how the failure of such a run begins
 MAX_FAILURE = 500  # characters; chosen
 MAX_TEXT = 2**26  # characters of a scenario in a file, 64 million; chosen
-FILE = "trace of smc_mujoco", "give the path of a .npz file that a run wrote"  # for errors: what it is, and the cure
+FILE = (
+    "trace of smc_mujoco",
+    "give the path of a .npz file that a run wrote",
+)  # for errors: what it is, and the cure
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Trace:
-    """One run at control samples t_k = k * control_period, k = 0 .. K. The arrays are read-only; NaN from a failure on.
+    """One run at control samples t_k = k * control_period, k = 0 ..
+
+    K. The arrays are read-only; NaN from a failure on.
 
     Attributes:
       t: times, (K + 1,), s.
-      x, v: true positions and velocities, (K + 1, n), in the channels' `plant.units`, and per second.
-      u: commanded control after saturation, constant from t_k to t_(k+1), (K + 1, n), N or N m, or V if the motor's
-        command is a voltage.
+      x, v: true positions and velocities, (K + 1, n), in the channels' `plant.units`, and per
+        second.
+      u: commanded control after saturation, constant from t_k to t_(k+1), (K + 1, n), N or N m, or
+        V if the motor's command is a voltage.
       applied: what the actuator gets at t_k, i.e. u after the input delay, (K + 1, n).
       s: sliding variable as the law returns it, (K + 1, n).
-      d: disturbances on the joint's body, as a generalised force on the joint, (K + 1, n), N or N m.
+      d: disturbances on the joint's body, as a generalised force on the joint, (K + 1, n), N or N
+        m.
       r: reference, (K + 1, n); free joints have none, and get the plant's goal.
       force: of the actuator on the joint, or on the rotor of a Backlash, (K + 1, n), N or N m.
-      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. So that no blow is missed,
-        force and reaction are means over the physics steps of the control period that ends at t_k; at t = 0 they are 0.
+      reaction: what friction, contacts and stops exert on the joint, (K + 1, n), N or N m. So that
+        no blow is missed, force and reaction are means over the physics steps of the control period
+        that ends at t_k; at t = 0 they are 0.
       scenario: the Scenario of the run.
       diverged_at: time in s at which the run failed, or None.
       failure: what happened then, in a sentence, or None.
-      held: time for which dry friction held the joint in the control period that ends at t_k, (K + 1, n), s, by the
-        friction's own state, if the scenario has `exact_friction`; None where dry friction is MuJoCo's, or none.
+      held: time for which dry friction held the joint in the control period that ends at t_k, (K +
+        1, n), s, by the friction's own state, if the scenario has `exact_friction`; None where dry
+        friction is MuJoCo's, or none.
 
-    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude; v its velocity in
-    the world's axes, and its angular velocity in its own. u, d, force and reaction are forces and torques in the same
-    axes; u is what the law asks for, and `applied` what its actuators get, the first in the first channel, and so on.
+    Of a free body x is its position, in the world's axes, and the rotation vector of its attitude;
+    v its velocity in the world's axes, and its angular velocity in its own. u, d, force and
+    reaction are forces and torques in the same axes; u is what the law asks for, and `applied` what
+    its actuators get, the first in the first channel, and so on.
     """
 
     t: np.ndarray
@@ -83,21 +100,30 @@ class Trace:
 
     @property
     def e(self) -> np.ndarray:
-        """Errors x - r, (K + 1, n); of an attitude, the rotation vector from the reference's to the body's, rad."""
+        """Errors x - r, (K + 1, n); of an attitude, the rotation vector from the reference's to the
+        body's, rad.
+        """
         whole = self.x.shape[1] == self.scenario.plant.n  # a group's trace has x = r + e
-        return rotation.pose_errors(self.x, self.r) if self.scenario.plant.pose and whole else self.x - self.r
+        if self.scenario.plant.pose and whole:
+            return rotation.pose_errors(self.x, self.r)
+        return self.x - self.r
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the arrays by name; `held` only if it is not None."""
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        return arrays if self.held is None else arrays | {"held": self.held}
+        if self.held is None:
+            return arrays
+        return arrays | {"held": self.held}
 
     def __setstate__(self, fields: dict) -> None:  # so that the arrays of a copy are read-only, too
         vars(self).update(fields)
         self.__post_init__()
 
     def __repr__(self) -> str:
-        end = "" if self.diverged_at is None else f", {self.failure}"
+        if self.diverged_at is None:
+            end = ""
+        else:
+            end = f", {self.failure}"
         law = self.scenario.law
         return f"Trace({self.scenario.plant.name}, {law}, gains: {law.source}, {len(self.t)} samples{end})"
 
@@ -112,20 +138,28 @@ class Trace:
             rows["failed"] = self.failure
         for name, units in (("x", s.plant.units), ("u", s.efforts[: s.plant.driven])):
             for unit in dict.fromkeys(units):
-                values = getattr(self, name)[:, [i for i, other in enumerate(units) if other == unit]]
+                values = getattr(self, name)[
+                    :, [i for i, other in enumerate(units) if other == unit]
+                ]
                 known = values[np.isfinite(values)].tolist() or [math.nan]
                 rows[f"{name} ({unit})"] = f"{min(known):.3g} to {max(known):.3g}"
         return html.fields(rows, "Trace")
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write a .npz file that `smc.load` reads back. Make missing folders, and replace an old file atomically."""
+        """Write a .npz file that `smc.load` reads back.
+
+        Make missing folders, and replace an old file atomically.
+        """
         path = as_path(path)
         if not path.name or "\0" in path.name:
             raise ScenarioError(f"cannot save to {str(path)!r}: give the file a name")
         if path.suffix not in ("", ".npz"):
             raise ScenarioError(f"cannot save to {path.name!r}: end the name in .npz")
         path = path.with_suffix(".npz")
-        about = to_json(serialise.describe(self.scenario) | {"diverged_at": self.diverged_at, "failure": self.failure})
+        about = to_json(
+            serialise.describe(self.scenario)
+            | {"diverged_at": self.diverged_at, "failure": self.failure}
+        )
         if len(about) > MAX_TEXT:
             raise ScenarioError(
                 f"cannot save {path}: its scenario is a text of {len(about):,} characters and more than {MAX_TEXT:,} "
@@ -138,49 +172,71 @@ class Trace:
 
     @property
     def plant_diverged(self) -> bool:
-        """Whether the run failed because its plant diverged, not because its law or a signal failed."""
-        return self.diverged_at is not None and (self.failure is None or self.failure.startswith(PLANT_DIVERGED))
+        """Whether the run failed because its plant diverged, not because its law or a signal
+        failed.
+        """
+        return self.diverged_at is not None and (
+            self.failure is None or self.failure.startswith(PLANT_DIVERGED)
+        )
 
     @property
     def broken(self) -> str:
         """How the law or a signal failed, in a sentence; "" if neither did."""
-        return "" if self.failure is None or self.plant_diverged else self.failure
+        if self.failure is None or self.plant_diverged:
+            return ""
+        return self.failure
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for several.
+        """Return the arrays by channel: t, x, v, ... for one channel, t, x0, x1, ..., v0, ... for
+        several.
 
         Those of your own model have the names of its joints: x_shoulder, x_elbow, ...
         """
         ends = column_ends(self.scenario.plant)
         return {"t": self.t} | {
-            f"{name}{end}": getattr(self, name)[:, i] for name in ARRAYS[1:] for i, end in enumerate(ends)
+            f"{name}{end}": getattr(self, name)[:, i]
+            for name in ARRAYS[1:]
+            for i, end in enumerate(ends)
         }
 
     def units(self) -> dict[str, str]:
-        """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit depends on the law."""
-        units = [unit for name in ARRAYS[1:] for unit in self._units(name)]
+        """Return the unit of each of the `columns`: "s", "rad", "N m", ...; "" for s, whose unit
+        depends on the law.
+        """
+        units = []
+        for name in ARRAYS[1:]:
+            for unit in self._units(name):
+                units.append(unit)
         return dict(zip(self.columns(), ["s", *units], strict=True))
 
     def _units(self, name: str) -> list[str]:
         """Return the unit of an array for each channel, (n,)."""
         pairs = zip(self.scenario.plant.units, self.scenario.efforts, strict=True)
-        of_channels = [{"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""} for x, u in pairs]
+        of_channels = []
+        for x, u in pairs:
+            of_channels.append({"x": x, "r": x, "v": f"{x}/s", "u": u, "applied": u, "s": ""})
         return [units.get(name, EFFORT[units["x"]]) for units in of_channels]
 
     def _unit(self, name: str) -> str:
         """Return the unit of an array, or those of its channels where they differ: "m, rad"."""
         units = ["s"] if name == "t" else self._units(name)
-        return units[0] if len(set(units)) == 1 else ", ".join(units)
+        if len(set(units)) == 1:
+            return units[0]
+        return ", ".join(units)
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
-        """Return the `columns` as a stream of Arrow's C interface: what polars.from_dataframe and duckdb take."""
+        """Return the `columns` as a stream of Arrow's C interface: what polars.from_dataframe and
+        duckdb take.
+        """
         with package("pyarrow", "Trace.__arrow_c_stream__"):
             import pyarrow
 
         return pyarrow.table(self.columns()).__arrow_c_stream__(requested_schema)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return the `columns` as a pandas DataFrame, indexed by t. Its `attrs` have the "units" and the "scenario".
+        """Return the `columns` as a pandas DataFrame, indexed by t.
+
+        Its `attrs` have the "units" and the "scenario".
 
         Raises:
           MissingPackageError: pandas is not installed.
@@ -190,14 +246,19 @@ class Trace:
 
         columns = self.columns()
         frame = pandas.DataFrame(columns, index=pandas.Index(columns.pop("t"), name="t"))
-        frame.attrs = {"units": self.units(), "scenario": to_json(serialise.describe(self.scenario))}
+        frame.attrs = {
+            "units": self.units(),
+            "scenario": to_json(serialise.describe(self.scenario)),
+        }
         return frame
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the arrays as an xarray Dataset: a variable for each, with dimensions t and channel.
+        """Return the arrays as an xarray Dataset: a variable for each, with dimensions t and
+        channel.
 
-        Each variable has its unit in `attrs["units"]`, or those of its channels, "m, rad". The coordinate "joint" has
-        the names of the joints. The Dataset's `attrs` have the "scenario", and of a run that failed the "failure".
+        Each variable has its unit in `attrs["units"]`, or those of its channels, "m, rad". The
+        coordinate "joint" has the names of the joints. The Dataset's `attrs` have the "scenario",
+        and of a run that failed the "failure".
 
         Raises:
           MissingPackageError: xarray is not installed.
@@ -206,26 +267,38 @@ class Trace:
             import xarray  # pyright: ignore[reportMissingImports]
 
         about = {"scenario": to_json(serialise.describe(self.scenario))}
-        variables = {n: (("t", "channel"), getattr(self, n), {"units": self._unit(n)}) for n in ARRAYS[1:]}
+        variables = {}
+        for n in ARRAYS[1:]:
+            variables[n] = (("t", "channel"), getattr(self, n), {"units": self._unit(n)})
         joints = "channel", list(joint_names(self.scenario.plant))
-        coords = {"t": ("t", self.t, {"units": "s"}), "channel": np.arange(self.x.shape[1]), "joint": joints}
-        return xarray.Dataset(variables, coords, about | ({"failure": self.failure} if self.failure else {}))
+        coords = {
+            "t": ("t", self.t, {"units": "s"}),
+            "channel": np.arange(self.x.shape[1]),
+            "joint": joints,
+        }
+        return xarray.Dataset(
+            variables, coords, about | ({"failure": self.failure} if self.failure else {})
+        )
 
     def export(self, path: str | os.PathLike[str]) -> Path:
-        """Write the trace to a .csv, .parquet, .mat (MATLAB 5) or .mcap file, without losing a bit of any number.
+        """Write the trace to a .csv, .parquet, .mat (MATLAB 5) or .mcap file, without losing a bit
+        of any number.
 
-        CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the fewest digits that
-        identify each number (0.1, not 0.10000000000000001), and nan after a failure. Parquet: the `columns`; the
-        metadata of each column has its "unit", and that of the schema the "scenario", as JSON. MAT: the arrays by name,
-        (K + 1, n), a struct `units` with the unit of each ("m, rad" if channels differ), and `scenario`. MCAP: the
-        moving machine and the arrays, for Foxglove and Rerun (`pip install 'smc-mujoco[mcap]'`).
+        CSV: a header line with units, "t [s]", "x [rad]", ..., then a line per sample, with the
+        fewest digits that identify each number (0.1, not 0.10000000000000001), and nan after a
+        failure. Parquet: the `columns`; the metadata of each column has its "unit", and that of the
+        schema the "scenario", as JSON. MAT: the arrays by name, (K + 1, n), a struct `units` with
+        the unit of each ("m, rad" if channels differ), and `scenario`. MCAP: the moving machine and
+        the arrays, for Foxglove and Rerun (`pip install 'smc-mujoco[mcap]'`).
 
         Raises:
           ScenarioError: the name has another ending.
         """
         path = as_path(path)
         if path.suffix not in _WRITERS:
-            raise ScenarioError(f"cannot export to {path.name!r}: end the name in .csv, .mat, .mcap or .parquet")
+            raise ScenarioError(
+                f"cannot export to {path.name!r}: end the name in .csv, .mat, .mcap or .parquet"
+            )
         with replacing(path) as file:
             _WRITERS[path.suffix](self, file)
         return path
@@ -244,7 +317,11 @@ def _write_mat(trace: Trace, file: Path) -> None:
 
     about = to_json(serialise.describe(trace.scenario))
     arrays = {name: getattr(trace, name) for name in ARRAYS}
-    savemat(file, arrays | {"units": {n: trace._unit(n) for n in ARRAYS}, "scenario": about}, oned_as="column")
+    savemat(
+        file,
+        arrays | {"units": {n: trace._unit(n) for n in ARRAYS}, "scenario": about},
+        oned_as="column",
+    )
 
 
 def _write_parquet(trace: Trace, file: Path) -> None:
@@ -252,16 +329,25 @@ def _write_parquet(trace: Trace, file: Path) -> None:
     from pyarrow import parquet
 
     about = to_json(serialise.describe(trace.scenario))
-    fields = [pa.field(name, pa.float64(), metadata={"unit": unit}) for name, unit in trace.units().items()]
+    fields = []
+    for name, unit in trace.units().items():
+        fields.append(pa.field(name, pa.float64(), metadata={"unit": unit}))
     with file.open("wb") as stream:  # opened here, so that errors are those of other files
-        parquet.write_table(pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream)
+        parquet.write_table(
+            pa.table(trace.columns(), pa.schema(fields, metadata={"scenario": about})), stream
+        )
 
 
 def _write_mcap(trace: Trace, file: Path) -> None:
     annexes.module("smc_mujoco.exchange.recording", "Trace.export to .mcap").write(trace, file)
 
 
-_WRITERS = {".csv": _write_csv, ".mat": _write_mat, ".mcap": _write_mcap, ".parquet": _write_parquet}
+_WRITERS = {
+    ".csv": _write_csv,
+    ".mat": _write_mat,
+    ".mcap": _write_mcap,
+    ".parquet": _write_parquet,
+}
 EXPORT_FORMATS = tuple(ending.removeprefix(".") for ending in _WRITERS)  # of Trace.export
 
 
@@ -274,14 +360,21 @@ def formats(text: str) -> tuple[str, ...]:
 
 
 def from_log(scenario: Scenario, log: np.ndarray, failed_step: int, failure: str | None) -> Trace:
-    """Return the Trace of a log, (K + 1, n) LOG, of a run that failed at a physics step, or that did not fail.
+    """Return the Trace of a log, (K + 1, n) LOG, of a run that failed at a physics step, or that
+    did not fail.
 
     A number that is not finite counts as a failure, and the trace is NaN from there on.
     """
     t = np.arange(scenario.samples + 1) * scenario.control_period
     diverged_at = None
-    end = len(t) if failure is None else math.ceil(failed_step / scenario.steps)
-    names = (*LOGGED, "held") if scenario.exact_friction else LOGGED
+    if failure is None:
+        end = len(t)
+    else:
+        end = math.ceil(failed_step / scenario.steps)
+    if scenario.exact_friction:
+        names = (*LOGGED, "held")
+    else:
+        names = LOGGED
     arrays = {name: np.ascontiguousarray(log[name]) for name in names}
     if scenario.plant.goal:
         arrays["r"][:, scenario.plant.driven :] = scenario.plant.goal
@@ -304,7 +397,11 @@ def load(path: str | os.PathLike[str]) -> Trace:
     Raises:
       ScenarioError: there is no such file, or it is not a trace.
     """
-    if isinstance(path, str | os.PathLike) and not os.path.exists(path) and os.path.exists(f"{os.fspath(path)}.npz"):
+    if (
+        isinstance(path, str | os.PathLike)
+        and not os.path.exists(path)
+        and os.path.exists(f"{os.fspath(path)}.npz")
+    ):
         path = f"{os.fspath(path)}.npz"
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
         about = from_json(str(_checked_array(archive, "about")))
@@ -314,15 +411,25 @@ def load(path: str | os.PathLike[str]) -> Trace:
     except ScenarioError as error:  # with its cure
         raise ScenarioError(f"the scenario of {path} cannot be restored, {error}") from None
     except Exception as error:
-        raise ScenarioError(f"{path} holds no scenario ({words(error)}): give a file that a run wrote") from None
+        raise ScenarioError(
+            f"{path} holds no scenario ({words(error)}): give a file that a run wrote"
+        ) from None
     with reading(path, *FILE) as file, zipfile.ZipFile(file) as archive:
-        names = (*ARRAYS, "held") if "held.npy" in archive.namelist() else ARRAYS
+        if "held.npy" in archive.namelist():
+            names = (*ARRAYS, "held")
+        else:
+            names = ARRAYS
         arrays = {name: _checked_array(archive, name, scenario) for name in names}
     return Trace(**arrays, scenario=scenario, **end)
 
 
-def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None) -> np.ndarray:
-    """Return an array of a file; a text if `scenario` is None. Check type and shape before the array is read."""
+def _checked_array(
+    archive: zipfile.ZipFile, name: str, scenario: Scenario | None = None
+) -> np.ndarray:
+    """Return an array of a file; a text if `scenario` is None.
+
+    Check type and shape before the array is read.
+    """
     with archive.open(f"{name}.npy") as stream:
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         shape, _, dtype = headers[npy.read_magic(stream)](stream)
@@ -330,10 +437,13 @@ def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | Non
         expected = shape == () and dtype.kind == "U" and dtype.itemsize <= 4 * MAX_TEXT
     else:
         expected = (
-            dtype == np.dtype(float) and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
+            dtype == np.dtype(float)
+            and shape == (scenario.samples + 1, scenario.plant.n)[: 1 if name == "t" else 2]
         )
     if not expected:
-        raise ScenarioError(f"its {name} is {dtype} of shape {shape}, which does not fit its scenario")
+        raise ScenarioError(
+            f"its {name} is {dtype} of shape {shape}, which does not fit its scenario"
+        )
     with archive.open(f"{name}.npy") as stream:
         array = npy.read_array(stream, allow_pickle=False)
         if stream.read(1):  # the checksum is compared at the end
@@ -342,6 +452,10 @@ def _checked_array(archive: zipfile.ZipFile, name: str, scenario: Scenario | Non
 
 
 def warn_of_broken(laws: Mapping[str, str]) -> None:
-    """Warn of laws that failed by themselves, name -> `Trace.broken`: it is no property of theirs, but a mistake."""
+    """Warn of laws that failed by themselves, name -> `Trace.broken`: it is no property of theirs,
+    but a mistake.
+    """
     for name, failure in laws.items():
-        warnings.warn(f"{name} failed by itself in a run: {failure}", ScenarioWarning, users_stacklevel())
+        warnings.warn(
+            f"{name} failed by itself in a run: {failure}", ScenarioWarning, users_stacklevel()
+        )

@@ -1,7 +1,8 @@
-"""Advice: the laws that were compared for the needs of a user, as a table and as an answer in sentences.
+"""Advice: the laws that were compared for the needs of a user, as a table and as an answer in
+sentences.
 
-A need, such as "fast", is a metric to keep small, in runs or in the worst case. Every sentence is made from the numbers
-of the comparison, so it changes when they do.
+A need, such as "fast", is a metric to keep small, in runs or in the worst case. Every sentence is
+made from the numbers of the comparison, so it changes when they do.
 """
 
 import dataclasses
@@ -31,7 +32,11 @@ MAX_ROWS = 12  # laws in the table; chosen
 
 
 NEEDS: Mapping[str, Metric] = {metric.need: metric for metric in metrics() if metric.need}
-NEEDS |= {ROBUST: dataclasses.replace(CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}")}
+NEEDS |= {
+    ROBUST: dataclasses.replace(
+        CATALOGUE[METRIC], need=ROBUST, label=f"worst found {CATALOGUE[METRIC].label}"
+    )
+}
 
 
 def ties(plant: Plant) -> list[Metric]:
@@ -49,7 +54,9 @@ class Choice:
     settles: float  # share of its runs
     reliable: bool  # whether it settles in nearly all runs of every condition
     fit: bool  # whether it settles often enough to be advised
-    medians: Mapping[str, Interval]  # need -> median over the conditions; of "robust" the largest over the conditions
+    medians: Mapping[
+        str, Interval
+    ]  # need -> median over the conditions; of "robust" the largest over the conditions
     worst: tuple[WorstCase, ...] = ()  # in each condition, for "robust"
 
     @property
@@ -64,7 +71,9 @@ class Choice:
         return "; ".join([f"gains: {self.law.source}", *remarks])
 
     def below(self, need: str) -> str:
-        """Return the text below a median in a table: its interval, if it has a width; of "robust" the random median."""
+        """Return the text below a median in a table: its interval, if it has a width; of "robust"
+        the random median.
+        """
         if need == ROBUST:
             return f"median {self.worst_found.shown(self.worst_found.median)}"
         median = self.medians[need]
@@ -80,7 +89,8 @@ class Advice(Tables):
     needs: tuple[str, ...]  # names of the compared ones, such as "fast"
     wanted: tuple[str, ...]  # properties that every law has, in words
     choices: tuple[Choice, ...]  # best first
-    comparison: Comparison  # of the laws that are fit, or of all if none is; its blocks are those of `blocks`
+    # of the laws that are fit, or of all if none is; its blocks are those of `blocks`
+    comparison: Comparison
     table: Table  # the runs
     effort: str = ""  # unit of u; "" for that of a force, or where conditions differ
     untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is advised
@@ -93,7 +103,9 @@ class Advice(Tables):
     @property
     def second(self) -> Component | None:
         """The second choice, with its gains; None if only one law suits."""
-        return self.choices[1].law if len(self.choices) > 1 else None
+        if len(self.choices) > 1:
+            return self.choices[1].law
+        return None
 
     @property
     def barred(self) -> list[str]:
@@ -108,15 +120,23 @@ class Advice(Tables):
     @property
     def compared(self) -> list[str]:
         """The laws that are compared, best first."""
-        return [choice.law.name for choice in self.choices if choice.law.name in self.comparison.laws]
+        return [
+            choice.law.name for choice in self.choices if choice.law.name in self.comparison.laws
+        ]
 
     def wins(self, law: str, rival: str) -> list[tuple[str, str]]:
         """Return the need and the condition of each block in which a law is better than a rival."""
         a, b = (self.comparison.laws.index(name) for name in (law, rival))
-        return [block for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True) if better]
+        return [
+            block
+            for block, better in zip(self.blocks, self.comparison.better[:, a, b], strict=True)
+            if better
+        ]
 
     def dominates(self, law: str) -> list[str]:
-        """Return the laws that this one dominates: it is better than each in some block, and worse in none."""
+        """Return the laws that this one dominates: it is better than each in some block, and worse
+        in none.
+        """
         rivals = (name for name in self.compared if name != law)
         return [name for name in rivals if self.wins(law, name) and not self.wins(name, law)]
 
@@ -124,13 +144,19 @@ class Advice(Tables):
     def level(self) -> list[str]:
         """The laws that are neither better nor worse than the advised law in any block."""
         first, *others = self.compared
-        return [name for name in others if not self.wins(first, name) and not self.wins(name, first)]
+        return [
+            name for name in others if not self.wins(first, name) and not self.wins(name, first)
+        ]
 
     @property
     def tied(self) -> list[str]:
         """The laws that are level with the advised law in every block, see `Comparison.level`."""
         laws, first = self.comparison.laws, self.compared[0]
-        return [name for name in self.compared[1:] if self.comparison.tied[laws.index(first), laws.index(name)]]
+        return [
+            name
+            for name in self.compared[1:]
+            if self.comparison.tied[laws.index(first), laws.index(name)]
+        ]
 
     @property
     def all_level(self) -> bool:
@@ -144,47 +170,83 @@ class Advice(Tables):
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table with a row for each of the first laws, above the answer; marked where no law is better."""
+        """One table with a row for each of the first laws, above the answer; marked where no law is
+        better.
+        """
         metrics = [NEEDS[need] for need in self.needs]
-        units = [f"{m.need}: {m.label} ({m.unit_for(self.plant.unit, self.effort)})" for m in metrics]
+        units = []
+        for m in metrics:
+            units.append(f"{m.need}: {m.label} ({m.unit_for(self.plant.unit, self.effort)})")
         rows = []
         for choice in self.choices[:MAX_ROWS]:
             law = Cell(choice.law.name, colour=law_colour(choice.law.name))
-            place, settles = f"{choice.rank.place:g}" if choice.fit else "–", f"{100 * choice.settles:.0f} %"
+            place, settles = (
+                f"{choice.rank.place:g}" if choice.fit else "–",
+                f"{100 * choice.settles:.0f} %",
+            )
             rows.append([law, place, settles, *(self._cell(choice, need) for need in self.needs)])
-        notes = [line for note in (self.key, *failures(self.table), *self.answer) for line in (note, "")][:-1]
-        wanted = f", by laws that {joined(self.wanted)}" if self.wanted else ""
+        notes = [
+            line for note in (self.key, *failures(self.table), *self.answer) for line in (note, "")
+        ][:-1]
+        if self.wanted:
+            wanted = f", by laws that {joined(self.wanted)}"
+        else:
+            wanted = ""
         title = f"{self.plant.name} under {joined(self.conditions)}: {joined(self.needs)}{wanted}"
-        return [Tabular(headings=["law", "place", "settles", *units], rows=rows, title=title, notes=notes)]
+        return [
+            Tabular(
+                headings=["law", "place", "settles", *units], rows=rows, title=title, notes=notes
+            )
+        ]
 
     def _cell(self, choice: Choice, need: str) -> Cell:
         """Return a median, marked if no law is better in any condition and no run fails."""
         name = choice.law.name
         rivalled = len(self.compared) > 1 and name in self.compared
-        doubted = rivalled and self._any(self.comparison.undecided | self.comparison.beaten, name, need)
-        return Cell(NEEDS[need].text(choice.medians[need].median), choice.below(need), rivalled and not doubted)
+        doubted = rivalled and self._any(
+            self.comparison.undecided | self.comparison.beaten, name, need
+        )
+        return Cell(
+            NEEDS[need].text(choice.medians[need].median),
+            choice.below(need),
+            rivalled and not doubted,
+        )
 
     def _any(self, flags: np.ndarray, law: str, need: str) -> bool:
-        """Return whether flags of the comparison, (laws, blocks), are true of a law in some block of a need."""
+        """Return whether flags of the comparison, (laws, blocks), are true of a law in some block
+        of a need.
+        """
         row = flags[self.comparison.laws.index(law)].tolist()
-        return any(value for (compared, _), value in zip(self.blocks, row, strict=True) if compared == need)
+        return any(
+            value for (compared, _), value in zip(self.blocks, row, strict=True) if compared == need
+        )
 
     @property
     def key(self) -> str:
         """The meaning of the table's signs."""
-        shown, more = self.choices[:MAX_ROWS], [choice.law.name for choice in self.choices[MAX_ROWS:]]
+        shown, more = (
+            self.choices[:MAX_ROWS],
+            [choice.law.name for choice in self.choices[MAX_ROWS:]],
+        )
         over = f" over {len(self.conditions)} conditions" * (len(self.conditions) > 1)
-        medians = f" Medians{over}, with {100 * LEVEL:g} % intervals over {self.samples}." * (not self._untested)
+        medians = f" Medians{over}, with {100 * LEVEL:g} % intervals over {self.samples}." * (
+            not self._untested
+        )
         text = "Places: by failed runs, then mean rank, behind laws that dominate (better somewhere, worse nowhere)."
         text += medians + f" {counted(len(more), 'more law')}: {first_of(more)}." * bool(more)
         text += " *: no law is better in any condition, every run has a value, and there are enough samples to tell."
         bare = any(not choice.below(need) for choice in shown for need in self.needs)
-        text += " Where there is no interval, its ends are equal, or one end is a run without a value." * bare
+        text += (
+            " Where there is no interval, its ends are equal, or one end is a run without a value."
+            * bare
+        )
         if self._shared and len(self._shared) < len(self.comparison.laws):
             text += f" Sets of gains, which are the sample of a law that has several: {first_of(self._shared)}."
         if sources := in_words({choice.law.name: [choice.law.source] for choice in shown}):
             text += f" {capital(sources)}."
-        text += " –: the law settles too seldom to be advised." * any(not choice.fit for choice in shown)
+        text += " –: the law settles too seldom to be advised." * any(
+            not choice.fit for choice in shown
+        )
         metrics = [NEEDS[need].name for need, _ in self.blocks]
         floors = zip(metrics, self.comparison.floors.tolist(), strict=True)
         relevant = relevance(self.comparison.relevant, floors, self.plant.unit)
@@ -192,15 +254,24 @@ class Advice(Tables):
 
     @property
     def samples(self) -> str:
-        """The largest sample of two laws in words: "24 runs", or "3 sets of gains" where runs share them."""
+        """The largest sample of two laws in words: "24 runs", or "3 sets of gains" where runs share
+        them.
+        """
         samples, sets = self.comparison.samples, self.comparison.sets.max(axis=1)
         block, a, b = np.unravel_index(int(samples.argmax()), samples.shape)
-        count = int(samples[block, a, b]) if len(sets) > 1 else int(self.comparison.seeds.max())
-        return f"{counted(count, 'set')} of gains" if max(sets[a], sets[b]) > 1 else counted(count, "run")
+        if len(sets) > 1:
+            count = int(samples[block, a, b])
+        else:
+            count = int(self.comparison.seeds.max())
+        if max(sets[a], sets[b]) > 1:
+            return f"{counted(count, 'set')} of gains"
+        return counted(count, "run")
 
     @property
     def _shared(self) -> list[str]:
-        """The laws whose runs share several sets of gains, with their number, such as "classical 3"."""
+        """The laws whose runs share several sets of gains, with their number, such as "classical
+        3".
+        """
         seeds, counts = self.comparison.seeds.max(), self.comparison.sets.max(axis=1).tolist()
         named = zip(self.comparison.laws, counts, strict=True)
         return [f"{law} {count}" for law, count in named if 1 < count < seeds]
@@ -220,8 +291,13 @@ class Advice(Tables):
 
     @property
     def answer(self) -> list[str]:
-        """The advice in sentences: the law and why, the second choice, how sure it is; or why no law is advised."""
-        robust = self._robust() if ROBUST in self.needs else ""
+        """The advice in sentences: the law and why, the second choice, how sure it is; or why no
+        law is advised.
+        """
+        if ROBUST in self.needs:
+            robust = self._robust()
+        else:
+            robust = ""
         parts = [self._use(), self._because(), robust, self._second(), self._sure()]
         if self.barred:
             why = f"No law is advised over {first_of(self.barred)}, with default gains"
@@ -233,7 +309,10 @@ class Advice(Tables):
         longer = f"longer runs than {self.table.scenario(0).duration:g} s"
         cure = f"give {longer}, a stronger actuator, more suitable laws or easier conditions"
         if not first.settles or not first.fit:
-            why = "none settles in any run" if not first.settles else "none settles often enough in every condition"
+            if not first.settles:
+                why = "none settles in any run"
+            else:
+                why = "none settles often enough in every condition"
             return f"No law can be advised, because {why}: {cure}."
         if not first.reliable:
             share = f"{100 * first.settles:.0f} % of its runs"
@@ -244,7 +323,10 @@ class Advice(Tables):
             return f"No law can be called the best with {self.samples}, too few for {comparisons}: {cure}."
         if self.all_level:
             laws = f"{every(len(self.compared))} laws"
-            where = "in the worst that was found" if self._untested else f"in every comparison of {self.samples}"
+            if self._untested:
+                where = "in the worst that was found"
+            else:
+                where = f"in every comparison of {self.samples}"
             return f"No law can be called the best: {laws} are level {where}. Use the one that you know."
         return f"Use {first.law} ({first.gains})."
 
@@ -267,9 +349,15 @@ class Advice(Tables):
         if tied:
             why = f"it ties with {first_of(tied)}, of better mean rank, and {self._rule}"
         if count == 1:
-            why = "it is the only law here that suits" if len(self.choices) == 1 else "it alone settles often enough"
+            if len(self.choices) == 1:
+                why = "it is the only law here that suits"
+            else:
+                why = "it alone settles often enough"
         parts = [f"Because {why}. It settles in {100 * first.settles:.0f} % of its runs."]
-        parts += [self._standing(first, need) for need in self.needs] if count > 1 else []
+        if count > 1:
+            parts += [self._standing(first, need) for need in self.needs]
+        else:
+            parts += []
         return " ".join(parts)
 
     @property
@@ -280,15 +368,21 @@ class Advice(Tables):
     def _standing(self, choice: Choice, need: str) -> str:
         """Return the median of a law on a need, and who is better."""
         name, value = choice.law.name, f"{NEEDS[need].label} {self._number(choice, need)}"
-        rivals = {rival: [block for block in self.wins(rival, name) if block[0] == need] for rival in self.compared}
+        rivals = {}
+        for rival in self.compared:
+            rivals[rival] = [block for block in self.wins(rival, name) if block[0] == need]
         better = [rival + self._where(blocks) for rival, blocks in rivals.items() if blocks]
-        said = "no law is better" + ", as far as so few samples tell" * self._any(self.comparison.undecided, name, need)
+        said = "no law is better" + ", as far as so few samples tell" * self._any(
+            self.comparison.undecided, name, need
+        )
         if better:
             said = f"better {'is' if len(better) == 1 else 'are'} {first_of(better)}"
         return f"{capital(need)}: {value}; {said}."
 
     def _robust(self) -> str:
-        """Return what the adversary did, and which law the median of its random runs puts first, if another."""
+        """Return what the adversary did, and which law the median of its random runs puts first, if
+        another.
+        """
         worst = self.choices[0].worst_found
         fit = [choice for choice in self.choices if choice.fit] or self.choices
         lowest = min(fit, key=lambda choice: choice.worst_found.median)
@@ -309,8 +403,13 @@ class Advice(Tables):
         named = f"Second choice: {second.law} ({second.gains})"
         if not second.fit:
             return f"{named}; it settles too seldom to be advised."
-        ahead, behind = self.wins(second.law.name, first.law.name), self.wins(first.law.name, second.law.name)
-        parts = [f"better {self._on(ahead)}"] * bool(ahead) + [f"worse {self._on(behind)}"] * bool(behind)
+        ahead, behind = (
+            self.wins(second.law.name, first.law.name),
+            self.wins(first.law.name, second.law.name),
+        )
+        parts = [f"better {self._on(ahead)}"] * bool(ahead) + [f"worse {self._on(behind)}"] * bool(
+            behind
+        )
         return f"{named}; {'; '.join(parts) or 'level with the first in every comparison'}."
 
     def _sure(self) -> str:
@@ -327,7 +426,9 @@ class Advice(Tables):
             f"it dominates {first_of(beaten)}: better somewhere, worse nowhere" if beaten else "",
             f"{it} ties with {first_of(self.tied)}; {self._rule}" if self.tied else "",
             f"{it} is not to be told from {first_of(unsure)}" if unsure else "",
-            f"it loses some comparisons to {first_of(mixed)}, so the choice depends on what counts" if mixed else "",
+            f"it loses some comparisons to {first_of(mixed)}, so the choice depends on what counts"
+            if mixed
+            else "",
             self._against(others[0]),
         ]
         sure = f"How sure: {'; '.join(filter(None, parts))}. {self._holds}"
@@ -337,13 +438,18 @@ class Advice(Tables):
         return f"{sure} The order is not tested: {chance}."
 
     def _against(self, rival: str) -> str:
-        """Return how the first law compares with a rival on each need, in the condition that is worst for the first."""
+        """Return how the first law compares with a rival on each need, in the condition that is
+        worst for the first.
+        """
         first, parts = self.compared[0], []
         a, b = (self.comparison.laws.index(name) for name in (first, rival))
         for need in self.needs:
             blocks = [k for k, block in enumerate(self.blocks) if block[0] == need]
             if need == ROBUST:
-                values = [self._number(choice, need) for choice in self.choices if choice.law.name in (first, rival)]
+                values = []
+                for choice in self.choices:
+                    if choice.law.name in (first, rival):
+                        values.append(self._number(choice, need))
                 parts.append(f"{need} {' to '.join(values)}")
                 continue
             worst = max(blocks, key=lambda k: self.comparison.p[k, a, b])
@@ -351,7 +457,9 @@ class Advice(Tables):
             where = f" under {self.blocks[worst][1]}, where it does worst," * (len(blocks) > 1)
             if math.isfinite(effect.value):
                 parts.append(f"{need}{where} {size_in_words(effect)}, {ahead_in_words(effect)}")
-        return f"{first} against {rival}: {'; '.join(parts)}" if parts else ""
+        if parts:
+            return f"{first} against {rival}: {'; '.join(parts)}"
+        return ""
 
     @property
     def _holds(self) -> str:
@@ -359,20 +467,32 @@ class Advice(Tables):
         if self._untested:
             return "There is no test, as the worst found is one value of a law and no sample."
         several = self.comparison.sets.max(axis=1) > 1
-        single = [law for law, many in zip(self.comparison.laws, several.tolist(), strict=True) if not many]
+        single = [
+            law
+            for law, many in zip(self.comparison.laws, several.tolist(), strict=True)
+            if not many
+        ]
         gains = f"over sets of gains{f', for these gains of {first_of(single)}' * bool(single)}"
-        these = "Except for robust, these" if ROBUST in self.needs else "These"
+        if ROBUST in self.needs:
+            these = "Except for robust, these"
+        else:
+            these = "These"
         return f"{these} comparisons hold {gains if several.any() else 'for these gains'}, over starts and noise."
 
     def _number(self, choice: Choice, need: str) -> str:
         """Return a median with its unit."""
         metric, median = NEEDS[need], choice.medians[need].median
-        unit = f" {metric.unit_for(self.plant.unit, self.effort)}" if math.isfinite(median) else ""
+        if math.isfinite(median):
+            unit = f" {metric.unit_for(self.plant.unit, self.effort)}"
+        else:
+            unit = ""
         return metric.text(median) + unit
 
     def _where(self, blocks: Sequence[tuple[str, str]]) -> str:
         """Return the conditions of blocks of one need in words, "" for all of them."""
-        return "" if len(blocks) == len(self.conditions) else f" under {joined([condition for _, condition in blocks])}"
+        if len(blocks) == len(self.conditions):
+            return ""
+        return f" under {joined([condition for _, condition in blocks])}"
 
     def _on(self, blocks: Sequence[tuple[str, str]]) -> str:
         """Return blocks in words, such as "on fast, on calm under noise and sine"."""

@@ -1,17 +1,21 @@
-"""An adviser: which law suits a plant, its conditions and the needs of a user, with which gains, and how sure that is.
+"""An adviser: which law suits a plant, its conditions and the needs of a user, with which gains,
+and how sure that is.
 
-A need is a metric to compare (fast, accurate, calm ...) or a property that a law must have (continuous, two-gains ...).
-With "no-velocity", laws that read a velocity get one that is differentiated from the position.
+A need is a metric to compare (fast, accurate, calm ...) or a property that a law must have
+(continuous, two-gains ...). With "no-velocity", laws that read a velocity get one that is
+differentiated from the position.
 
-Every law that suits gets gains by one rule, and runs in each condition from the same seeds. Laws are compared by the
-rules of `ranking`; a block is a need in a condition. No law is dropped early, because a few seeds would then decide
-which law may be first. A law is not fit, and not compared, if in some condition it settles in less than half as many
-runs as the law that settles most often: else a law that does nothing would be the calmest. For "robust" an adversary
-attacks each law. There is no test then, because a worst case is no sample.
+Every law that suits gets gains by one rule, and runs in each condition from the same seeds. Laws
+are compared by the rules of `ranking`; a block is a need in a condition. No law is dropped early,
+because a few seeds would then decide which law may be first. A law is not fit, and not compared, if
+in some condition it settles in less than half as many runs as the law that settles most often: else
+a law that does nothing would be the calmest. For "robust" an adversary attacks each law. There is
+no test then, because a worst case is no sample.
 
-A law dominates another if it is better in some block and worse in none. Laws are ordered by their runs that fail, then
-by mean rank, but none comes before a law that dominates it. Laws that tie with the next law are ordered by the metrics
-of `ties`, less first. The first law is advised, unless all are level.
+A law dominates another if it is better in some block and worse in none. Laws are ordered by their
+runs that fail, then by mean rank, but none comes before a law that dominates it. Laws that tie with
+the next law are ordered by the metrics of `ties`, less first. The first law is advised, unless all
+are level.
 """
 
 import math
@@ -78,20 +82,23 @@ def which(
     relevant: Relevant = RELEVANT,
     within: Uncertainty | None = None,
 ) -> Advice:
-    """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how sure the answer is.
+    """Advise a law for a plant: compare all laws that suit, with gains for the plant, and say how
+    sure the answer is.
 
     Args:
       plant: a name, a Plant, or your own MJCF and its joints, as "arm.xml:shoulder,elbow".
       conditions: names, texts or Conditions, see `condition`. Default: nominal, noise and sine.
-      needs: what to compare: "fast", "accurate" (at the end), "on-track" (on the way), "calm", "gentle", "frugal",
-        "no-overshoot", "robust" (in the worst case); by default fast, accurate and calm. And what every law must have:
-        "no-velocity", "continuous" and the other names in `smc_mujoco.control.properties.PROPERTIES`.
+      needs: what to compare: "fast", "accurate" (at the end), "on-track" (on the way), "calm",
+        "gentle", "frugal",
+        "no-overshoot", "robust" (in the worst case); by default fast, accurate and calm. And what
+        every law must have: "no-velocity", "continuous" and the other names in
+        `smc_mujoco.control.properties.PROPERTIES`.
       laws: the laws to compare, by name or with your own gains. Default: all that suit.
       seeds: runs of a law in each condition, each with another start and other noise.
       duration: of a run, s. Default: 5, or 3 if quick; 8 under an adversary.
       out: folder for gains and runs, which another call reads.
-      quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64, and a third of an adversary's
-        runs.
+      quick: shorter runs, three searches of 16 evaluations a gain in place of 12 of 64, and a third
+        of an adversary's runs.
       defaults: whether a law may be advised over rivals whose gains are their defaults.
       starts, relevant, threads, progress: as in `compare`.
       within: the class for the need "robust". Default: that of `worst_case`.
@@ -101,13 +108,19 @@ def which(
     """
     extent, machine = QUICK if quick else FULL, as_plant(plant)
     compared, properties = _needs(needs, machine)
-    length = extent.duration if duration is None else duration
+    if duration is None:
+        length = extent.duration
+    else:
+        length = duration
     tested = _conditions(conditions, machine, length, NO_VELOCITY in properties)
     trial = Trial([machine], tested, length, starts, Path(out), threads, progress)
     effort, wanted = _effort(trial), [name for name in properties if name != NO_VELOCITY]
     candidates = _candidates(trial, _suited(machine, wanted, laws), extent, defaults)
     table = trial.run({machine.name: [*candidates.values()]}, seeds)
-    worst = _worst(trial, candidates, duration, within, extent.parts) if ROBUST in compared else {}
+    if ROBUST in compared:
+        worst = _worst(trial, candidates, duration, within, extent.parts)
+    else:
+        worst = {}
     comparison, choices = _contest(table, worst, candidates, machine, compared, relevant)
     return Advice(
         plant=machine,
@@ -118,7 +131,9 @@ def which(
         comparison=comparison,
         table=table,
         effort=effort,
-        untuned=() if defaults else tuple(n for n, c in candidates.items() if c.law.source.kind == source.DEFAULT),
+        untuned=()
+        if defaults
+        else tuple(n for n, c in candidates.items() if c.law.source.kind == source.DEFAULT),
     )
 
 
@@ -129,7 +144,10 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
     """Return the needs that are metrics, and those that are properties."""
     if isinstance(needs, str):
         needs = [name.strip() for name in needs.split(",") if name.strip()]
-    names = list(dict.fromkeys(listed("needs", needs))) if needs else []
+    if needs:
+        names = list(dict.fromkeys(listed("needs", needs)))
+    else:
+        names = []
     for name in names:
         if name not in NEEDS and name not in PROPERTIES:
             raise unknown("need", name, [*NEEDS, *PROPERTIES])
@@ -141,11 +159,18 @@ def _needs(needs: str | Sequence[str], plant: Plant) -> tuple[tuple[str, ...], t
     return tuple(compared), tuple(name for name in names if name in PROPERTIES)
 
 
-def _conditions(given: Any, plant: Plant, duration: float, without_velocity: bool) -> list[Condition]:
+def _conditions(
+    given: Any, plant: Plant, duration: float, without_velocity: bool
+) -> list[Condition]:
     """Return the given conditions, or the default ones that have numbers for the plant."""
-    names = applicable(DEFAULT_CONDITIONS, [plant], duration) if given is None else listed("conditions", given)
+    if given is None:
+        names = applicable(DEFAULT_CONDITIONS, [plant], duration)
+    else:
+        names = listed("conditions", given)
     chosen = [find_condition(name) for name in names]
-    return [_without_velocity(condition) for condition in chosen] if without_velocity else chosen
+    if without_velocity:
+        return [_without_velocity(condition) for condition in chosen]
+    return chosen
 
 
 def _without_velocity(condition: Condition) -> Condition:
@@ -153,13 +178,17 @@ def _without_velocity(condition: Condition) -> Condition:
 
     def fields(plant: Plant, duration: float) -> dict[str, Any]:
         given = condition.on(plant, duration)
-        return given if given.keys() & {"velocity", "sensor"} else given | {"velocity": DIFFERENCED}
+        if given.keys() & {"velocity", "sensor"}:
+            return given
+        return given | {"velocity": DIFFERENCED}
 
     return Condition(f"{condition.name} (no velocity sensor)", fields)
 
 
 def _effort(trial: Trial) -> str:
-    """Return the unit of u, or "" where conditions differ; refuse conditions in which nothing moves."""
+    """Return the unit of u, or "" where conditions differ; refuse conditions in which nothing
+    moves.
+    """
     plant, efforts = trial.plants[0], set()
     for condition in trial.conditions:
         scenario = case(plant, "none", condition, trial.duration, starts=trial.starts)
@@ -171,12 +200,17 @@ def _effort(trial: Trial) -> str:
 def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> Sequence[Component | Template]:
     """Return the laws to compare. Those without given gains are templates."""
     if laws is None:
-        left_out = {"none", *gain_sets.ALIASES}  # aliases have the gains of laws that are there already
+        left_out = {
+            "none",
+            *gain_sets.ALIASES,
+        }  # aliases have the gains of laws that are there already
         chosen = [law for law in suitable(properties, plant=plant) if law.name not in left_out]
     else:
         chosen = [law for law in map(law_or_template, listed_laws(laws)) if _has(law, properties)]
     if not chosen and not properties:
-        raise ScenarioError(f"the package has no law for {plant.name}: give your own with laws, as [my_law]")
+        raise ScenarioError(
+            f"the package has no law for {plant.name}: give your own with laws, as [my_law]"
+        )
     if not chosen:
         words = " and ".join(PROPERTIES[name].words for name in properties)
         raise ScenarioError(f"no law for {plant.name} is among those that {words}: ask for less")
@@ -185,7 +219,10 @@ def _suited(plant: Plant, properties: Sequence[str], laws: Any) -> Sequence[Comp
 
 def _has(law: Component | Template, properties: Sequence[str]) -> bool:
     """Return whether a law has the properties, as far as that is known."""
-    template = law if isinstance(law, Template) else law.template
+    if isinstance(law, Template):
+        template = law
+    else:
+        template = law.template
     return template is None or all(PROPERTIES[name].holds(template) for name in properties)
 
 
@@ -197,7 +234,9 @@ def _candidates(
     (candidates,) = trial.gains({trial.plants[0].name: laws}, **options).values()
     by_name = {candidate.law.name: candidate for candidate in candidates}
     if len(by_name) < len(candidates):
-        raise ScenarioError("two laws have one name: name one of them, as smc.law(...).named('slow')")
+        raise ScenarioError(
+            "two laws have one name: name one of them, as smc.law(...).named('slow')"
+        )
     return by_name
 
 
@@ -205,22 +244,32 @@ def _candidates(
 
 
 def _worst(
-    trial: Trial, candidates: Mapping[str, Candidate], duration: float | None, within: Uncertainty | None, parts: int
+    trial: Trial,
+    candidates: Mapping[str, Candidate],
+    duration: float | None,
+    within: Uncertainty | None,
+    parts: int,
 ) -> dict[str, list[WorstCase]]:
-    """Return law -> its worst case in each condition; the default budget is divided by the conditions and by `parts`.
+    """Return law -> its worst case in each condition; the default budget is divided by the
+    conditions and by `parts`.
 
     All laws are attacked within one class, by default that of the first one.
     """
     (plant,), length = trial.plants, DURATION if duration is None else duration
-    scenarios = {
-        name: [case(plant, candidate.law, condition, length, starts=trial.starts) for condition in trial.conditions]
-        for name, candidate in candidates.items()
-    }
+    scenarios = {}
+    for name, candidate in candidates.items():
+        scenarios[name] = [
+            case(plant, candidate.law, condition, length, starts=trial.starts)
+            for condition in trial.conditions
+        ]
     first = next(iter(scenarios.values()))[0]
     within = within or default_class(first)
     budget = max(MIN_BUDGET, default_budget(first, within) // (len(trial.conditions) * parts))
     return {
-        name: [trial.attack(f"{i}-{plant.name}-{name}", attacked, within, budget) for i, attacked in enumerate(of_law)]
+        name: [
+            trial.attack(f"{i}-{plant.name}-{name}", attacked, within, budget)
+            for i, attacked in enumerate(of_law)
+        ]
         for name, of_law in scenarios.items()
     }
 
@@ -233,17 +282,23 @@ def _contest(
     needs: Sequence[str],
     relevant: float,
 ) -> tuple[Comparison, tuple[Choice, ...]]:
-    """Compare laws over all needs and conditions; those that are not fit come last, with NaN for a rank."""
+    """Compare laws over all needs and conditions; those that are not fit come last, with NaN for a
+    rank.
+    """
     (group,) = paired_runs.groups(table, by=("plant",))
     rows = paired_runs.values(table, SETTLES)[group.rows]
-    settled = 1.0 - np.nanmean(np.where(group.rows >= 0, rows, np.nan), axis=2)  # (laws, conditions)
+    settled = 1.0 - np.nanmean(
+        np.where(group.rows >= 0, rows, np.nan), axis=2
+    )  # (laws, conditions)
     enough = np.all(settled >= MIN_SETTLED * settled.max(axis=0), axis=1)
     fit = {law for law, settles in zip(group.laws, enough.tolist(), strict=True) if settles}
     laws = [law for law in group.laws if law in fit] or group.laws
     scores = {need: _scores(need, table, group, worst) for need in needs}
     for need, its in scores.items():
         if not its.blocks:
-            raise ScenarioError(f"need {need!r} has no number in any run on {plant.name}: leave it out")
+            raise ScenarioError(
+                f"need {need!r} has no number in any run on {plant.name}: leave it out"
+            )
     blocks = [(need, k) for need, its in scores.items() for k in its.blocks]
     ran = paired_runs.scenarios(table, group)
     comparison = Comparison(
@@ -274,8 +329,12 @@ def _contest(
     )
 
 
-def _scores(need: str, table: Table, group: Group, worst: Mapping[str, Sequence[WorstCase]]) -> Scores:
-    """Return the scores of all laws on a need; for "robust" the values of their worst cases, (conditions, 1)."""
+def _scores(
+    need: str, table: Table, group: Group, worst: Mapping[str, Sequence[WorstCase]]
+) -> Scores:
+    """Return the scores of all laws on a need; for "robust" the values of their worst cases,
+    (conditions, 1).
+    """
     if need != ROBUST:
         return group.scores(paired_runs.by_row(table, NEEDS[need].name))
     values = {law: np.array([[case.value] for case in cases]) for law, cases in worst.items()}
@@ -291,8 +350,13 @@ def _median(need: str, scores: Scores, law: str) -> Interval:
     return median_of(scores.values[law], linked(*scores.sets[law]))
 
 
-def _stacked(parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1) -> dict[str, np.ndarray]:
-    """Return law -> the blocks of all parts, (blocks, columns). Parts with fewer columns are filled up."""
+def _stacked(
+    parts: Sequence[Mapping[str, np.ndarray]], laws: Sequence[str], fill: float = -1
+) -> dict[str, np.ndarray]:
+    """Return law -> the blocks of all parts, (blocks, columns).
+
+    Parts with fewer columns are filled up.
+    """
     columns = max(values.shape[1] for part in parts for values in part.values())
 
     def filled(values: np.ndarray) -> np.ndarray:
@@ -316,7 +380,9 @@ def _restraint(
 
 
 def _order(comparison: Comparison, restraint: Mapping[str, tuple[float, ...]]) -> list[Rank]:
-    """Return the laws by mean rank, but none before a law that dominates it, and laws that tie by `restraint`."""
+    """Return the laws by mean rank, but none before a law that dominates it, and laws that tie by
+    `restraint`.
+    """
     ahead = np.any(comparison.better, axis=0)
     dominates = np.logical_and(ahead, ~ahead.T)
     place = {law: k for k, law in enumerate(comparison.laws)}

@@ -1,4 +1,6 @@
-"""A board: laws compared in one metric, its verdict in words, and boards as tables, with medians and intervals."""
+"""A board: laws compared in one metric, its verdict in words, and boards as tables, with medians
+and intervals.
+"""
 
 import dataclasses
 import itertools
@@ -21,8 +23,12 @@ if TYPE_CHECKING:
     from smc_mujoco.analysis.law_time import LawTime
     from smc_mujoco.studies.worst_case import WorstCase
 
-MAX_RATIO_OF_TIMES_LESS = 0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
-MIN_RATIO_OF_TIMES_AS_MUCH = 10.0  # a larger ratio is "so many times as much", not so many percent; chosen
+MAX_RATIO_OF_TIMES_LESS = (
+    0.5  # a smaller ratio is "so many times less", a larger one so many percent; chosen
+)
+MIN_RATIO_OF_TIMES_AS_MUCH = (
+    10.0  # a larger ratio is "so many times as much", not so many percent; chosen
+)
 LABELS = {SETTLES: "share that settles", OBJECTIVE: "J on runs that no search has seen"}
 MAX_NAMES = 6  # in a sentence; chosen
 MAX_VISIBLE = 0.995  # a larger lead that would have been seen is called none
@@ -47,16 +53,21 @@ class Entry:
 
 
 class Lead(NamedTuple):
-    """The law in front in a block, its closest rival (with the largest p-value), and how they compare."""
+    """The law in front in a block, its closest rival (with the largest p-value), and how they
+    compare.
+    """
 
     law: str
     rival: str
     effect: Effect
-    small: bool = False  # whether their medians differ by less than the problem can show, see `paired_runs.floor`
+    # whether their medians differ by less than the problem can show, see `paired_runs.floor`
+    small: bool = False
 
     @property
     def words(self) -> str:
-        """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24 of 24 runs"."""
+        """How the law compares with its rival, such as "12 % less than pid (8 to 16 %), ahead in 24
+        of 24 runs".
+        """
         small = f", {SMALL}" if self.small else ""
         return f"{size_in_words(self.effect, self.rival)}, {ahead_in_words(self.effect)}{small}"
 
@@ -67,22 +78,40 @@ class Block:
 
     plant: str
     condition: str
-    medians: Mapping[str, float]  # law -> median over the seeds; for "settles" the share of runs that do not settle
+    medians: Mapping[
+        str, float
+    ]  # law -> median over the seeds; for "settles" the share of runs that do not settle
     lacking: Mapping[str, int]  # law -> number of runs that failed or have no value
-    best: tuple[str, ...]  # laws that no other is better than, with a value in every run and enough samples to tell
-    undecided: tuple[str, ...]  # laws that no other is better than, but only because there are too few samples
+    best: tuple[
+        str, ...
+    ]  # laws that no other is better than, with a value in every run and enough samples to tell
+    undecided: tuple[
+        str, ...
+    ]  # laws that no other is better than, but only because there are too few samples
     worse: tuple[str, ...]  # laws that another is better than
     ahead: str | None  # the law that is better than every other, laws with default gains included
-    lead: Lead | None  # None for one law, for "settles", or if the law in front has runs without a value
+    lead: (
+        Lead | None
+    )  # None for one law, for "settles", or if the law in front has runs without a value
     seeds: int  # in which every law ran
-    runs: int  # distinct runs in these seeds; in the other seeds every law repeats the result of an earlier one
+    # distinct runs in these seeds; in the other seeds every law repeats the result of an earlier
+    # one
+    runs: int
     level: bool  # whether the `best` laws are all level with each other
-    visible: Mapping[str, float]  # law -> the least lead that would have been seen, a share; {} without a test
-    by_step: Mapping[str, tuple[float, float]]  # law -> medians at the step and at half of it, where they differ much
-    samples: int  # largest number of samples of any two laws, see `ranking`; for one law, of its runs
+    visible: Mapping[
+        str, float
+    ]  # law -> the least lead that would have been seen, a share; {} without a test
+    by_step: Mapping[
+        str, tuple[float, float]
+    ]  # law -> medians at the step and at half of it, where they differ much
+    samples: (
+        int  # largest number of samples of any two laws, see `ranking`; for one law, of its runs
+    )
     sets: int  # smallest number of sets of gains of a law that has several; 1 if none has
     given: tuple[str, ...] = ()  # the laws with one set of gains, where another law has several
-    untuned: tuple[str, ...] = ()  # the laws with default gains, over which no other law is named the winner
+    untuned: tuple[
+        str, ...
+    ] = ()  # the laws with default gains, over which no other law is named the winner
 
     @property
     def winner(self) -> str | None:
@@ -91,14 +120,26 @@ class Block:
 
     @property
     def barred(self) -> tuple[str, ...]:
-        """The laws with default gains that are worse than the law ahead, which is then not named the winner."""
-        return tuple(law for law in self.untuned if law != self.ahead) if self.ahead else ()
+        """The laws with default gains that are worse than the law ahead, which is then not named
+        the winner.
+        """
+        if self.ahead:
+            return tuple(law for law in self.untuned if law != self.ahead)
+        return ()
 
     @property
     def sample(self) -> str:
-        """The size of the sample in words, such as "20 seeds, 1 distinct run" or "24 seeds, 3 sets of gains"."""
+        """The size of the sample in words, such as "20 seeds, 1 distinct run" or "24 seeds, 3 sets
+        of gains".
+        """
         distinct = [counted(self.runs, "distinct run")] * (self.runs < self.seeds)
-        return ", ".join([counted(self.seeds, "seed"), *distinct, *[f"{self.sets} sets of gains"] * (self.sets > 1)])
+        return ", ".join(
+            [
+                counted(self.seeds, "seed"),
+                *distinct,
+                *[f"{self.sets} sets of gains"] * (self.sets > 1),
+            ]
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, repr=False)
@@ -107,18 +148,25 @@ class Board(Tables):
 
     group: Mapping[str, str]  # what the runs have in common, such as {"plant": "duffing"}
     metric: str  # its name, or "settles"
-    unit: str  # of the medians, with {x} and {u} as in `Metric.unit`; "" for "settles", which is 0 to 1
+    # of the medians, with {x} and {u} as in `Metric.unit`; "" for "settles", which is 0 to 1
+    unit: str
     entries: tuple[Entry, ...]  # lowest mean rank first
     blocks: tuple[Block, ...]  # the same laws in each condition
     family: int  # number of blocks of the table for which winners are corrected
     relevant: float  # share of a value that is relevant
-    resolution: float  # the largest lower bound on the least relevant difference, in the unit of the board
-    by_step: bool  # whether halving the physics step may change its numbers, and no run was repeated with it
+    resolution: (
+        float  # the largest lower bound on the least relevant difference, in the unit of the board
+    )
+    # whether halving the physics step may change its numbers, and no run was repeated with it
+    by_step: bool
     x: str = ""  # the unit of positions, "rad" or "m"; "" where it is not known
 
     @property
     def best(self) -> tuple[str, ...]:
-        """The laws that no other is better than, in any block. With several blocks there may be none."""
+        """The laws that no other is better than, in any block.
+
+        With several blocks there may be none.
+        """
         return tuple(entry.law for entry in self.entries if entry.rank.best)
 
     @property
@@ -146,8 +194,14 @@ class Board(Tables):
         return [block.condition for block in self.blocks if law in block.worse]
 
     def fails(self, law: str) -> list[str]:
-        """Return the conditions in which no other law is better, but runs of this law fail or have no value."""
-        return [block.condition for block in self.blocks if block.lacking[law] and law not in block.worse]
+        """Return the conditions in which no other law is better, but runs of this law fail or have
+        no value.
+        """
+        return [
+            block.condition
+            for block in self.blocks
+            if block.lacking[law] and law not in block.worse
+        ]
 
     @property
     def label(self) -> str:
@@ -159,7 +213,9 @@ class Board(Tables):
         """The plant and the conditions in words, such as " on duffing under noise"."""
         if self.metric == OBJECTIVE:
             return f" on {self.group['plant']}"
-        return f" on {self.group['plant']} under {first_of(block.condition for block in self.blocks)}"
+        return (
+            f" on {self.group['plant']} under {first_of(block.condition for block in self.blocks)}"
+        )
 
     @property
     def verdict(self) -> str:
@@ -168,20 +224,27 @@ class Board(Tables):
 
     @property
     def result(self) -> str:
-        """The result in words: the winner, else where laws win and lose, why there is no winner, or the best laws."""
+        """The result in words: the winner, else where laws win and lose, why there is no winner, or
+        the best laws.
+        """
         blocks = f"in {every(len(self.blocks))} conditions"
         these = self._these_gains
         if self.winner:
             leads = [block.lead for block in self.blocks if block.lead]
             closest = max(leads, key=lambda lead: lead.effect.high, default=None)
-            how = f": {'at least ' * (len(leads) > 1)}{closest.words}" if closest else ""
+            if closest:
+                how = f": {'at least ' * (len(leads) > 1)}{closest.words}"
+            else:
+                how = ""
             if closest and not closest.small:
                 how += self._small(self.winner)
             return f"{self.winner} wins{f' {blocks}' * (len(self.blocks) > 1)}{how}{self._search(self.winner)}{these}"
         results = []
         for law in (entry.law for entry in self.entries if self.wins(entry.law)):
             losses = f", loses under {_listed(self.losses(law))}" * bool(self.losses(law))
-            fails = f", has runs that {self._fail} under {_listed(self.fails(law))}" * bool(self.fails(law))
+            fails = f", has runs that {self._fail} under {_listed(self.fails(law))}" * bool(
+                self.fails(law)
+            )
             won = f"{law} wins under {_listed(self.wins(law))}{self._small(law)}"
             results.append(f"{won}{losses}{fails}{self._search(law)}")
         if results:
@@ -189,25 +252,44 @@ class Board(Tables):
         if self.why:
             return f"no winner: {self.why}"
         if len(self.best) == len(self.entries):
-            which = "all laws" if len(self.best) > 2 else "both laws"
+            if len(self.best) > 2:
+                which = "all laws"
+            else:
+                which = "both laws"
             return f"no winner: {f'{which} are {LEVEL_WORDS}' if self.level else self.cannot_tell}"
-        apart = f"; {LEVEL_WORDS if self.level else self.cannot_tell}" if len(self.best) > 1 else ""
+        if len(self.best) > 1:
+            apart = f"; {LEVEL_WORDS if self.level else self.cannot_tell}"
+        else:
+            apart = ""
         defeated = any(self.losses(entry.law) for entry in self.entries)
-        told = f"undefeated: {joined(self.best)}{apart}" if defeated else "none beaten"
+        if defeated:
+            told = f"undefeated: {joined(self.best)}{apart}"
+        else:
+            told = "none beaten"
         return "; ".join([f"no winner, {told}", *self._doubts])
 
     @property
     def _doubts(self) -> list[str]:
         """Why laws that are not the best may not be beaten, in words."""
-        open_ones = [entry.law for entry in self.entries if entry.law not in self.best and not self.losses(entry.law)]
+        open_ones = []
+        for entry in self.entries:
+            if entry.law not in self.best and not self.losses(entry.law):
+                open_ones.append(entry.law)
         failing = [law for law in open_ones if self.fails(law)]
         few = [law for law in open_ones if law not in failing]
         doubts = []
         if few:
-            doubts.append(f"too few samples to tell whether {joined(few)} {'is' if len(few) == 1 else 'are'} beaten")
+            doubts.append(
+                f"too few samples to tell whether {joined(few)} {'is' if len(few) == 1 else 'are'} beaten"
+            )
         if failing:
-            have, are = ("has", "it is") if len(failing) == 1 else ("have", "they are")
-            doubts.append(f"{joined(failing)} {have} runs that {self._fail}, too few to tell whether {are} beaten")
+            if len(failing) == 1:
+                have, are = ("has", "it is")
+            else:
+                have, are = ("have", "they are")
+            doubts.append(
+                f"{joined(failing)} {have} runs that {self._fail}, too few to tell whether {are} beaten"
+            )
         return doubts
 
     @property
@@ -222,8 +304,14 @@ class Board(Tables):
 
     @property
     def cannot_tell(self) -> str:
-        """That laws cannot be told apart, and the largest of the least leads that would have been seen, in words."""
-        visible = [block.visible[law] for block in self.blocks for law in self.best if law in block.visible]
+        """That laws cannot be told apart, and the largest of the least leads that would have been
+        seen, in words.
+        """
+        visible = []
+        for block in self.blocks:
+            for law in self.best:
+                if law in block.visible:
+                    visible.append(block.visible[law])
         if not visible:
             return "cannot tell them apart"
         if max(visible) >= MAX_VISIBLE:
@@ -232,17 +320,30 @@ class Board(Tables):
         return f"cannot tell them apart: {seen}"
 
     def visible(self, law: str) -> float:
-        """Return the largest, over the blocks, of the least leads that would have been seen, a share; NaN for none."""
-        return max((block.visible[law] for block in self.blocks if law in block.visible), default=math.nan)
+        """Return the largest, over the blocks, of the least leads that would have been seen, a
+        share; NaN for none.
+        """
+        return max(
+            (block.visible[law] for block in self.blocks if law in block.visible), default=math.nan
+        )
 
     def step_change(self, law: str) -> tuple[float, float] | None:
-        """Return the medians of a law at the physics step and at half of it, in the first block that is marked."""
+        """Return the medians of a law at the physics step and at half of it, in the first block
+        that is marked.
+        """
         return next((block.by_step[law] for block in self.blocks if law in block.by_step), None)
 
     def _small(self, law: str) -> str:
-        """Return the conditions in which a law wins by less than the problem can show, after a comma."""
-        won = [block for block in self.blocks if block.winner == law and block.lead and block.lead.small]
-        return f", {SMALL} under {_listed([block.condition for block in won])}" if won else ""
+        """Return the conditions in which a law wins by less than the problem can show, after a
+        comma.
+        """
+        won = []
+        for block in self.blocks:
+            if block.winner == law and block.lead and block.lead.small:
+                won.append(block)
+        if won:
+            return f", {SMALL} under {_listed([block.condition for block in won])}"
+        return ""
 
     @property
     def _these_gains(self) -> str:
@@ -265,14 +366,20 @@ class Board(Tables):
             return "one law"
         if barred := self.barred:
             return f"none is named over {joined(barred)} with default gains"
-        if all(not block.best for block in self.blocks) and all(all(block.lacking.values()) for block in self.blocks):
+        if all(not block.best for block in self.blocks) and all(
+            all(block.lacking.values()) for block in self.blocks
+        ):
             return f"every law has runs that {self._fail}"
-        undecided = ", or has too few samples to tell" * any(block.undecided for block in self.blocks)
+        undecided = ", or has too few samples to tell" * any(
+            block.undecided for block in self.blocks
+        )
         return self.too_few or ("" if self.best else f"each loses to another, or fails{undecided}")
 
     @property
     def barred(self) -> list[str]:
-        """The laws with default gains over which no winner is named in any block, see `Block.barred`."""
+        """The laws with default gains over which no winner is named in any block, see
+        `Block.barred`.
+        """
         return list(dict.fromkeys(law for block in self.blocks for law in block.barred))
 
     @property
@@ -281,9 +388,14 @@ class Board(Tables):
         largest = max(self.blocks, key=lambda block: block.samples)
         if 2 * min_p(largest.samples) <= (1 - LEVEL) / self.family:
             return ""
-        known = largest.sets if largest.sets > 1 else largest.runs
+        if largest.sets > 1:
+            known = largest.sets
+        else:
+            known = largest.runs
         samples = f": {counted(largest.samples, 'sample')}" * (largest.samples != known)
-        few = f"{largest.sample}{samples}, too few" + f" for {self.family} comparisons" * (self.family > 1)
+        few = f"{largest.sample}{samples}, too few" + f" for {self.family} comparisons" * (
+            self.family > 1
+        )
         if largest.runs < largest.seeds and largest.sets == 1:
             return f"{few}: most seeds change nothing here"
         least = next(n for n in itertools.count(1) if 2 * min_p(n) <= (1 - LEVEL) / self.family)
@@ -291,70 +403,113 @@ class Board(Tables):
         return f"{few}: take {least} seeds (--seeds {least}){searches}"
 
     def failures(self, entry: Entry) -> str:
-        """Return how many of a law's runs failed, or never reach a time, such as "2 of 24 failed"; "" if none did."""
-        return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}" if entry.failed else ""
+        """Return how many of a law's runs failed, or never reach a time, such as "2 of 24 failed";
+        "" if none did.
+        """
+        if entry.failed:
+            return f"{entry.failed} of {entry.runs} {'never' if self.unit == 's' else 'failed'}"
+        return ""
 
 
 def size_in_words(effect: Effect, rival: str = "") -> str:
-    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8 to 16 %)"."""
+    """Return how much less or more a law has than a rival, with the interval, such as "12 % less (8
+    to 16 %)".
+    """
     if math.isnan(effect.value) or effect.value in (0.0, math.inf):
         return f"{rival or 'the other'} {'has no value' if effect.value == 0.0 else 'alone has a value'} in most runs"
     if effect.low == effect.high == 1.0:
         return "no difference"
     endless = effect.low == 0.0 and math.isinf(effect.high)
     if effect.high < MAX_RATIO_OF_TIMES_LESS:
-        times = [number(1 / value) if value else "" for value in (effect.value, effect.high, effect.low)]
+        times = [
+            number(1 / value) if value else "" for value in (effect.value, effect.high, effect.low)
+        ]
         words = f"{times[0]} times less"
-        span = f"{times[1]} to {times[2]} times" if times[2] else f"{times[1]} times or more"
+        if times[2]:
+            span = f"{times[1]} to {times[2]} times"
+        else:
+            span = f"{times[1]} times or more"
     elif effect.low > MIN_RATIO_OF_TIMES_AS_MUCH:
         value, low, high = map(number, effect[:3])
         words = f"{value} times as much"
-        span = f"{low} times or more" if math.isinf(effect.high) else f"{low} to {high} times"
+        if math.isinf(effect.high):
+            span = f"{low} times or more"
+        else:
+            span = f"{low} to {high} times"
     else:
         saved = [1.0 - value for value in (effect.value, effect.high, effect.low)]
         less = saved[0] >= 0
-        value, *ends = saved if less else [0.0 - saved[k] for k in (0, 2, 1)]
-        words, (low, high) = f"{_percent(value)} % {'less' if less else 'more'}", map(_percent, ends)
-        span = f"{low} % or more" if math.isinf(ends[1]) else f"{low} to {high} %"
+        if less:
+            value, *ends = saved
+        else:
+            value, *ends = [0.0 - saved[k] for k in (0, 2, 1)]
+        words, (low, high) = (
+            f"{_percent(value)} % {'less' if less else 'more'}",
+            map(_percent, ends),
+        )
+        if math.isinf(ends[1]):
+            span = f"{low} % or more"
+        else:
+            span = f"{low} to {high} %"
     named = f" {'as' if words.endswith(' as much') else 'than'} {rival}" * bool(rival)
     return f"{words}{named} ({'too few for an interval' if endless else span})"
 
 
 def ahead_in_words(effect: Effect) -> str:
     """Return in how many samples a law is better, such as "ahead in 24 of 24 runs"."""
-    return f"ahead in {effect.ahead} of {effect.samples} {'sets of gains' if effect.sets else 'runs'}"
+    return (
+        f"ahead in {effect.ahead} of {effect.samples} {'sets of gains' if effect.sets else 'runs'}"
+    )
 
 
 def _percent(share: float) -> str:
     """Return a share in percent, with two digits where it is small."""
-    return f"{share:g}" if math.isinf(share) else f"{100 * share:.2g}" if abs(share) < 0.0995 else f"{100 * share:.0f}"
+    if math.isinf(share):
+        return f"{share:g}"
+    if abs(share) < 0.0995:
+        return f"{100 * share:.2g}"
+    return f"{100 * share:.0f}"
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Return names in a row, between semicolons if a name has a comma in it, as that of a condition may have."""
-    return "; ".join(names) if any("," in name for name in names) else joined(names)
+    """Return names in a row, between semicolons if a name has a comma in it, as that of a condition
+    may have.
+    """
+    if any("," in name for name in names):
+        return "; ".join(names)
+    return joined(names)
 
 
 def first_of(names: Iterable[str]) -> str:
     """Return names in a row; if they are many, the first ones and how many more there are."""
     several = list(names)
     more = len(several) - MAX_NAMES
-    return joined([*several[:MAX_NAMES], f"{more} more"]) if more > 1 else joined(several)
+    if more > 1:
+        return joined([*several[:MAX_NAMES], f"{more} more"])
+    return joined(several)
 
 
 class Boards(Tables, list[Board]):
-    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each board."""
+    """Boards: a list that terminals, notebooks and `print` show as tables, with a verdict on each
+    board.
+    """
 
-    worst: Mapping[str, Mapping[str, "WorstCase"]] = frozen({})  # plant -> law -> its worst case, for a column
-    times: Mapping[str, Mapping[str, "LawTime"]] = frozen({})  # plant -> law -> its time, for the plant's first table
+    worst: Mapping[str, Mapping[str, "WorstCase"]] = frozen(
+        {}
+    )  # plant -> law -> its worst case, for a column
+    times: Mapping[str, Mapping[str, "LawTime"]] = frozen(
+        {}
+    )  # plant -> law -> its time, for the plant's first table
     failures: Sequence[str] = ()  # a sentence for each law with failed runs, below the last table
 
     @property
     def tables(self) -> list[Tabular]:
-        """A table for each group of runs, with what each metric's board says below, and a key below the last.
+        """A table for each group of runs, with what each metric's board says below, and a key below
+        the last.
 
-        It has a line for each law and a column for each metric. A cell has a median with its interval. The median is
-        marked if no law is better in any block, no run failed, and there are enough runs for a winner.
+        It has a line for each law and a column for each metric. A cell has a median with its
+        interval. The median is marked if no law is better in any block, no run failed, and there
+        are enough runs for a winner.
         """
         groups: dict[str, list[Board]] = {}
         for board in self:
@@ -363,9 +518,16 @@ class Boards(Tables, list[Board]):
             return [Tabular(headings=["no boards: no metric applies"], rows=[])]
         plants, made = [its[0].group.get("plant", "") for its in groups.values()], list[Tabular]()
         for i, (name, its) in enumerate(groups.items()):
-            times = self.times.get(plants[i], {}) if plants[i] not in plants[:i] else {}
+            if plants[i] not in plants[:i]:
+                times = self.times.get(plants[i], {})
+            else:
+                times = {}
             made.append(_table(name, its, self.worst.get(plants[i], {}), times))
-        notes = (*made[-1].notes, *self.failures, f"{key(self)} {TIMED}" if self.times else key(self))
+        notes = (
+            *made[-1].notes,
+            *self.failures,
+            f"{key(self)} {TIMED}" if self.times else key(self),
+        )
         return [*made[:-1], dataclasses.replace(made[-1], notes=notes)]
 
 
@@ -375,11 +537,15 @@ def size(value: float, metric: str) -> str:
         return ""
     if metric == OBJECTIVE:
         return number(value)
-    return f"{100 * value:.0f}" if metric == SETTLES else CATALOGUE[metric].text(value)
+    if metric == SETTLES:
+        return f"{100 * value:.0f}"
+    return CATALOGUE[metric].text(value)
 
 
 def spread(interval: Interval, metric: str) -> str:
-    """Return the ends of an interval, rounded like its median; "" if they are not known, or both infinite."""
+    """Return the ends of an interval, rounded like its median; "" if they are not known, or both
+    infinite.
+    """
     if math.isinf(interval.low):
         return ""
     ends = [size(value, metric) for value in (interval.low, interval.high)]
@@ -392,15 +558,27 @@ def heading(board: Board) -> str:
         return "settles (%)"
     if board.metric == OBJECTIVE:
         return "J (s^2)"
-    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit).heading(board.x)  # in V for voltages
+    return dataclasses.replace(CATALOGUE[board.metric], unit=board.unit).heading(
+        board.x
+    )  # in V for voltages
 
 
 def _table(
-    name: str, boards: Sequence[Board], worst: Mapping[str, "WorstCase"], times: Mapping[str, "LawTime"]
+    name: str,
+    boards: Sequence[Board],
+    worst: Mapping[str, "WorstCase"],
+    times: Mapping[str, "LawTime"],
 ) -> Tabular:
-    """Return the table of one group of runs. Laws stand by place in the first metric, then in the next ones."""
+    """Return the table of one group of runs.
+
+    Laws stand by place in the first metric, then in the next ones.
+    """
     sources_of = sources(boards)
-    cells = {(i, entry.law): _cell(board, entry) for i, board in enumerate(boards) for entry in board.entries}
+    cells = {
+        (i, entry.law): _cell(board, entry)
+        for i, board in enumerate(boards)
+        for entry in board.entries
+    }
     places: dict[str, list[float]] = {}
     for entry in (entry for board in boards for entry in board.entries):
         places.setdefault(entry.law, []).append(entry.rank.place)
@@ -408,15 +586,22 @@ def _table(
     for law in sorted(places, key=lambda law: (places[law], law)):
         name_cell = Cell(law, kinds(sources_of[law]), colour=style.law_colour(law))
         found = worst.get(law)
-        case = [Cell(found.shown(found.value), f"median {found.shown(found.median)}") if found else ""] * bool(worst)
+        case = [
+            Cell(found.shown(found.value), f"median {found.shown(found.median)}") if found else ""
+        ] * bool(worst)
         time = [_time(times[law]) if law in times else ""] * bool(times)
-        rows.append([name_cell, *(cells.get((i, law), "") for i in range(len(boards))), *case, *time])
+        rows.append(
+            [name_cell, *(cells.get((i, law), "") for i in range(len(boards))), *case, *time]
+        )
     units = [f"worst found ({case.unit})" for case in worst.values()][:1]
     largest = max(boards, key=lambda board: len(board.blocks))
     if len(largest.blocks) == 1:
         name = f"{largest.group['plant']}, {largest.blocks[0].condition}"
     samples = {block.sample: block.condition for block in reversed(largest.blocks)}
-    several = "; ".join(f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})" for sample, block in samples.items())
+    several = "; ".join(
+        f"{sample} ({block}{' ...' * (len(largest.blocks) > 2)})"
+        for sample, block in samples.items()
+    )
     return Tabular(
         headings=["law", *map(heading, boards), *units, *["time (of pid's)"] * bool(times)],
         rows=rows,
@@ -427,29 +612,48 @@ def _table(
 
 def _time(one: "LawTime") -> Cell:
     """Return the time of a law a sample: over that of pid, and below it median and 99 % quantile."""
-    return Cell(f"{one.ratio:.2g}" if one.ratio < 100.0 else f"{one.ratio:.0f}", f"{_ns(one.median)}, {_ns(one.high)}")
+    return Cell(
+        f"{one.ratio:.2g}" if one.ratio < 100.0 else f"{one.ratio:.0f}",
+        f"{_ns(one.median)}, {_ns(one.high)}",
+    )
 
 
 def _ns(seconds: float) -> str:
-    return f"{1e9 * seconds:.3g} ns" if seconds < 1e-6 else f"{1e6 * seconds:.3g} us"
+    if seconds < 1e-6:
+        return f"{1e9 * seconds:.3g} ns"
+    return f"{1e6 * seconds:.3g} us"
 
 
 def _cell(board: Board, entry: Entry) -> Cell:
-    """Return a law's median, strong if no law is better, no run failed and there are enough runs for a winner."""
+    """Return a law's median, strong if no law is better, no run failed and there are enough runs
+    for a winner.
+    """
     median = size(entry.interval.median, board.metric)
     visible, change = board.visible(entry.law), board.step_change(entry.law)
     blind = board.too_few or visible >= MAX_VISIBLE
     best = entry.rank.best and median != "" and not blind and not board.barred
-    seen = f"sees {_percent(visible)} %" if visible < MAX_VISIBLE else "sees no lead" * (not math.isnan(visible))
-    step = " to ".join(size(value, board.metric) for value in change) + " by the step" if change else ""
+    if visible < MAX_VISIBLE:
+        seen = f"sees {_percent(visible)} %"
+    else:
+        seen = "sees no lead" * (not math.isnan(visible))
+    if change:
+        step = " to ".join(size(value, board.metric) for value in change) + " by the step"
+    else:
+        step = ""
     lines = "\n".join(filter(None, (spread(entry.interval, board.metric), seen)))
     return Cell(median, lines, best, alarm="\n".join(filter(None, (board.failures(entry), step))))
 
 
 def key(boards: Sequence[Board]) -> str:
     """Return what the cells of a table show."""
-    words = f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share"
-    medians = [entry.interval for board in boards if board.metric != SETTLES for entry in board.entries]
+    words = (
+        f"Medians with {100 * LEVEL:g} % intervals over runs, or over sets of gains that runs share"
+    )
+    medians = []
+    for board in boards:
+        if board.metric != SETTLES:
+            for entry in board.entries:
+                medians.append(entry.interval)
     if any(interval.n < MIN_INTERVAL_SAMPLES for interval in medians):
         words += f"; of fewer than {MIN_INTERVAL_SAMPLES} samples the interval is their range, and covers less"
     family = max(board.family for board in boards)
@@ -465,32 +669,41 @@ def key(boards: Sequence[Board]) -> str:
             " 'sees 24 %': a lead of 24 % between the law and the one in front would have been seen in "
             f"{100 * POWER:g} % of such comparisons, at the level of {100 * (1 - LEVEL):.0f} % for all."
         )
-    if any(block.lead and block.lead.small and block.winner for board in boards for block in board.blocks):
+    if any(
+        block.lead and block.lead.small and block.winner
+        for board in boards
+        for block in board.blocks
+    ):
         words += (
             f" '{SMALL}': the medians differ by less than half a count of the encoder, the noise or 1e-4 of the start, "
             "or by less than follows from these for other units."
         )
     if any(block.by_step for board in boards for block in board.blocks):
-        words += (
-            f" 'by the step': the medians at the physics step and at half of it, which differ by more than {APART}."
-        )
+        words += f" 'by the step': the medians at the physics step and at half of it, which differ by more than {APART}."
     words += f" {capital(UNTRIED)}." * any(board.by_step for board in boards)
     gains = in_words(sources(boards))
-    return f"{words} {capital(gains)}." if gains else words
+    if gains:
+        return f"{words} {capital(gains)}."
+    return words
 
 
 def relevance(share: float, floors: Iterable[tuple[str, float]], x: str = "rad or m") -> str:
-    """Return the least relevant difference in words: a share, and q by unit; `x` is the unit of positions."""
+    """Return the least relevant difference in words: a share, and q by unit; `x` is the unit of
+    positions.
+    """
     of_unit: dict[str, float] = {}
     for metric, floor in floors:
         unit = UNITS[metric].removesuffix("/s")
         of_unit[unit] = max(floor, of_unit.get(unit, 0.0))
     words = f"{100 * share:g} % of the larger value"
-    parts = [f"up to {number(resolved)} {x} of a position"] if (resolved := of_unit.get("{x}")) else []
+    if resolved := of_unit.get("{x}"):
+        parts = [f"up to {number(resolved)} {x} of a position"]
+    else:
+        parts = []
     parts += [f"{100 * MIN_COMMAND_SHARE:g} % of the bound on u"] * bool(of_unit.get("{u}"))
-    return (
-        f"{words}, where values below what the problem can show count as equal ({', '.join(parts)})" if parts else words
-    )
+    if parts:
+        return f"{words}, where values below what the problem can show count as equal ({', '.join(parts)})"
+    return words
 
 
 def sources(boards: Iterable[Board]) -> dict[str, list[Source]]:
@@ -507,4 +720,7 @@ def _verdicts(boards: Sequence[Board]) -> list[str]:
     results: dict[str, list[Board]] = {}
     for board in boards:
         results.setdefault(board.result, []).append(board)
-    return [f"{', '.join(board.label for board in same)}{same[0].where}: {result}." for result, same in results.items()]
+    return [
+        f"{', '.join(board.label for board in same)}{same[0].where}: {result}."
+        for result, same in results.items()
+    ]

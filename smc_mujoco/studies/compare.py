@@ -46,7 +46,8 @@ if TYPE_CHECKING:
     from smc_mujoco.studies.worst_case import WorstCase
 
 QUICK_SEARCHES = 6  # the fewest from which a verdict can follow, if it is the only one asked for
-MAX_BLOCKS = 12  # plants times conditions that have a table each; if there are more, each plant has one table
+# plants times conditions that have a table each; if there are more, each plant has one table
+MAX_BLOCKS = 12
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -56,26 +57,37 @@ class Compared(Tables):
     table: Table  # a row for each run, with all its scores, as `smc.study` returns it
     # Plant -> the laws with all sets of gains that their runs used, and remarks on them
     candidates: Mapping[str, Sequence[Candidate]]
-    # A board for each metric on each plant in each condition; on each plant, if that makes more than 12 blocks
+    # A board for each metric on each plant in each condition; on each plant, if that makes more
+    # than 12 blocks
     leaderboard: Boards
-    worst: Mapping[str, Mapping[str, "WorstCase"]]  # plant -> law -> its `worst_case`; empty if it was not searched
-    times: Mapping[str, Mapping[str, LawTime]]  # plant -> law -> time of its compiled code a sample, on this machine
+    worst: Mapping[
+        str, Mapping[str, "WorstCase"]
+    ]  # plant -> law -> its `worst_case`; empty if it was not searched
+    times: Mapping[
+        str, Mapping[str, LawTime]
+    ]  # plant -> law -> time of its compiled code a sample, on this machine
 
     @property
     def gains(self) -> dict[str, dict[str, Law]]:
-        """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says their source."""
+        """Plant -> law -> the law with its best gains; `gains["duffing"]["classical"].source` says
+        their source.
+        """
         return {plant: {c.law.name: c.law for c in laws} for plant, laws in self.candidates.items()}
 
     @functools.cached_property
     def traces(self) -> list[Trace]:
-        """The traces of the first seed: of each plant, in each condition, of each law; computed when first used."""
+        """The traces of the first seed: of each plant, in each condition, of each law; computed
+        when first used.
+        """
         first = min(self.table.column("seed").tolist())
         rows = [i for i, seed in enumerate(self.table.column("seed").tolist()) if seed == first]
         return run([self.table.scenario(i) for i in rows])
 
     @property
     def verdicts(self) -> list[str]:
-        """A sentence for each metric on each plant in each condition: the winner, or why there is none."""
+        """A sentence for each metric on each plant in each condition: the winner, or why there is
+        none.
+        """
         return [board.verdict for board in self.leaderboard]
 
     @property
@@ -100,7 +112,9 @@ class Compared(Tables):
                 best = ", ".join(f"{name}={gain_text(value)}" for name, value in told.items())
                 rows.append((plant, law.name, law.source.kind, f"{len(sets)}", best))
         heads = ["plant", "law", "gains", "sets", "best set"]
-        gains = Tabular(headings=heads, rows=rows, title="Gains", notes=self.remarks, left=len(heads))
+        gains = Tabular(
+            headings=heads, rows=rows, title="Gains", notes=self.remarks, left=len(heads)
+        )
         return [*self.leaderboard.tables, *self._worst_tables, gains]
 
     @property
@@ -109,15 +123,22 @@ class Compared(Tables):
             return []
         from smc_mujoco.studies.worst_case import WorstCases
 
-        return [table for worst_cases in self.worst.values() for table in WorstCases(worst_cases.values()).tables]
+        return [
+            table
+            for worst_cases in self.worst.values()
+            for table in WorstCases(worst_cases.values()).tables
+        ]
 
     def to_latex(self, path: str | os.PathLike[str] | None = None) -> str:
-        """Return a LaTeX tabular for each plant in each condition, below comments with the verdicts; needs booktabs.
+        """Return a LaTeX tabular for each plant in each condition, below comments with the
+        verdicts; needs booktabs.
 
         Args:
           path: of a file to which it is written too.
         """
-        text = "\n".join(table.to_latex() for table in [*self.leaderboard.tables, *self._worst_tables])
+        text = "\n".join(
+            table.to_latex() for table in [*self.leaderboard.tables, *self._worst_tables]
+        )
         if path is not None:
             with replacing(Path(path)) as file:
                 file.write_text(text, encoding="utf-8")
@@ -126,10 +147,11 @@ class Compared(Tables):
     def to_pandas(self) -> "pandas.DataFrame":
         """Return a pandas DataFrame with a row for each law, plant, condition and metric.
 
-        Its columns are plant, condition, law, gains (their source), metric, unit, median, low and high (the interval),
-        failed (runs without a value), runs, best (whether no law is better), winner, worst_found: the rms error of the
-        worst run that an adversary found on the plant, NaN without a search, and time, s, and time_ratio, see `times`.
-        All runs are in `table.data.to_pandas()`.
+        Its columns are plant, condition, law, gains (their source), metric, unit, median, low and
+        high (the interval), failed (runs without a value), runs, best (whether no law is better),
+        winner, worst_found: the rms error of the worst run that an adversary found on the plant,
+        NaN without a search, and time, s, and time_ratio, see `times`. All runs are in
+        `table.data.to_pandas()`.
 
         Raises:
           MissingPackageError: pandas is not installed.
@@ -146,17 +168,28 @@ class Compared(Tables):
             worst, times = self.worst.get(plant, {}), self.times.get(plant, {})
             for entry in board.entries:
                 yield {
-                    **{"plant": "", "condition": ""} | dict(board.group), "law": entry.law,
-                    "gains": ", ".join(dict.fromkeys(origin.kind for origin in entry.sources)), "metric": board.metric,
-                    "unit": board.unit, "median": entry.interval.median, "low": entry.interval.low,
-                    "high": entry.interval.high, "failed": entry.failed, "runs": entry.runs, "best": entry.rank.best,
-                    "winner": board.winner == entry.law, "worst_found": worst[entry.law].value if worst else math.nan,
+                    **{"plant": "", "condition": ""} | dict(board.group),
+                    "law": entry.law,
+                    "gains": ", ".join(dict.fromkeys(origin.kind for origin in entry.sources)),
+                    "metric": board.metric,
+                    "unit": board.unit,
+                    "median": entry.interval.median,
+                    "low": entry.interval.low,
+                    "high": entry.interval.high,
+                    "failed": entry.failed,
+                    "runs": entry.runs,
+                    "best": entry.rank.best,
+                    "winner": board.winner == entry.law,
+                    "worst_found": worst[entry.law].value if worst else math.nan,
                     "time": times[entry.law].median if entry.law in times else math.nan,
                     "time_ratio": times[entry.law].ratio if entry.law in times else math.nan,
-                }  # fmt: skip
+                }
 
     def plot(
-        self, path: str | os.PathLike[str] | None = None, metrics: Sequence[str] = (), **options: Any
+        self,
+        path: str | os.PathLike[str] | None = None,
+        metrics: Sequence[str] = (),
+        **options: Any,
     ) -> "Figure | SubFigure":
         """Draw the medians with their intervals by condition, as `smc.plot` does with a table.
 
@@ -193,28 +226,34 @@ def compare(
     threads: int | None = None,
     progress: bool = True,
 ) -> Compared:
-    """Compare laws on plants in conditions, with gains by one rule for all, and say which is better and how sure it is.
+    """Compare laws on plants in conditions, with gains by one rule for all, and say which is better
+    and how sure it is.
 
-    A law whose gains you gave keeps them. Any other law has those that come with the package for the plant, or is tuned
-    by one rule, yours too: run i has the gains that search i found, so twelve searches are twelve answers to "what do
-    I get if I tune it?". The folder keeps each search and each run: after a kill, the same call goes on from there.
+    A law whose gains you gave keeps them. Any other law has those that come with the package for
+    the plant, or is tuned by one rule, yours too: run i has the gains that search i found, so
+    twelve searches are twelve answers to "what do I get if I tune it?". The folder keeps each
+    search and each run: after a kill, the same call goes on from there.
 
     Args:
-      laws: names, or your own laws. Default: those of the report's first page, of these the ones that come with gains
-        for the plant, if any do; or else all that suit the plant.
+      laws: names, or your own laws. Default: those of the report's first page, of these the ones
+        that come with gains for the plant, if any do; or else all that suit the plant.
       plants: names, or Plants, such as one from your own MJCF. Default: the paper's five.
-      conditions: names, such as "noise + coulomb", texts, or your own, see `condition`. Default: one of each kind.
-      seeds: runs of a law on each plant in each condition; each has another start and other noise, the same for every
-        law, and the gains of the next search. With more seeds than searches, runs take these in turn.
+      conditions: names, such as "noise + coulomb", texts, or your own, see `condition`. Default:
+        one of each kind.
+      seeds: runs of a law on each plant in each condition; each has another start and other noise,
+        the same for every law, and the gains of the next search. With more seeds than searches,
+        runs take these in turn.
       tune: whether to tune laws without gains for a plant; otherwise they run with their defaults.
-      worst: whether to search the worst case of each law on each plant too; or the class in which to search it.
+      worst: whether to search the worst case of each law on each plant too; or the class in which
+        to search it.
       executor, traces: as in `study`. Default: this machine, no traces.
       out: folder for gains and runs.
       metrics, defaults, relevant: as in `leaderboard`.
       duration: of a run, s. Default: 10, or 3 if quick; 8 under an adversary.
       starts: where runs begin, see `starts`. Default: within 20 % of the plant's own x0.
       gains: the set of gains of the package: "tuned", "tracking", "study" or "default".
-      searches: searches of a tuning, which share nothing. Default: 12, or 6 if quick, which few verdicts follow from.
+      searches: searches of a tuning, which share nothing. Default: 12, or 6 if quick, which few
+        verdicts follow from.
       budget: largest number of sets of gains that a search tries, for each gain.
       quick: shorter runs and fewer searches; by default three plants and three conditions.
       threads, progress: as in `run`.
@@ -226,19 +265,37 @@ def compare(
     for name in items_of("metrics", metrics):
         find("metric", name, dict.fromkeys((paired_runs.SETTLES, *CATALOGUE)))
     _check_worst(worst)
-    trial = _trial(QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress)
-    number = (QUICK_SEARCHES if quick else SEARCHES) if searches is None else searches
-    options = {"tune": tune and gains == "tuned", "gains": gains, "searches": number, "budget": budget}
+    trial = _trial(
+        QUICK if quick else FULL, plants, conditions, duration, starts, Path(out), threads, progress
+    )
+    if searches is None:
+        number = QUICK_SEARCHES if quick else SEARCHES
+    else:
+        number = searches
+    options = {
+        "tune": tune and gains == "tuned",
+        "gains": gains,
+        "searches": number,
+        "budget": budget,
+    }
     candidates = trial.gains(_checked(trial, laws), defaults, **options)
     table = trial.run(candidates, seeds, executor=workers, traces=traces)
-    found = _worst_cases(trial, candidates, None if worst is True else worst, duration) if worst else {}
-    by = paired_runs.GROUPS if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS else ("plant",)
+    if worst:
+        found = _worst_cases(trial, candidates, None if worst is True else worst, duration)
+    else:
+        found = {}
+    if len(trial.plants) * len(trial.conditions) <= MAX_BLOCKS:
+        by = paired_runs.GROUPS
+    else:
+        by = ("plant",)
     boards = leaderboard(table, metrics, by, defaults, relevant, found)
     unseen = trial.unseen(candidates, seeds)
     sources = {p: {c.law.name: (c.law.source,) for c in candidates[p]} for p in unseen}
     boards[:0] = objective_boards(unseen, sources, defaults, relevant)
     boards.times = times = _times(trial, candidates)
-    return Compared(table=table, candidates=candidates, leaderboard=boards, worst=found, times=times)
+    return Compared(
+        table=table, candidates=candidates, leaderboard=boards, worst=found, times=times
+    )
 
 
 def _trial(
@@ -252,10 +309,20 @@ def _trial(
     progress: bool,
 ) -> Trial:
     """Return the plants and conditions to compare laws on. The extent has the defaults."""
-    length = extent.duration if duration is None else duration
-    machines = [as_plant(plant) for plant in (extent.plants if plants is None else listed("plants", plants))]
-    given = applicable(extent.conditions, machines, length) if conditions is None else listed("conditions", conditions)
-    return Trial(machines, [find_condition(name) for name in given], length, starts, out, threads, progress)
+    if duration is None:
+        length = extent.duration
+    else:
+        length = duration
+    machines = []
+    for plant in extent.plants if plants is None else listed("plants", plants):
+        machines.append(as_plant(plant))
+    if conditions is None:
+        given = applicable(extent.conditions, machines, length)
+    else:
+        given = listed("conditions", conditions)
+    return Trial(
+        machines, [find_condition(name) for name in given], length, starts, out, threads, progress
+    )
 
 
 def _check_worst(worst: object) -> None:
@@ -265,37 +332,62 @@ def _check_worst(worst: object) -> None:
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
 
     if not isinstance(worst, Uncertainty):
-        raise ScenarioError(f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)")
+        raise ScenarioError(
+            f"worst is {shown(worst)}: give True or a class, such as smc.Uncertainty(disturbance=1.0)"
+        )
 
 
 def _worst_cases(
-    trial: Trial, candidates: Mapping[str, Sequence[Candidate]], within: "Uncertainty | None", duration: float | None
+    trial: Trial,
+    candidates: Mapping[str, Sequence[Candidate]],
+    within: "Uncertainty | None",
+    duration: float | None,
 ) -> "dict[str, dict[str, WorstCase]]":
     """Return `Compared.worst`: the worst case of each law with its best gains on each plant."""
     from smc_mujoco.studies.worst_case import DURATION
 
     def attacked(plant: Plant, law: Law) -> "WorstCase":
-        scenario = case(plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts)
+        scenario = case(
+            plant, law, "nominal", DURATION if duration is None else duration, starts=trial.starts
+        )
         return trial.attack(f"{plant.name}-{law.name}", scenario, within)
 
-    return {p.name: {c.law.name: attacked(p, c.law) for c in candidates[p.name]} for p in trial.plants}
+    return {
+        p.name: {c.law.name: attacked(p, c.law) for c in candidates[p.name]} for p in trial.plants
+    }
 
 
-def _times(trial: Trial, candidates: Mapping[str, Sequence[Candidate]]) -> dict[str, dict[str, LawTime]]:
-    """Return `Compared.times`, of the laws with their best gains, without those that do not compile."""
+def _times(
+    trial: Trial, candidates: Mapping[str, Sequence[Candidate]]
+) -> dict[str, dict[str, LawTime]]:
+    """Return `Compared.times`, of the laws with their best gains, without those that do not
+    compile.
+    """
 
     def timed(plant: Plant) -> Iterator[tuple[str, LawTime]]:
         for candidate in candidates[plant.name]:
-            if found := law_time(case(plant, candidate.law, trial.conditions[0], trial.duration, starts=trial.starts)):
+            if found := law_time(
+                case(plant, candidate.law, trial.conditions[0], trial.duration, starts=trial.starts)
+            ):
                 yield candidate.law.name, found
 
     return {plant.name: dict(timed(plant)) for plant in trial.plants}
 
 
 def _checked(trial: Trial, laws: Any) -> dict[str, list[Law | Template]]:
-    """Return plant -> laws to compare on it. What cannot run is refused here, before gains are searched."""
-    given = None if laws is None else [law_or_template(law) for law in listed_laws(laws)]  # a file is read once
-    compared = {plant.name: given or [law_or_template(law) for law in _usual(plant)] for plant in trial.plants}
+    """Return plant -> laws to compare on it.
+
+    What cannot run is refused here, before gains are searched.
+    """
+    # a file is read once
+    if laws is None:
+        given = None
+    else:
+        given = [law_or_template(law) for law in listed_laws(laws)]
+    compared = {
+        plant.name: given or [law_or_template(law) for law in _usual(plant)]
+        for plant in trial.plants
+    }
     every = {id(law): law for its in compared.values() for law in its}.values()
     check_names(trial.plants, [coerce.law(law) for law in every], trial.conditions)
     for plant, condition in itertools.product(trial.plants, trial.conditions):

@@ -1,8 +1,10 @@
-"""Computation of a study's runs: in batches, on threads of this process or by the workers of an Executor.
+"""Computation of a study's runs: in batches, on threads of this process or by the workers of an
+Executor.
 
-A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a killed study loses
-at most one. The results depend neither on the batch nor on the machine. If a worker dies, another one runs its batch.
-If four die with the same batch, the study ends, and can be started again.
+A batch is a list of prepared scenarios of one layout. It is run, scored and stored as a whole, so a
+killed study loses at most one. The results depend neither on the batch nor on the machine. If a
+worker dies, another one runs its batch. If four die with the same batch, the study ends, and can be
+started again.
 """
 
 import contextlib
@@ -35,7 +37,11 @@ MAX_RUNS = 1000  # of a batch
 LOOP_SLOWDOWN = 40  # time of the reference loop over that of compiled laws, roughly
 MAX_BATCHES_SENT = 1000  # to workers, and not finished; chosen
 ADDRESS, DASK_ADDRESS = "dask://", "tcp://"  # beginnings of a scheduler's address, here and in dask
-LOGGERS = "distributed", "distributed.client", "tornado.application"  # of dask, which set their own level
+LOGGERS = (
+    "distributed",
+    "distributed.client",
+    "tornado.application",
+)  # of dask, which set their own level
 TIMEOUT = 10.0  # s, for a scheduler, and for its first worker; chosen
 
 if TYPE_CHECKING:
@@ -70,7 +76,9 @@ def batches(scenarios: Iterable[Scenario], threads: int) -> Iterator[list[Prepar
         yield from (group[i : i + size] for i in range(0, len(group), size))
 
 
-def run_batch(batch: Sequence[Scenario | Prepared], threads: int, report: Report = lambda steps: None) -> list[Trace]:
+def run_batch(
+    batch: Sequence[Scenario | Prepared], threads: int, report: Report = lambda steps: None
+) -> list[Trace]:
     """Return the traces of a batch, in its order."""
     traces = dict(stream(batch, threads, report))
     return [traces[i] for i in range(len(batch))]
@@ -109,7 +117,9 @@ def compute_elsewhere(
         while len(sent) > remaining:
             done = futures.wait(sent, return_when=futures.FIRST_COMPLETED).done
             # failed batches come last, so that the others are stored before an error ends the study
-            for future in sorted(done, key=lambda future: future.cancelled() or future.exception() is not None):
+            for future in sorted(
+                done, key=lambda future: future.cancelled() or future.exception() is not None
+            ):
                 batch = sent.pop(future)
                 finish(batch, future.result())
                 report(sum(prepared.scenario.work for prepared in batch))
@@ -126,9 +136,13 @@ def compute_elsewhere(
         collect(0)
     except (BrokenExecutor, CancelledError) as error:
         why = " ".join(str(error).split()).rstrip(".") or "its tasks were cancelled"
-        raise ScenarioError(f"the executor has stopped ({why}): start it and the study again to continue") from None
+        raise ScenarioError(
+            f"the executor has stopped ({why}): start it and the study again to continue"
+        ) from None
     except ImportError as error:
-        raise ScenarioError(f"a worker says {error}: install smc-mujoco there, the same version as here") from None
+        raise ScenarioError(
+            f"a worker says {error}: install smc-mujoco there, the same version as here"
+        ) from None
     finally:
         for future in sent:
             future.cancel()
@@ -143,14 +157,20 @@ def run_on_worker(packed: bytes, keys: Sequence[str]) -> list[ResultColumns]:
     plants: run_key.Hashes = {}
     for scenario, sent in zip(scenarios, keys, strict=True):
         if run_key.key(scenario, plants=plants) != sent:
-            versions = {"Python": platform.python_version()} | run_key.description(scenario)["versions"]
+            versions = {"Python": platform.python_version()} | run_key.description(scenario)[
+                "versions"
+            ]
             here = ", ".join(f"{name} {version}" for name, version in versions.items())
-            raise ScenarioError(f"a worker has other code for {scenario.law} ({here}): install the same there as here")
+            raise ScenarioError(
+                f"a worker has other code for {scenario.law} ({here}): install the same there as here"
+            )
     return [result_columns(trace) for trace in run_batch(scenarios, _threads())]
 
 
 def _threads() -> int:
-    """Return the number of threads of a dask worker; 1 elsewhere, because other executors have a worker per core."""
+    """Return the number of threads of a dask worker; 1 elsewhere, because other executors have a
+    worker per core.
+    """
     if (distributed := sys.modules.get("distributed")) is None:
         return 1
     try:
@@ -160,7 +180,10 @@ def _threads() -> int:
 
 
 def as_executor(executor: object) -> str | Executor:
-    """Return "local", an address that begins with ADDRESS, or an Executor. A dask Client becomes an Executor."""
+    """Return "local", an address that begins with ADDRESS, or an Executor.
+
+    A dask Client becomes an Executor.
+    """
     dask = sys.modules.get("distributed")
     if dask is not None and isinstance(executor, dask.Client):
         return _DaskExecutor(executor)
@@ -187,19 +210,28 @@ def opened(executor: str | Executor) -> Iterator[Executor]:
     with extra("cluster", f"executor {executor!r}"):
         from distributed import Client
         from distributed.scheduler import KilledWorker
-    logs = [logging.getLogger(name) for name in LOGGERS]  # an error is one sentence here, not also a traceback
+    # an error is one sentence here, not also a traceback
+    logs = []
+    for name in LOGGERS:
+        logs.append(logging.getLogger(name))
     before = [log.level for log in logs]
     try:
         for log in logs:
             log.setLevel(logging.CRITICAL)
-        with Client(f"tcp://{executor.removeprefix(ADDRESS)}", timeout=TIMEOUT, set_as_default=False) as client:
+        with Client(
+            f"tcp://{executor.removeprefix(ADDRESS)}", timeout=TIMEOUT, set_as_default=False
+        ) as client:
             with contextlib.suppress(TimeoutError):
                 client.wait_for_workers(1, timeout=TIMEOUT)
             if not client.ncores():
-                raise ScenarioError(f"dask at {executor} has no workers: start `dask worker` with its address")
+                raise ScenarioError(
+                    f"dask at {executor} has no workers: start `dask worker` with its address"
+                )
             yield _DaskExecutor(client)
     except KilledWorker as error:
-        raise ScenarioError(f"{error}: read the workers' logs, and start the study again to continue") from None
+        raise ScenarioError(
+            f"{error}: read the workers' logs, and start the study again to continue"
+        ) from None
     except OSError as error:  # a timeout is one
         raise ScenarioError(
             f"no dask at {executor} ({error}): start `dask scheduler` and `dask worker` there"
@@ -235,18 +267,23 @@ class _DaskExecutor(Executor):
 
 # scenarios and laws as bytes for another process, with the code that it cannot import
 
-# Pickle names a function by its module. A script or notebook is the module `__main__`, but a worker has another
-# `__main__`. A law in a function or an executed file has no module at all. cloudpickle sends their code by value.
+# Pickle names a function by its module. A script or notebook is the module `__main__`, but a worker
+# has another `__main__`. A law in a function or an executed file has no module at all. cloudpickle
+# sends their code by value.
 SCRIPTS = ("__main__", "__mp_main__")  # modules that differ from process to process
 
 
 def packed(thing: Any) -> bytes:
-    """Return a thing as bytes for `pickle.loads` in any process that has this package, and cloudpickle if needed."""
+    """Return a thing as bytes for `pickle.loads` in any process that has this package, and
+    cloudpickle if needed.
+    """
     try:
         data = pickle.dumps(thing)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         return _by_value(thing, one_line(str(error)))
-    return _by_value(thing, "it is in a script") if any(name.encode() in data for name in SCRIPTS) else data
+    if any(name.encode() in data for name in SCRIPTS):
+        return _by_value(thing, "it is in a script")
+    return data
 
 
 def _by_value(thing: Any, why: str) -> bytes:
@@ -255,7 +292,9 @@ def _by_value(thing: Any, why: str) -> bytes:
         import cloudpickle
     except ImportError:
         cure = "put it into a module, or pip install cloudpickle"
-        raise ScenarioError(f"a law, signal or part cannot be sent to another process ({why}): {cure}") from None
+        raise ScenarioError(
+            f"a law, signal or part cannot be sent to another process ({why}): {cure}"
+        ) from None
 
     class Pickler(cloudpickle.Pickler):
         """Pickler that writes a script's component by its fields, not by its name."""

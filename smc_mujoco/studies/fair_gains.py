@@ -1,9 +1,10 @@
 """Trials of laws on plants: their gains, all by one rule, their runs and their worst cases.
 
-A law has the gains that the user gave it, else those that come with the package for the plant, else those that a search
-by the same rule finds: with the same bound on u, the same starts, as many searches and as many evaluations. A law that
-cannot be tuned keeps its defaults, and its remark says why. Each search ends with its own gains. The run of seed s has
-those of search s modulo their number, so that a comparison holds over the gains with which a tuning may end.
+A law has the gains that the user gave it, else those that come with the package for the plant, else
+those that a search by the same rule finds: with the same bound on u, the same starts, as many
+searches and as many evaluations. A law that cannot be tuned keeps its defaults, and its remark says
+why. Each search ends with its own gains. The run of seed s has those of search s modulo their
+number, so that a comparison holds over the gains with which a tuning may end.
 """
 
 import contextlib
@@ -60,14 +61,18 @@ class Candidate(NamedTuple):
     def unseen(
         self, plant: Plant, goal: Objective, count: int, threads: int | None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return J on instances 0, 1, ..., that of one in four at half the physics step, and the sets' numbers."""
+        """Return J on instances 0, 1, ..., that of one in four at half the physics step, and the
+        sets' numbers.
+        """
         from smc_mujoco.analysis.tuning.evaluator import objectives
 
         instances, again = range(count), range(0, count, REPEATED_SEEDS)
         options = {"threads": threads}
         values = objectives(plant, [self(i) for i in instances], goal, instances, **options)
         halves = np.full(count, math.nan)
-        halves[::REPEATED_SEEDS] = objectives(plant, [self(i) for i in again], goal, again, halved=True, **options)
+        halves[::REPEATED_SEEDS] = objectives(
+            plant, [self(i) for i in again], goal, again, halved=True, **options
+        )
         return values, halves, np.arange(count) % len(self.sets)
 
 
@@ -78,7 +83,9 @@ def law_or_template(law: Component | Template | str) -> Component | Template:
     if isinstance(law, Template):
         return law
     given = coerce.law(law)
-    return given.template if given.template and given.source.kind == source.DEFAULT else given
+    if given.template and given.source.kind == source.DEFAULT:
+        return given.template
+    return given
 
 
 def _without_search(plant: Plant, law: Component | Template, gains: str) -> Candidate | None:
@@ -88,12 +95,21 @@ def _without_search(plant: Plant, law: Component | Template, gains: str) -> Cand
     if not law.gains or gains == "default":
         return _default(law)
     library = plants_known().get(plant.name)
-    ours = catalogue().get(law.name) is law and library is not None and library.parameters == plant.parameters
+    ours = (
+        catalogue().get(law.name) is law
+        and library is not None
+        and library.parameters == plant.parameters
+    )
     if ours and not plant.unscaled and gain_sets.in_set(plant, law.name, gains):
-        count = 1 if gains == "study" else len(gain_sets.tuned(plant, law.name, gains).sets)
+        if gains == "study":
+            count = 1
+        else:
+            count = len(gain_sets.tuned(plant, law.name, gains).sets)
         sets = tuple(gain_sets.law(plant, law.name, gains, seed) for seed in range(count))
         return Candidate(gain_sets.law(plant, law.name, gains), sets)
-    return _default(law, f"{UNTUNABLE}{plant.unscaled.partition(':')[0]}") if plant.unscaled else None
+    if plant.unscaled:
+        return _default(law, f"{UNTUNABLE}{plant.unscaled.partition(':')[0]}")
+    return None
 
 
 def _default(law: Component | Template, remark: str = "") -> Candidate:
@@ -103,25 +119,39 @@ def _default(law: Component | Template, remark: str = "") -> Candidate:
 
 
 def candidate_of(default: Component, tuned: "Tuned") -> Candidate:
-    """Return a law with the gains of each search, or with those that it had if no search found better ones."""
+    """Return a law with the gains of each search, or with those that it had if no search found
+    better ones.
+    """
     from smc_mujoco.analysis.tuning import search_space
 
     its = tuned.law.source
     if tuned.before < tuned.objective:
-        its_own = "defaults" if default.source.kind == source.DEFAULT else "own gains"
+        if default.source.kind == source.DEFAULT:
+            its_own = "defaults"
+        else:
+            its_own = "own gains"
         default = default.sourced(its.kind, its.search)
         return Candidate(default, (default,), f"its {its_own}, better than those tried")
-    gains = [dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True)) for tried in tuned.sets]
-    sets = tuple(dataclasses.replace(default, gains=values).sourced(its.kind, its.search) for values in gains)
+    gains = []
+    for tried in tuned.sets:
+        gains.append(dict(default.gains) | dict(zip(tuned.bounds, tried.gains, strict=True)))
+    sets = tuple(
+        dataclasses.replace(default, gains=values).sourced(its.kind, its.search) for values in gains
+    )
     without_unit = list(search_space.without_unit(default))
-    have = "have no unit, so their" if len(without_unit) > 1 else "has no unit, so its"
+    if len(without_unit) > 1:
+        have = "have no unit, so their"
+    else:
+        have = "has no unit, so its"
     words = f"{joined(without_unit)} {have} search is about the defaults and not by the rule"
     best = dataclasses.replace(default, gains=tuned.law.gains).sourced(its.kind, its.search)
     return Candidate(best, sets, words * bool(without_unit))
 
 
 class Trial(NamedTuple):
-    """The plants and conditions of a comparison, and its folder; `threads` and `progress` are as in `run`."""
+    """The plants and conditions of a comparison, and its folder; `threads` and `progress` are as in
+    `run`.
+    """
 
     plants: Sequence[Plant]
     conditions: Sequence[Condition]
@@ -137,14 +167,16 @@ class Trial(NamedTuple):
         """Return plant -> its laws with gains, see `gains_on` for the options.
 
         Raises:
-          ScenarioError: none of several laws can be tuned on a plant, so that there could be no winner, unless
-            `defaults`. It is raised before the first search.
+          ScenarioError: none of several laws can be tuned on a plant, so that there could be no
+            winner, unless `defaults`. It is raised before the first search.
         """
         for plant in () if defaults else self.plants:
             self._check_tunable(plant, laws[plant.name], **options)
         if self.progress:
             self._announce(laws, **options)
-        return {plant.name: self.gains_on(plant, laws[plant.name], **options) for plant in self.plants}
+        return {
+            plant.name: self.gains_on(plant, laws[plant.name], **options) for plant in self.plants
+        }
 
     def gains_on(
         self,
@@ -155,30 +187,44 @@ class Trial(NamedTuple):
         tune: bool = True,
         gains: str = "tuned",
     ) -> list[Candidate]:
-        """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order of preference.
+        """Return laws with gains for a plant: given, shipped, tuned or default ones, in this order
+        of preference.
 
-        If some laws have shipped gains, the others are tuned from the starts of those. Laws without given gains come as
-        templates. The folder keeps each search.
+        If some laws have shipped gains, the others are tuned from the starts of those. Laws without
+        given gains come as templates. The folder keeps each search.
         """
         known, starts = self._known(plant, laws, gains)
 
         def missing(law: Component | Template) -> Candidate:
-            return self.tuned(plant, law, starts, searches, budget) if tune else _default(law)
+            if tune:
+                return self.tuned(plant, law, starts, searches, budget)
+            return _default(law)
 
         return [candidate or missing(law) for law, candidate in zip(laws, known, strict=True)]
 
     def _known(
         self, plant: Plant, laws: Sequence[Component | Template], gains: str
     ) -> tuple[list[Candidate | None], Starts | None]:
-        """Return the laws that need no search, None for others, and the starts of the searches for those."""
+        """Return the laws that need no search, None for others, and the starts of the searches for
+        those.
+        """
         known = [_without_search(plant, law, gains) for law in laws]
-        shipped = any(candidate and candidate.law.source.kind == source.SHIPPED for candidate in known)
+        shipped = any(
+            candidate and candidate.law.source.kind == source.SHIPPED for candidate in known
+        )
         return known, None if shipped else self.starts
 
     def _check_tunable(
-        self, plant: Plant, laws: Sequence[Component | Template], tune: bool = True, gains: str = "tuned", **_: Any
+        self,
+        plant: Plant,
+        laws: Sequence[Component | Template],
+        tune: bool = True,
+        gains: str = "tuned",
+        **_: Any,
     ) -> None:
-        """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a plant."""
+        """Raise ScenarioError, with the first reason, if none of several laws can be tuned on a
+        plant.
+        """
         if len(laws) < 2 or not tune:
             return
         known, starts = self._known(plant, laws, gains)
@@ -189,7 +235,9 @@ class Trial(NamedTuple):
             if not (why := candidate.remark if candidate else self._why_not(plant, law, starts)):
                 return
             reasons.append(why)
-        raise ScenarioError(f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default gains")
+        raise ScenarioError(
+            f"{reasons[0]}; or give laws with gains, or defaults=True (--defaults) for default gains"
+        )
 
     def _announce(
         self,
@@ -199,18 +247,30 @@ class Trial(NamedTuple):
         tune: bool = True,
         gains: str = "tuned",
     ) -> None:
-        """Say which laws are tuned on which plants, by how many searches, and for about how long, on stderr."""
+        """Say which laws are tuned on which plants, by how many searches, and for about how long,
+        on stderr.
+        """
         seconds, named = 0.0, dict[str, list[str]]()
         for plant in self.plants if tune else ():
             known, starts = self._known(plant, laws[plant.name], gains)
-            new = [law for law, candidate in zip(laws[plant.name], known, strict=True) if candidate is None]
+            new = [
+                law
+                for law, candidate in zip(laws[plant.name], known, strict=True)
+                if candidate is None
+            ]
             files = [self._file(plant, law, searches, budget) for law in new]
-            new = [law for law, file in zip(new, files, strict=True) if not any(file.parent.glob(f"{file.stem}-*"))]
+            new = [
+                law
+                for law, file in zip(new, files, strict=True)
+                if not any(file.parent.glob(f"{file.stem}-*"))
+            ]
             if new := [law for law in new if not self._why_not(plant, law, starts)]:
                 from smc_mujoco.analysis.tuning import search
 
                 goal = self._goal(plant, starts)
-                seconds += searches * search.expected_seconds(plant, new, goal, budget, self.threads)
+                seconds += searches * search.expected_seconds(
+                    plant, new, goal, budget, self.threads
+                )
                 for law in new:
                     named.setdefault(law.name, []).append(plant.name)
         if named:
@@ -218,7 +278,10 @@ class Trial(NamedTuple):
             for law, plants in named.items():
                 groups.setdefault(joined(plants), []).append(law)
             what = "; ".join(f"{first_of(its)} on {plants}" for plants, its in groups.items())
-            each = f"{searches} searches each" if searches > 1 else "1 search each"
+            if searches > 1:
+                each = f"{searches} searches each"
+            else:
+                each = "1 search each"
             cures = ["name some of the laws (laws=, --law)"] * (len(named) > 1)
             cures += ["quick=True (--quick)"] * (searches >= SEARCHES)
             less = f". For less time: {' or '.join(cures)}" * (seconds > LONG and bool(cures))
@@ -237,30 +300,51 @@ class Trial(NamedTuple):
     def _goal(self, plant: Plant, starts: Starts | None) -> Objective:
         """Return the objective of searches on a plant."""
         usual = Objective()
-        conditions = tuple(c for c in usual.conditions if applicable([c.name], [plant], usual.duration))
+        conditions = tuple(
+            c for c in usual.conditions if applicable([c.name], [plant], usual.duration)
+        )
         return dataclasses.replace(usual, conditions=conditions, starts=starts or usual.starts)
 
     def tuned(
-        self, plant: Plant, law: Component | Template, starts: Starts | None, searches: int, budget: int
+        self,
+        plant: Plant,
+        law: Component | Template,
+        starts: Starts | None,
+        searches: int,
+        budget: int,
     ) -> Candidate:
-        """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if it cannot."""
+        """Return a law with gains that `tune` finds, or found in an earlier call; its defaults if
+        it cannot.
+        """
         from smc_mujoco.analysis.tuning import result, search
 
         goal, default = self._goal(plant, starts), coerce.law(law)
         try:
             (first, *_) = goal.scenarios(plant, default)
-            template = law if isinstance(law, Template) else default.template
+            if isinstance(law, Template):
+                template = law
+            else:
+                template = default.template
             ranges = template and (dict(template.gains), dict(template.conditions))
-            depends = [run_key.key(first), goal.describe(), fingerprint.of((default.function, ranges))]
+            depends = [
+                run_key.key(first),
+                goal.describe(),
+                fingerprint.of((default.function, ranges)),
+            ]
             with warnings.catch_warnings():
-                for words in ("no set of gains tried", ".* no unit, and so a search"):  # the remark says so
+                for words in (
+                    "no set of gains tried",
+                    ".* no unit, and so a search",
+                ):  # the remark says so
                     warnings.filterwarnings("ignore", words, ScenarioWarning)
                 file = self._file(plant, law, searches, budget)
                 options = {"searches": searches, "folder": file.parent / "searches"}
                 tuned = cached(
                     file,
                     depends,
-                    lambda: search.tune(plant, law, budget, 0, goal, self.threads, self.progress, **options),
+                    lambda: search.tune(
+                        plant, law, budget, 0, goal, self.threads, self.progress, **options
+                    ),
                     lambda made, path: made.save(path),
                     lambda path: result.load(path, plant),
                 )
@@ -270,17 +354,27 @@ class Trial(NamedTuple):
             return _default(law, f"{NOT_TUNED}{error}")
         return candidate_of(default, tuned)
 
-    def run(self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any) -> Table:
-        """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options of `study`."""
+    def run(
+        self, candidates: Mapping[str, Sequence[Candidate]], seeds: int, **options: Any
+    ) -> Table:
+        """Run the laws of each plant in each condition from the seeds 0, 1, ..., with the options
+        of `study`.
+        """
         grid = self.plants, lambda plant: candidates[plant.name], self.conditions, range(seeds)
         runs = all_combinations(*grid, self.duration, self.starts)
         options |= {"half_steps": True, "threads": self.threads, "progress": self.progress}
         return study(runs, self.folder, **options)
 
-    def unseen(self, candidates: Mapping[str, Sequence[Candidate]], count: int) -> dict[str, Unseen]:
-        """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is left out."""
+    def unseen(
+        self, candidates: Mapping[str, Sequence[Candidate]], count: int
+    ) -> dict[str, Unseen]:
+        """Return plant -> J of its laws on `count` instances; a plant on which J is not defined is
+        left out.
+        """
         found, several = {}, [(plant, c) for plant in self.plants for c in candidates[plant.name]]
-        with bar("J on runs that no search has seen", len(several), self.progress, counted=True) as shown:
+        with bar(
+            "J on runs that no search has seen", len(several), self.progress, counted=True
+        ) as shown:
             for plant in self.plants:
                 goal, its = self._goal(plant, self.starts), {}
                 for candidate in candidates[plant.name]:
@@ -288,8 +382,12 @@ class Trial(NamedTuple):
                         its[candidate.law.name] = candidate.unseen(plant, goal, count, self.threads)
                     shown.advance(1.0)
                 if len(its) == len(candidates[plant.name]):
-                    values, halves, sets = ({law: one[k] for law, one in its.items()} for k in range(3))
-                    found[plant.name] = Unseen(values, halves, sets, len(goal.conditions) * goal.duration**2 / 2.0)
+                    values, halves, sets = (
+                        {law: one[k] for law, one in its.items()} for k in range(3)
+                    )
+                    found[plant.name] = Unseen(
+                        values, halves, sets, len(goal.conditions) * goal.duration**2 / 2.0
+                    )
         return found
 
     def attack(

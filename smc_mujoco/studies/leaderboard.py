@@ -1,9 +1,10 @@
 """Leaderboards: comparison of a study's laws on equal runs, with the uncertainty of every number.
 
-A board is one metric in one group of runs. Laws are compared by the rules of `analysis.ranking` in each of its blocks,
-a plant in a condition. The tests are corrected for all blocks of the table in this metric, so the verdict on a block is
-the same on every board that has it. The winner of a board with several blocks wins in every one. The conclusions hold
-for the plants and conditions of the table, over initial states and noise, and over the gains with which the laws ran.
+A board is one metric in one group of runs. Laws are compared by the rules of `analysis.ranking` in
+each of its blocks, a plant in a condition. The tests are corrected for all blocks of the table in
+this metric, so the verdict on a block is the same on every board that has it. The winner of a board
+with several blocks wins in every one. The conclusions hold for the plants and conditions of the
+table, over initial states and noise, and over the gains with which the laws ran.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,8 +14,24 @@ import numpy as np
 
 from smc_mujoco.analysis import paired_runs
 from smc_mujoco.analysis.bootstrap import median_of, share_interval
-from smc_mujoco.analysis.paired_runs import EPS, OBJECTIVE, SETTLES, UNITS, ByRow, Columns, Group, Scores
-from smc_mujoco.analysis.ranking import RELEVANT, Comparison, Limits, corrected_limits, linked, ranks
+from smc_mujoco.analysis.paired_runs import (
+    EPS,
+    OBJECTIVE,
+    SETTLES,
+    UNITS,
+    ByRow,
+    Columns,
+    Group,
+    Scores,
+)
+from smc_mujoco.analysis.ranking import (
+    RELEVANT,
+    Comparison,
+    Limits,
+    corrected_limits,
+    linked,
+    ranks,
+)
 from smc_mujoco.analysis.step_halving import first_order, repeats_all
 from smc_mujoco.common.errors import ScenarioError, find, shown
 from smc_mujoco.control.source import DEFAULT, Source
@@ -31,7 +48,9 @@ class Unseen(NamedTuple):
     """J of the laws on one plant, on instances that no search has seen: law -> (instances,)."""
 
     values: Mapping[str, np.ndarray]  # s^2
-    halves: Mapping[str, np.ndarray]  # the same at half the physics step, NaN where it was not computed
+    halves: Mapping[
+        str, np.ndarray
+    ]  # the same at half the physics step, NaN where it was not computed
     sets: Mapping[str, np.ndarray]  # the number of the set of gains
     least: float  # s^2, J of an error that is X0 throughout
 
@@ -46,10 +65,10 @@ def leaderboard(
 ) -> Boards:
     """Compare the laws of a table in each metric within each group.
 
-    Only cells (plant, condition, seed) that every law of the group has are compared. A failed run is inf in all
-    metrics. For two laws, a seed in which both repeat their results of an earlier seed is not counted.
-    Runs that share one of several sets of gains of a law are one sample. A metric that does not apply to a group has no
-    board for it.
+    Only cells (plant, condition, seed) that every law of the group has are compared. A failed run
+    is inf in all metrics. For two laws, a seed in which both repeat their results of an earlier
+    seed is not counted. Runs that share one of several sets of gains of a law are one sample. A
+    metric that does not apply to a group has no board for it.
 
     Args:
       table: a study's runs, as `smc.Table.read` returns them.
@@ -61,8 +80,8 @@ def leaderboard(
       worst: plant -> law -> its `worst_case`, for a column of the tables of a plant.
 
     Raises:
-      ScenarioError: no runs, an unknown metric or group, two runs in a cell, laws without a common cell, or a worst
-        case of a plant or law that has no run.
+      ScenarioError: no runs, an unknown metric or group, two runs in a cell, laws without a common
+        cell, or a worst case of a plant or law that has no run.
     """
     if isinstance(metrics, str) or not metrics:
         raise ScenarioError(f"metrics is {shown(metrics)}: give names, such as ('itae', 'tv_rate')")
@@ -73,19 +92,28 @@ def leaderboard(
     boards.worst, boards.failures = worst or {}, paired_runs.failures(table)
     by_row = {name: paired_runs.by_row(table, name) for name in dict.fromkeys(metrics)}
     groups = list(paired_runs.groups(table, by))
-    every = groups if set(by) == set(paired_runs.GROUPS) else list(paired_runs.groups(table, paired_runs.GROUPS))
-    families = {name: _family(table, every, values, name, relevant) for name, values in by_row.items()}
+    if set(by) == set(paired_runs.GROUPS):
+        every = groups
+    else:
+        every = list(paired_runs.groups(table, paired_runs.GROUPS))
+    families = {
+        name: _family(table, every, values, name, relevant) for name, values in by_row.items()
+    }
     for group in groups:
         ran = paired_runs.scenarios(table, group)
         sources = paired_runs.sources(table, group.rows[group.rows >= 0])
-        at_default = (law for law, its in sources.items() if any(source.kind == DEFAULT for source in its))
+        at_default = (
+            law for law, its in sources.items() if any(source.kind == DEFAULT for source in its)
+        )
         untuned = () if defaults else tuple(at_default)
         for metric, values in by_row.items():
             limits, family = families[metric]
             scores = group.scores(values)
             if scores.blocks:
                 comparison = _compared(scores, ran, metric, relevant, limits)
-                boards.append(_board(group, scores, ran, metric, comparison, untuned, sources, family))
+                boards.append(
+                    _board(group, scores, ran, metric, comparison, untuned, sources, family)
+                )
     return boards
 
 
@@ -103,7 +131,12 @@ def objective_boards(
     def compared(plant: str, limits: Limits) -> Comparison:
         its = unseen[plant]
         return Comparison(
-            its.values, EPS * its.least, sets=its.sets, relevant=relevant, limits=limits, halves=its.halves
+            its.values,
+            EPS * its.least,
+            sets=its.sets,
+            relevant=relevant,
+            limits=limits,
+            halves=its.halves,
         )
 
     alone = [compared(plant, Limits(0.0, 0.0)) for plant in unseen]
@@ -111,7 +144,10 @@ def objective_boards(
     for plant in unseen:
         comparison = compared(plant, limits)
         its = sources.get(plant, {})
-        untuned = () if defaults else tuple(law for law in its if any(one.kind == DEFAULT for one in its[law]))
+        if defaults:
+            untuned = ()
+        else:
+            untuned = tuple(law for law in its if any(one.kind == DEFAULT for one in its[law]))
         count = len(next(iter(unseen[plant].values.values())))
         block = _block((plant, "unseen runs"), count, comparison, 0, untuned)
         sets = {law: np.atleast_2d(numbers) for law, numbers in unseen[plant].sets.items()}
@@ -133,11 +169,16 @@ def objective_boards(
 
 def _check_worst(table: Columns, worst: Mapping[str, Mapping[str, "WorstCase"]]) -> None:
     """Raise ScenarioError for the worst case of a law that has no run on the plant."""
-    ran = set(zip(table.column("plant").tolist(), table.column("law").tolist(), strict=True)) if worst else set()
+    if worst:
+        ran = set(zip(table.column("plant").tolist(), table.column("law").tolist(), strict=True))
+    else:
+        ran = set()
     for plant, cases in worst.items():
         for law in cases:
             if (plant, law) not in ran:
-                raise ScenarioError(f"worst has {law} on {plant}, which has no run in the table: leave it out")
+                raise ScenarioError(
+                    f"worst has {law} on {plant}, which has no run in the table: leave it out"
+                )
 
 
 def _board(
@@ -152,11 +193,17 @@ def _board(
 ) -> Board:
     """Return the board of a comparison, whose limits are corrected for `family` comparisons."""
     unit = UNITS[metric]
-    others = {one.efforts[0] if (one := ran[k]) is not None and not one.force_command else "" for k in scores.blocks}
+    others = {
+        one.efforts[0] if (one := ran[k]) is not None and not one.force_command else ""
+        for k in scores.blocks
+    }
     if len(others) == 1 and (other := others.pop()):
-        unit = unit.replace("({u})", other if other.isalpha() else f"({other})").replace("{u}", other)
+        unit = unit.replace("({u})", other if other.isalpha() else f"({other})").replace(
+            "{u}", other
+        )
     blocks = tuple(
-        _block(group.blocks[k], group.seeds[k], comparison, at, untuned) for at, k in enumerate(scores.blocks)
+        _block(group.blocks[k], group.seeds[k], comparison, at, untuned)
+        for at, k in enumerate(scores.blocks)
     )
     return Board(
         group=group.name,
@@ -167,7 +214,8 @@ def _board(
         family=family,
         relevant=comparison.relevant,
         resolution=float(comparison.floors.max()),
-        by_step=bool(np.isnan(comparison.halves).all()) and any(map(repeats_all, filter(None, ran))),
+        by_step=bool(np.isnan(comparison.halves).all())
+        and any(map(repeats_all, filter(None, ran))),
         x=paired_runs.unit_of_x(group.name["plant"], ran),
     )
 
@@ -190,8 +238,12 @@ def _compared(
     )
 
 
-def _family(table: Columns, blocks: Sequence[Group], by_row: ByRow, metric: str, relevant: float) -> tuple[Limits, int]:
-    """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the number of these."""
+def _family(
+    table: Columns, blocks: Sequence[Group], by_row: ByRow, metric: str, relevant: float
+) -> tuple[Limits, int]:
+    """Return the limits of the p-values of a metric, corrected for all blocks of a table, and the
+    number of these.
+    """
     comparisons = []
     for group in blocks:
         try:
@@ -201,7 +253,9 @@ def _family(table: Columns, blocks: Sequence[Group], by_row: ByRow, metric: str,
         if scores.values:
             ran = paired_runs.scenarios(table, group)
             comparisons.append(_compared(scores, ran, metric, relevant, Limits(0.0, 0.0)))
-    return corrected_limits(comparisons), sum(len(comparison.laws) > 1 for comparison in comparisons) or 1
+    return corrected_limits(comparisons), sum(
+        len(comparison.laws) > 1 for comparison in comparisons
+    ) or 1
 
 
 def _block(
@@ -225,52 +279,75 @@ def _block(
         lead=_lead(comparison, at),
         level=_level(comparison, at),
         visible=_visible(comparison, at),
-        by_step={law: change for law in comparison.laws if (change := comparison.step_change(at, law))},
+        by_step={
+            law: change for law in comparison.laws if (change := comparison.step_change(at, law))
+        },
         seeds=seeds,
         runs=int(comparison.seeds[at]),
-        samples=int(comparison.samples[at].max()) if len(comparison.laws) > 1 else int(comparison.seeds[at]),
+        samples=int(comparison.samples[at].max())
+        if len(comparison.laws) > 1
+        else int(comparison.seeds[at]),
         sets=int(sets[sets > 1].min()) if (sets > 1).any() else 1,
-        given=tuple(law for law, n in zip(comparison.laws, sets, strict=True) if n == 1 and (sets > 1).any()),
+        given=tuple(
+            law for law, n in zip(comparison.laws, sets, strict=True) if n == 1 and (sets > 1).any()
+        ),
         untuned=untuned,
     )
 
 
 def _lead(comparison: Comparison, at: int) -> Lead | None:
-    """Return how the law in front of a block compares with its closest rival, that with the largest p-value."""
+    """Return how the law in front of a block compares with its closest rival, that with the largest
+    p-value.
+    """
     if len(comparison.laws) < 2 or comparison.shares:
         return None
     lacking, winner = comparison.without_value[:, at], comparison.winners[at]
-    order = sorted(range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at]))
-    first = order[0] if winner is None else comparison.laws.index(winner)
+    order = sorted(
+        range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at])
+    )
+    if winner is None:
+        first = order[0]
+    else:
+        first = comparison.laws.index(winner)
     if lacking[first]:
         return None
     rival = max((i for i in order if i != first), key=lambda i: comparison.p[at, first, i])
     names = comparison.laws[first], comparison.laws[rival]
     effect = comparison.effect(at, *names)
     apart = abs(float(comparison.centres[rival, at] - comparison.centres[first, at]))
-    return Lead(*names, effect, apart < float(comparison.floors[at])) if effect.samples else None
+    if effect.samples:
+        return Lead(*names, effect, apart < float(comparison.floors[at]))
+    return None
 
 
 def _level(comparison: Comparison, at: int) -> bool:
     """Return whether the laws of a block that are not beaten are all level with each other."""
     best = [comparison.laws.index(law) for law in comparison.best[at]]
-    return bool(comparison.level[at][np.ix_(best, best)].all()) and not comparison.undecided[:, at].any()
+    return (
+        bool(comparison.level[at][np.ix_(best, best)].all())
+        and not comparison.undecided[:, at].any()
+    )
 
 
 def _visible(comparison: Comparison, at: int) -> dict[str, float]:
-    """Return law -> the least lead that would have been seen between it and the law in front; {} without a test.
+    """Return law -> the least lead that would have been seen between it and the law in front; {}
+    without a test.
 
     For the law in front it is that over its closest rival.
     """
     if len(comparison.laws) < 2 or comparison.shares or comparison.untested[at]:
         return {}
     lacking = comparison.without_value[:, at]
-    order = sorted(range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at]))
+    order = sorted(
+        range(len(comparison.laws)), key=lambda i: (lacking[i], comparison.centres[i, at])
+    )
     first, *others = order
     rival = max(others, key=lambda i: comparison.p[at, first, i])
     pairs = {first: (first, rival)} | {other: (first, other) for other in others}
     names = comparison.laws
-    return {names[i]: comparison.visible(at, names[a], names[b]) for i, (a, b) in sorted(pairs.items())}
+    return {
+        names[i]: comparison.visible(at, names[a], names[b]) for i, (a, b) in sorted(pairs.items())
+    }
 
 
 def _entries(
@@ -284,7 +361,10 @@ def _entries(
         at = comparison.laws.index(rank.law)
         values, samples = comparison.cells[at], linked(*sets[rank.law])
         if comparison.shares:
-            n = values.shape[1] if samples is None else max(samples) + 1
+            if samples is None:
+                n = values.shape[1]
+            else:
+                n = max(samples) + 1
             interval = share_interval(float(1 - np.nanmean(values, axis=1).mean()), n)
         else:
             interval = median_of(values, samples)

@@ -1,4 +1,6 @@
-"""The identity of a run: its key, the name of its condition, and the columns of a table that describe it."""
+"""The identity of a run: its key, the name of its condition, and the columns of a table that
+describe it.
+"""
 
 import contextlib
 import functools
@@ -16,23 +18,46 @@ from smc_mujoco.simulation.conditions import CONTROL_PERIOD, NAMED, find_conditi
 from smc_mujoco.simulation.scenario import U_MAX, Scenario
 
 # Fields of a description that belong to the plant, the law or the run, and not to the condition.
-NOT_OF_CONDITION = ("plant", "law", "model", "surface", "seed", "x0", "duration", "versions", "condition")
+NOT_OF_CONDITION = (
+    "plant",
+    "law",
+    "model",
+    "surface",
+    "seed",
+    "x0",
+    "duration",
+    "versions",
+    "condition",
+)
 UNRELATED_FOLDERS = (  # of this package, which do not affect runs
-    "benchmark/realaigym", "evidence/audit", "evidence/papers", "exchange/live", "draw", "testing",
+    "benchmark/realaigym",
+    "evidence/audit",
+    "evidence/papers",
+    "exchange/live",
+    "draw",
+    "testing",
     "control/tuned_gains",
-)  # fmt: skip
+)
 MAX_NAME = 60  # characters of a condition's name
 
 
 def description(scenario: Scenario) -> dict[str, Any]:
-    """Return the scenario as plain data. It is the same for equal scenarios: the source of gains is left out."""
+    """Return the scenario as plain data.
+
+    It is the same for equal scenarios: the source of gains is left out.
+    """
     data = serialise.describe(scenario)
     del data["left_out"], data["source"]
     return data
 
 
-def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes | None = None) -> str:
-    """Return a hash, 32 hex digits, of all that determines a run: scenario, code, versions. `plants` is a cache."""
+def key(
+    scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes | None = None
+) -> str:
+    """Return a hash, 32 hex digits, of all that determines a run: scenario, code, versions.
+
+    `plants` is a cache.
+    """
     data = data or description(scenario)
     if scenario.condition in NAMED:  # the name adds nothing to the fields
         data = data | {"condition": None}
@@ -42,20 +67,33 @@ def key(scenario: Scenario, data: dict[str, Any] | None = None, plants: Hashes |
 
 
 def portable_key(scenario: Scenario) -> str:
-    """Return a hash, 16 hex digits, of the scenario and of the code of its parts alone: the same on every machine."""
-    data = description(scenario) | {"versions": None, "condition": None}  # the condition's name adds nothing
-    return hashlib.sha256(to_json([data, code_hashes(scenario, {})], sort_keys=True).encode()).hexdigest()[:16]
+    """Return a hash, 16 hex digits, of the scenario and of the code of its parts alone: the same on
+    every machine.
+    """
+    data = description(scenario) | {
+        "versions": None,
+        "condition": None,
+    }  # the condition's name adds nothing
+    return hashlib.sha256(
+        to_json([data, code_hashes(scenario, {})], sort_keys=True).encode()
+    ).hexdigest()[:16]
 
 
 def row(scenario: Scenario, plants: Hashes | None = None) -> dict[str, Any]:
     """Return the columns of a table that describe a run. `plants` is as in `key`."""
     data = description(scenario)
     return {
-        "hash": key(scenario, data, plants), "plant": scenario.plant.name, "law": scenario.law.name,
-        "gains": to_json(dict(scenario.law.gains)), **source(scenario), "condition": condition(scenario, data),
-        "seed": scenario.seed, "duration": scenario.duration,
-        "versions": to_json(data["versions"]), "scenario": to_json(data),
-    }  # fmt: skip
+        "hash": key(scenario, data, plants),
+        "plant": scenario.plant.name,
+        "law": scenario.law.name,
+        "gains": to_json(dict(scenario.law.gains)),
+        **source(scenario),
+        "condition": condition(scenario, data),
+        "seed": scenario.seed,
+        "duration": scenario.duration,
+        "versions": to_json(data["versions"]),
+        "scenario": to_json(data),
+    }
 
 
 def source(scenario: Scenario) -> dict[str, str | None]:
@@ -65,16 +103,27 @@ def source(scenario: Scenario) -> dict[str, str | None]:
 
 
 def condition(scenario: Scenario, data: dict[str, Any] | None = None) -> str:
-    """Return the name of the run's condition: the given name, or the differences from the nominal condition."""
+    """Return the name of the run's condition: the given name, or the differences from the nominal
+    condition.
+    """
     if scenario.condition:
         return scenario.condition
-    text, nominal = _condition_text(data or description(scenario)), _nominal(scenario.plant, scenario.duration)
+    text, nominal = (
+        _condition_text(data or description(scenario)),
+        _nominal(scenario.plant, scenario.duration),
+    )
     if text == nominal:
         return "nominal"
-    changed = [name for name, value in json.loads(text).items() if json.loads(nominal).get(name) != value]
-    differ = [name for name in changed if getattr(scenario, name) is not None]  # the rest are defaults
+    changed = [
+        name for name, value in json.loads(text).items() if json.loads(nominal).get(name) != value
+    ]
+    differ = [
+        name for name in changed if getattr(scenario, name) is not None
+    ]  # the rest are defaults
     name = ", ".join(f"{name}={' '.join(repr(getattr(scenario, name)).split())}" for name in differ)
-    return name if len(name) <= MAX_NAME else f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
+    if len(name) <= MAX_NAME:
+        return name
+    return f"{name[:MAX_NAME]}... {hashlib.sha256(text.encode()).hexdigest()[:6]}"
 
 
 def _condition_text(data: dict[str, Any]) -> str:
@@ -84,10 +133,21 @@ def _condition_text(data: dict[str, Any]) -> str:
 
 @functools.lru_cache(maxsize=256)
 def _nominal(plant: Plant, duration: float) -> str:
-    """Return the `_condition_text` of the nominal condition on a plant, "{}" where it does not fit the plant."""
-    common: dict[str, Any] = {"plant": plant, "law": "none", "duration": duration, "control_period": CONTROL_PERIOD}
+    """Return the `_condition_text` of the nominal condition on a plant, "{}" where it does not fit
+    the plant.
+    """
+    common: dict[str, Any] = {
+        "plant": plant,
+        "law": "none",
+        "duration": duration,
+        "control_period": CONTROL_PERIOD,
+    }
     if not plant.limits:  # with limits, its motors bound u
         common["u_max"] = U_MAX
-    with contextlib.suppress(ScenarioError):  # `recorded`: x0 may be outside a joint's range, as this is not run
-        return _condition_text(description(Scenario.recorded(**common | find_condition("nominal").on(plant, duration))))
+    with contextlib.suppress(
+        ScenarioError
+    ):  # `recorded`: x0 may be outside a joint's range, as this is not run
+        return _condition_text(
+            description(Scenario.recorded(**common | find_condition("nominal").on(plant, duration)))
+        )
     return "{}"

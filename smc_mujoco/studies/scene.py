@@ -1,13 +1,16 @@
-"""A scene: one question, the runs that answer it, and how they are shown. The folder scenes/ has a script for each.
+"""A scene: one question, the runs that answer it, and how they are shown.
 
-The docstring of a scene file says the question, the figure of the paper that it answers, and what to look for. The file
+The folder scenes/ has a script for each.
+
+The docstring of a scene file says the question, the figure of the paper that it answers, and what
+to look for. The file
 defines `scene`:
 
     scene = smc.Scene(title="Duffing", conditions={"nominal": smc.paper.comparison("duffing")})
 
-The sentence that answers the question is made of parts, see `Outcome`. Values that differ by less than the least
-relevant difference are tied, as on leaderboards. These are single runs: a study says whether another start or noise
-would change the order.
+The sentence that answers the question is made of parts, see `Outcome`. Values that differ by less
+than the least relevant difference are tied, as on leaderboards. These are single runs: a study says
+whether another start or noise would change the order.
 """
 
 import ast
@@ -39,7 +42,9 @@ Measure = str | Callable[[Trace], float]
 
 
 def settles(trace: Trace) -> bool:
-    """Return whether every channel stays in its settling band, from some time until the end of the run."""
+    """Return whether every channel stays in its settling band, from some time until the end of the
+    run.
+    """
     return math.isfinite(settling_time(trace))
 
 
@@ -47,8 +52,8 @@ def settles(trace: Trace) -> bool:
 class Outcome:
     """The runs of a scene, and their outcome in words: the argument of `Scene.answer`.
 
-    A measure is the name of a metric, or a function Trace -> float. For `least`, smaller values are better. A run that
-    failed has no value, and every `holds` counts as False for it.
+    A measure is the name of a metric, or a function Trace -> float. For `least`, smaller values are
+    better. A run that failed has no value, and every `holds` counts as False for it.
 
     Attributes:
       traces: condition -> label -> Trace.
@@ -74,11 +79,18 @@ class Outcome:
         """Return the outcome of the runs with these labels."""
         for label in labels:
             lookup("label of the scene", label, dict.fromkeys(self.labels))
-        return Outcome(traces={name: {x: run for x, run in runs.items() if x in labels} for name, runs in self})
+        return Outcome(
+            traces={name: {x: run for x, run in runs.items() if x in labels} for name, runs in self}
+        )
 
     def those(self, holds: Callable[[Trace], bool] = settles) -> "Outcome":
-        """Return the outcome of the runs for which `holds` is true; by default, of those that settle."""
-        kept = {name: {label: run for label, run in runs.items() if _true(holds, run)} for name, runs in self}
+        """Return the outcome of the runs for which `holds` is true; by default, of those that
+        settle.
+        """
+        kept = {
+            name: {label: run for label, run in runs.items() if _true(holds, run)}
+            for name, runs in self
+        }
         return Outcome(traces=kept)
 
     def __iter__(self) -> Iterator[tuple[str, Mapping[str, Trace]]]:
@@ -90,24 +102,37 @@ class Outcome:
         return {name: {label: value(run) for label, run in runs.items()} for name, runs in self}
 
     def size(self, measure: Measure, unit: str = "") -> str:
-        """Return a run's value, or the range over several: "0.323 s", "1.12 to 1.13 s, 1 failed", "never".
+        """Return a run's value, or the range over several: "0.323 s", "1.12 to 1.13 s, 1 failed",
+        "never".
 
         Args:
           unit: unit of the value, if the measure is a function.
         """
-        values = [value for by_label in self.values(measure).values() for value in by_label.values()]
+        values = []
+        for by_label in self.values(measure).values():
+            for value in by_label.values():
+                values.append(value)
         units = {unit or _unit(measure, run) for _, runs in self for run in runs.values()}
-        return _range(values, units.pop() if len(units) == 1 else "") if values else "none"
+        if values:
+            return _range(values, units.pop() if len(units) == 1 else "")
+        return "none"
 
     def leaders(self, *measures: Measure) -> list[str]:
-        """Return the labels whose value is smallest, or tied with the smallest, in every measure and condition."""
-        winners = [self._level(name, measure, smallest=True) for name in self.traces for measure in measures]
+        """Return the labels whose value is smallest, or tied with the smallest, in every measure
+        and condition.
+        """
+        winners = []
+        for name in self.traces:
+            for measure in measures:
+                winners.append(self._level(name, measure, smallest=True))
         return [label for label in self.labels if all(label in level for level in winners)]
 
     def least(self, measure: Measure, unit: str = "") -> str:
-        """Return whose value is smallest, with the value: "classical (1.12 s)", "a and b tied (1.12 to 1.13 s)".
+        """Return whose value is smallest, with the value: "classical (1.12 s)", "a and b tied (1.12
+        to 1.13 s)".
 
-        Several conditions have a winner each: "classical (10 ms, 20 ms), adaptive (50 ms)". "none" where all fail.
+        Several conditions have a winner each: "classical (10 ms, 20 ms), adaptive (50 ms)". "none"
+        where all fail.
         """
         return self._first(measure, unit, smallest=True)
 
@@ -116,7 +141,8 @@ class Outcome:
         return self._first(measure, unit, smallest=False)
 
     def who(self, singular: str, plural: str, holds: Callable[[Trace], bool] = settles) -> str:
-        """Return in words for which runs `holds` is true: "all 4 settle", "a and b settle, c does not".
+        """Return in words for which runs `holds` is true: "all 4 settle", "a and b settle, c does
+        not".
 
         Over several conditions: "a settles in all 3 conditions, b in all but 50 ms, c in none".
 
@@ -127,7 +153,10 @@ class Outcome:
         """
         where = self._where(holds)
         if len(self.traces) == 1:
-            yes, no = ([label for label in where if bool(where[label]) == wanted] for wanted in (True, False))
+            yes, no = (
+                [label for label in where if bool(where[label]) == wanted]
+                for wanted in (True, False)
+            )
             return _one_condition(yes, no, singular, plural)
         parts: dict[tuple[str, tuple[str, ...]], list[str]] = {}
         for label, names in where.items():
@@ -140,10 +169,11 @@ class Outcome:
         return ", ".join([sentence, *(f"{joined(parts[part])} {part[0]}" for part in others)])
 
     def up_to(self, holds: Callable[[Trace], bool] = settles) -> str:
-        """Return the last condition that each label tolerates, if the conditions are ordered from weak to strong.
+        """Return the last condition that each label tolerates, if the conditions are ordered from
+        weak to strong.
 
-        It is the last one before `holds` is first false: "a and b 20 ms, c 10 ms, d none". The sentence also names
-        later conditions in which it is true again.
+        It is the last one before `holds` is first false: "a and b 20 ms, c 10 ms, d none". The
+        sentence also names later conditions in which it is true again.
         """
         where, words = self._where(holds), {}
         for label, names in where.items():
@@ -151,22 +181,30 @@ class Outcome:
             good = next((i for i, name in enumerate(tried) if name not in names), len(tried))
             again = [name for name in tried[good:] if name in names]
             text = tried[good - 1] if good else "none"
-            text += f" (and {joined(again)} again)" if again else ""
+            if again:
+                text += f" (and {joined(again)} again)"
+            else:
+                text += ""
             words.setdefault((-good, text), []).append(label)
         return ", ".join(f"{_all(words[key], self.labels)} {key[1]}" for key in sorted(words))
 
     def changes(self, measure: Measure, one: str, other: str, unit: str = "") -> str:
         """Return each label's value in one condition and in another: "a 1.20 to 1.43 s".
 
-        A change below the least relevant difference is called that: "b no relevant change (0.535 s)".
+        A change below the least relevant difference is called that: "b no relevant change (0.535
+        s)".
         """
         value, parts = _function(measure), []
-        before, after = (lookup("condition of the scene", name, self.traces) for name in (one, other))
+        before, after = (
+            lookup("condition of the scene", name, self.traces) for name in (one, other)
+        )
         for label in (label for label in before if label in after):
             run = before[label]
             pair = [value(run), value(after[label])]
             size = _from_to(pair, unit or _unit(measure, run))
-            level = not any(map(math.isnan, pair)) and not _exceeds(max(pair), min(pair), _floor(measure, run))
+            level = not any(map(math.isnan, pair)) and not _exceeds(
+                max(pair), min(pair), _floor(measure, run)
+            )
             parts.append(f"{label} no relevant change ({size})" if level else f"{label} {size}")
         return ", ".join(parts) or "none"
 
@@ -180,15 +218,24 @@ class Outcome:
         return where
 
     def _level(self, condition: str, measure: Measure, smallest: bool) -> dict[str, float]:
-        """Return label -> value of the runs with the extreme value, or tied with it; {} if the smallest is "never"."""
+        """Return label -> value of the runs with the extreme value, or tied with it; {} if the
+        smallest is "never".
+        """
         values = self[condition].values(measure)[condition]
         known = {label: value for label, value in values.items() if not math.isnan(value)}
         if not known or (smallest and min(known.values()) == math.inf):
             return {}
         resolution = _floor(measure, self.traces[condition][next(iter(known))])
         best = (min if smallest else max)(known.values())
-        ends = {label: (value, best) if smallest else (best, value) for label, value in known.items()}
-        return {label: known[label] for label, (a, b) in ends.items() if not _exceeds(a, b, resolution)}
+        ends = {}
+        for label, value in known.items():
+            if smallest:
+                ends[label] = (value, best)
+            else:
+                ends[label] = (best, value)
+        return {
+            label: known[label] for label, (a, b) in ends.items() if not _exceeds(a, b, resolution)
+        }
 
     def _first(self, measure: Measure, unit: str, smallest: bool) -> str:
         """Return in words the runs with the smallest or largest value of each condition."""
@@ -198,12 +245,23 @@ class Outcome:
             winners.setdefault(tuple(level), {})[name] = list(level.values())
         parts = []
         for labels, where in winners.items():
-            several = f"{joined(labels)} tied" if len(labels) > 1 else joined(labels) if labels else "none"
+            if len(labels) > 1:
+                several = f"{joined(labels)} tied"
+            else:
+                several = joined(labels) if labels else "none"
             if 1 < len(labels) == len(self.labels):
                 several = f"{_all(labels, self.labels)} tied"
-            values = [value for of_condition in where.values() for value in of_condition]
-            units = {unit or _unit(measure, self.traces[name][labels[0]]) for name in where if labels}
-            size = _range(values, units.pop()) if len(units) == 1 else ""
+            values = []
+            for of_condition in where.values():
+                for value in of_condition:
+                    values.append(value)
+            units = {
+                unit or _unit(measure, self.traces[name][labels[0]]) for name in where if labels
+            }
+            if len(units) == 1:
+                size = _range(values, units.pop())
+            else:
+                size = ""
             sized = f" ({size})" if size else ""
             if len(self.traces) == 1:
                 parts.append(several + sized)
@@ -217,8 +275,13 @@ class Outcome:
 def _function(measure: Measure) -> Callable[[Trace], float]:
     """Return the function of a measure; its value is NaN for a run that failed."""
     if not isinstance(measure, str) and not callable(measure):
-        raise ScenarioError(f"a measure is {shown(measure)}: give the name of a metric, or a function of a trace")
-    value = lookup("metric", measure, CATALOGUE).of if isinstance(measure, str) else measure
+        raise ScenarioError(
+            f"a measure is {shown(measure)}: give the name of a metric, or a function of a trace"
+        )
+    if isinstance(measure, str):
+        value = lookup("metric", measure, CATALOGUE).of
+    else:
+        value = measure
     return lambda run: math.nan if run.failure is not None else float(value(run))
 
 
@@ -228,23 +291,33 @@ def _true(holds: Callable[[Trace], bool], run: Trace) -> bool:
 
 
 def _one_condition(yes: Sequence[str], no: Sequence[str], singular: str, plural: str) -> str:
-    """Return the sentence of `who` for one condition: who does what the verb says, and who does not."""
+    """Return the sentence of `who` for one condition: who does what the verb says, and who does
+    not.
+    """
     count = len(yes) + len(no)
     if not yes:
-        return f"{no[0]} does not {plural}" if count == 1 else f"none of the {count} {singular}"
+        if count == 1:
+            return f"{no[0]} does not {plural}"
+        return f"none of the {count} {singular}"
     if not no:
-        return f"{yes[0]} {singular}" if count == 1 else f"{_all(yes, yes)} {plural}"
+        if count == 1:
+            return f"{yes[0]} {singular}"
+        return f"{_all(yes, yes)} {plural}"
     return f"{joined(yes)} {singular if len(yes) == 1 else plural}, {joined(no)} {'does' if len(no) == 1 else 'do'} not"
 
 
 def _share(names: Sequence[str], tried: Sequence[str]) -> str:
-    """Return some of the conditions tried in words: "in all 3 conditions", "in all but 50 ms", "in none"."""
+    """Return some of the conditions tried in words: "in all 3 conditions", "in all but 50 ms", "in
+    none".
+    """
     if len(names) == len(tried):
         return f"in {every(len(tried))} conditions"
     if not names:
         return "in none"
     missing = [name for name in tried if name not in names]
-    return f"in all but {joined(missing)}" if len(missing) < len(names) else f"only in {joined(names)}"
+    if len(missing) < len(names):
+        return f"in all but {joined(missing)}"
+    return f"only in {joined(names)}"
 
 
 def _all(some: Sequence[str], labels: Sequence[str]) -> str:
@@ -255,23 +328,32 @@ def _all(some: Sequence[str], labels: Sequence[str]) -> str:
 
 
 def _exceeds(a: float, b: float, resolution: float) -> bool:
-    """Return whether a is larger than b by more than the least relevant difference; inf is not larger than inf."""
+    """Return whether a is larger than b by more than the least relevant difference; inf is not
+    larger than inf.
+    """
     return a != b and bool(exceeds(a, b, resolution))
 
 
 def _floor(measure: Measure, run: Trace) -> float:
     """Return the smallest value of a metric that matters, as on leaderboards; 0 for a function."""
-    return floor(run.scenario, measure) if isinstance(measure, str) else 0.0
+    if isinstance(measure, str):
+        return floor(run.scenario, measure)
+    return 0.0
 
 
 def _unit(measure: Measure, run: Trace) -> str:
     """Return the unit of a metric in a run; "" for a function."""
-    unit = CATALOGUE[measure].unit_in(run.scenario) if isinstance(measure, str) else ""
+    if isinstance(measure, str):
+        unit = CATALOGUE[measure].unit_in(run.scenario)
+    else:
+        unit = ""
     return "" if unit == "1" else unit
 
 
 def _range(values: Sequence[float], unit: str) -> str:
-    """Return the value, or the smallest and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed", "never"."""
+    """Return the value, or the smallest and the largest: "0.323 s", "1.12 to 1.13 s, 1 failed",
+    "never".
+    """
     known = [value for value in values if not math.isnan(value)]
     if not known:
         return "failed"
@@ -284,13 +366,20 @@ def _from_to(pair: Sequence[float], unit: str) -> str:
     texts = ["failed" if math.isnan(value) else number(value) for value in pair]
     if all(map(math.isfinite, pair)):
         return f"{' to '.join(dict.fromkeys(texts))} {unit}".rstrip()
-    sized = (f"{text} {unit}".rstrip() if math.isfinite(v) else text for v, text in zip(pair, texts, strict=True))
+    sized = (
+        f"{text} {unit}".rstrip() if math.isfinite(v) else text
+        for v, text in zip(pair, texts, strict=True)
+    )
     return " to ".join(dict.fromkeys(sized))
 
 
 def summary(runs: Outcome) -> str:
     """Return who settles, who is first, and who failed: the answer of a scene that declares none."""
-    failed = [(label, name) for name, condition in runs for label, run in condition.items() if run.failure is not None]
+    failed = []
+    for name, condition in runs:
+        for label, run in condition.items():
+            if run.failure is not None:
+                failed.append((label, name))
     parts = [runs.who("settles", "settle")]
     if runs.those().labels:
         parts.append(f"first: {runs.least('settling_time')}")
@@ -308,13 +397,16 @@ class Scene:
 
     Attributes:
       title: shown on figures and films.
-      conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its labelled runs.
+      conditions: condition -> label -> Scenario. Each condition gets a figure, which compares its
+        labelled runs.
       film: the condition that is filmed; by default the first.
-      figure: "overview" (as `smc.figure`, a figure for each condition), "signals" (u of all conditions in one) or
-        "chattering" (amplitude over the actuator's lag, predicted and run, all conditions in one).
-      answers: metrics of the driven channels that answer the scene's question, printed after the scores.
-      answer: function of the `Outcome` of all runs that returns the sentence which answers the scene's question. The
-        default says who settles, and who is first.
+      figure: "overview" (as `smc.figure`, a figure for each condition), "signals" (u of all
+        conditions in one) or "chattering" (amplitude over the actuator's lag, predicted and run,
+        all conditions in one).
+      answers: metrics of the driven channels that answer the scene's question, printed after the
+        scores.
+      answer: function of the `Outcome` of all runs that returns the sentence which answers the
+        scene's question. The default says who settles, and who is first.
       camera: of the film, as `smc.film` takes it; default: the plant's own.
     """
 
@@ -329,10 +421,16 @@ class Scene:
     def __post_init__(self):
         errors.name("title", self.title)
         if not isinstance(self.conditions, Mapping) or not self.conditions:
-            raise ScenarioError(f"scene {self.title!r} has conditions {shown(self.conditions)}: give names with runs")
+            raise ScenarioError(
+                f"scene {self.title!r} has conditions {shown(self.conditions)}: give names with runs"
+            )
         for condition, runs in self.conditions.items():
             errors.name(f"a condition of scene {self.title!r}", condition)
-            if not isinstance(runs, Mapping) or not runs or not all(isinstance(s, Scenario) for s in runs.values()):
+            if (
+                not isinstance(runs, Mapping)
+                or not runs
+                or not all(isinstance(s, Scenario) for s in runs.values())
+            ):
                 raise ScenarioError(
                     f"condition {condition!r} of scene {self.title!r} is {shown(runs)}: give labels with Scenarios"
                 )
@@ -347,20 +445,29 @@ class Scene:
         for named in ([(slug(condition), condition) for condition in self.conditions], files):
             made = [file for file, _ in named]
             if same := [name for file, name in named if made.count(file) > 1]:
-                raise ScenarioError(f"scene {self.title!r} has names that make the same file name: {', '.join(same)}")
+                raise ScenarioError(
+                    f"scene {self.title!r} has names that make the same file name: {', '.join(same)}"
+                )
         object.__setattr__(self, "film", self.film or next(iter(self.conditions)))
         lookup(f"condition to film in scene {self.title!r}", self.film, self.conditions)
         lookup("kind of figure", self.figure, dict.fromkeys(("overview", "signals", "chattering")))
         object.__setattr__(self, "camera", checked(self.camera))
-        answers = (self.answers,) if isinstance(self.answers, str) else tuple(self.answers)
+        if isinstance(self.answers, str):
+            answers = (self.answers,)
+        else:
+            answers = tuple(self.answers)
         object.__setattr__(self, "answers", answers)
         for name in answers:
             lookup(f"metric that answers scene {self.title!r}", name, CATALOGUE)
         if not callable(self.answer):
-            raise ScenarioError(f"scene {self.title!r} has answer {shown(self.answer)}: give a function of its runs")
+            raise ScenarioError(
+                f"scene {self.title!r} has answer {shown(self.answer)}: give a function of its runs"
+            )
 
     def sentence(self, traces: Mapping[str, Mapping[str, Trace]]) -> str:
-        """Return the sentence that answers the question of the scene, from condition -> label -> Trace."""
+        """Return the sentence that answers the question of the scene, from condition -> label ->
+        Trace.
+        """
         text = self.answer(Outcome(traces=traces))
         if not isinstance(text, str) or not text.strip():
             raise ScenarioError(
@@ -368,13 +475,17 @@ class Scene:
             )
         text = " ".join(text.split())
         labels = "|".join(re.escape(label) for _, label, _ in self.runs())
-        text = text if re.match(rf"(?:{labels})(?!\w)", text) else capital(text)  # labels stay as in tables
+        # labels stay as in tables
+        if not re.match(rf"(?:{labels})(?!\w)", text):
+            text = capital(text)
         return text + "." * (not text.endswith((".", "?", "!")))
 
     def seeded(self, seed: int) -> "Scene":
         """Return the same scene with another seed in every run."""
         conditions = {
-            condition: {label: dataclasses.replace(scenario, seed=seed) for label, scenario in runs.items()}
+            condition: {
+                label: dataclasses.replace(scenario, seed=seed) for label, scenario in runs.items()
+            }
             for condition, runs in self.conditions.items()
         }
         return dataclasses.replace(self, conditions=conditions)
@@ -394,7 +505,10 @@ def scenes() -> Catalogue[Path]:
 
 
 def _of_package(point: EntryPoint) -> Path:
-    """Return the scene file that an entry point of another package names. The file is read, and not run."""
+    """Return the scene file that an entry point of another package names.
+
+    The file is read, and not run.
+    """
     path = Path(str(source(point).origin))
     ast.parse(path.read_text(encoding="utf-8"), str(path))
     return path
@@ -405,7 +519,9 @@ def find(name: str) -> Path:
     if os.path.isfile(name):
         return Path(name)
     if Path(name).suffix or Path(name).name != name:
-        raise ScenarioError(f"no scene file {name}: give the path of a scene file, or a name from smc-mujoco list")
+        raise ScenarioError(
+            f"no scene file {name}: give the path of a scene file, or a name from smc-mujoco list"
+        )
     return lookup("scene", name, scenes())
 
 
@@ -417,7 +533,9 @@ def read(path: Path) -> Scene:
     else:
         scene = execute(path).get("scene")
     if not isinstance(scene, Scene):
-        raise ScenarioError(f"{path} declares no scene: write `scene = smc.Scene(title=..., conditions=...)`")
+        raise ScenarioError(
+            f"{path} declares no scene: write `scene = smc.Scene(title=..., conditions=...)`"
+        )
     return scene
 
 

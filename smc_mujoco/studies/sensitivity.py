@@ -2,16 +2,18 @@
 
     found = smc.sensitivity(scenario, over=smc.Uncertainty(delay=(0.0, 0.02), mass=(0.7, 1.3)))
 
-The uncertainties vary together, each uniformly within its bounds. An axis's first-order index is the share of the
-score's variance that the axis alone explains. Its total index also counts what it does together with others, so it is
-0 only for an axis that changes nothing. First-order indices add up to at most 1, total ones to at least 1, and so do
-their estimates (`analysis.sensitivity.estimates`, `possible`; design by A. Saltelli et al., Computer Physics
-Communications 181:259, 2010). The variance is that of the score's logarithm if all scores are positive, because scores
-are compared by their ratio. What chance decides, such as the realisation of noise, is an axis, too, so that it is not
-taken for the work of another. Intervals are bootstraps over the sampled points.
+The uncertainties vary together, each uniformly within its bounds. An axis's first-order index is
+the share of the score's variance that the axis alone explains. Its total index also counts what it
+does together with others, so it is 0 only for an axis that changes nothing. First-order indices add
+up to at most 1, total ones to at least 1, and so do their estimates
+(`analysis.sensitivity.estimates`, `possible`; design by A. Saltelli et al., Computer Physics
+Communications 181:259, 2010). The variance is that of the score's logarithm if all scores are
+positive, because scores are compared by their ratio. What chance decides, such as the realisation
+of noise, is an axis, too, so that it is not taken for the work of another. Intervals are bootstraps
+over the sampled points.
 
-A region where runs fail has bounds on at most two axes. Half of the runs choose it, and the other half, which are
-independent, give its rate. The axis to improve is chosen and told in the same way.
+A region where runs fail has bounds on at most two axes. Half of the runs choose it, and the other
+half, which are independent, give its rate. The axis to improve is chosen and told in the same way.
 """
 
 import dataclasses
@@ -53,11 +55,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 METRIC = "rms_error"
-DEFAULT_STEPS = 3_600_000  # physics steps by default, for a plant of one channel: up to 20 s of a core
+DEFAULT_STEPS = (
+    3_600_000  # physics steps by default, for a plant of one channel: up to 20 s of a core
+)
 MIN_POINTS, MAX_POINTS = 8, 4096  # of the default, powers of 2
-ROUGH_POINTS = 32  # with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
+ROUGH_POINTS = (
+    32  # with fewer, intervals of indices may cover less than 90 %, see docs/worst_case.md
+)
 MASS, PERIOD, BOUND = (0.7, 1.3), (1.0, 4.0), (0.5, 1.0)  # factors of the default class: chosen
-DELAY_PERIODS, NOISE, COUNTS = 20.0, 1e-3, (2.0**11, 2.0**15)  # of the default class: control periods, rad or m; chosen
+DELAY_PERIODS, NOISE, COUNTS = (
+    20.0,
+    1e-3,
+    (2.0**11, 2.0**15),
+)  # of the default class: control periods, rad or m; chosen
 FRICTION_SHARE = 1 / 20  # of the force of the weakest drive: of the default class, chosen
 HEADINGS = "axis", "from", "to", "alone", "with others", "more is"
 
@@ -116,7 +126,9 @@ class Sensitivity(Tables, Explained):
             return [f"None of {n} runs fails (at most {100 * share_interval(0.0, n).high:.2g} %)."]
         if count == n:
             return [f"All of {n} runs fail."]
-        told = [f"It fails where {_words(self.space, its.cuts)}: {_rate(its.rate)}" for its in self.regions]
+        told = []
+        for its in self.regions:
+            told.append(f"It fails where {_words(self.space, its.cuts)}: {_rate(its.rate)}")
         if not told:
             return [f"{count} of {n} runs fail, in no region that two bounds could tell."]
         rest = self.regions[-1].outside
@@ -132,21 +144,38 @@ class Sensitivity(Tables, Explained):
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table: the range of each axis, its indices in percent, and whether more of it is better or worse."""
+        """One table: the range of each axis, its indices in percent, and whether more of it is
+        better or worse.
+        """
         rows = []
         for axis in self.axes:
             chance = axis.name == CHANCE
-            ends = ["–", "–"] if chance else [_with_unit(end, axis.unit) for end in (axis.low, axis.high)]
-            trend = "–" if chance or abs(axis.direction) < 0.1 else ("worse" if axis.direction > 0.0 else "better")
-            rows.append([in_words(axis.name), *ends, _percent(axis.first), _percent(axis.total), trend])
+            if chance:
+                ends = ["–", "–"]
+            else:
+                ends = [_with_unit(end, axis.unit) for end in (axis.low, axis.high)]
+            if chance or abs(axis.direction) < 0.1:
+                trend = "–"
+            else:
+                trend = "worse" if axis.direction > 0.0 else "better"
+            rows.append(
+                [in_words(axis.name), *ends, _percent(axis.first), _percent(axis.total), trend]
+            )
         title = f"{self.scenario.law.name} on {self.scenario.plant.name}: shares of the variance of {self.label}, %"
-        key = (
-            "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 % intervals."
-        )
-        fails = ["A run fails, too, if it ends beyond 5 % of its scale."] if self.failed.any() else []
-        missing = [f"{self.unscored} runs have no score and count as the worst."] if self.unscored else []
+        key = "Alone: first-order index. With others: total index, 0 if the axis changes nothing. Below: 95 % intervals."
+        if self.failed.any():
+            fails = ["A run fails, too, if it ends beyond 5 % of its scale."]
+        else:
+            fails = []
+        if self.unscored:
+            missing = [f"{self.unscored} runs have no score and count as the worst."]
+        else:
+            missing = []
         points = len(self.values) // 2
-        few = [f"{points} points, which is few: intervals are rough, so give more."] if points < ROUGH_POINTS else []
+        if points < ROUGH_POINTS:
+            few = [f"{points} points, which is few: intervals are rough, so give more."]
+        else:
+            few = []
         notes = [*self.sentences, *few, *missing, key, *fails]
         return [Tabular(headings=HEADINGS, rows=rows, title=title, notes=notes)]
 
@@ -155,13 +184,23 @@ class Sensitivity(Tables, Explained):
         fields = "metric", "unit", "runs"
         data: dict[str, Any] = {name: getattr(self, name) for name in fields}
         data |= {"over": dataclasses.asdict(self.over), "says": self.sentences}
-        indices = [{"first": axis.first._asdict(), "total": axis.total._asdict()} for axis in self.axes]
+        indices = []
+        for axis in self.axes:
+            indices.append({"first": axis.first._asdict(), "total": axis.total._asdict()})
         data["axes"] = [axis._asdict() | its for axis, its in zip(self.axes, indices, strict=True)]
-        samples = {name: self.space.column(i, self.shares).tolist() for i, name in enumerate(self.space.names)}
-        return data | {"samples": samples, "values": self.values.tolist(), "failed": self.failed.tolist()}
+        samples = {}
+        for i, name in enumerate(self.space.names):
+            samples[name] = self.space.column(i, self.shares).tolist()
+        return data | {
+            "samples": samples,
+            "values": self.values.tolist(),
+            "failed": self.failed.tolist(),
+        }
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
-        """Draw the indices, and the runs over the two axes that tell most; arguments as in `smc.figure`."""
+        """Draw the indices, and the runs over the two axes that tell most; arguments as in
+        `smc.figure`.
+        """
         from smc_mujoco.draw.sensitivity import draw
 
         return draw(self, path, **options)
@@ -182,33 +221,43 @@ def sensitivity(
     """Find which uncertainties explain a law's score, and where its runs fail.
 
     Args:
-      scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and parameters.
-      over: the class. Its disturbance and its errors of measurement are axes with a level from 0 to the bound, and
-        random within it. Default: mass, friction, delay, noise, encoder, period and bound, see `default_over`.
+      scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
+        parameters.
+      over: the class. Its disturbance and its errors of measurement are axes with a level from 0 to
+        the bound, and random within it. Default: mass, friction, delay, noise, encoder, period and
+        bound, see `default_over`.
       metric: name of any metric; more is worse. A run without a score counts as the worst.
-      points: number of points, a power of 2; with k axes there are (k + 2) times as many runs. Default: as many as
-        take up to about 20 s of one core, but at least 8, with which the Panda takes 25 s. A result of fewer than 32
-        says so.
+      points: number of points, a power of 2; with k axes there are (k + 2) times as many runs.
+        Default: as many as take up to about 20 s of one core, but at least 8, with which the Panda
+        takes 25 s. A result of fewer than 32 says so.
       seed: of the points.
       threads, progress: as in `run`. The result does not depend on threads.
 
     Raises:
-      ScenarioError: a class that the plant cannot have, an unknown metric, points that are no power of 2, or no run
-        with a score.
+      ScenarioError: a class that the plant cannot have, an unknown metric, points that are no power
+        of 2, or no run with a score.
     """
     if not isinstance(scenario, Scenario):
-        raise ScenarioError(f"sensitivity is of a Scenario, not {shown(scenario)}: give smc.Scenario(...)")
-    over = default_over(scenario) if over is None else over
+        raise ScenarioError(
+            f"sensitivity is of a Scenario, not {shown(scenario)}: give smc.Scenario(...)"
+        )
+    if over is None:
+        over = default_over(scenario)
     if not isinstance(over, Uncertainty):
-        raise ScenarioError(f"over is {shown(over)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))")
+        raise ScenarioError(
+            f"over is {shown(over)}: give a class, such as smc.Uncertainty(delay=(0.0, 0.02))"
+        )
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)
     space = Space(scenario, over)
     k = len(space.names)
-    points = default_points(space.scenario_at(np.full(k, 0.5)), k) if points is None else points
+    if points is None:
+        points = default_points(space.scenario_at(np.full(k, 0.5)), k)
     if points & (points - 1):
-        raise ScenarioError(f"points is {points}: give a power of 2, such as {1 << points.bit_length() - 1}")
+        raise ScenarioError(
+            f"points is {points}: give a power of 2, such as {1 << points.bit_length() - 1}"
+        )
     design = designs(points, k, seed)
     scores, held = np.empty(len(design)), np.empty(len(design), bool)
     broken = ""
@@ -220,7 +269,10 @@ def sensitivity(
     if broken and np.isfinite(scores).any():
         warn_of_broken({scenario.law.name: broken})
     if not (finite := np.isfinite(scores)).any():
-        cure = f"{broken}: correct the law" if broken else "give longer runs, another metric or a narrower class"
+        if broken:
+            cure = f"{broken}: correct the law"
+        else:
+            cure = "give longer runs, another metric or a narrower class"
         raise ScenarioError(f"no run of {len(scores)} has a {metric}: {cure}")
     scores[~finite] = scores[finite].max()
     halves = slice(0, 2 * points)  # A, which chooses, then B, which tells
@@ -245,11 +297,12 @@ def sensitivity(
 
 
 def default_over(scenario: Scenario) -> Uncertainty:
-    """Return the default class: what the plant declares as `uncertain`, or its mass, and what machines differ in.
+    """Return the default class: what the plant declares as `uncertain`, or its mass, and what
+    machines differ in.
 
-    Mass x .7 to 1.3, dry friction up to a twentieth of the force of the weakest drive, delay up to 20 control periods,
-    noise up to 1 mrad or mm at each sample, encoders of 2^11 to 2^15 counts, u_max x .5 to 1, control period x 1 to 4.
-    A free body has no friction and no encoder.
+    Mass x .7 to 1.3, dry friction up to a twentieth of the force of the weakest drive, delay up to
+    20 control periods, noise up to 1 mrad or mm at each sample, encoders of 2^11 to 2^15 counts,
+    u_max x .5 to 1, control period x 1 to 4. A free body has no friction and no encoder.
     """
     plant, u, flies = scenario.plant, strength(scenario), bool(scenario.plant.pose)
     return Uncertainty(
@@ -266,7 +319,9 @@ def default_over(scenario: Scenario) -> Uncertainty:
 
 
 def default_points(scenario: Scenario, axes: int) -> int:
-    """Return the number of points, a power of 2, for which runs like this one take about 20 s of one core."""
+    """Return the number of points, a power of 2, for which runs like this one take about 20 s of
+    one core.
+    """
     dry = 1 + bool(scenario.friction and not scenario.exact_friction)
     a_run = scenario.samples * scenario.steps * (1 + scenario.plant.n) / 2 * dry
     most = DEFAULT_STEPS / (a_run * (axes + 2))

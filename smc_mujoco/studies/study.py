@@ -1,12 +1,12 @@
 """A study: many runs, stored as they finish, and a table of their scores.
 
-A run is identified by everything that determines its result: the scenario, the code of its law, of its signals and of
-your other parts, and the versions of the packages. A run with a result in the folder is repeated only if this code has
-changed.
+A run is identified by everything that determines its result: the scenario, the code of its law, of
+its signals and of your other parts, and the versions of the packages. A run with a result in the
+folder is repeated only if this code has changed.
 
-Finished runs are in parts, parquet files named by a hash of the runs in them. A file that is damaged, has other
-columns, or has scores by other code is ignored, and its runs count as not done. The bytes of results.parquet depend
-only on its rows.
+Finished runs are in parts, parquet files named by a hash of the runs in them. A file that is
+damaged, has other columns, or has scores by other code is ignored, and its runs count as not done.
+The bytes of results.parquet depend only on its rows.
 """
 
 import contextlib
@@ -49,7 +49,8 @@ if TYPE_CHECKING:
 IDEAL = ("nominal", "noise", "sine", "constant", "delay_10ms", "heavy", "jump_mild")
 REAL = ("coulomb", "dc_motor", "backlash", "encoder", "contact")
 Traces = Annotated[str, OneOf(names=("none", "worst", "all"))]  # choices of traces to save
-REPEATED_SEEDS = 4  # one seed in so many is repeated at half the step, where no constraint acts under RK4; chosen
+# one seed in so many is repeated at half the step, where no constraint acts under RK4; chosen
+REPEATED_SEEDS = 4
 ROWS_PER_GROUP = 4096  # rows in memory at once while the table is written; chosen
 MAX_OPEN_PARTS = 64  # parts in memory at once while the table is written; chosen
 MAX_TEMPORARY_AGE = 3600.0  # s: older temporary files belong to a killed study; chosen
@@ -62,7 +63,9 @@ class Store:
     def __init__(self, out: Path):
         self.parts, self.results = out / "parts", out / "results.parquet"
         self.schema = tables.schema({"scores": fingerprint.of(tuple(m.formula for m in metrics()))})
-        self.where: dict[str, tuple[Path, int]] = {}  # hash of a finished run -> its part, and its row in it
+        self.where: dict[
+            str, tuple[Path, int]
+        ] = {}  # hash of a finished run -> its part, and its row in it
 
     def open(self, resume: bool) -> None:
         """Make the folder and list the runs in it. Without `resume`, remove them and the table."""
@@ -93,7 +96,10 @@ class Store:
         import pyarrow as pa
 
         hashes = [row["hash"] for row in rows]
-        path = self.parts / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
+        path = (
+            self.parts
+            / f"{hashlib.sha256(''.join(sorted(hashes)).encode()).hexdigest()[:32]}.parquet"
+        )
         tables.write(path, self.schema, [pa.Table.from_pylist(list(rows), schema=self.schema)])
         self.where.update((name, (path, i)) for i, name in enumerate(hashes))
 
@@ -110,8 +116,9 @@ class Store:
     def collect(self, hashes: Sequence[str], changes: Mapping[str, Mapping[str, Any]]) -> None:
         """Write the table of these finished runs, in this order.
 
-        `changes` is hash -> columns that replace those of the part: scores at half the step, what a part does not tell,
-        and the source of the gains, because the part may be from an earlier study whose gains had another source.
+        `changes` is hash -> columns that replace those of the part: scores at half the step, what a
+        part does not tell, and the source of the gains, because the part may be from an earlier
+        study whose gains had another source.
         """
         import pyarrow as pa
 
@@ -124,7 +131,9 @@ class Store:
             parts = []
             for path, indices in places.items():
                 if (part := read(path)) is None:
-                    raise ScenarioError(f"part {path} was removed or broken while the study ran: start it again")
+                    raise ScenarioError(
+                        f"part {path} was removed or broken while the study ran: start it again"
+                    )
                 parts.append(part.take([self.where[names[i]][1] for i in indices]))
             order = np.argsort(np.concatenate(list(places.values())))
             data = pa.concat_tables(parts).take(order).combine_chunks()
@@ -145,7 +154,9 @@ class Store:
                 part = tables.read(file, sealed=True)
         except ScenarioError:
             return None
-        complete = part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count
+        complete = (
+            part.schema.equals(self.schema, check_metadata=True) and not part["hash"].null_count
+        )
         return part if complete else None
 
 
@@ -181,35 +192,42 @@ def study(
     traces: Traces = "none",
     half_steps: bool = False,
 ) -> Table:
-    """Run and score scenarios; write a table with a row for each to out/results.parquet, and return it.
+    """Run and score scenarios; write a table with a row for each to out/results.parquet, and return
+    it.
 
-    Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored in out/parts, some
-    seconds of work in each file. If a study was killed, or filled the disk, start it again with the same arguments: it
-    continues, and ends with the same file, bit for bit.
+    Rows are in the order of the scenarios; equal scenarios have one row. Finished runs are stored
+    in out/parts, some seconds of work in each file. If a study was killed, or filled the disk,
+    start it again with the same arguments: it continues, and ends with the same file, bit for bit.
 
     Args:
       scenarios: any number of Scenarios, such as those of `smc.grid`.
       out: folder of the study; it may contain the parts of other studies.
       resume: whether to keep the finished runs in the folder; False removes them first.
-      executor: "local", "dask://HOST:PORT" (or "tcp://HOST:PORT") for the workers of that scheduler, a dask Client, or
-        any concurrent.futures.Executor, whose workers run one simulation each. The study does not close it.
+      executor: "local", "dask://HOST:PORT" (or "tcp://HOST:PORT") for the workers of that
+        scheduler, a dask Client, or any concurrent.futures.Executor, whose workers run one
+        simulation each. The study does not close it.
       threads: number of simulations at a time, if local; None for one per available core.
       progress: whether to show a progress bar.
-      traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and condition: of a failed
-        run, else of one that never settles, else of the one with the largest ultimate bound.
-      half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no winner that the step
-        decides: all of them where constraints may act or the integrator is not RK4, elsewhere one seed in four.
+      traces: traces to save in out/traces: "none", "all", or "worst", one for every plant and
+        condition: of a failed run, else of one that never settles, else of the one with the largest
+        ultimate bound.
+      half_steps: whether to repeat runs at half the physics step, so that `leaderboard` names no
+        winner that the step decides: all of them where constraints may act or the integrator is not
+        RK4, elsewhere one seed in four.
 
     Raises:
-      ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that are missing or die.
-        Finished runs stay.
+      ScenarioError: scenarios that cannot be run, a folder that cannot be written, or workers that
+        are missing or die. Finished runs stay.
     """
     where = executors.as_executor(executor)
     threads = cores(threads)
     store, folder = Store(Path(out)), Path(out) / "traces"
     plants: run_key.Hashes = {}
     by_key = _by_key(_checked(scenarios), store, resume, plants)
-    repeated = _repeated(by_key, plants) if half_steps else {}
+    if half_steps:
+        repeated = _repeated(by_key, plants)
+    else:
+        repeated = {}
     every = by_key | {name: scenario for name, scenario in repeated.values() if name not in by_key}
     missing = {name: scenario for name, scenario in every.items() if name not in store.where}
     if progress and (done := len(every) - len(missing)):
@@ -224,7 +242,9 @@ def study(
     return table
 
 
-def _by_key(scenarios: Iterator[Scenario], store: Store, resume: bool, plants: run_key.Hashes) -> dict[str, Scenario]:
+def _by_key(
+    scenarios: Iterator[Scenario], store: Store, resume: bool, plants: run_key.Hashes
+) -> dict[str, Scenario]:
     """Return hash -> scenario, and open the store."""
     by_key: dict[str, Scenario] = {}
     for scenario in scenarios:
@@ -242,7 +262,9 @@ def _compute(
     progress: bool,
     traces: Path | None,
 ) -> None:
-    """Compute runs, given by key, store their rows as they finish, and save the traces of local ones in a folder."""
+    """Compute runs, given by key, store their rows as they finish, and save the traces of local
+    ones in a folder.
+    """
     # made before any run: a law may change its globals
     first = {id(scenario): {"hash": key} for key, scenario in missing.items()}
 
@@ -259,14 +281,22 @@ def _compute(
 
     with counter(len(missing), sum(s.work for s in missing.values()), progress) as stepped:
         if where == "local":
-            executors.compute_here(executors.batches(missing.values(), threads), threads, finish_here, stepped)
+            executors.compute_here(
+                executors.batches(missing.values(), threads), threads, finish_here, stepped
+            )
         else:
             with executors.opened(where) as pool:
-                executors.compute_elsewhere(executors.batches(missing.values(), 1), pool, finish, stepped)
+                executors.compute_elsewhere(
+                    executors.batches(missing.values(), 1), pool, finish, stepped
+                )
 
 
-def _repeated(runs: Mapping[str, Scenario], plants: run_key.Hashes) -> dict[str, tuple[str, Scenario]]:
-    """Return hash -> hash and scenario of the same run at half the physics step, for the runs that are repeated."""
+def _repeated(
+    runs: Mapping[str, Scenario], plants: run_key.Hashes
+) -> dict[str, tuple[str, Scenario]]:
+    """Return hash -> hash and scenario of the same run at half the physics step, for the runs that
+    are repeated.
+    """
     again = {}
     for name, scenario in runs.items():
         if repeats_all(scenario) or scenario.seed % REPEATED_SEEDS == 0:
@@ -279,19 +309,23 @@ def _repeated(runs: Mapping[str, Scenario], plants: run_key.Hashes) -> dict[str,
 def _half_step_scores(repeated: Mapping[str, tuple[str, Scenario]], store: Store) -> dict[str, str]:
     """Return hash -> the scores of the repeated run as JSON; {} for one that failed."""
     names = [metric.name for metric in metrics()]
-    scores = {
-        row["hash"]: to_json({name: row[name] for name in names if row[name] is not None})
-        for row in store.rows({half for half, _ in repeated.values()})
-    }
+    scores = {}
+    for row in store.rows({half for half, _ in repeated.values()}):
+        scores[row["hash"]] = to_json({name: row[name] for name in names if row[name] is not None})
     return {name: scores[half] for name, (half, _) in repeated.items() if half in scores}
 
 
 def _checked(scenarios: Any) -> Iterator[Scenario]:
     """Check and yield scenarios one by one: a generator with a wrong item may be endless."""
-    empty, several = True, isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping)
+    empty, several = (
+        True,
+        isinstance(scenarios, Iterable) and not isinstance(scenarios, str | bytes | Mapping),
+    )
     for scenario in scenarios if several else ():
         if not isinstance(scenario, Scenario):
-            raise ScenarioError(f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid")
+            raise ScenarioError(
+                f"cannot study {shown(scenario)}: give scenarios, such as those of smc.grid"
+            )
         checked_name(scenario.law)
         yield scenario
         empty = False
@@ -309,7 +343,9 @@ def trace_file(folder: Path, row: Mapping[str, Any]) -> Path:
 
 
 def worst_rows(table: Table) -> list[int]:
-    """Return row indices of the worst runs by plant and condition: failed, unsettled, then by bound or overshoot."""
+    """Return row indices of the worst runs by plant and condition: failed, unsettled, then by bound
+    or overshoot.
+    """
     failed, bounds = table.column("failure") != np.array(None), table.column("ultimate_bound")
     ends = np.where(np.isnan(bounds), table.column("overshoot"), bounds)
     unsettled = table.column("settling_time") == np.inf

@@ -8,11 +8,13 @@ Columns:
 
 - the run: `hash`, `plant`, `law`, `gains` as JSON, `condition`, `seed`, and
   `duration` in s;
-- where its gains come from: `source`, a kind of `control.source`, and `search` as JSON, null if there was no search;
+- where its gains come from: `source`, a kind of `control.source`, and `search` as JSON, null if
+  there was no search;
 - every metric of `smc.score`: null if the run failed or the metric does not apply, inf for "never";
 - how the run failed: `diverged_at` in s, and `failure`;
-- what `leaderboard` charges: `half_step`, the scores of the same run at half the physics step, as JSON, null where it
-  was not repeated; `trends`, the ratios of the metrics of the last part to those before it, see `ranking`, as JSON;
+- what `leaderboard` charges: `half_step`, the scores of the same run at half the physics step, as
+  JSON, null where it was not repeated; `trends`, the ratios of the metrics of the last part to
+  those before it, see `ranking`, as JSON;
 
 - the data to repeat it, as JSON: `versions` and `scenario`.
 """
@@ -43,9 +45,16 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 # Column -> its type. RUN_COLUMNS stand before the metrics, RESULT_COLUMNS after them.
-RUN_COLUMNS = dict.fromkeys(("hash", "plant", "law", "gains", "source", "search", "condition"), "string")
+RUN_COLUMNS = dict.fromkeys(
+    ("hash", "plant", "law", "gains", "source", "search", "condition"), "string"
+)
 RUN_COLUMNS |= {"seed": "int64", "duration": "float64"}
-RESULT_COLUMNS = {"diverged_at": "float64", "failure": "string", "half_step": "string", "trends": "string"}
+RESULT_COLUMNS = {
+    "diverged_at": "float64",
+    "failure": "string",
+    "half_step": "string",
+    "trends": "string",
+}
 RESULT_COLUMNS |= {"checked": "bool"}
 RESULT_COLUMNS |= {"versions": "string", "scenario": "string"}
 PREVIEW = ("plant", "law", "source", "condition", "seed")
@@ -58,9 +67,16 @@ def schema(metadata: Mapping[str, str]) -> "pa.Schema":
     """Return the schema of a study's files."""
     import pyarrow as pa
 
-    kinds = {"bool": pa.bool_(), "string": pa.string(), "int64": pa.int64(), "float64": pa.float64()}
+    kinds = {
+        "bool": pa.bool_(),
+        "string": pa.string(),
+        "int64": pa.int64(),
+        "float64": pa.float64(),
+    }
     columns = RUN_COLUMNS | {m.name: "float64" for m in metrics()} | RESULT_COLUMNS
-    return pa.schema([(name, kinds[kind]) for name, kind in columns.items()], metadata=dict(metadata))
+    return pa.schema(
+        [(name, kinds[kind]) for name, kind in columns.items()], metadata=dict(metadata)
+    )
 
 
 def content(rows: "pa.Table") -> bytes:
@@ -77,9 +93,11 @@ def content(rows: "pa.Table") -> bytes:
 
 
 def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None:
-    """Write a parquet file with a row group for each table, and a digest of all rows in its metadata.
+    """Write a parquet file with a row group for each table, and a digest of all rows in its
+    metadata.
 
-    The digest is needed because parquet's checksums cover neither the headers of pages nor the footer.
+    The digest is needed because parquet's checksums cover neither the headers of pages nor the
+    footer.
     """
     import pyarrow.parquet as pq
 
@@ -96,16 +114,23 @@ def write(path: Path, schema: "pa.Schema", groups: "Iterable[pa.Table]") -> None
 
 
 def read(path: Path, sealed: bool = False) -> "pa.Table":
-    """Return the rows that `write` wrote; if `sealed`, refuse a file without a digest, such as another program's."""
+    """Return the rows that `write` wrote; if `sealed`, refuse a file without a digest, such as
+    another program's.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     with pq.ParquetFile(path, page_checksum_verification=True) as file:
         size = sum(file.metadata.row_group(i).total_byte_size for i in range(file.num_row_groups))
         if size > max(MAX_UNPACKED, MAX_RATIO * Path(path).stat().st_size):
-            raise ScenarioError(f"it unpacks to {size / 1e6:,.0f} MB, and {MAX_UNPACKED / 1e6:,.0f} MB are allowed")
+            raise ScenarioError(
+                f"it unpacks to {size / 1e6:,.0f} MB, and {MAX_UNPACKED / 1e6:,.0f} MB are allowed"
+            )
         groups = [file.read_row_group(i) for i in range(file.num_row_groups)]
-        rows = pa.concat_tables(groups) if groups else file.read()
+        if groups:
+            rows = pa.concat_tables(groups)
+        else:
+            rows = file.read()
         metadata = dict(file.metadata.metadata or {})
     written, digest = metadata.pop(DIGEST, None), hashlib.sha256()
     for group in groups:
@@ -133,13 +158,16 @@ class Table:
         """Return the table in a parquet file that a study wrote, or in the study's folder.
 
         Raises:
-          ScenarioError: no such file, not a table of a study, or one that has changed since it was written.
+          ScenarioError: no such file, not a table of a study, or one that has changed since it was
+            written.
         """
         if isinstance(path, str | os.PathLike) and os.path.isdir(path):
             path = Path(path) / "results.parquet"
         with reading(path, "table", "give the results.parquet of a study that has ended") as file:
             data = read(file)
-            if missing := [name for name in (*RUN_COLUMNS, *RESULT_COLUMNS) if name not in data.column_names]:
+            if missing := [
+                name for name in (*RUN_COLUMNS, *RESULT_COLUMNS) if name not in data.column_names
+            ]:
                 raise ScenarioError(f"it has no column {missing[0]!r}")
         return cls(data=data)
 
@@ -147,15 +175,27 @@ class Table:
         return self.data.num_rows
 
     def __repr__(self) -> str:
-        counts = (counted(len(set(self.column(name).tolist())), name) for name in ("plant", "law", "condition"))
+        counts = (
+            counted(len(set(self.column(name).tolist())), name)
+            for name in ("plant", "law", "condition")
+        )
         return f"Table({len(self)} runs: {', '.join(counts)})"
 
     def _repr_html_(self) -> str:
         names = [name for name in PREVIEW if name in self.data.column_names]
-        rows = [list(row.values()) for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist()]
-        cells = [["" if v is None else number(v) if isinstance(v, float) else v for v in row] for row in rows]
+        rows = [
+            list(row.values()) for row in self.data.select(names).slice(0, MAX_ROWS).to_pylist()
+        ]
+        cells = []
+        for row in rows:
+            cells.append(
+                ["" if v is None else number(v) if isinstance(v, float) else v for v in row]
+            )
         rest = len(self) - len(rows)
-        note = f"and {rest} more: Table.rows, Table.column" if rest else ""
+        if rest:
+            note = f"and {rest} more: Table.rows, Table.column"
+        else:
+            note = ""
         return html_table(names, cells, repr(self), note, range(4, 9))
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
@@ -186,7 +226,9 @@ class Table:
         law: str | Sequence[str] | None = None,
         condition: str | Sequence[str] | None = None,
     ) -> "Table":
-        """Return the rows with this plant, law and condition, each a name, several, or None for all."""
+        """Return the rows with this plant, law and condition, each a name, several, or None for
+        all.
+        """
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -194,7 +236,10 @@ class Table:
         for name, wanted in (("plant", plant), ("law", law), ("condition", condition)):
             if wanted is not None:
                 several = isinstance(wanted, Iterable) and not isinstance(wanted, str)
-                names = items_of(name, wanted) if several else [wanted]
+                if several:
+                    names = items_of(name, wanted)
+                else:
+                    names = [wanted]
                 known = dict.fromkeys(self.column(name).tolist())
                 for value in names:
                     find(f"{name} of this table", value, known)
@@ -211,9 +256,15 @@ class Table:
         about = from_json(row["scenario"][0].as_py())
         if "source" in row.column_names:
             search = row["search"][0].as_py()
-            about["source"] = {"kind": row["source"][0].as_py(), "search": search and from_json(search)}
+            about["source"] = {
+                "kind": row["source"][0].as_py(),
+                "search": search and from_json(search),
+            }
         return serialise.restore(about)
 
     def trace(self, i: int) -> Trace:
-        """Run row i again and return its trace. With the same versions it is equal to the last bit."""
+        """Run row i again and return its trace.
+
+        With the same versions it is equal to the last bit.
+        """
         return run(self.scenario(i))

@@ -1,8 +1,10 @@
-"""The worst that an adversary finds for a law within a class of uncertainty, beside the median of random members.
+"""The worst that an adversary finds for a law within a class of uncertainty, beside the median of
+random members.
 
-Sliding mode promises that the error stays small whatever a disturbance does within its bound. A median over random
-seeds does not test this. The user gives the class. The search has no parameters, so that no law gets a milder adversary
-than another. `analysis.worst_case` describes both. The worst run that is found is a lower bound of the worst case.
+Sliding mode promises that the error stays small whatever a disturbance does within its bound. A
+median over random seeds does not test this. The user gives the class. The search has no parameters,
+so that no law gets a milder adversary than another. `analysis.worst_case` describes both. The worst
+run that is found is a lower bound of the worst case.
 """
 
 import dataclasses
@@ -35,8 +37,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 METRIC = "rms_error"
-DURATION = 8.0  # s, default of attacked runs: the error counts from a quarter of it on, when laws have settled
-DEFAULT_STEPS = 1_250_000  # physics steps of a search by default, for a plant of one channel: 4 s of a core
+# s, default of attacked runs: the error counts from a quarter of it on, when laws have settled
+DURATION = 8.0
+DEFAULT_STEPS = (
+    1_250_000  # physics steps of a search by default, for a plant of one channel: 4 s of a core
+)
 MIN_RUNS, MAX_RUNS = 24, 1024  # of the default budget
 MAX_BUDGET = 1_000_000
 PANELS = "error", "d", "u", "phase"  # of a figure
@@ -57,7 +62,8 @@ class WorstCase(Tables):
     nominal: Scenario  # the scenario that was given
     within: Uncertainty  # the class
     metric: str  # its name
-    outside: str  # why the theorem of the law does not cover the class; "" if nothing is known against it
+    # why the theorem of the law does not cover the class; "" if nothing is known against it
+    outside: str
     seed: int  # of the search
     sets: int = 1  # number of sets of the machine's parameters that the adversary chose from
 
@@ -80,7 +86,10 @@ class WorstCase(Tables):
     @property
     def class_words(self) -> str:
         """The class in words."""
-        sets = [f"any of {self.sets} parameter sets"] if self.sets > 1 else []
+        if self.sets > 1:
+            sets = [f"any of {self.sets} parameter sets"]
+        else:
+            sets = []
         return ", ".join([*sets, self.within.words(self.nominal.plant)])
 
     def shown(self, value: float) -> str:
@@ -100,7 +109,10 @@ class WorstCase(Tables):
         """Return it as JSON data, with the scenario as in a trace's file."""
         names = "value", "median", "unit", "found_by", "tried", "metric", "outside", "seed", "sets"
         values = {name: getattr(self, name) for name in names}
-        return values | {"within": dataclasses.asdict(self.within), "scenario": serialise.describe(self.scenario)}
+        return values | {
+            "within": dataclasses.asdict(self.within),
+            "scenario": serialise.describe(self.scenario),
+        }
 
     @property
     def tables(self) -> list[Tabular]:
@@ -122,10 +134,14 @@ class WorstCases(Tables, list[WorstCase]):
 
     @property
     def tau(self) -> float:
-        """Kendall's tau between the order by median and the order by worst found; NaN for fewer than two laws."""
+        """Kendall's tau between the order by median and the order by worst found; NaN for fewer
+        than two laws.
+        """
         from scipy.stats import kendalltau
 
-        return float(kendalltau([case.median for case in self], [case.value for case in self]).statistic)  # pyright: ignore[reportAttributeAccessIssue] scipy's stubs lack it
+        return float(
+            kendalltau([case.median for case in self], [case.value for case in self]).statistic
+        )  # pyright: ignore[reportAttributeAccessIssue] scipy's stubs lack it
 
     @property
     def title(self) -> str:
@@ -136,31 +152,51 @@ class WorstCases(Tables, list[WorstCase]):
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table: the worst run of each law, the median of random members, and the place by median."""
+        """One table: the worst run of each law, the median of random members, and the place by
+        median.
+        """
         by_median = sorted(self, key=lambda case: case.median)
         rows = []
         for case in self:
             law = Cell(case.nominal.law.name, colour=law_colour(case.nominal.law.name))
             place = str(by_median.index(case) + 1)
-            rows.append([law, case.shown(case.value), case.shown(case.median), place, case.found_by])
+            rows.append(
+                [law, case.shown(case.value), case.shown(case.median), place, case.found_by]
+            )
         return [Tabular(headings=HEADINGS, rows=rows, title=self.title, notes=self.notes)]
 
     @property
     def notes(self) -> list[str]:
-        """The meaning of the numbers, Kendall's tau, laws whose theorem does not cover the class, and untuned laws."""
-        key = ["The median is that of random members of the class. The true worst case may be worse."]
-        tau = [f"Kendall's tau between the two orders: {self.tau:.2f}"] if len(self) > 2 else []
+        """The meaning of the numbers, Kendall's tau, laws whose theorem does not cover the class,
+        and untuned laws.
+        """
+        key = [
+            "The median is that of random members of the class. The true worst case may be worse."
+        ]
+        if len(self) > 2:
+            tau = [f"Kendall's tau between the two orders: {self.tau:.2f}"]
+        else:
+            tau = []
         laws = {case.nominal.law.name: case for case in self}
         beyond = [f"{law}: {case.outside}" for law, case in laws.items() if case.outside]
-        return [*key, *tau, *beyond, *untuned_laws({law: case.nominal.law.source.kind for law, case in laws.items()})]
+        return [
+            *key,
+            *tau,
+            *beyond,
+            *untuned_laws({law: case.nominal.law.source.kind for law, case in laws.items()}),
+        ]
 
     def figure(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
-        """Draw the worst runs of all laws, or of one law beside the given run; arguments as in `smc.figure`."""
+        """Draw the worst runs of all laws, or of one law beside the given run; arguments as in
+        `smc.figure`.
+        """
         from smc_mujoco.draw.figure import figure
 
         first = self[0]
         metric = CATALOGUE[first.metric].label
-        runs = {f"{law_name(case.nominal.law)}: {metric} {case.words}": case.scenario for case in self}
+        runs = {}
+        for case in self:
+            runs[f"{law_name(case.nominal.law)}: {metric} {case.words}"] = case.scenario
         if len(self) == 1:
             worst = f"worst found, {metric} {first.words}"
             runs = {"as given": first.nominal, worst: first.scenario}
@@ -181,25 +217,32 @@ def worst_case(
     """Search for the worst run of a scenario within a class of uncertainty, and return it.
 
     Args:
-      scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and parameters. Or several,
-        such as a rig's parameter sets: the first is the nominal one, and the adversary chooses.
-      metric: name of any metric; more is worse. Default: the rms error from a quarter of the run on.
-      within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what the
-        plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a sixth of the force of the
-        weakest drive; and friction within 50 %.
-      budget: number of runs of the search; random members get as many. A larger budget continues the same search.
-        Default: as many as take about 10 s of one core together, by the number of physics steps.
+      scenario: plant, law and conditions. The class adds to its disturbances, noise, delay and
+        parameters. Or several, such as a rig's parameter sets: the first is the nominal one, and
+        the adversary chooses.
+      metric: name of any metric; more is worse. Default: the rms error from a quarter of the run
+        on.
+      within: the class, such as smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3)). Default: what
+        the plant declares as `uncertain`, such as an arm's payload, or else disturbances up to a
+        sixth of the force of the weakest drive; and friction within 50 %.
+      budget: number of runs of the search; random members get as many. A larger budget continues
+        the same search. Default: as many as take about 10 s of one core together, by the number of
+        physics steps.
       seed: of the random members and of the search.
       threads, progress: as in `run`. The result does not depend on threads.
 
     Raises:
-      ScenarioError: a class that the plant cannot have, an unknown metric, or one that the plant does not have.
+      ScenarioError: a class that the plant cannot have, an unknown metric, or one that the plant
+        does not have.
     """
     scenarios = _listed(scenario)
     scenario = scenarios[0]
-    within = default_class(scenario) if within is None else within
+    if within is None:
+        within = default_class(scenario)
     if not isinstance(within, Uncertainty):
-        raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
+        raise ScenarioError(
+            f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
+        )
     if within.period != (1.0, 1.0):
         raise ScenarioError(
             "the adversary's forces have a value a sample, so period cannot differ: leave it out of within"
@@ -207,10 +250,13 @@ def worst_case(
     entry = find("metric", metric, CATALOGUE)
     if why := entry.refusal(scenario.plant):
         raise ScenarioError(why)
-    budget = default_budget(scenario, within) if budget is None else budget
+    if budget is None:
+        budget = default_budget(scenario, within)
     members = Members(scenarios, within)
     work = 2 * budget * scenario.work
-    with bar(f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress) as drawn:
+    with bar(
+        f"worst case of {scenario.law.name} on {scenario.plant.name}", work, shown=progress
+    ) as drawn:
         drawing, search = (Search(members, entry, budget, threads, drawn.advance) for _ in range(2))
         drawing.draw(np.random.default_rng([seed, 0]))
         early = sorted(drawing.tried[:MIN_RUNS], key=lambda tried: tried.key, reverse=True)
@@ -243,7 +289,8 @@ def cached_worst_case(
     progress: bool = False,
 ) -> WorstCase:
     """Return the `worst_case` of a scenario, from the file of an earlier call if there is one."""
-    within = default_class(scenario) if within is None else within
+    if within is None:
+        within = default_class(scenario)
 
     def load(file: Path) -> WorstCase:
         data = read_json(file)
@@ -267,20 +314,37 @@ def cached_worst_case(
 
 def _listed(given: object) -> list[Scenario]:
     """Return the scenario, or the scenarios, to attack."""
-    scenarios: Any = list(given) if isinstance(given, list | tuple) else [given]
+    scenarios: Any
+    if isinstance(given, list | tuple):
+        scenarios = list(given)
+    else:
+        scenarios = [given]
     if not scenarios or not all(isinstance(attacked, Scenario) for attacked in scenarios):
-        raise ScenarioError(f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)")
+        raise ScenarioError(
+            f"worst_case attacks a Scenario, not {shown(given)}: give smc.Scenario(...)"
+        )
     if len({(s.samples, s.control_period, s.plant.n) for s in scenarios}) > 1:
-        raise ScenarioError("worst_case attacks one run on several parameter sets: give all the same duration")
+        raise ScenarioError(
+            "worst_case attacks one run on several parameter sets: give all the same duration"
+        )
     return scenarios
 
 
 def default_budget(scenario: Scenario, within: Uncertainty) -> int:
     """Return the number of runs of a search without a given budget.
 
-    With n channels a physics step takes (1 + n) / 2 times as long as with one; MuJoCo's dry friction doubles that.
+    With n channels a physics step takes (1 + n) / 2 times as long as with one; MuJoCo's dry
+    friction doubles that.
     """
     plant = scenario.plant
-    dry = bool(scenario.friction or within.friction[1]) or any(plant.parameters[name] for name in plant.dry)
+    dry = bool(scenario.friction or within.friction[1]) or any(
+        plant.parameters[name] for name in plant.dry
+    )
     channels = 1 + plant.n
-    return min(max(MIN_RUNS, 2 * DEFAULT_STEPS // (scenario.samples * scenario.steps * channels * (1 + dry))), MAX_RUNS)
+    return min(
+        max(
+            MIN_RUNS,
+            2 * DEFAULT_STEPS // (scenario.samples * scenario.steps * channels * (1 + dry)),
+        ),
+        MAX_RUNS,
+    )

@@ -1,1 +1,3 @@
-"""The pytest plugin: step responses, limits on metrics, golden metrics, cases of the study, reports of failures."""
+"""The pytest plugin: step responses, limits on metrics, golden metrics, cases of the study, reports
+of failures.
+"""

@@ -1,7 +1,9 @@
-"""Golden metrics: `pytest --smc-update` records them in a JSON file beside the test, and later runs compare with it.
+"""Golden metrics:
 
-The file of test_laws.py is test_laws.golden.json. It has, for each test and metric, the value, the tolerance, and the
-unit of both. A test that names no tolerance uses those of the file.
+`pytest --smc-update` records them in a JSON file beside the test, and later runs compare with it.
+
+The file of test_laws.py is test_laws.golden.json. It has, for each test and metric, the value, the
+tolerance, and the unit of both. A test that names no tolerance uses those of the file.
 """
 
 import contextlib
@@ -18,36 +20,52 @@ from smc_mujoco.testing.limits import Limit, judge, quantity
 from smc_mujoco.testing.response import StepResponse
 
 __tracebackhide__ = True  # pytest hides the frames of a module that has it
-RELATIVE = 0.01  # default tolerance, as a share of the value: chosen, far above rounding errors of other processors
+# default tolerance, as a share of the value: chosen, far above rounding errors of other processors
+RELATIVE = 0.01
 UPDATE = "run pytest --smc-update"
 MIN_TOLERANCE = 1e-9  # in the metric's unit: above rounding errors of a value that is 0
 
 
 def record(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
-    """Write a response's metrics and their tolerances into the file, under `key`. Arguments are those of `compare`."""
+    """Write a response's metrics and their tolerances into the file, under `key`.
+
+    Arguments are those of `compare`.
+    """
     tolerances = _checked(response, tolerances)
     entry = {}
     for name in tolerances or [name for name in response.values if response.applies(name)]:
         value, unit = response.value(name)
-        share = float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}") if math.isfinite(value) else 0.0
+        if math.isfinite(value):
+            share = float(f"{max(RELATIVE * abs(value), MIN_TOLERANCE):.2g}")
+        else:
+            share = 0.0
         entry[name] = {"value": value, "tolerance": tolerances.get(name, share), "unit": unit}
     try:
         with locked(file.parent):
-            text = json.dumps(plain(dict(sorted((read(file) | {key: entry}).items()))), indent=2, ensure_ascii=False)
+            text = json.dumps(
+                plain(dict(sorted((read(file) | {key: entry}).items()))),
+                indent=2,
+                ensure_ascii=False,
+            )
             with replacing(file) as part:
                 part.write_text(f"{text}\n", encoding="utf-8")
     except OSError as error:
-        raise ScenarioError(f"{file} cannot be written ({error.strerror}): record it in a writable folder") from None
+        raise ScenarioError(
+            f"{file} cannot be written ({error.strerror}): record it in a writable folder"
+        ) from None
 
 
 def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[str, float]) -> None:
     """Compare a response with the metrics recorded under `key`.
 
-    With `tolerances`, in the metrics' units, only these metrics count; without, all with the tolerances in the file.
+    With `tolerances`, in the metrics' units, only these metrics count; without, all with the
+    tolerances in the file.
     """
     tolerances = _checked(response, tolerances)
     known = read(file).get(key, {})
-    if missing := [name for name in tolerances if name not in known] or ([] if known else ["metrics"]):
+    if missing := [name for name in tolerances if name not in known] or (
+        [] if known else ["metrics"]
+    ):
         raise AssertionError(f"{file.name} has no golden {', '.join(missing)} of {key}: {UPDATE}")
     names = tolerances or known
     try:
@@ -57,22 +75,39 @@ def compare(file: Path, key: str, response: StepResponse, tolerances: Mapping[st
     limits = []
     for name in names:
         (value, unit), golden = response.value(name), known[name]["value"]
-        tolerance = tolerances[name] if tolerances else known[name]["tolerance"]
-        within = value == golden or abs(value - golden) <= tolerance or (math.isnan(value) and math.isnan(golden))
-        limits.append(Limit(name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within))
+        if tolerances:
+            tolerance = tolerances[name]
+        else:
+            tolerance = known[name]["tolerance"]
+        within = (
+            value == golden
+            or abs(value - golden) <= tolerance
+            or (math.isnan(value) and math.isnan(golden))
+        )
+        limits.append(
+            Limit(
+                name, quantity(value, unit), f"{quantity(golden)} ± {quantity(tolerance)}", within
+            )
+        )
     judge(limits, "golden", "golden", f"{response}; if it is meant, {UPDATE}")
 
 
 def _checked(response: object, tolerances: Mapping[str, float]) -> dict[str, float]:
-    """Return tolerances as numbers; raise ScenarioError for others, and for anything but a response that has them."""
+    """Return tolerances as numbers; raise ScenarioError for others, and for anything but a response
+    that has them.
+    """
     if not isinstance(response, StepResponse):
         raise ScenarioError(f"golden is given {shown(response)}: give what step_response returned")
     response.check_names(tolerances)
-    return {name: number(f"tolerance of {name}", value, low=0.0) for name, value in tolerances.items()}
+    return {
+        name: number(f"tolerance of {name}", value, low=0.0) for name, value in tolerances.items()
+    }
 
 
 def read(file: Path) -> dict[str, dict[str, dict[str, Any]]]:
-    """Return the content of a golden file, test -> metric -> value, tolerance and unit; {} if there is no file."""
+    """Return the content of a golden file, test -> metric -> value, tolerance and unit; {} if there
+    is no file.
+    """
     try:
         stored = read_json(file)
         for golden in (golden for entry in stored.values() for golden in entry.values()):

@@ -15,7 +15,9 @@ R = TypeVar("R")
 
 
 class Limit(NamedTuple):
-    """A metric with its value and its limit, both as text, and whether the value is within the limit."""
+    """A metric with its value and its limit, both as text, and whether the value is within the
+    limit.
+    """
 
     metric: str
     value: str
@@ -24,25 +26,41 @@ class Limit(NamedTuple):
 
 
 def bound(metric: str, value: float, unit: str, limit: object) -> Limit:
-    """Return the Limit of a value that may be up to `limit`, or in the range `limit` = (lowest, highest).
+    """Return the Limit of a value that may be up to `limit`, or in the range `limit` = (lowest,
+    highest).
 
-    A metric of a limit cycle is NaN in a run without one. `Metric.absent` is then compared with the limit.
+    A metric of a limit cycle is NaN in a run without one. `Metric.absent` is then compared with the
+    limit.
     """
-    compared = CATALOGUE[metric.rpartition(" ")[2]].absent if math.isnan(value) else value
+    if math.isnan(value):
+        compared = CATALOGUE[metric.rpartition(" ")[2]].absent
+    else:
+        compared = value
     if not isinstance(limit, tuple | list):
         high = number(f"limit of {metric}", limit, infinite=True)
         return Limit(metric, quantity(value, unit), f"<= {quantity(high)}", compared <= high)
     if len(limit) != 2:
-        raise ScenarioError(f"limit of {metric} is {shown(limit)}: give the highest value, or (lowest, highest)")
+        raise ScenarioError(
+            f"limit of {metric} is {shown(limit)}: give the highest value, or (lowest, highest)"
+        )
     low, high = (number(f"limit of {metric}", end, infinite=True) for end in limit)
     if low > high:
         raise ScenarioError(f"limits of {metric} are {shown(limit)}: give the lower one first")
-    return Limit(metric, quantity(value, unit), f"{quantity(low)} .. {quantity(high)}", low <= compared <= high)
+    return Limit(
+        metric,
+        quantity(value, unit),
+        f"{quantity(low)} .. {quantity(high)}",
+        low <= compared <= high,
+    )
 
 
 def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
     """Raise an AssertionError with a table of all limits if one is violated."""
-    if missed := [f"{metric} is {value}, {word} {limit}" for metric, value, limit, within in limits if not within]:
+    if missed := [
+        f"{metric} is {value}, {word} {limit}"
+        for metric, value, limit, within in limits
+        if not within
+    ]:
         rows = [(*line, "yes" if within else "NO") for *line, within in limits]
         raise AssertionError(
             f"{'; '.join(missed)} ({note})\n{Tabular(headings=('metric', 'value', kind, 'ok'), rows=rows)}"
@@ -50,16 +68,24 @@ def judge(limits: Sequence[Limit], kind: str, word: str, note: object) -> None:
 
 
 def quantity(value: float, unit: str = "") -> str:
-    """Return a number with its unit for tables. As in every table of this package inf is "never", and NaN "none"."""
+    """Return a number with its unit for tables.
+
+    As in every table of this package inf is "never", and NaN "none".
+    """
     if math.isnan(value):
         return "none"
     if math.isinf(value):
         return "never"
-    return f"{value:.6g} {unit}".rstrip() if unit != "1" else f"{value:.6g}"
+    if unit != "1":
+        return f"{value:.6g} {unit}".rstrip()
+    return f"{value:.6g}"
 
 
 def without_frames(function: Callable[P, R]) -> Callable[P, R]:
-    """Return the function. At its ScenarioErrors pytest shows the test's line, and not the lines of this package."""
+    """Return the function.
+
+    At its ScenarioErrors pytest shows the test's line, and not the lines of this package.
+    """
 
     @functools.wraps(function)
     def call(*args: P.args, **named: P.kwargs) -> R:

@@ -4,8 +4,8 @@
         r = step_response("inverted_pendulum", my_law, step=0.2, friction=smc.Coulomb(0.05))
         assert r.settling_time < 0.6 and r.overshoot < 5 and r.tv_rate < 10
 
-pytest loads this file in every session if the package is installed (entry point `pytest11`). So it imports nothing
-heavy until a test uses a fixture or the marker, and does not change MUJOCO_GL.
+pytest loads this file in every session if the package is installed (entry point `pytest11`). So it
+imports nothing heavy until a test uses a fixture or the marker, and does not change MUJOCO_GL.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ GOLDEN = "smc_golden"  # property of a test's report: the golden file that it wr
 
 
 class Ledger(NamedTuple):
-    """The running test's responses, and pytest's temporary folder: written by fixtures, read by hooks."""
+    """The running test's responses, and pytest's temporary folder: written by fixtures, read by
+    hooks.
+    """
 
     responses: list[StepResponse]
     temporary: Path
@@ -38,9 +40,17 @@ LEDGER = pytest.StashKey[Ledger]()
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of this plugin."""
     group = parser.getgroup("smc_mujoco", "step responses of control laws (smc_mujoco)")
-    group.addoption("--smc-update", action="store_true", help="record golden metrics instead of comparing with them")
-    group.addoption("--smc-film", action="store_true", help="film the step responses of failing tests too")
-    group.addoption("--smc-out", metavar="DIR", help="folder for figures and films; default: a temporary one")
+    group.addoption(
+        "--smc-update",
+        action="store_true",
+        help="record golden metrics instead of comparing with them",
+    )
+    group.addoption(
+        "--smc-film", action="store_true", help="film the step responses of failing tests too"
+    )
+    group.addoption(
+        "--smc-out", metavar="DIR", help="folder for figures and films; default: a temporary one"
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -69,7 +79,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         metafunc.parametrize(argument, names)
 
 
-def _cases(given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]) -> dict[str, list[str]]:
+def _cases(
+    given: Sequence[object], named: Mapping[str, object], arguments: Collection[str]
+) -> dict[str, list[str]]:
     """Return the test's argument, "plant" or "condition" -> the names with which the test runs."""
     from smc_mujoco.common.errors import ScenarioError, find, shown
     from smc_mujoco.mechanisms.plant import catalogue
@@ -81,21 +93,32 @@ def _cases(given: Sequence[object], named: Mapping[str, object], arguments: Coll
         "condition": lambda one: str(find_condition(one)),
     }
     if given:
-        raise ScenarioError(f"marker smc is given {shown(given[0])}: name its arguments, as in {EXAMPLE}")
+        raise ScenarioError(
+            f"marker smc is given {shown(given[0])}: name its arguments, as in {EXAMPLE}"
+        )
     for name in named:
         find("argument of marker smc", name, defaults)
     used: dict[str, list[str]] = {}
     for plural, default in defaults.items():
         argument, value = plural.removesuffix("s"), named.get(plural, default)
-        several = value if isinstance(value, list | tuple) else [value]
+        if isinstance(value, list | tuple):
+            several = value
+        else:
+            several = [value]
         if argument in arguments:
             if not several:
-                raise ScenarioError(f"{plural} of marker smc is {shown(value)}: give names, as in {EXAMPLE}")
+                raise ScenarioError(
+                    f"{plural} of marker smc is {shown(value)}: give names, as in {EXAMPLE}"
+                )
             used[argument] = [name_of[argument](one) for one in several]
         elif plural in named:
-            raise ScenarioError(f"marker smc gives {plural} and the test takes no {argument}: add the argument")
+            raise ScenarioError(
+                f"marker smc gives {plural} and the test takes no {argument}: add the argument"
+            )
     if not used:
-        raise ScenarioError("marker smc is on a test that takes neither plant nor condition: add the arguments")
+        raise ScenarioError(
+            "marker smc is on a test that takes neither plant nor condition: add the arguments"
+        )
     return used
 
 
@@ -103,10 +126,12 @@ def _cases(given: Sequence[object], named: Mapping[str, object], arguments: Coll
 def step_response(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[..., StepResponse]:
-    """Run a law from rest to a step of the reference: step_response(plant, law, step, condition, **scenario fields).
+    """Run a law from rest to a step of the reference: step_response(plant, law, step, condition,
+    **scenario fields).
 
     Example: r = step_response("duffing", my_law(k1=4.0), step=0.2, condition="noise", duration=5.0)
-    Every metric is an attribute: assert r.settling_time < 2. r.check(settling_time=2, overshoot=5) tests several.
+    Every metric is an attribute: assert r.settling_time < 2. r.check(settling_time=2, overshoot=5)
+    tests several.
     """
     from smc_mujoco.testing.limits import without_frames
     from smc_mujoco.testing.response import respond
@@ -123,10 +148,11 @@ def step_response(
 
 @pytest.fixture
 def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
-    """Compare a response with the metrics that `pytest --smc-update` recorded: smc_golden(r, settling_time=0.01).
+    """Compare a response with the metrics that `pytest --smc-update` recorded: smc_golden(r,
+    settling_time=0.01).
 
-    Named metrics are compared within a tolerance in their unit. If none is named, all metrics are compared, within 1 %
-    of their recorded value.
+    Named metrics are compared within a tolerance in their unit. If none is named, all metrics are
+    compared, within 1 % of their recorded value.
     """
     from smc_mujoco.testing import golden as files
     from smc_mujoco.testing.limits import without_frames
@@ -136,7 +162,10 @@ def smc_golden(request: pytest.FixtureRequest) -> Callable[..., None]:
 
     @without_frames
     def compare(response: StepResponse, **tolerances: float) -> None:
-        key = test if (n := next(number)) == 1 else f"{test} {n}"
+        if (n := next(number)) == 1:
+            key = test
+        else:
+            key = f"{test} {n}"
         if update:
             files.record(file, key, response, tolerances)
             request.node.user_properties.append((GOLDEN, str(file)))
@@ -164,7 +193,10 @@ def pytest_runtest_makereport(
         from smc_mujoco.testing.response import report_of
 
         config, out = item.config, item.config.getoption("smc_out")
-        folder = config.invocation_params.dir / out if out else ledger.temporary / "smc_mujoco"
+        if out:
+            folder = config.invocation_params.dir / out
+        else:
+            folder = ledger.temporary / "smc_mujoco"
         text = report_of(item.nodeid, responses, folder, bool(config.getoption("smc_film")))
         report.sections.append(("step responses", text))
     return report
@@ -174,14 +206,22 @@ def _used(item: pytest.Item, ledger: Ledger) -> list[StepResponse]:
     """Return the responses that a test made, and those that it got from fixtures of a wider scope."""
     from smc_mujoco.testing.response import StepResponse
 
-    fixed = [value for value in getattr(item, "funcargs", {}).values() if isinstance(value, StepResponse)]
+    fixed = []
+    for value in getattr(item, "funcargs", {}).values():
+        if isinstance(value, StepResponse):
+            fixed.append(value)
     return list({id(response): response for response in [*fixed, *ledger.responses]}.values())
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
     """Print which golden files were written."""
     if config.getoption("smc_update"):
         reports = itertools.chain.from_iterable(terminalreporter.stats.values())
-        properties = [pair for report in reports for pair in getattr(report, "user_properties", ())]
+        properties = []
+        for report in reports:
+            for pair in getattr(report, "user_properties", ()):
+                properties.append(pair)
         for file in sorted({value for name, value in properties if name == GOLDEN}):
             terminalreporter.write_line(f"golden metrics recorded in {file}")

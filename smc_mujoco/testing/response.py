@@ -1,4 +1,6 @@
-"""Step responses: runs from rest to a step of the reference, with every metric as an attribute, and their reports."""
+"""Step responses: runs from rest to a step of the reference, with every metric as an attribute, and
+their reports.
+"""
 
 import dataclasses
 import functools
@@ -27,17 +29,23 @@ IN_REPR = ("settling_time", "overshoot", "tv_rate")  # metrics in the repr of a 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class StepResponse:
-    """The response of a law to a step. Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
+    """The response of a law to a step.
 
-    If some joints have no actuator, `r.scores` has the metrics of each group of channels, as `smc.scores` does. For the
-    pole on a cart: `r.scores["free"]["ultimate_bound"]`. In `check` that metric is named "free ultimate_bound".
+    Every metric of `smc.score` is an attribute: r.settling_time, r.overshoot, ...
 
-    A failed run has no metrics: reading one raises a ScenarioError that says when and why the run failed.
+    If some joints have no actuator, `r.scores` has the metrics of each group of channels, as
+    `smc.scores` does. For the pole on a cart: `r.scores["free"]["ultimate_bound"]`. In `check` that
+    metric is named "free ultimate_bound".
+
+    A failed run has no metrics: reading one raises a ScenarioError that says when and why the run
+    failed.
     """
 
     trace: Trace
     step: float  # height, rad or m
-    condition: str = ""  # with the scenario fields that the test gave; "" for the nominal condition alone
+    condition: str = (
+        ""  # with the scenario fields that the test gave; "" for the nominal condition alone
+    )
 
     @property
     def scenario(self) -> Scenario:
@@ -61,9 +69,15 @@ class StepResponse:
 
     @functools.cached_property
     def values(self) -> Mapping[str, float]:
-        """`metrics`, and those of each group of channels if there are several, with names such as "free peak"."""
+        """`metrics`, and those of each group of channels if there are several, with names such as
+        "free peak".
+        """
         by_group = self.scores.items()
-        labelled = {self._label(group, name): value for group, values in by_group for name, value in values.items()}
+        labelled = {
+            self._label(group, name): value
+            for group, values in by_group
+            for name, value in values.items()
+        }
         return dict(self.metrics) | labelled
 
     @without_frames
@@ -85,7 +99,9 @@ class StepResponse:
     def __repr__(self) -> str:
         how = f"failed, {self.failure}"
         if self.failure is None:
-            how = ", ".join(f"{name} {quantity(*self.value(name))}" for name in IN_REPR if name in self.metrics)
+            how = ", ".join(
+                f"{name} {quantity(*self.value(name))}" for name in IN_REPR if name in self.metrics
+            )
         return f"StepResponse({self}: {how})"
 
     def value(self, name: str) -> tuple[float, str]:
@@ -100,16 +116,24 @@ class StepResponse:
         return unknown("metric", name, CATALOGUE)
 
     def _label(self, group: str, metric: str) -> str:
-        """Return the name of a group's metric in tables: the metric's name if `metrics` has it, else "GROUP METRIC"."""
+        """Return the name of a group's metric in tables: the metric's name if `metrics` has it,
+        else "GROUP METRIC".
+        """
         only_group = len(groups(self.scenario.plant)) == 1
-        return metric if only_group or (group == "driven" and not CATALOGUE[metric].shared) else f"{group} {metric}"
+        if only_group or (group == "driven" and not CATALOGUE[metric].shared):
+            return metric
+        return f"{group} {metric}"
 
     def applies(self, name: str) -> bool:
-        """Return whether a metric has a meaning for this run: some have one for realistic mechanisms only."""
+        """Return whether a metric has a meaning for this run: some have one for realistic
+        mechanisms only.
+        """
         return self.scenario.realistic or not CATALOGUE[name.rpartition(" ")[2]].realistic
 
     def check_names(self, names: Iterable[str]) -> None:
-        """Raise AssertionError if the run failed, and ScenarioError for a name that is not among its `values`."""
+        """Raise AssertionError if the run failed, and ScenarioError for a name that is not among
+        its `values`.
+        """
         if self.failure is not None:
             raise AssertionError(f"{self}: {self.failure}")
         for name in names:
@@ -118,14 +142,24 @@ class StepResponse:
 
     @without_frames
     def check(self, **limits: float | tuple[float, float]) -> None:
-        """Assert several limits on metrics: `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
+        """Assert several limits on metrics:
 
-        A limit is the highest value, or (lowest, highest), in the metric's unit. The AssertionError has a table of all.
+        `r.check(settling_time=0.6, overshoot=5, rise_time=(0.05, 0.3))`.
+
+        A limit is the highest value, or (lowest, highest), in the metric's unit. The AssertionError
+        has a table of all.
         """
         if not limits:
-            raise ScenarioError("check has no limits: give metrics with their largest values, as settling_time=0.6")
+            raise ScenarioError(
+                "check has no limits: give metrics with their largest values, as settling_time=0.6"
+            )
         self.check_names(limits)
-        judge([bound(name, *self.value(name), limit) for name, limit in limits.items()], "limit", "not", self)
+        judge(
+            [bound(name, *self.value(name), limit) for name, limit in limits.items()],
+            "limit",
+            "not",
+            self,
+        )
 
     def table(self) -> str:
         """Return a table, as text, of the metrics that have a meaning for this run."""
@@ -142,14 +176,21 @@ def respond(
     condition: str | Condition,
     fields: Mapping[str, object],
 ) -> StepResponse:
-    """Run a law from rest to a step of the reference at t = 0. Rest is at 0, or at `plant.rest` if the plant has it."""
+    """Run a law from rest to a step of the reference at t = 0.
+
+    Rest is at 0, or at `plant.rest` if the plant has it.
+    """
     for name in fields:
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())
     if "reference" in fields:
-        raise ScenarioError(f"reference is {shown(fields['reference'])}: leave it out, as it is the step of {step}")
+        raise ScenarioError(
+            f"reference is {shown(fields['reference'])}: leave it out, as it is the step of {step}"
+        )
     if isinstance(law, Callable) and not isinstance(law, Template):
-        raise ScenarioError(f"law is {shown(law)}: put @smc.law_function(gains={{...}}) above the function")
+        raise ScenarioError(
+            f"law is {shown(law)}: put @smc.law_function(gains={{...}}) above the function"
+        )
     height = number("step", step)
     if height == 0.0:
         raise ScenarioError("step is 0: give the height of the step in rad or m, such as 0.2")
@@ -157,15 +198,23 @@ def respond(
     under = chosen.on(plant, number("duration", fields.get("duration", DURATION)))
     start = {"x0": 0.0, "reference": Step(height)}
     if plant.rest:
-        start = {"x0": plant.rest, "reference": [Constant(x + height) for x in plant.rest[: plant.driven]]}
+        start = {
+            "x0": plant.rest,
+            "reference": [Constant(x + height) for x in plant.rest[: plant.driven]],
+        }
     scenario = Scenario(plant=plant, law=law, **(start | under | dict(fields)))  # pyright: ignore[reportArgumentType]
-    words = [chosen.name] if chosen.name != "nominal" else []
+    if chosen.name != "nominal":
+        words = [chosen.name]
+    else:
+        words = []
     words += [f"{name}={shown(value)}" for name, value in fields.items()]
     return StepResponse(trace=run(scenario), step=height, condition=", ".join(words))
 
 
 def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video: bool) -> str:
-    """Return tables of all responses, and the paths of the files that show them: a figure and a film for each plant."""
+    """Return tables of all responses, and the paths of the files that show them: a figure and a
+    film for each plant.
+    """
     from smc_mujoco.draw.figure import figure
     from smc_mujoco.draw.film.film import film
 
@@ -183,7 +232,9 @@ def report_of(test: str, responses: Sequence[StepResponse], folder: Path, video:
     return "\n\n".join([*parts, "\n".join(dict.fromkeys(lines))])
 
 
-def _line(what: str, draw: Callable[[Sequence[Trace], Path], object], traces: Sequence[Trace], path: Path) -> str:
+def _line(
+    what: str, draw: Callable[[Sequence[Trace], Path], object], traces: Sequence[Trace], path: Path
+) -> str:
     """Draw traces. Return a line with the file, or with the reason why there is none."""
     try:
         draw(traces, path)

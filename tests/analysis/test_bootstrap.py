@@ -1,4 +1,6 @@
-"""Intervals of medians and shares: their two ends are treated in the same way, and they cover what they say."""
+"""Intervals of medians and shares: their two ends are treated in the same way, and they cover what
+they say.
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +10,9 @@ from smc_mujoco.analysis.bootstrap import median_of, share_interval
 
 pytestmark = pytest.mark.quick
 
-SAMPLES = np.random.default_rng(0).normal(size=(20, 2, 15))  # two blocks each: the values of one are sorted first
+SAMPLES = np.random.default_rng(0).normal(
+    size=(20, 2, 15)
+)  # two blocks each: the values of one are sorted first
 
 
 def test_an_interval_of_negated_values_is_the_mirror_image():

@@ -1,4 +1,6 @@
-"""A law that raises is told as broken, not only as one that does not converge, tolerates nothing or fails."""
+"""A law that raises is told as broken, not only as one that does not converge, tolerates nothing or
+fails.
+"""
 
 import pytest
 
@@ -16,14 +18,18 @@ QUESTIONS = {
     "basin": lambda law: smc.basin("duffing", law, points=(3, 3), duration=2.0),
     "margins": lambda law: smc.margins("duffing", law, kinds="delay", quick=True),
     "worst_case": lambda law: smc.worst_case(
-        smc.Scenario(plant="duffing", law=law, duration=1.0), within=smc.Uncertainty(disturbance=1.0), budget=2
+        smc.Scenario(plant="duffing", law=law, duration=1.0),
+        within=smc.Uncertainty(disturbance=1.0),
+        budget=2,
     ),
 }
 
 
 @pytest.mark.parametrize("ask", QUESTIONS.values(), ids=QUESTIONS)
 def test_a_law_that_raises_is_told_once(ask):
-    with pytest.warns(smc.errors.ScenarioWarning, match=r"^late failed by itself in a run: .*too late") as told:
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"^late failed by itself in a run: .*too late"
+    ) as told:
         ask(late)
     assert len(told) == 1
 

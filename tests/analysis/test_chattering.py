@@ -1,4 +1,6 @@
-"""Predicted chattering: describing functions against closed forms, limit cycles against formulas and against runs."""
+"""Predicted chattering: describing functions against closed forms, limit cycles against formulas
+and against runs.
+"""
 
 import dataclasses
 import itertools
@@ -12,7 +14,14 @@ import pytest
 import smc_mujoco as smc
 from smc_mujoco import chattering
 from smc_mujoco.analysis.apart import relative_range
-from smc_mujoco.analysis.chattering import Chattering, _assumptions, _other_cycles, cycles, save, switches
+from smc_mujoco.analysis.chattering import (
+    Chattering,
+    _assumptions,
+    _other_cycles,
+    cycles,
+    save,
+    switches,
+)
 from smc_mujoco.analysis.harmonics import Loop, Wave, play
 from smc_mujoco.analysis.linear_theory import critical_delay
 from smc_mujoco.analysis.step_halving import StepChange
@@ -36,7 +45,9 @@ def lagging(law, mu, **fields):
 
 
 def measured(trace, part=0.4):
-    """Half the range of s within a period, median of all, and the frequency by its crossings, of the last part."""
+    """Half the range of s within a period, median of all, and the frequency by its crossings, of
+    the last part.
+    """
     first = int(len(trace.t) * (1 - part))
     s, t = trace.s[first:, 0], trace.t[first:]
     z = s - s.mean()
@@ -49,7 +60,10 @@ def measured(trace, part=0.4):
 # describing functions
 
 A, OMEGA, C = 0.03, 7.0, 2.5
-S, TURN = A * abs(C + 1j * OMEGA), np.exp(1j * np.angle(C + 1j * OMEGA))  # s = v + c x, for e = A sin(omega t)
+S, TURN = (
+    A * abs(C + 1j * OMEGA),
+    np.exp(1j * np.angle(C + 1j * OMEGA)),
+)  # s = v + c x, for e = A sin(omega t)
 
 
 def saturated(k, width, a):
@@ -74,13 +88,19 @@ def relay_with_dead_zone(y, gains, memory):
 
 REACHED = math.sqrt(1 - (0.1 / S) ** 2)  # cosine of the angle at which s is 0.1
 CLOSED = {
-    "relay with hysteresis": (relay_with_hysteresis(), -8 / (math.pi * A) * complex(REACHED, -0.1 / S) * TURN),
+    "relay with hysteresis": (
+        relay_with_hysteresis(),
+        -8 / (math.pi * A) * complex(REACHED, -0.1 / S) * TURN,
+    ),
     "relay with a dead zone": (relay_with_dead_zone(), -8 / (math.pi * A) * REACHED * TURN),
     "sub-optimal": (
         smc.law("suboptimal", r1=3.0, r2=2.0),
         -2 / (math.pi * A) * complex(3.0 * math.sqrt(3.0), 3.0 + 2 * 2.0),
     ),
-    "saturation": (smc.law("boundary_layer", k=2.0, c=C, phi=0.1), -saturated(2.0, 0.1, S) * S / A * TURN),
+    "saturation": (
+        smc.law("boundary_layer", k=2.0, c=C, phi=0.1),
+        -saturated(2.0, 0.1, S) * S / A * TURN,
+    ),
     "super-twisting": (
         smc.law("super_twisting", k1=1.5, k2=1.1, c=C),
         -(2 * 1.5 * HALF / math.sqrt(S) + 4 * 1.1 / (math.pi * S * 1j * OMEGA)) * S / A * TURN,
@@ -98,7 +118,9 @@ def test_the_describing_function_of_a_compiled_law_is_its_closed_form(name):
 
 
 def fitted(scenario, omega):
-    """First harmonic of x, complex, of a run under u = sin(omega t), after what was there at the start has decayed."""
+    """First harmonic of x, complex, of a run under u = sin(omega t), after what was there at the
+    start has decayed.
+    """
     trace = smc.run(scenario)
     part = trace.t > 0.5 * scenario.duration
     t, x = trace.t[part], trace.x[part, 0]
@@ -130,7 +152,9 @@ def test_the_response_of_the_loop_is_that_of_a_run_under_a_sine(fields):
         physics_step=2e-4,
         **fields,
     )
-    late = (omega * scenario.resolved.physics_step) ** 2 / 12.0  # of positions, because forces are means over steps
+    late = (
+        omega * scenario.resolved.physics_step
+    ) ** 2 / 12.0  # of positions, because forces are means over steps
     assert Loop(scenario).response(omega) == pytest.approx(fitted(scenario, omega), rel=1e-5 + late)
 
 
@@ -143,7 +167,10 @@ def weighted(y, gains, memory):
 
 @pytest.mark.parametrize("name", weighted.gains)
 def test_a_law_is_told_of_its_joint_of_the_one_that_this_moves_and_of_their_models(name):
-    omega, loop = 20.0, Loop(smc.Scenario(plant=smc.plant("furuta", b=1e-3, bq=1e-3), law=weighted(**{name: 1.0})))
+    omega, loop = (
+        20.0,
+        Loop(smc.Scenario(plant=smc.plant("furuta", b=1e-3, bq=1e-3), law=weighted(**{name: 1.0}))),
+    )
     answer = loop._answer(omega) / loop._answer(omega)[loop.rows[0]]
     (x, q), (v, dq) = answer[loop.rows], answer[loop.nv + loop.rows]
     (*_, fx, fv), (*_, fqx, fqv) = loop.nominal_models
@@ -173,18 +200,28 @@ def test_the_describing_function_of_play_is_that_of_a_run_under_a_sine(gap, omeg
 @pytest.mark.parametrize(("law", "gap"), [("twisting", 2e-2), ("quasi_continuous", 2e-3)])
 def test_predicted_chattering_behind_play_is_that_of_a_run(law, gap):
     gear = smc.Backlash(gap, rotor_inertia=5e-3)
-    scenario = smc.Scenario(plant="duffing", law=law, x0=0.02, duration=6.0, actuator=(smc.Lag(0.01), gear))
+    scenario = smc.Scenario(
+        plant="duffing", law=law, x0=0.02, duration=6.0, actuator=(smc.Lag(0.01), gear)
+    )
     cycle = chattering(scenario)
-    short = dataclasses.replace(scenario, physics_step=6.25e-5)  # with play, positions lead by half a step
+    short = dataclasses.replace(
+        scenario, physics_step=6.25e-5
+    )  # with play, positions lead by half a step
     assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(short)), rel=0.03)
-    rigid = chattering(dataclasses.replace(scenario, actuator=(smc.Lag(0.01), dataclasses.replace(gear, gap=0.0))))
+    rigid = chattering(
+        dataclasses.replace(scenario, actuator=(smc.Lag(0.01), dataclasses.replace(gear, gap=0.0)))
+    )
     assert cycle.amplitude > 1.03 * rigid.amplitude
 
 
 @pytest.mark.parametrize("counts", [2_000])
 def test_a_coarse_encoder_s_count_moves_s_as_in_a_run(counts):
     scenario = smc.Scenario(
-        plant="duffing", law="super_twisting", actuator=smc.Lag(0.01), sensor=smc.Encoder(counts), duration=5.0
+        plant="duffing",
+        law="super_twisting",
+        actuator=smc.Lag(0.01),
+        sensor=smc.Encoder(counts),
+        duration=5.0,
     )
     cycle, trace = chattering(scenario), smc.run(scenario)
     part = trace.t > 4.0
@@ -209,14 +246,26 @@ def test_amplitude_and_frequency_follow_formulas_runs_and_exponents_of_the_lag(n
             amplitude, omega = 2 * mu * 2.0 / math.pi, 1 / mu
         else:
             a, b = 2 * HALF * 1.5, 16 * 1.1 / math.pi
-            amplitude, omega = mu**2 * (a * a + b) ** 2 / (4 * a * a), a / (mu * math.sqrt(a * a + b))
-        fine = chattering(lagging(LAWS[name], mu, control_period=mu / 100))  # the formula knows no sampling
-        assert (fine.amplitude, fine.frequency) == pytest.approx((amplitude, omega / math.tau), rel=0.05)
-        assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.05)
-        assert cycle.power == pytest.approx((cycle.amplitude * math.tau * cycle.frequency) ** 2 / 2, rel=0.05)
+            amplitude, omega = (
+                mu**2 * (a * a + b) ** 2 / (4 * a * a),
+                a / (mu * math.sqrt(a * a + b)),
+            )
+        fine = chattering(
+            lagging(LAWS[name], mu, control_period=mu / 100)
+        )  # the formula knows no sampling
+        assert (fine.amplitude, fine.frequency) == pytest.approx(
+            (amplitude, omega / math.tau), rel=0.05
+        )
+        assert (cycle.amplitude, cycle.frequency) == pytest.approx(
+            measured(smc.run(scenario)), rel=0.05
+        )
+        assert cycle.power == pytest.approx(
+            (cycle.amplitude * math.tau * cycle.frequency) ** 2 / 2, rel=0.05
+        )
         found.append(fine)
     amplitudes, frequencies = (
-        np.polyfit(np.log(lags), np.log([getattr(one, of) for one in found]), 1)[0] for of in ("amplitude", "frequency")
+        np.polyfit(np.log(lags), np.log([getattr(one, of) for one in found]), 1)[0]
+        for of in ("amplitude", "frequency")
     )
     assert amplitudes == pytest.approx(1.0 if name == "classical" else 2.0, rel=0.02)
     assert frequencies == pytest.approx(-1.0, rel=0.02)
@@ -239,11 +288,15 @@ SLOWLY = {"velocity": smc.estimator("filtered_difference", tau=0.01)}  # 1.5 tim
 def test_predicted_chattering_of_plants_is_that_of_runs(plant, law, fields):
     scenario = smc.Scenario(plant=plant, law=law, x0=0.02, duration=6.0, **fields)
     cycle = chattering(scenario)
-    assert (cycle.amplitude, cycle.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
+    assert (cycle.amplitude, cycle.frequency) == pytest.approx(
+        measured(smc.run(scenario)), rel=0.15
+    )
 
 
 def test_a_relay_without_an_actuator_chatters_from_sample_to_sample():
-    scenario = smc.Scenario(plant="inverted_pendulum", law="power_rate", actuator=smc.DCMotor(), x0=0.02, duration=3.0)
+    scenario = smc.Scenario(
+        plant="inverted_pendulum", law="power_rate", actuator=smc.DCMotor(), x0=0.02, duration=3.0
+    )
     cycle = chattering(scenario)
     assert cycle.frequency * scenario.control_period == pytest.approx(0.5)
     assert cycle.amplitude == pytest.approx(measured(smc.run(scenario))[0], rel=0.02)
@@ -254,19 +307,25 @@ RELAY = smc.law("classical", k=4.0, c=2.5)
 
 @pytest.mark.slow
 def test_samples_delay_a_relay_by_half_a_period_and_a_smooth_law_by_none():
-    scenario = smc.Scenario(plant=smc.plant("duffing", **INTEGRATOR), law=RELAY, actuator=smc.Lag(0.01))
+    scenario = smc.Scenario(
+        plant=smc.plant("duffing", **INTEGRATOR), law=RELAY, actuator=smc.Lag(0.01)
+    )
     cycle = chattering(scenario)
     omega = math.tau * cycle.frequency
     late, early = Loop(scenario).phases(cycle.amplitude_x, omega)
     assert (late, early) == pytest.approx((-0.5e-3 * omega, 0.5e-3 * omega), rel=0.1)
-    smooth = Loop(dataclasses.replace(scenario, law=smc.law("boundary_layer", k=4.0, c=2.5, phi=10.0)))
+    smooth = Loop(
+        dataclasses.replace(scenario, law=smc.law("boundary_layer", k=4.0, c=2.5, phi=10.0))
+    )
     assert smooth.phases(1e-3, omega) == pytest.approx((0.0, 0.0), abs=1e-3 * omega * 1e-3)
 
 
 @COARSELY
 @pytest.mark.parametrize("lag", [0.007, 0.03])
 def test_a_relay_locked_to_the_samples_is_within_its_ranges(lag):
-    scenario = smc.Scenario(plant="duffing", law=RELAY, actuator=smc.Lag(lag), x0=0.02, duration=6.0)
+    scenario = smc.Scenario(
+        plant="duffing", law=RELAY, actuator=smc.Lag(lag), x0=0.02, duration=6.0
+    )
     cycle, (amplitude, frequency) = chattering(scenario), measured(smc.run(scenario))
     assert cycle.uncertainty > 1.0
     assert cycle.amplitude_range[0] < amplitude < cycle.amplitude_range[1] < 2.5 * cycle.amplitude
@@ -309,7 +368,9 @@ def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
     plain = _assumptions(Loop(smc.Scenario(plant="inverted_pendulum", law="classical")))
     for field, kinds in parts.items():
         for word, part in kinds.items():
-            run = smc.Scenario(plant="inverted_pendulum", law="classical", physics_step=2.5e-4, **{field: part})
+            run = smc.Scenario(
+                plant="inverted_pendulum", law="classical", physics_step=2.5e-4, **{field: part}
+            )
             said = " ".join(one for one in _assumptions(Loop(run)) if one not in plain)
             others = {each for its in parts.values() for each in its} - {word}
             assert word in said
@@ -319,19 +380,36 @@ def test_each_part_that_a_prediction_leaves_out_is_said_and_no_other():
 def test_a_file_of_predictions_has_what_was_predicted_and_measured(tmp_path, snapshot):
     run = smc.Scenario(plant="duffing", law=smc.law("classical", k=2.0, c=3.0))
     sure = Chattering(
-        amplitude=0.5, amplitude_x=0.1, amplitude_u=2.0, frequency=20.0, power=3.0, third_harmonic=0.01,
-        amplitude_range=(0.25, 0.6), frequency_range=(18.0, 21.0), coupling=0.0, gain=1.0 - 2.0j, response=0.25 + 0.5j,
+        amplitude=0.5,
+        amplitude_x=0.1,
+        amplitude_u=2.0,
+        frequency=20.0,
+        power=3.0,
+        third_harmonic=0.01,
+        amplitude_range=(0.25, 0.6),
+        frequency_range=(18.0, 21.0),
+        coupling=0.0,
+        gain=1.0 - 2.0j,
+        response=0.25 + 0.5j,
         assumptions=("about rest",),
-    )  # fmt: skip
+    )
     possible = Chattering(amplitude_range=(0.0, 0.6), frequency_range=(18.0, 21.0))
     changes = StepChange(0.02, 0.2), StepChange(0.0, math.inf)
-    path = save([run, run], [sure, possible], [(0.4, 19.0), (math.nan, math.nan)], changes, tmp_path / "a.json")
+    path = save(
+        [run, run],
+        [sure, possible],
+        [(0.4, 19.0), (math.nan, math.nan)],
+        changes,
+        tmp_path / "a.json",
+    )
     said = [json.dumps(one) for one in json.loads(path.read_text())]
     assert [*said, bool(sure), bool(possible), *(one.marked for one in changes)] == snapshot
 
 
 class Formula:
-    """A loop whose law has a describing function in closed form: -K / (j w (1 + j w / p)^2), whose phase turns at p."""
+    """A loop whose law has a describing function in closed form: -K / (j w (1 + j w / p)^2), whose
+    phase turns at p.
+    """
 
     scenario = SimpleNamespace(control_period=1e-3)
 
@@ -358,17 +436,24 @@ def relay(a):
 
 
 def relay_with_a_dead_zone(a):
-    return relay(a) * math.sqrt(1.0 - (0.01 / a) ** 2) if a > 0.01 else 0.0
+    if a > 0.01:
+        return relay(a) * math.sqrt(1.0 - (0.01 / a) ** 2)
+    return 0.0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "wanted"),  # N at the cycles: 2 p / K
     [
-        (saturation, 1.0 / 1.02), (saturation, 0.7), (saturation, 1.05), (relay, 3.0), (relay_with_a_dead_zone, 5.0),
-        (relay_with_a_dead_zone, 40.0), (relay_with_a_dead_zone, 62.0),
+        (saturation, 1.0 / 1.02),
+        (saturation, 0.7),
+        (saturation, 1.05),
+        (relay, 3.0),
+        (relay_with_a_dead_zone, 5.0),
+        (relay_with_a_dead_zone, 40.0),
+        (relay_with_a_dead_zone, 62.0),
     ],
-)  # fmt: skip
+)
 def test_the_cycles_of_a_closed_form_are_stable_where_its_gain_falls(law, wanted):
     """The largest N of the relay with a dead zone is 63.7, at 0.0141; N = 62 at 0.0126 and 0.0162."""
     turn, places = 40.0, np.geomspace(1e-3, 3.0, 200_001)
@@ -389,11 +474,17 @@ def thruster(y, gains, memory):
 
 def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_rests():
     damped = smc.plant("duffing", alpha=0.0, beta=0.0, delta=2.0)
-    scenario = smc.Scenario(plant=damped, law=thruster(), actuator=smc.Lag(0.02), v0=0.0, duration=20.0)
+    scenario = smc.Scenario(
+        plant=damped, law=thruster(), actuator=smc.Lag(0.02), v0=0.0, duration=20.0
+    )
     cycle = chattering(scenario)
-    assert cycle.threshold_x == pytest.approx(0.0107, rel=0.01)  # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
+    assert cycle.threshold_x == pytest.approx(
+        0.0107, rel=0.01
+    )  # where 4 k |L| sqrt(1 - (d / a)^2) / (pi a) is 1
     assert any("smaller oscillations die out" in said for said in cycle.assumptions)
-    calm, *others = smc.run([dataclasses.replace(scenario, x0=q * cycle.threshold_x) for q in (0.9, 1.1, 10.0)])
+    calm, *others = smc.run(
+        [dataclasses.replace(scenario, x0=q * cycle.threshold_x) for q in (0.9, 1.1, 10.0)]
+    )
     assert np.ptp(calm.s[calm.t > 10.0]) == 0.0
     for trace in others:
         assert channel_cycle(trace) == pytest.approx((cycle.amplitude, cycle.frequency), rel=0.02)
@@ -401,18 +492,33 @@ def test_of_the_two_cycles_behind_a_dead_zone_a_run_ends_in_the_outer_one_or_res
 
 
 def test_what_half_a_step_changes_is_relative_and_infinite_where_one_cycle_is_lost():
-    runs = (0.2, 0.25, 0.2), (0.2, 0.2, 0.16), (math.nan,) * 3, (math.nan, 0.2), (0.2, math.nan), (-0.2, 0.2)
-    assert [relative_range(values) for values in runs] == pytest.approx([0.25, 0.25, 0.0, math.inf, math.inf, 2.0])
-    assert [relative_range(values, 0.2) for values in ((0.0, 0.25), (0.1, -0.2))] == pytest.approx([0.25, 0.0])
+    runs = (
+        (0.2, 0.25, 0.2),
+        (0.2, 0.2, 0.16),
+        (math.nan,) * 3,
+        (math.nan, 0.2),
+        (0.2, math.nan),
+        (-0.2, 0.2),
+    )
+    assert [relative_range(values) for values in runs] == pytest.approx(
+        [0.25, 0.25, 0.0, math.inf, math.inf, 2.0]
+    )
+    assert [relative_range(values, 0.2) for values in ((0.0, 0.25), (0.1, -0.2))] == pytest.approx(
+        [0.25, 0.0]
+    )
 
 
 def test_under_an_integrator_of_first_order_what_half_the_step_leaves_counts_too():
-    """A number with an error of h c and so with c (h - h / 2) = c h / 2 between the runs: the error itself is told."""
+    """A number with an error of h c and so with c (h - h / 2) = c h / 2 between the runs: the error
+    itself is told.
+    """
     exact, error = 2.0, 0.3
     halves = [exact + error / 2**k for k in range(2)]
     assert relative_range(halves) == pytest.approx(0.5 * error / (exact + error / 2))
     assert relative_range(halves, first_order=True) == pytest.approx(error / exact)
-    assert relative_range([*halves, 4.0], first_order=True) == pytest.approx(4.0 / exact - 1.0)  # another nudged start
+    assert relative_range([*halves, 4.0], first_order=True) == pytest.approx(
+        4.0 / exact - 1.0
+    )  # another nudged start
     never = (math.inf, math.inf), (math.nan,) * 2, (0.2,)
     assert [relative_range(values, first_order=True) for values in never] == [0.0, 0.0, 0.0]
     assert relative_range((0.2, math.inf), first_order=True) == math.inf
@@ -424,13 +530,19 @@ def test_a_smooth_law_oscillates_only_above_its_critical_delay():
     plant = smc.plant("duffing")
     law = smc.law("observer_free", lam=6.0, k1=2.5)
     critical = critical_delay(plant, lam=6.0, k1=2.5, control_period=1e-3)
-    calm, above = (chattering(law, plant=plant, input_delay=round(q * critical, 3)) for q in (0.9, 1.15))
+    calm, above = (
+        chattering(law, plant=plant, input_delay=round(q * critical, 3)) for q in (0.9, 1.15)
+    )
     assert not calm
     assert math.isnan(calm.frequency)
     assert math.isnan(calm.uncertainty)
-    scenario = smc.Scenario(plant=plant, law=law, input_delay=round(1.15 * critical, 3), x0=0.1, duration=40.0)
+    scenario = smc.Scenario(
+        plant=plant, law=law, input_delay=round(1.15 * critical, 3), x0=0.1, duration=40.0
+    )
     assert above
-    assert (above.amplitude, above.frequency) == pytest.approx(measured(smc.run(scenario)), rel=0.15)
+    assert (above.amplitude, above.frequency) == pytest.approx(
+        measured(smc.run(scenario)), rel=0.15
+    )
 
 
 @smc.law_function(gains={"k": 2.0})
@@ -465,4 +577,6 @@ def test_bad_input_is_one_sentence(refused):
 def test_many_balances_beside_each_other_are_no_cycles():
     slow, *others = [(1e-3, math.tau * frequency) for frequency in (15.0, 4.0, 6.0, 9.0)]
     (sentence,) = _other_cycles(None, [slow, *others])
-    assert sentence == "N L is about 1 everywhere from 4 to 15 Hz: the prediction is not to be trusted"
+    assert (
+        sentence == "N L is about 1 everywhere from 4 to 15 Hz: the prediction is not to be trusted"
+    )

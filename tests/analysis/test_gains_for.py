@@ -31,7 +31,9 @@ def test_super_twisting_gets_the_largest_gains_in_the_proportion_of_its_theorem(
 @pytest.mark.slow
 @COARSELY
 def test_forces_among_the_gains_stay_at_the_actuators_limit():
-    design = smc.design.gains_for(smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG)
+    design = smc.design.gains_for(
+        smc.law("classical", k=0.5, c=2.5), "duffing", amplitude=1.0, u_max=2.0, **LAG
+    )
     assert design.law.gains["k"] == pytest.approx(2.0)
     assert design.chattering.amplitude < 1.0
 
@@ -40,7 +42,10 @@ def test_forces_among_the_gains_stay_at_the_limit_of_every_channel():
     """With the model a gain is an acceleration, of which each joint has its own limit."""
     law, limits, rest = smc.law("classical", k=2.0), (6.0, 0.5), np.zeros(2)
     base = smc.Scenario(plant="double_pendulum", law=law, model="nominal", u_max=limits)
-    least = min(u * base.plant.nominal(rest, rest, i, base.plant.values({}))[1] for i, u in enumerate(limits))
+    least = min(
+        u * base.plant.nominal(rest, rest, i, base.plant.values({}))[1]
+        for i, u in enumerate(limits)
+    )
     assert _force_headroom(base) == pytest.approx(least / 2.0)
 
 
@@ -50,7 +55,9 @@ FAST = smc.law("classical", k=1.0, c=20.0)
 @COARSELY
 def test_a_frequency_decides_the_speed():
     wanted, fields = 60.0, {"u_max": 10.0, **LAG}
-    with pytest.warns(smc.errors.ScenarioWarning, match="does not hold duffing, even without a disturbance"):
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match="does not hold duffing, even without a disturbance"
+    ):
         design = smc.design.gains_for(FAST, "duffing", frequency=wanted, **fields)
     assert design.chattering.frequency <= wanted
     assert (design.size, design.law.gains["k"]) == (1.0, pytest.approx(design.speed**2))
@@ -82,7 +89,11 @@ def test_bad_input_is_one_sentence(refused):
         (without_units(), {"amplitude": 1e-3}),
         (smc.law("classical", k=(1.0, 2.0)), {"amplitude": 1.0, "plant": "double_pendulum"}),
     ]:
-        refused(lambda law=law, wanted=wanted: smc.design.gains_for(law, **({"plant": "duffing"} | wanted), **LAG))
+        refused(
+            lambda law=law, wanted=wanted: smc.design.gains_for(
+                law, **({"plant": "duffing"} | wanted), **LAG
+            )
+        )
 
 
 def predicted(frequency, amplitude):
@@ -90,7 +101,9 @@ def predicted(frequency, amplitude):
 
 
 def test_the_speed_is_that_of_the_largest_forces_at_most_as_fast_as_wanted(refused):
-    """Cycles of 20 w Hz and 0.1 / w, then with a dip about w = 4, and with none below w = 0.5 or above 2."""
+    """Cycles of 20 w Hz and 0.1 / w, then with a dip about w = 4, and with none below w = 0.5 or
+    above 2.
+    """
 
     def steady(w):
         return predicted(20.0 * w, 0.1 / w)
@@ -117,12 +130,16 @@ def test_the_speed_is_that_of_the_largest_forces_at_most_as_fast_as_wanted(refus
     ):
         assert next(iter(_forces(cycle, amplitude, frequency, headroom))) == speeds[chosen]
     refused(lambda: _forces(steady, None, 1.9, math.inf), "oscillates at 2 Hz at least")
-    refused(lambda: _forces(lambda w: steady(w) if w < 2.0 else Chattering(), None, 1.9, math.inf), "2 Hz at least")
+    refused(
+        lambda: _forces(lambda w: steady(w) if w < 2.0 else Chattering(), None, 1.9, math.inf),
+        "2 Hz at least",
+    )
     refused(lambda: _forces(steady, None, 9.0, 1e-3))
 
 
 def test_size_and_speed_are_those_of_the_largest_forces_within_both_bounds(refused):
-    """Cycles that are faster at larger sizes, so that the fastest speed by its cycle at size 1 is out of reach.
+    """Cycles that are faster at larger sizes, so that the fastest speed by its cycle at size 1 is
+    out of reach.
 
     The truth is a search over all sizes at each speed.
     """
@@ -134,11 +151,18 @@ def test_size_and_speed_are_those_of_the_largest_forces_within_both_bounds(refus
 
         forces = _forces(lambda w: cycle(1.0, w), amplitude, frequency, math.inf)
         size, speed = _largest(cycle, forces, amplitude, frequency, math.inf)
-        within = [(20.0 * w * sizes**power <= frequency) & (0.1 * sizes / w <= amplitude) for w in SPEEDS]
-        best = max(sizes[its].max() * w**2 for w, its in zip(SPEEDS, within, strict=True) if its.any())
+        within = [
+            (20.0 * w * sizes**power <= frequency) & (0.1 * sizes / w <= amplitude) for w in SPEEDS
+        ]
+        best = max(
+            sizes[its].max() * w**2 for w, its in zip(SPEEDS, within, strict=True) if its.any()
+        )
         assert size * speed**2 == pytest.approx(best, rel=2e-3)
     never = {1.0: 1.0, 0.5: 0.5}
-    refused(lambda: _largest(lambda q, w: predicted(70.0, 0.1), never, 1.0, 60.0, math.inf), "faster than wanted")
+    refused(
+        lambda: _largest(lambda q, w: predicted(70.0, 0.1), never, 1.0, 60.0, math.inf),
+        "faster than wanted",
+    )
     only_slow = {1.0: 1.0, 0.5: 0.5}
     found = _largest(lambda q, w: predicted(61.0 * w, 0.1 * q), only_slow, 1.0, 60.0, math.inf)
     assert found == (pytest.approx(10.0, rel=1e-3), 0.5)
@@ -155,6 +179,8 @@ def test_the_largest_size_is_where_the_amplitude_is_the_wanted_one(refused):
     ):
         size = _largest_size(lambda q, power=power: 2.0 * q**power, wanted, limit)
         assert 0.999 <= size / min((wanted / 2.0) ** (1.0 / power), limit) <= 1.0
-    assert _largest_size(lambda q: q if q < 3.0 else math.nan, 10.0, 100.0) == pytest.approx(3.0, rel=1e-3)
+    assert _largest_size(lambda q: q if q < 3.0 else math.nan, 10.0, 100.0) == pytest.approx(
+        3.0, rel=1e-3
+    )
     assert _largest_size(lambda q: math.nan, 10.0, 100.0) == 100.0
     refused(lambda: _largest_size(lambda q: 1.0, 0.1, 100.0))

@@ -31,7 +31,9 @@ def test_the_law_is_given_what_it_measures_in_its_run():
 
 
 def test_a_time_is_what_is_left_of_the_clock_without_the_call_over_the_copies(monkeypatch):
-    """The clock says 1 us for no copy, and for 256 copies 7 ns more for each, but 50 ns at one sample in 50."""
+    """The clock says 1 us for no copy, and for 256 copies 7 ns more for each, but 50 ns at one
+    sample in 50.
+    """
     each = [1000 + 256 * (50 if k % 50 == 0 else 7) for k in range(101)]
     ticks = itertools.cycle(itertools.chain.from_iterable((0, 1000, one) for one in each))
     now = itertools.accumulate(ticks)
@@ -40,6 +42,13 @@ def test_a_time_is_what_is_left_of_the_clock_without_the_call_over_the_copies(mo
     assert found == pytest.approx((7e-9, 50e-9, 1.0))
 
 
-@pytest.mark.parametrize("law", [smc.policy(lambda seen: -0.1 * seen[0]), smc.law("observer_free_joint")])
+@pytest.mark.parametrize(
+    "law", [smc.policy(lambda seen: -0.1 * seen[0]), smc.law("observer_free_joint")]
+)
 def test_a_law_in_python_or_of_many_joints_has_none(law):
-    assert law_time.law_time(smc.Scenario(plant="panda" if law.joint else "duffing", law=law, duration=0.01)) is None
+    assert (
+        law_time.law_time(
+            smc.Scenario(plant="panda" if law.joint else "duffing", law=law, duration=0.01)
+        )
+        is None
+    )

@@ -20,8 +20,11 @@ PLANTS = [smc.plant(name) for name in scenarios.PLANTS]
 each_plant = pytest.mark.parametrize("plant", PLANTS, ids=lambda p: p.name)
 
 
-def growth(plant: smc.Plant, lam: float, k1: float, control_period: float, periods: int = 0) -> float:
-    """Return the growth per period of the loop with a delay of whole control periods, in the end: stable below 1.
+def growth(
+    plant: smc.Plant, lam: float, k1: float, control_period: float, periods: int = 0
+) -> float:
+    """Return the growth per period of the loop with a delay of whole control periods, in the end:
+    stable below 1.
 
     The largest |eigenvalue| of (x, x', u_-1, .. u_-m), worst mode.
     """
@@ -44,7 +47,9 @@ def own(plant: smc.Plant, name: str = "observer_free") -> smc.Law:
     return gains.law(plant.name, name, "study")
 
 
-def from_near_rest(plant: smc.Plant, law: smc.Law, delay: float = 0.0, duration: float = 24.0) -> np.ndarray:
+def from_near_rest(
+    plant: smc.Plant, law: smc.Law, delay: float = 0.0, duration: float = 24.0
+) -> np.ndarray:
     """|x| of the worst channel at the samples, after a push that leaves every mode moving."""
     x0 = [SMALL * x for x in plant.x0]
     trace = smc.run(smc.Scenario(plant=plant, law=law, x0=x0, input_delay=delay, duration=duration))
@@ -72,7 +77,9 @@ def test_a_network_has_the_modes_of_its_path_graph():
     plant = smc.plant("pendulum_network", n=7)
     p = plant.parameters
     graph = 2.0 - 2.0 * np.cos(np.pi * np.arange(7) / 7)  # its Laplacian's eigenvalues
-    assert linear_theory.linear(plant).modes == pytest.approx(p["m"] * p["grav"] * p["l"] + p["kc"] * graph)
+    assert linear_theory.linear(plant).modes == pytest.approx(
+        p["m"] * p["grav"] * p["l"] + p["kc"] * graph
+    )
 
 
 def test_a_joint_without_an_actuator_is_refused(refused):
@@ -90,7 +97,9 @@ def test_a_plant_coupled_by_more_than_springs_or_whose_joints_differ_is_refused(
     pair = smc.plant("pendulum_network", n=2)
     refused(lambda: linear_theory.smallest_lam(dataclasses.replace(pair, nominal=dragged), 1.0))
     law = smc.law("observer_free")
-    refused(lambda: linear_theory.tolerated_force(dataclasses.replace(pair, nominal=uneven), law, 0.1))
+    refused(
+        lambda: linear_theory.tolerated_force(dataclasses.replace(pair, nominal=uneven), law, 0.1)
+    )
 
 
 @pytest.mark.parametrize("name", ["classical", "adaptive", "super_twisting"])
@@ -129,7 +138,10 @@ def test_without_k1_nothing_holds_a_pendulum_up():
 @each_plant
 def test_sampling_fast_leaves_the_smallest_lambda_and_bounds_the_largest(plant):
     k1, h = own(plant).gains["k1"], 1e-6
-    low, high = linear_theory.smallest_lam(plant, k1), 2.0 * linear_theory.linear(plant).inertia / h  # above: v+ = -v
+    low, high = (
+        linear_theory.smallest_lam(plant, k1),
+        2.0 * linear_theory.linear(plant).inertia / h,
+    )  # above: v+ = -v
     for lam, stable in (
         (low * 1.00001 + 1e-9, True),
         (0.99999 * low, False),
@@ -155,7 +167,9 @@ def test_the_measured_critical_delay_is_the_one_of_theory_within_one_control_per
 def test_the_theory_is_that_of_a_saturated_laws_middle_too():
     plant = smc.plant("inverted_pendulum")
     law = own(plant, "boundary_layer")
-    critical = linear_theory.critical_delay(plant, *linear_theory.linear_gains(law) or (0.0, 0.0), H)
+    critical = linear_theory.critical_delay(
+        plant, *linear_theory.linear_gains(law) or (0.0, 0.0), H
+    )
     periods = math.ceil(critical / H) - 1
     assert not grows(from_near_rest(plant, law, delay=periods * H))
     assert grows(from_near_rest(plant, law, delay=(periods + 1) * H))
@@ -164,7 +178,10 @@ def test_the_theory_is_that_of_a_saturated_laws_middle_too():
 @each_plant
 def test_holding_the_command_costs_half_a_period_of_delay(plant):
     law = own(plant)
-    few, more = (linear_theory.critical_delay(plant, law.gains["lam"], law.gains["k1"], h) for h in (1e-4, 1e-3))
+    few, more = (
+        linear_theory.critical_delay(plant, law.gains["lam"], law.gains["k1"], h)
+        for h in (1e-4, 1e-3)
+    )
     assert few - more == pytest.approx(4.5e-4, abs=2e-6)
 
 
@@ -177,7 +194,11 @@ def test_holding_the_command_costs_half_a_period_of_delay(plant):
 )
 def test_the_closed_form_of_the_critical_delay_agrees_with_eigenvalues(plant, lam, k1, h):
     critical = linear_theory.critical_delay(plant, lam, k1, h) / h
-    first = math.ceil(min(critical, 60.0) + 1e-9) if critical else 0  # of the unstable ones, in periods
+    # of the unstable ones, in periods
+    if critical:
+        first = math.ceil(min(critical, 60.0) + 1e-9)
+    else:
+        first = 0
     for periods in {0, 1, 2, 3, 7, 12, first - 1}:
         if 0 <= periods < first:
             assert growth(plant, lam, k1, h, periods) < 1.0 + 1e-9
@@ -197,9 +218,13 @@ def test_a_law_weaker_than_the_plants_own_damping_bears_every_delay():
 @each_plant
 def test_the_measured_steady_error_is_the_one_of_theory_within_one_percent(plant):
     d, law = 0.2, own(plant)
-    trace = smc.run(smc.Scenario(plant=plant, law=law, disturbance=smc.Constant(d), x0=0.01, duration=15.0))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law=law, disturbance=smc.Constant(d), x0=0.01, duration=15.0)
+    )
     measured = steady_error(trace)
-    assert measured == pytest.approx(linear_theory.steady_error(plant, law.gains["lam"], law.gains["k1"], d), rel=0.01)
+    assert measured == pytest.approx(
+        linear_theory.steady_error(plant, law.gains["lam"], law.gains["k1"], d), rel=0.01
+    )
 
 
 @each_plant
@@ -219,7 +244,9 @@ def test_the_tolerated_force_is_the_largest_up_to_the_limit(plant, k1, most):
     assert force is not None
     rises = force(np.linspace(0.0, most, 2_001)[1:])
     first = int(np.argmax(np.r_[np.diff(rises) < 0.0, True]))
-    assert linear_theory.tolerated_force(plant, law, most) == pytest.approx(max(rises[first], 0.0), rel=1e-6, abs=1e-9)
+    assert linear_theory.tolerated_force(plant, law, most) == pytest.approx(
+        max(rises[first], 0.0), rel=1e-6, abs=1e-9
+    )
 
 
 def test_the_actuators_bound_counts_where_it_is_below_lambda():

@@ -17,7 +17,14 @@ margins = importlib.import_module("smc_mujoco.analysis.margins")  # smc.margins 
 
 BASE = scenarios.scenario("duffing", "observer_free", duration=4.0)
 ROUGH = Margin(
-    plant="p", law="l", kind="delay", value=math.nan, unit="s", resolution=0.1, searched=1.0, theory=math.inf
+    plant="p",
+    law="l",
+    kind="delay",
+    value=math.nan,
+    unit="s",
+    resolution=0.1,
+    searched=1.0,
+    theory=math.inf,
 )
 
 
@@ -33,8 +40,12 @@ def kind_of(put):
 
 
 def pushed(level):
-    """A scenario that tolerates the level or not: without a push, or with one of more than the law has."""
-    return dataclasses.replace(BASE, duration=0.5, x0=0.0, disturbance=smc.Constant(0.0 if level else 50.0))
+    """A scenario that tolerates the level or not: without a push, or with one of more than the law
+    has.
+    """
+    return dataclasses.replace(
+        BASE, duration=0.5, x0=0.0, disturbance=smc.Constant(0.0 if level else 50.0)
+    )
 
 
 # what a margin is
@@ -42,7 +53,10 @@ def pushed(level):
 
 @pytest.mark.slow
 def test_it_is_the_boundary_between_what_is_tolerated_and_what_is_not(found):
-    bases = {"observer_free": BASE, "classical": scenarios.scenario("duffing", "classical", duration=4.0)}
+    bases = {
+        "observer_free": BASE,
+        "classical": scenarios.scenario("duffing", "classical", duration=4.0),
+    }
     closed = [margin for margin in found if not margin.open]
     assert len(closed) > 5
     for margin in closed:
@@ -83,13 +97,19 @@ def test_it_comes_in_the_order_asked_for_with_units_and_to_the_resolution_asked_
     assert [margin.unit for margin in found[:5]] == ["s", "N", "N", "1", "m"]
     for margin in found:
         if not margin.open:
-            step = 5 * BASE.control_period if margin.kind == "delay" else COARSE * margin.value
+            if margin.kind == "delay":
+                step = 5 * BASE.control_period
+            else:
+                step = COARSE * margin.value
             assert margin.resolution <= step * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
 def test_it_does_not_depend_on_company_or_threads(found):
-    assert margins.margins_of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [found[1], found[0]]
+    assert margins.margins_of([BASE], ["disturbance", "delay"], COARSE, threads=1) == [
+        found[1],
+        found[0],
+    ]
 
 
 # the search
@@ -102,13 +122,21 @@ SEARCHED = [  # whether a level is tolerated, of 1, 2 and 4 first, and the margi
     ),
     (lambda level: not 1.3 < level < 1.9, 4.0, "an island between two levels goes unseen"),
     (lambda level: True, 4.0, "has the searched level where no run fails"),
-    (lambda level: level < 0.3, pytest.approx(0.3, abs=FINE), "is also found below the smallest level"),
+    (
+        lambda level: level < 0.3,
+        pytest.approx(0.3, abs=FINE),
+        "is also found below the smallest level",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("tolerated", "value", "words"), SEARCHED, ids=[row[-1] for row in SEARCHED])
+@pytest.mark.parametrize(
+    ("tolerated", "value", "words"), SEARCHED, ids=[row[-1] for row in SEARCHED]
+)
 def test_a_margin(tolerated, value, words, monkeypatch):
-    monkeypatch.setitem(margins.MARGIN_KINDS, "push", kind_of(lambda base, level: pushed(tolerated(level))))
+    monkeypatch.setitem(
+        margins.MARGIN_KINDS, "push", kind_of(lambda base, level: pushed(tolerated(level)))
+    )
     (margin,) = margins.margins_of([pushed(True)], ["push"])
     assert (margin.value, margin.searched) == (value, 4.0), words
     assert (margin.open, margin.resolution == 0.0) == (value == 4.0,) * 2
@@ -117,13 +145,17 @@ def test_a_margin(tolerated, value, words, monkeypatch):
 @pytest.mark.slow
 def test_both_signs_of_a_disturbance_are_tolerated(monkeypatch):
     onesided = kind_of(lambda base, level: pushed(level > -1.5))
-    monkeypatch.setitem(margins.MARGIN_KINDS, "onesided", dataclasses.replace(onesided, signed=True))
+    monkeypatch.setitem(
+        margins.MARGIN_KINDS, "onesided", dataclasses.replace(onesided, signed=True)
+    )
     (margin,) = margins.margins_of([pushed(True)], ["onesided"])
     assert margin.value == pytest.approx(1.5, rel=FINE)
     law = smc.law("super_twisting", k1=7.634, k2=28.49, c=2.5)  # winds up when pushed towards 0
     wound = dataclasses.replace(BASE, law=law, actuator=smc.Lag(0.01), duration=5.0)
     (margin,) = margins.margins_of([wound], ["disturbance"], COARSE)
-    runs = smc.run([dataclasses.replace(wound, disturbance=smc.Constant(sign * 4.5)) for sign in (1.0, -1.0)])
+    runs = smc.run(
+        [dataclasses.replace(wound, disturbance=smc.Constant(sign * 4.5)) for sign in (1.0, -1.0)]
+    )
     assert [margins.tolerates(one) for one in runs] == [True, False]
     assert margin.value < 4.5
 
@@ -136,7 +168,9 @@ def test_a_law_that_fails_anyway_has_no_margin():
 
 def test_it_tells_how_far_it_is():
     told = []
-    margins.margins_of([BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole)))
+    margins.margins_of(
+        [BASE], ["delay"], COARSE, report=lambda done, whole: told.append((done, whole))
+    )
     assert all(0.0 < done <= whole for done, whole in told)
     assert [done for done, _ in told] == sorted(done for done, _ in told)
     assert told[-1][0] == told[-1][1]
@@ -159,9 +193,13 @@ def test_a_delay_may_be_tolerated_beyond_where_rest_turns_unstable_in_a_small_os
     (margin,) = margins.margins(["inverted_pendulum"], ["observer_free"], ["delay"], "study")
     assert margin.theory is not None
     assert margin.theory - BASE.control_period < margin.value < 1.25 * margin.theory
-    ringing = scenarios.scenario("inverted_pendulum", "observer_free", changes={"input_delay": margin.value})
+    ringing = scenarios.scenario(
+        "inverted_pendulum", "observer_free", changes={"input_delay": margin.value}
+    )
     x = abs(smc.run(ringing).x[:, 0])
-    assert x[-1000:].max() == pytest.approx(x[-3000:-2000].max(), rel=1e-3)  # neither grows nor decays
+    assert x[-1000:].max() == pytest.approx(
+        x[-3000:-2000].max(), rel=1e-3
+    )  # neither grows nor decays
     assert 0.01 < x[-1000:].max() / 0.5 <= margins.TOLERATED_ERROR
 
 
@@ -180,22 +218,41 @@ def test_dry_friction_is_tolerated_beside_what_a_condition_has():
 
 
 def test_linear_theory_is_only_for_the_loop_that_it_describes():
-    """None for a plant that is pushed or changed, a law that reads an encoder or the model, or another reference."""
+    """None for a plant that is pushed or changed, a law that reads an encoder or the model, or
+    another reference.
+    """
     base = smc.grid("duffing", "observer_free", "nominal")[0]
-    others = [{"model": "nominal"}, {"reference": smc.Constant(0.1)}, {"reference": smc.Sine(0.1, 1.0)}]
+    others = [
+        {"model": "nominal"},
+        {"reference": smc.Constant(0.1)},
+        {"reference": smc.Sine(0.1, 1.0)},
+    ]
     others += [{"feedforward": smc.Constant(2.0)}]
     cases = [(smc.grid("duffing", "observer_free", "noise")[0], True), (base, True)]
-    cases += [(smc.grid("duffing", "observer_free", one)[0], False) for one in ("constant", "heavy", "encoder")]
-    for case, told in [*cases, *((dataclasses.replace(base, **fields), False) for fields in others)]:
+    cases += [
+        (smc.grid("duffing", "observer_free", one)[0], False)
+        for one in ("constant", "heavy", "encoder")
+    ]
+    for case, told in [
+        *cases,
+        *((dataclasses.replace(base, **fields), False) for fields in others),
+    ]:
         for kind in ("delay", "disturbance", "friction"):
             assert (margins.MARGIN_KINDS[kind].expected(case) is not None) == told
     estimated = dataclasses.replace(base, velocity="filtered_difference")  # changes nothing at rest
-    told = [margins.MARGIN_KINDS[kind].expected(estimated) is not None for kind in ("delay", "disturbance")]
+    told = [
+        margins.MARGIN_KINDS[kind].expected(estimated) is not None
+        for kind in ("delay", "disturbance")
+    ]
     assert told == [False, True]
 
 
 def test_only_laws_with_a_linear_part_have_theory(found):
-    assert [margin.kind for margin in found if margin.theory is not None] == ["delay", "disturbance", "friction"]
+    assert [margin.kind for margin in found if margin.theory is not None] == [
+        "delay",
+        "disturbance",
+        "friction",
+    ]
 
 
 POLES = """
@@ -203,7 +260,9 @@ POLES = """
   <body><joint name="a" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
   <body pos="0 2 0"><joint name="b" axis="0 1 0"/><geom size=".1" pos="0 0 1" mass="1" contype="0"/></body>
 </worldbody><actuator>{motors}</actuator>{rest}</mujoco>"""
-MOTORS = '<motor joint="a" gear="40" ctrlrange="-1 1"/><motor joint="b" gear="15" ctrlrange="-1 1"/>'
+MOTORS = (
+    '<motor joint="a" gear="40" ctrlrange="-1 1"/><motor joint="b" gear="15" ctrlrange="-1 1"/>'
+)
 
 
 @pytest.fixture
@@ -221,7 +280,9 @@ def poles(tmp_path):
 def test_theory_knows_the_weakest_motor(poles):
     strong = smc.law("boundary_layer", k=30.0, phi=0.01, c=5.0)
     base = smc.Scenario(plant=poles(), law=strong, x0=(1.0, 1.0))
-    at = 15.0 / (30.0 * 5.0 / 0.01)  # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
+    at = 15.0 / (
+        30.0 * 5.0 / 0.01
+    )  # rad: there it gives its 15 N m, of which gravity takes m g l sin(x) and ever more
     expected = margins.MARGIN_KINDS["disturbance"].expected(base)
     assert expected == pytest.approx(15.0 - 9.81 * math.sin(at), rel=1e-3)
 
@@ -232,7 +293,9 @@ def test_margins_are_measured_where_theory_has_nothing_to_say(poles):
     tied = poles('<equality><joint joint1="a" joint2="b"/></equality>', ["a"])
     bases = [
         smc.Scenario(plant=tied, law=law, x0=0.2, **runs),
-        smc.Scenario(plant=dataclasses.replace(poles(), mixed=("rad", "m")), law=law, x0=0.2, **runs),
+        smc.Scenario(
+            plant=dataclasses.replace(poles(), mixed=("rad", "m")), law=law, x0=0.2, **runs
+        ),
         smc.Scenario(plant="cart_pole", law=law, x0=0.0, **runs),
     ]
     found = margins.margins_of(bases, ["disturbance"], COARSE)
@@ -247,7 +310,9 @@ def test_the_mass_ratio_is_of_the_nominal_mass_under_whichever_name():
         known = dataclasses.replace(BASE, mismatch={name: 1.5, "alpha": 2.0})
         assert heavier(known, 2.0).mismatch == {name: 2.0, "alpha": 2.0}
     assert heavier(BASE, 2.0).mismatch == {"mass": 2.0}
-    (margin,) = margins.margins_of([dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE)
+    (margin,) = margins.margins_of(
+        [dataclasses.replace(BASE, mismatch={"M": 1.1}, duration=1.0)], ["mass"], COARSE
+    )
     assert margin.kind == "mass"
 
 
@@ -257,7 +322,9 @@ def test_levels_of_time_are_multiples_of_the_shortest_that_a_run_can_have():
         search = margins.MARGIN_KINDS[kind].search(BASE, FINE)
         assert search.rounded(0.6 * least) == search.rounded(1.4 * least) == least
         assert search.rounded(1.6 * least) == 2.0 * least
-        assert np.allclose(search.levels, np.round(np.divide(search.levels, least)) * least, rtol=1e-12, atol=0.0)
+        assert np.allclose(
+            search.levels, np.round(np.divide(search.levels, least)) * least, rtol=1e-12, atol=0.0
+        )
         assert search.resolution(0.0) % least == pytest.approx(0.0)
 
 
@@ -297,7 +364,11 @@ def test_the_table_says_what_was_not_found_to_fail_and_what_was_never_tolerated(
 
     console = Console(width=100)
     with console.capture() as captured:
-        console.print(tables.margins("delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]))
+        console.print(
+            tables.margins(
+                "delay", [ROUGH, dataclasses.replace(ROUGH, law="m", value=1.0, theory=None)]
+            )
+        )
     first, second = captured.get().splitlines()[-3:-1]
     assert "none" in first
     assert "any" in first

@@ -14,7 +14,9 @@ from smc_mujoco.analysis import linear_theory
 from smc_mujoco.analysis.region_of_attraction import CONVERGES, DOES_NOT, UNDECIDED, Basin
 from smc_mujoco.draw import region
 
-maps = importlib.import_module("smc_mujoco.analysis.region_of_attraction")  # smc.basin is the function
+maps = importlib.import_module(
+    "smc_mujoco.analysis.region_of_attraction"
+)  # smc.basin is the function
 
 PENDULUM = smc.plant("inverted_pendulum")
 WEAK = smc.law("observer_free", lam=1.5, k1=9.0)  # N m, of the 2.45 that hold a pendulum anywhere
@@ -34,7 +36,9 @@ def to_the_end(scenario, x, v):
 @pytest.fixture(scope="module")
 def weak():
     """The inverted pendulum under a law that cannot lift it from everywhere."""
-    return maps.basin_of(base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 12), np.linspace(-4.5, 4.5, 12))
+    return maps.basin_of(
+        base("inverted_pendulum", WEAK), np.linspace(-1.5, 1.5, 12), np.linspace(-4.5, 4.5, 12)
+    )
 
 
 @smc.law_function(gains={"far": 1.0})
@@ -70,7 +74,8 @@ def test_states_that_leave_early_get_the_verdict_of_a_run_to_the_end(plant, law)
 
 
 def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **ended):
-    """The verdict on a run that is at `start`, then in both halves of the part that counts at `first` and `second`.
+    """The verdict on a run that is at `start`, then in both halves of the part that counts at
+    `first` and `second`.
 
     X is 2 m and V 4 m/s, so that the band is 0.04 m and 0.08 m/s.
     """
@@ -78,10 +83,17 @@ def verdict(first, second, final, start=1.0, v=0.0, u=(0.0, 0.0), u_max=6.0, **e
     late = t >= (240 if final else 201)
     second_half = t >= (270 if final else 251)
     x = np.where(second_half, second, np.where(late, first, start))
-    signals = {"x": x, "v": np.where(late, v, 0.0), "u": np.where(second_half, *reversed(u)), "r": 0.0 * t}
+    signals = {
+        "x": x,
+        "v": np.where(late, v, 0.0),
+        "u": np.where(second_half, *reversed(u)),
+        "r": 0.0 * t,
+    }
     scenario = SimpleNamespace(resolved=SimpleNamespace(u_max=u_max))
     columns = {name: values[:, None] for name, values in signals.items()}
-    trace = SimpleNamespace(t=t, **columns, scenario=scenario, **{"failure": None, "diverged_at": None} | ended)
+    trace = SimpleNamespace(
+        t=t, **columns, scenario=scenario, **{"failure": None, "diverged_at": None} | ended
+    )
     return maps.verdict_of(trace, np.array([-2.0, 1.0]), np.array([0.5, -4.0]), final)
 
 
@@ -91,7 +103,10 @@ def test_a_whole_run_is_judged_by_the_band_and_by_whether_it_leaves():
     assert [verdict(0.0, 0.0, True, v=v) for v in (0.08, 0.0801)] == [CONVERGES, DOES_NOT]
     leaving = 0.03 * math.sqrt(1.05)
     assert [verdict(0.03, q * leaving, True) for q in (0.9999, 1.0001)] == [CONVERGES, UNDECIDED]
-    assert [verdict(1e-4, x, True) for x in (0.00399, 0.00401)] == [CONVERGES, UNDECIDED]  # near, and no longer
+    assert [verdict(1e-4, x, True) for x in (0.00399, 0.00401)] == [
+        CONVERGES,
+        UNDECIDED,
+    ]  # near, and no longer
 
 
 def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
@@ -100,11 +115,20 @@ def test_an_early_verdict_needs_a_run_that_approaches_rests_or_fails():
     assert [verdict(1e-4, x, False) for x in (0.00399, 0.00401)] == [CONVERGES, None]
     assert verdict(1e-4, 0.003, False, start=0.003) is None  # it began near
     assert [verdict(0.5, 0.5 + 2.0 * q, False) for q in (0.99e-6, 1.01e-6)] == [DOES_NOT, None]
-    assert [verdict(0.5, 0.5, False, u=(1.0, 1.0 + 6.0 * q)) for q in (0.99e-6, 1.01e-6)] == [DOES_NOT, None]
-    rests = [verdict(0.5, 0.5, False, u=(2.0, 2.0 + 2.0 * q), u_max=math.inf) for q in (0.99e-6, 1.01e-6)]
+    assert [verdict(0.5, 0.5, False, u=(1.0, 1.0 + 6.0 * q)) for q in (0.99e-6, 1.01e-6)] == [
+        DOES_NOT,
+        None,
+    ]
+    rests = []
+    for q in (0.99e-6, 1.01e-6):
+        rests.append(verdict(0.5, 0.5, False, u=(2.0, 2.0 + 2.0 * q), u_max=math.inf))
     assert rests == [DOES_NOT, None]
     assert verdict(0.03, 0.03, False) is None  # at rest in the band
-    assert verdict(0.0, 0.0, False, failure="raised") == verdict(0.0, 0.0, True, diverged_at=3.0) == DOES_NOT
+    assert (
+        verdict(0.0, 0.0, False, failure="raised")
+        == verdict(0.0, 0.0, True, diverged_at=3.0)
+        == DOES_NOT
+    )
 
 
 @pytest.mark.slow
@@ -124,7 +148,10 @@ def test_a_run_that_still_approaches_at_the_end_is_undecided():
     slow = base("duffing", smc.law("observer_free", lam=1.98, k1=0.83))
     assert np.roots([1.0, 0.2 + 1.98, -1.0 + 1.98 * 0.83]).max() == pytest.approx(-0.35, abs=0.005)
     assert (to_the_end(slow, [-1.5, 1.5], [0.0]).outcome == UNDECIDED).all()
-    assert (maps.basin_of(dataclasses.replace(slow, duration=20.0), [-1.5, 1.5], [0.0]).outcome == CONVERGES).all()
+    assert (
+        maps.basin_of(dataclasses.replace(slow, duration=20.0), [-1.5, 1.5], [0.0]).outcome
+        == CONVERGES
+    ).all()
 
 
 def test_a_run_that_leaves_slowly_does_not_converge_early():
@@ -151,24 +178,36 @@ def test_a_run_that_fails_does_not_converge():
 def test_sticking_under_a_growing_command_is_not_decided_early():
     stuck = base("duffing", smc.law("pid"), 10.0)
     stuck = dataclasses.replace(stuck, friction=smc.Coulomb(3.0), u_max=math.inf)
-    early, whole = (run(stuck, [0.1, 0.5], [0.0]).outcome.tolist() for run in (maps.basin_of, to_the_end))
+    early, whole = (
+        run(stuck, [0.1, 0.5], [0.0]).outcome.tolist() for run in (maps.basin_of, to_the_end)
+    )
     assert early == whole
     assert DOES_NOT not in whole[0]
 
 
 def test_distance_is_measured_from_the_reference(refused):
-    held = dataclasses.replace(base("duffing", smc.law("lqr"), 12.0), model="nominal", reference=smc.Constant(0.3))
+    held = dataclasses.replace(
+        base("duffing", smc.law("lqr"), 12.0), model="nominal", reference=smc.Constant(0.3)
+    )
     found = maps.basin_of(held, [0.0, 0.6], [0.0, 0.1])
     assert found.outcome.tolist() == [[CONVERGES] * 2] * 2
     assert found.decided_at.max() < 5.0
-    refused(lambda: maps.basin_of(dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1]))
+    refused(
+        lambda: maps.basin_of(
+            dataclasses.replace(held, reference=smc.Sine(0.3, 1.0)), [0.0, 0.6], [0.0, 0.1]
+        )
+    )
 
 
 def test_rest_a_turn_away_does_not_converge_and_the_way_back_from_there_takes_time():
-    found = maps.basin_of(base("inverted_pendulum", counts_no_turns, 3.0), [0.0, 2 * math.pi], [0.0])
+    found = maps.basin_of(
+        base("inverted_pendulum", counts_no_turns, 3.0), [0.0, 2 * math.pi], [0.0]
+    )
     assert found.outcome.tolist() == [[CONVERGES, DOES_NOT]]
     for duration, outcome in ((3.0, UNDECIDED), (6.0, CONVERGES)):
-        found = maps.basin_of(base("inverted_pendulum", smc.law("lqr"), duration), [2 * math.pi], [0.0])
+        found = maps.basin_of(
+            base("inverted_pendulum", smc.law("lqr"), duration), [2 * math.pi], [0.0]
+        )
         assert found.outcome.tolist() == [[outcome]]
 
 
@@ -181,13 +220,17 @@ def test_a_run_that_swings_through_the_band_at_the_end_is_undecided():
 
 
 def test_a_state_has_the_same_verdict_in_any_company(weak):
-    alone = maps.basin_of(base("inverted_pendulum", WEAK), weak.x[[0, 7, -1]], weak.v[[0, 9, -1]], threads=1)
+    alone = maps.basin_of(
+        base("inverted_pendulum", WEAK), weak.x[[0, 7, -1]], weak.v[[0, 9, -1]], threads=1
+    )
     assert (alone.outcome == weak.outcome[np.ix_([0, 9, -1], [0, 7, -1])]).all()
 
 
 def test_the_channels_of_a_network_start_alike():
     found = maps.basin_of(
-        base("inverted_pendulum_network", smc.law("observer_free", lam=3.96, k1=9.36), 3.0), [-0.5, 0.5], [0]
+        base("inverted_pendulum_network", smc.law("observer_free", lam=3.96, k1=9.36), 3.0),
+        [-0.5, 0.5],
+        [0],
     )
     assert (found.outcome == CONVERGES).all()
 
@@ -195,7 +238,9 @@ def test_the_channels_of_a_network_start_alike():
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [smc.law("adaptive", gamma=66.11, c=2.853)])
 def test_what_a_switching_law_holds_has_converged_whatever_the_beat_of_its_ripple(law):
-    """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the end."""
+    """Van der Pol, from everywhere on the study's map: an independent integration is at rest in the
+    end.
+    """
     x, v = np.linspace(-4.0, 4.0, 5), np.linspace(-12.0, 12.0, 5)
     assert (maps.basin_of(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
     assert (to_the_end(base("van_der_pol", law, 8.0), x, v).outcome == CONVERGES).all()
@@ -229,14 +274,18 @@ def test_metres_and_radians_do_not_start_alike(refused):
 def test_beyond_the_angle_that_the_torque_can_hold_a_pendulum_at_rest_falls():
     p = PENDULUM.parameters
     limit = math.asin(WEAK.gains["lam"] / (p["m"] * p["grav"] * p["l"]))
-    found = maps.basin_of(base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0])
+    found = maps.basin_of(
+        base("inverted_pendulum", WEAK), [0.9 * limit, 1.02 * limit, 2.0 * limit], [0.0, 9.0]
+    )
     assert found.outcome[0].tolist() == [CONVERGES, DOES_NOT, DOES_NOT]
 
 
 def test_a_pendulum_beyond_the_saddle_of_full_torque_comes_back_only_by_a_swing(weak):
-    """With u = -U, only friction changes E = J v^2 / 2 + m grav l cos x + U x; another u lowers it on the way.
+    """With u = -U, only friction changes E = J v^2 / 2 + m grav l cos x + U x; another u lowers it
+    on the way.
 
-    So there is no way back from beyond the saddle with less than its E. With more, a pendulum swings down and back.
+    So there is no way back from beyond the saddle with less than its E. With more, a pendulum
+    swings down and back.
     """
     p, torque = PENDULUM.parameters, WEAK.gains["lam"]
     inertia, weight = p["m"] * p["l"] ** 2, p["m"] * p["grav"] * p["l"]
@@ -268,7 +317,9 @@ def test_what_is_no_map_is_refused(tmp_path, refused):
 
 def test_however_many_horizons_maps_have_what_rests_has_a_shade_of_the_law_and_the_latest_share_one():
     for after, last in (([1.0], 1.0), ([1.0, 2.0, 4.0], 4.0), ([1.0, 2.0, 4.0, 8.0, 16.0], 16.0)):
-        drawn: Any = SimpleNamespace(decided_at=np.array(after), outcome=np.full(len(after), CONVERGES))
+        drawn: Any = SimpleNamespace(
+            decided_at=np.array(after), outcome=np.full(len(after), CONVERGES)
+        )
         shades = region.colour_indices(drawn, after)
         words = region.meanings(after, "by {:g} s", "never")
         assert shades.tolist() == [0, 1, 2, 2, 2][: len(after)]
@@ -279,8 +330,14 @@ def test_however_many_horizons_maps_have_what_rests_has_a_shade_of_the_law_and_t
 def test_a_grid_of_nothing_is_refused(refused):
     for points in [(1, 5), (5, 0), (5, 2.5)]:
         refused(lambda points=points: maps.basin("duffing", "observer_free", points, gains="study"))
-        refused(lambda points=points: maps.basin("duffing", "observer_free", (*points, 5), gains="study"))
-    refused(lambda: maps.basin(dataclasses.replace(smc.plant("duffing"), x0=(0.0,)), "observer_free"))
+        refused(
+            lambda points=points: maps.basin(
+                "duffing", "observer_free", (*points, 5), gains="study"
+            )
+        )
+    refused(
+        lambda: maps.basin(dataclasses.replace(smc.plant("duffing"), x0=(0.0,)), "observer_free")
+    )
 
 
 def test_too_short_a_duration_is_one_sentence_and_a_longer_one_is_mapped(refused):
@@ -300,7 +357,16 @@ def test_positions_that_are_none_are_refused(refused):
 
 def test_the_study_maps_by_name_and_tells_how_far_it_is():
     told = []
-    found = maps.basin("duffing", "observer_free", (3, 2), None, None, "study", 2.0, report=lambda *a: told.append(a))
+    found = maps.basin(
+        "duffing",
+        "observer_free",
+        (3, 2),
+        None,
+        None,
+        "study",
+        2.0,
+        report=lambda *a: told.append(a),
+    )
     assert (found.x.tolist(), found.v.tolist(), found.unit) == ([-3.0, 0.0, 3.0], [-9.0, 9.0], "m")
     assert all(0 < done <= most for done, most in told)
     assert told == sorted(told)

@@ -33,7 +33,9 @@ def test_a_p_value_is_the_share_of_signs_with_as_large_a_rank_sum(differences):
     assert p_values(differences) == pytest.approx(share_of_signs(differences), abs=1e-12)
 
 
-@pytest.mark.parametrize("differences", [[1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5], [0.0, 0.0, 1.0, -1.0, 2.0]], ids=len)
+@pytest.mark.parametrize(
+    "differences", [[1.0, 1.0, -2.0, 3.0, 3.0, 3.0, -0.5], [0.0, 0.0, 1.0, -1.0, 2.0]], ids=len
+)
 def test_ties_and_zeros_only_raise_a_p_value(differences):
     pairs = list(itertools.combinations_with_replacement(differences, 2))
     untied = np.arange(1.0, len(differences) + 1)
@@ -49,7 +51,9 @@ def test_an_interval_has_the_centres_that_the_test_does_not_reject(error):
     centre, low, high = interval(differences, error)
     assert low < centre < high
     for end, side in ((low, 1.0), (high, -1.0)):
-        outside, inside = (p_values(side * (differences - end) + shift)[0] for shift in (1e-9, -1e-9))
+        outside, inside = (
+            p_values(side * (differences - end) + shift)[0] for shift in (1e-9, -1e-9)
+        )
         assert outside <= error < inside
 
 

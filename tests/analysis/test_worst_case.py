@@ -1,4 +1,6 @@
-"""The adversary: it stays within the class, replays, depends on nothing else, and finds what is known to be worst."""
+"""The adversary: it stays within the class, replays, depends on nothing else, and finds what is
+known to be worst.
+"""
 
 import dataclasses
 import itertools
@@ -7,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers import reference
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.worst_case import search as attack
@@ -14,7 +17,6 @@ from smc_mujoco.analysis.worst_case.search import Search, loop_frequency, record
 from smc_mujoco.analysis.worst_case.uncertainty import Members, default_class, outside
 from smc_mujoco.control import gain_sets
 from smc_mujoco.metrics.catalogue import CATALOGUE
-from helpers import reference
 from smc_mujoco.simulation import serialise
 from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.studies.worst_case import WorstCases, default_budget
@@ -31,7 +33,9 @@ CLASSES = {
     "slope": smc.Uncertainty(disturbance=2.0, slope=8.0),
     "constants": smc.Uncertainty(mass=(0.7, 1.3), delay=(0.0, 0.01), friction=(0.0, 0.1), x0=0.2),
     "errors": smc.Uncertainty(position_noise=0.01, velocity_noise=0.05, hold=0.04),
-    "all": smc.Uncertainty(disturbance=1.0, jitter=5e-4, mass=(0.7, 1.3), parameters={"alpha": (0.8, 1.2)}),
+    "all": smc.Uncertainty(
+        disturbance=1.0, jitter=5e-4, mass=(0.7, 1.3), parameters={"alpha": (0.8, 1.2)}
+    ),
 }
 
 
@@ -40,16 +44,24 @@ def test_the_worst_scenario_replays_in_the_class_whatever_the_threads(name):
     base, within = scenario(duration=1.0), CLASSES[name]
     worst = smc.worst_case(base, within=within, budget=8)
     again = smc.worst_case(base, within=within, budget=8, threads=1)
-    assert (again.value, again.median, again.scenario) == (worst.value, worst.median, worst.scenario)
+    assert (again.value, again.median, again.scenario) == (
+        worst.value,
+        worst.median,
+        worst.scenario,
+    )
     trace = smc.run(serialise.restore(serialise.describe(worst.scenario)))
     assert smc.score(trace)["rms_error"] == worst.value >= worst.median
     assert worst.tried == 16
     assert np.abs(trace.d).max() <= within.disturbance
     if within.slope:
-        assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (1 + 1e-9)
+        assert np.abs(np.diff(trace.d[:, 0])).max() <= within.slope * base.control_period * (
+            1 + 1e-9
+        )
     made = worst.scenario
     assert 0.0 <= made.input_delay <= within.delay[1]
-    for error, bound in zip(made.noise.errors, (within.position_noise, within.velocity_noise), strict=True):
+    for error, bound in zip(
+        made.noise.errors, (within.position_noise, within.velocity_noise), strict=True
+    ):
         assert np.abs(error.values if error else 0.0).max() <= bound
         assert error is None or np.allclose(np.diff(error.times), within.hold)
     for changed, factor in made.mismatch.items():
@@ -62,7 +74,11 @@ def test_the_ends_of_a_class_are_within_it():
     """A delay and a jitter are counted in steps, and friction may be both scaled and added."""
     base = scenario(friction=smc.Coulomb(0.1), physics_step=1e-3)
     within = smc.Uncertainty(
-        delay=(3e-4, 2.6e-3), jitter=2e-4, friction=(0.0, 0.2), friction_scale=(0.5, 1.5), mass=(0.12, 1.14)
+        delay=(3e-4, 2.6e-3),
+        jitter=2e-4,
+        friction=(0.0, 0.2),
+        friction_scale=(0.5, 1.5),
+        mass=(0.12, 1.14),
     )
     members = Members([base], within)
     low, high = (members.with_constants(np.full(len(members.ends), share)) for share in (0.0, 1.0))
@@ -84,14 +100,21 @@ def test_the_ends_of_a_class_are_within_it():
         ("force", smc.signals.TimeSeries, [0, 1, 2, 3, 2, 1, 1, 1, 1], [0, 3, 5, 8]),
     ],
 )
-def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_its_corners(name, kind, values, kept):
+def test_a_force_is_kept_at_its_jumps_if_few_of_its_values_change_and_else_at_its_corners(
+    name, kind, values, kept
+):
     signal = Members([scenario()], CLASSES[name]).signal(np.array(values, float))
     assert signal == kind([1e-3 * k for k in kept], [values[k] for k in kept])
 
 
 def test_errors_of_measurement_reach_the_law_alike_in_both_loops():
-    error, steps = smc.signals.Held([0.0, 0.05], [0.02, -0.02]), smc.signals.TimeSeries([0.0, 0.2], [0.1, -0.1])
-    made = scenario(duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps))
+    error, steps = (
+        smc.signals.Held([0.0, 0.05], [0.02, -0.02]),
+        smc.signals.TimeSeries([0.0, 0.2], [0.1, -0.1]),
+    )
+    made = scenario(
+        duration=0.1, noise=smc.Noise(position=1e-3, position_error=error, velocity_error=steps)
+    )
     fast, slow = smc.run(made), reference.run(made)
     plain = smc.run(dataclasses.replace(made, noise=smc.Noise(position=1e-3)))
     for name in ("x", "v", "u", "s"):
@@ -107,9 +130,19 @@ def test_a_larger_budget_continues_the_search():
     assert values[0] < values[-1]
 
 
-@pytest.mark.parametrize(("name", "disturbance"), [("force", (Relay(2.0, rate=1.0),)), ("errors", ())])
-def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_without_a_force(name, disturbance):
-    searcher = Search(Members([scenario(duration=0.1)], CLASSES[name]), CATALOGUE["rms_error"], 9, 1, lambda _: None)
+@pytest.mark.parametrize(
+    ("name", "disturbance"), [("force", (Relay(2.0, rate=1.0),)), ("errors", ())]
+)
+def test_the_loop_s_frequency_is_read_of_a_run_under_a_relay_of_the_rate_or_without_a_force(
+    name, disturbance
+):
+    searcher = Search(
+        Members([scenario(duration=0.1)], CLASSES[name]),
+        CATALOGUE["rms_error"],
+        9,
+        1,
+        lambda _: None,
+    )
     searcher.search(np.random.default_rng(0), [])
     assert searcher.swing
     assert searcher.swing.scenario.disturbance == disturbance
@@ -136,14 +169,20 @@ def test_a_relay_replays_from_its_record_to_the_last_bit():
 
 def test_a_relay_that_starts_late_goes_on_from_another_force():
     relay = Relay(2.0, rate=1.0, start=0.5)
-    run = smc.run(scenario(duration=1.0, disturbance=(smc.signals.Held([0.0, 0.5, 1.0], [1.0, 0.0, 0.0]), relay)))
+    run = smc.run(
+        scenario(
+            duration=1.0, disturbance=(smc.signals.Held([0.0, 0.5, 1.0], [1.0, 0.0, 0.0]), relay)
+        )
+    )
     np.testing.assert_array_equal(run.d[:, 0], 2.0 * recorded_force(run, relay, np.full(1001, 0.5)))
     assert set(run.d[:500, 0]) == {1.0}
     assert set(run.d[500:, 0]) == {-2.0}
 
 
 def test_it_finds_the_worst_of_a_linear_loop():
-    """For M x'' = -k x - c v + d, |d| <= D, at rest at first, the largest x(T) is D times the integral of |h|."""
+    """For M x'' = -k x - c v + d, |d| <= D, at rest at first, the largest x(T) is D times the
+    integral of |h|.
+    """
     k, c, T = 20.0, 1.0, 4.0
 
     @smc.law_function(gains={"k": k, "c": c})
@@ -154,7 +193,9 @@ def test_it_finds_the_worst_of_a_linear_loop():
     w, a = np.sqrt(k - c * c / 4), c / 2
     gain = np.trapezoid(np.abs(np.exp(-a * t) * np.sin(w * t) / w), t)
     still = {"alpha": 0.0, "beta": 0.0, "delta": 0.0}
-    base = smc.Scenario(plant=smc.plant("duffing", M=1.0, **still), law=linear, duration=T, x0=0.0, u_max=1e3)
+    base = smc.Scenario(
+        plant=smc.plant("duffing", M=1.0, **still), law=linear, duration=T, x0=0.0, u_max=1e3
+    )
     worst = smc.worst_case(base, "peak", smc.Uncertainty(disturbance=0.5), budget=48)
     assert worst.value <= 0.5 * gain * 1.001
     assert worst.value >= 0.5 * gain * 0.95  # the 5 % that a second searcher may find more
@@ -164,10 +205,11 @@ def test_the_adversary_chooses_the_set_of_parameters_and_the_scale_of_friction()
     friction = smc.Coulomb(0.2), smc.Viscous(0.5)
     sets = [scenario(mismatch={"M": factor}, friction=friction) for factor in (1.0, 3.0, 0.4)]
     worst = smc.worst_case(sets, within=smc.Uncertainty(friction_scale=(0.0, 2.0)), budget=6)
-    made = [
-        dataclasses.replace(one, friction=(smc.Coulomb(0.2 * scale), smc.Viscous(0.5 * scale)))
-        for one, scale in itertools.product(sets, (0.0, 2.0))
-    ]
+    made = []
+    for one, scale in itertools.product(sets, (0.0, 2.0)):
+        made.append(
+            dataclasses.replace(one, friction=(smc.Coulomb(0.2 * scale), smc.Viscous(0.5 * scale)))
+        )
     assert worst.value == max(smc.score(trace)["rms_error"] for trace in smc.run(made))
     assert worst.scenario in made
     assert "any of 3 parameter sets, friction x 0 to 2" in str(worst)
@@ -179,13 +221,19 @@ def test_the_class_where_none_is_given_is_what_the_machine_leaves_open():
     own = default_class(smc.Scenario(plant=arm, law="none", friction=arm.friction))
     assert own == smc.Uncertainty(parameters=arm.uncertain, friction_scale=(0.5, 1.5))
     assert (own.disturbance, own.parameters["payload"]) == (0.0, (0.0, 2.0))
-    rig = smc.rig("qube_servo")  # its u is a voltage: the force is that of the motor at rest under 10 V
-    assert default_class(rig.scenario("none")).disturbance == pytest.approx(10.0 * rig.values["torque_per_volt"] / 6)
+    rig = smc.rig(
+        "qube_servo"
+    )  # its u is a voltage: the force is that of the motor at rest under 10 V
+    assert default_class(rig.scenario("none")).disturbance == pytest.approx(
+        10.0 * rig.values["torque_per_volt"] / 6
+    )
 
 
 @pytest.mark.slow
 def test_constants_and_relays_reach_what_another_adversary_found():
-    """Rms errors in m on duffing within |d| <= 2 N, by an evolution of 144 straight lines and by constants."""
+    """Rms errors in m on duffing within |d| <= 2 N, by an evolution of 144 straight lines and by
+    constants.
+    """
     found = {
         smc.law("implicit_first_order", k=4.744, c=4.382): 0.1165,
         smc.law("extended_state", k=6.484, c=3.13, w=36.11, b=5.667): 0.0863,
@@ -199,11 +247,17 @@ def test_constants_and_relays_reach_what_another_adversary_found():
 
 def test_a_weighted_sum_sees_two_signals_as_equally_large(monkeypatch):
     t = np.arange(4001) * 1e-3
-    signals = {"s": 5.0 * np.sin(3.0 * t), "rate": 2.0 * np.sin(5.0 * t), "error": 0.3 * np.cos(5.0 * t)}
+    signals = {
+        "s": 5.0 * np.sin(3.0 * t),
+        "rate": 2.0 * np.sin(5.0 * t),
+        "error": 0.3 * np.cos(5.0 * t),
+    }
     for still in ("", "s"):
         seen = signals | ({still: 0.0 * t} if still else {})
         monkeypatch.setattr(attack, "relay_signals", lambda trace, seen=seen: seen)
-        searcher = Search(Members([scenario(duration=0.1)], CLASSES["slope"]), CATALOGUE["rms_error"], 9, 1, print)
+        searcher = Search(
+            Members([scenario(duration=0.1)], CLASSES["slope"]), CATALOGUE["rms_error"], 9, 1, print
+        )
         cases: list[Any] = [*searcher._weighted_sums(None)]
         *pairs, last = cases
         size = {name: signal.std() for name, signal in signals.items()}
@@ -211,7 +265,9 @@ def test_a_weighted_sum_sees_two_signals_as_equally_large(monkeypatch):
         assert (last.relay.rate * size["rate"], last.relay.s) == pytest.approx(
             (1.0, 1.0 / (1.0 if still else size["s"]))
         )
-        weights = np.array([(one.rate * size["rate"], one.error * size["error"]) for _, one, _ in pairs])
+        weights = np.array(
+            [(one.rate * size["rate"], one.error * size["error"]) for _, one, _ in pairs]
+        )
         leads = np.array(attack.PHASE_LEADS)
         assert weights == pytest.approx(np.column_stack([np.cos(leads), np.sin(leads)]))
         assert {(one.amplitude, one.slope) for _, one, _ in (*pairs, last)} == {(2.0, 8e-3)}
@@ -229,9 +285,15 @@ TRIED = {  # class -> the strategies in order, and how many members each tries
 
 
 @pytest.mark.parametrize("name", TRIED)
-def test_a_search_tries_simple_members_then_corners_then_what_swings_with_the_loop_each_of_its_own_origin(name):
+def test_a_search_tries_simple_members_then_corners_then_what_swings_with_the_loop_each_of_its_own_origin(
+    name,
+):
     search = Search(
-        Members([scenario(duration=0.4)], CLASSES[name]), CATALOGUE["rms_error"], 500, 1, lambda steps: None
+        Members([scenario(duration=0.4)], CLASSES[name]),
+        CATALOGUE["rms_error"],
+        500,
+        1,
+        lambda steps: None,
     )
     kinds = search._simple, search._corners, search._at_loop_frequency, search._driven
     counts: dict[str, int] = {}
@@ -250,8 +312,12 @@ def test_a_failed_run_is_the_worst():
     def fragile(y, gains, memory):
         return (-10.0 * y.x - 5.0 * y.v) / (0.0 if y.v > 3.0 else 1.0), 0.0
 
-    with pytest.warns(smc.errors.ScenarioWarning, match="fragile failed by itself in a run: .*division by zero"):
-        worst = smc.worst_case(scenario(law=fragile, u_max=50.0), within=smc.Uncertainty(disturbance=20.0), budget=32)
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match="fragile failed by itself in a run: .*division by zero"
+    ):
+        worst = smc.worst_case(
+            scenario(law=fragile, u_max=50.0), within=smc.Uncertainty(disturbance=20.0), budget=32
+        )
     assert worst.value == np.inf
     assert smc.run(worst.scenario).failure
 
@@ -260,7 +326,9 @@ def test_bad_values_get_a_sentence(refused):
     for make in (
         smc.Uncertainty,
         lambda: smc.Uncertainty(parameters=0.3),
-        lambda: smc.worst_case(scenario(noise=smc.Noise(position_error=smc.Step(0.1))), within=CLASSES["errors"]),
+        lambda: smc.worst_case(
+            scenario(noise=smc.Noise(position_error=smc.Step(0.1))), within=CLASSES["errors"]
+        ),
         lambda: smc.worst_case(scenario(), within=smc.Uncertainty(parameters={"zz": (1, 2)})),
         lambda: smc.worst_case(scenario(), "speed", CLASSES["force"]),
         lambda: smc.worst_case(scenario(), within=2.0),
@@ -273,16 +341,39 @@ def test_bad_values_get_a_sentence(refused):
         smc.worst_case(scenario(input_delay=1.5), within=smc.Uncertainty(delay=(0.0, 1.0)))
 
 
-@pytest.mark.parametrize(("plant", "force", "length"), [("duffing", "N", "m"), ("inverted_pendulum", "N m", "rad")])
+@pytest.mark.parametrize(
+    ("plant", "force", "length"), [("duffing", "N", "m"), ("inverted_pendulum", "N m", "rad")]
+)
 def test_a_class_is_said_with_all_its_bounds_in_the_plant_s_units(plant, force, length):
     everything = smc.Uncertainty(
-        disturbance=2.0, slope=8.0, position_noise=0.01, velocity_noise=0.05, hold=0.04, delay=(0.0, 0.01),
-        friction=(0.1, 0.2), friction_scale=(0.5, 1.5), mass=(0.7, 1.3), parameters={"b": (0.8, 1.2)}, jitter=5e-4,
+        disturbance=2.0,
+        slope=8.0,
+        position_noise=0.01,
+        velocity_noise=0.05,
+        hold=0.04,
+        delay=(0.0, 0.01),
+        friction=(0.1, 0.2),
+        friction_scale=(0.5, 1.5),
+        mass=(0.7, 1.3),
+        parameters={"b": (0.8, 1.2)},
+        jitter=5e-4,
         x0=0.2,
-    )  # fmt: skip
+    )
     said = everything.words(smc.plant(plant))
-    bounds = f"|d| <= 2 {force}", f"|d'| <= 8 {force}/s", f"<= 0.01 {length} held for 0.04 s", f"<= 0.05 {length}/s"
-    ranges = "delay (s) 0 to 0.01", f"friction ({force}) 0.1 to 0.2", "0.5 to 1.5", "0.7 to 1.3", "0.8 to 1.2", "0.2"
+    bounds = (
+        f"|d| <= 2 {force}",
+        f"|d'| <= 8 {force}/s",
+        f"<= 0.01 {length} held for 0.04 s",
+        f"<= 0.05 {length}/s",
+    )
+    ranges = (
+        "delay (s) 0 to 0.01",
+        f"friction ({force}) 0.1 to 0.2",
+        "0.5 to 1.5",
+        "0.7 to 1.3",
+        "0.8 to 1.2",
+        "0.2",
+    )
     assert [part for part in (*bounds, *ranges) if part not in said] == []
     one = scenario(plant=plant, law=smc.law("classical", k=1.9))
     rubbing = dataclasses.replace(one, friction=smc.Coulomb(0.1))
@@ -291,18 +382,29 @@ def test_a_class_is_said_with_all_its_bounds_in_the_plant_s_units(plant, force, 
 
 
 THEOREM, WITHOUT = "its theorem needs ", "its theorem is without "
-OUTSIDE = [  # changes of the run, the class, what lies outside of the theorem's conditions and what does not
+# changes of the run, the class, what lies outside of the theorem's conditions and what does not
+OUTSIDE = [
     ({}, {"disturbance": 1.8}, (), (THEOREM, WITHOUT)),
     ({}, {"disturbance": 2.0}, (f"{THEOREM}|d| < 1.9 N",), (WITHOUT,)),
     ({}, {"disturbance": 2.0, "delay": (0.0, 0.01)}, ("|d| < 1.9 N", f"{WITHOUT}delay"), ()),
     ({}, {"disturbance": 6.0}, ("no law holds |d| = 6 N with drives of 6 N",), ()),
-    ({"law": smc.law("super_twisting", k2=8.0)}, {"disturbance": 2.0, "slope": 8.0}, ("|d'| <",), ("no law holds",)),
-    ({"disturbance": (smc.Constant(0.5), smc.Sine(-1.0, 2.0))}, {"disturbance": 0.5}, ("|d| < 1.9 N",), (WITHOUT,)),
+    (
+        {"law": smc.law("super_twisting", k2=8.0)},
+        {"disturbance": 2.0, "slope": 8.0},
+        ("|d'| <",),
+        ("no law holds",),
+    ),
+    (
+        {"disturbance": (smc.Constant(0.5), smc.Sine(-1.0, 2.0))},
+        {"disturbance": 0.5},
+        ("|d| < 1.9 N",),
+        (WITHOUT,),
+    ),
     ({"input_delay": 0.002}, {"x0": 0.1}, (f"{WITHOUT}delay",), (THEOREM,)),
     ({"actuator": smc.Lag(0.01)}, {"x0": 0.1}, ("drives",), ("delay",)),
     ({"clock": smc.Clock(missed=0.1)}, {"x0": 0.1}, ("late or missed samples",), ()),
     ({"noise": smc.Noise(position=1e-3)}, {"x0": 0.1}, ("noise",), ()),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("change", "bounds", "told", "untold"), OUTSIDE, ids=range(len(OUTSIDE)))
@@ -314,7 +416,11 @@ def test_what_lies_outside_a_theorem_is_told_by_condition(change, bounds, told, 
 
 
 def test_a_table_says_which_law_has_its_defaults_beside_tuned_ones():
-    laws = smc.law("pid"), gain_sets.law("duffing", "classical", "tuned"), smc.law("twisting", r1=5.0)
+    laws = (
+        smc.law("pid"),
+        gain_sets.law("duffing", "classical", "tuned"),
+        smc.law("twisting", r1=5.0),
+    )
     short = smc.Scenario(plant="duffing", duration=0.1, law="none")
     found = [smc.worst_case(dataclasses.replace(short, law=law), budget=1) for law in laws]
     said = "pid has its default gains, classical is tuned: tune it too (smc-mujoco tune)"
@@ -324,8 +430,13 @@ def test_a_table_says_which_law_has_its_defaults_beside_tuned_ones():
 
 def test_dry_friction_of_zero_does_not_halve_the_default_budget():
     smooth = smc.Scenario(plant=smc.plant("servo_axis", cf=0.0), law="pid")
-    within, rubbing = smc.Uncertainty(disturbance=1.0), smc.Uncertainty(disturbance=1.0, friction=(0.0, 0.1))
-    assert default_budget(smooth, within) == pytest.approx(2 * default_budget(smooth, rubbing), abs=1)
+    within, rubbing = (
+        smc.Uncertainty(disturbance=1.0),
+        smc.Uncertainty(disturbance=1.0, friction=(0.0, 0.1)),
+    )
+    assert default_budget(smooth, within) == pytest.approx(
+        2 * default_budget(smooth, rubbing), abs=1
+    )
 
 
 def searching(tried: list[tuple[Any, float, int]], **members: Any) -> Search:
@@ -338,7 +449,9 @@ def searching(tried: list[tuple[Any, float, int]], **members: Any) -> Search:
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7])
-def test_most_changes_are_of_the_worst_member_then_of_the_worst_of_other_origins_and_none_of_milder_ones(count):
+def test_most_changes_are_of_the_worst_member_then_of_the_worst_of_other_origins_and_none_of_milder_ones(
+    count,
+):
     order = np.random.default_rng(count).permutation(count).tolist()
     tried = [(k, float(k), k) for k in order] + [("milder", -1.0, count - 1)]
     search = searching(tried, changed=lambda member, rng: member)

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers import reference
 
 import smc_mujoco as smc
 from smc_mujoco.benchmark import controls, entry
 from smc_mujoco.control.law import law_function
-from helpers import reference
 
 
 @law_function(requires_model=True)
@@ -17,16 +17,32 @@ def told(y, gains, memory):
     return 1.0, y.f
 
 
-@pytest.mark.parametrize(("fields", "force"), [
-    ({"disturbance": smc.Constant(0.3)}, lambda trace: 0.3),
-    ({"disturbance": smc.Sine(amplitude=0.2, omega=5.0)}, lambda trace: 0.2 * np.sin(5.0 * trace.t[1:])),
-    ({"friction": smc.Coulomb(0.1)}, lambda trace: -0.1 * np.sign(trace.v[1:, 0])),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("fields", "force"),
+    [
+        ({"disturbance": smc.Constant(0.3)}, lambda trace: 0.3),
+        (
+            {"disturbance": smc.Sine(amplitude=0.2, omega=5.0)},
+            lambda trace: 0.2 * np.sin(5.0 * trace.t[1:]),
+        ),
+        ({"friction": smc.Coulomb(0.1)}, lambda trace: -0.1 * np.sign(trace.v[1:, 0])),
+    ],
+)
 def test_the_true_model_has_true_parameters_and_the_other_forces(fields, force):
-    """The force is that of the last instant before the sample, and friction's mean over the period before it."""
+    """The force is that of the last instant before the sample, and friction's mean over the period
+    before it.
+    """
     plant = smc.plant("duffing")
     trace = smc.run(
-        smc.Scenario(plant=plant, law=told(), model="true", mismatch={"mass": 1.4}, duration=0.3, v0=0.5, **fields)
+        smc.Scenario(
+            plant=plant,
+            law=told(),
+            model="true",
+            mismatch={"mass": 1.4},
+            duration=0.3,
+            v0=0.5,
+            **fields,
+        )
     )
     p, x, v = plant.values({}), trace.x[1:, 0], trace.v[1:, 0]
     f = (-p.delta * v - p.alpha * x - p.beta * x**3 + force(trace)) / (1.4 * p.M)
@@ -55,7 +71,9 @@ def test_no_law_of_an_entry_is_told_anything():
 @pytest.mark.parametrize(("name", "told"), [("geometric", False), ("oracle", True)])
 def test_the_oracle_of_flight_alone_knows_a_payload(name, told):
     one = smc.problem("quadrotor/payload@2")
-    (scenario,) = one.scenarios(controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else name, [0])
+    (scenario,) = one.scenarios(
+        controls.oracle_of("quadrotor", 8.0, 1.5) if name == "oracle" else name, [0]
+    )
     payload = 0.006 * one.instance(0).disturbance
     assert (scenario.plant.parameters["payload"], scenario.mismatch.get("payload")) == (
         (payload, None) if told else (0.0, payload)
@@ -88,6 +106,9 @@ def test_an_entry_is_not_the_oracle(law, tmp_path):
 
 
 def test_what_the_true_model_has_not_is_refused():
-    for fields in ({"clock": smc.Clock(jitter=1e-4)}, {"jump": smc.Jump(time=0.1, factors={"mass": 2.0})}):
+    for fields in (
+        {"clock": smc.Clock(jitter=1e-4)},
+        {"jump": smc.Jump(time=0.1, factors={"mass": 2.0})},
+    ):
         with pytest.raises(smc.ScenarioError, match="true"):
             smc.Scenario(plant="duffing", law=told(), model="true", **fields)

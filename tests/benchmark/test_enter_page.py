@@ -30,13 +30,18 @@ def test_the_page_s_law_goes_from_its_files_to_a_row_and_is_compared(tmp_path, m
     assert printed.getvalue().count("soft relay") == 5  # its row, and four boards
     assert printed.getvalue().count("the same") == 4
     assert (
-        "soft relay" in (pages.build(tmp_path / "results", tmp_path / "pages")[0].parent / "smc-30@1.html").read_text()
+        "soft relay"
+        in (
+            pages.build(tmp_path / "results", tmp_path / "pages")[0].parent / "smc-30@1.html"
+        ).read_text()
     )
 
 
 @pytest.mark.parametrize("folder", EXAMPLES, ids=lambda path: path.name)
 def test_an_example_of_an_entry_brings_a_plant_home(folder):
-    problem = smc.problem("quadrotor/delay_5ms@2" if folder.name == "leaning" else "duffing/noise@1")
+    problem = smc.problem(
+        "quadrotor/delay_5ms@2" if folder.name == "leaning" else "duffing/noise@1"
+    )
     one = entry.read(folder)
     law = one.law(problem.plant)
     (trace,) = smc.run(problem.scenarios(law, [0]))

@@ -1,4 +1,6 @@
-"""The pages of results: complete, small, without scripts or network, and with links that lead somewhere."""
+"""The pages of results: complete, small, without scripts or network, and with links that lead
+somewhere.
+"""
 
 import hashlib
 import html
@@ -25,20 +27,32 @@ def entered(folder, name, factor, marks=()):
     target = folder / "smc-30@1" / name
     target.mkdir(parents=True)
     rng = np.random.default_rng(3)
-    groups = [
-        [
-            {"problem": cell, "instance": i, "failed": 0.0}
-            | {column: factor * rng.uniform(0.1, 1.0) for column in runs.COLUMNS[1:]}
-            for i in range(3)
-        ]
-        for cell in PROBLEMS
-    ]
+    groups = []
+    for cell in PROBLEMS:
+        groups.append(
+            [
+                {"problem": cell, "instance": i, "failed": 0.0}
+                | {column: factor * rng.uniform(0.1, 1.0) for column in runs.COLUMNS[1:]}
+                for i in range(3)
+            ]
+        )
     runs.write(target / TABLE, groups)
     table = hashlib.sha256((target / TABLE).read_bytes()).hexdigest()
     entry = {
-        "name": name, "authors": ["A <b>"], "source": "here", "licence": "MIT", "division": "one set", "digest": "0",
-    }  # fmt: skip
-    about = {"suite": "smc-30@1", "instances": 3, "entry": entry, "checked": not marks, "marks": list(marks)}
+        "name": name,
+        "authors": ["A <b>"],
+        "source": "here",
+        "licence": "MIT",
+        "division": "one set",
+        "digest": "0",
+    }
+    about = {
+        "suite": "smc-30@1",
+        "instances": 3,
+        "entry": entry,
+        "checked": not marks,
+        "marks": list(marks),
+    }
     about |= {
         "sample": [1e-8, 2e-8, 1.5],
         "hashes": {"table": table} | enter.made_under(PROBLEMS),
@@ -60,7 +74,10 @@ class Page(HTMLParser):
         values = dict(attrs)
         self.tags.add(tag)
         self.ids += [values["id"]] if "id" in values else []
-        self.links += [values["href"]] if "href" in values else []
+        if "href" in values:
+            self.links += [values["href"]]
+        else:
+            self.links += []
         if tag not in VOID:
             self.open.append(tag)
 
@@ -72,7 +89,11 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
-    for name, factor, marks in (("slow", 2.0, ()), ("fast", 1.0, ()), ("odd", 3.0, ("unchecked: it is in Python",))):
+    for name, factor, marks in (
+        ("slow", 2.0, ()),
+        ("fast", 1.0, ()),
+        ("odd", 3.0, ("unchecked: it is in Python",)),
+    ):
         entered(folder / "results", name, factor, marks)
     return pages.build(folder / "results", folder / "site")[0].parent
 
@@ -80,8 +101,12 @@ def site(tmp_path_factory):
 def test_pages_are_complete_and_their_links_lead_to_pages(site):
     files = sorted(site.rglob("*.html"))
     assert [str(file.relative_to(site)) for file in files] == [
-        "index.html", "smc-30@1/fast.html", "smc-30@1/odd.html", "smc-30@1/slow.html", "smc-30@1.html",
-    ]  # fmt: skip
+        "index.html",
+        "smc-30@1/fast.html",
+        "smc-30@1/odd.html",
+        "smc-30@1/slow.html",
+        "smc-30@1.html",
+    ]
     for file in files:
         page = Page(file.read_text(encoding="utf-8"))
         assert page.open == []
@@ -94,7 +119,9 @@ def test_pages_are_complete_and_their_links_lead_to_pages(site):
 def test_a_table_is_read_once_for_the_medians_and_once_for_each_board(site, monkeypatch):
     """Whatever the number of pages: else 43 entries take minutes, and 430 days."""
     read, columns = list[str](), runs.Runs.columns
-    monkeypatch.setattr(runs.Runs, "columns", lambda self, name: (read.append(name), columns(self, name))[1])
+    monkeypatch.setattr(
+        runs.Runs, "columns", lambda self, name: (read.append(name), columns(self, name))[1]
+    )
     pages.build(site.parent / "results", site)
     on_boards = sum(len(suite.boards(name)) for name in PROBLEMS)
     assert len(read) == 3 * (len(PROBLEMS) + on_boards)
@@ -124,16 +151,24 @@ def said(**change):
 
     def forge(folder):
         about = json.loads((folder / RESULT).read_text(encoding="utf-8"))
-        write_json(folder / RESULT, {name: value for name, value in (about | change).items() if value != "nothing"})
+        write_json(
+            folder / RESULT,
+            {name: value for name, value in (about | change).items() if value != "nothing"},
+        )
 
     return forge
 
 
 FORGED = {
     "a table of others": (lambda folder: (folder / TABLE).write_bytes(b"PAR1"), "not the table"),
-    "no table": (lambda folder: with_row(folder, lambda table: table.write_bytes(b"PAR1")), "not a table of runs"),
+    "no table": (
+        lambda folder: with_row(folder, lambda table: table.write_bytes(b"PAR1")),
+        "not a table of runs",
+    ),
     "one problem": (
-        lambda folder: with_row(folder, lambda table: runs.write(table, [[{"problem": PROBLEMS[0], "instance": 0}]])),
+        lambda folder: with_row(
+            folder, lambda table: runs.write(table, [[{"problem": PROBLEMS[0], "instance": 0}]])
+        ),
         rf"1 runs of {PROBLEMS[0]}, not 3",
     ),
     "no JSON": (lambda folder: (folder / RESULT).write_text("{"), "not a result"),
@@ -141,10 +176,18 @@ FORGED = {
     "words for a time": (said(sample=["fast", 1.0, 1.0]), "its sample is"),
     "no entry": (said(entry=[]), "its entry is"),
     "an unknown suite": (said(suite="smc-99@1"), "unknown suite"),
-    "other rules": (said(hashes=dict.fromkeys(("table", "rules", "suite"), "0")), "of another rules"),
-    "another's name": (said(entry={"name": "slow", "authors": []} | dict.fromkeys(
-        ("source", "licence", "division", "digest"), "")), "another result of 'slow'"),
-}  # fmt: skip
+    "other rules": (
+        said(hashes=dict.fromkeys(("table", "rules", "suite"), "0")),
+        "of another rules",
+    ),
+    "another's name": (
+        said(
+            entry={"name": "slow", "authors": []}
+            | dict.fromkeys(("source", "licence", "division", "digest"), "")
+        ),
+        "another result of 'slow'",
+    ),
+}
 
 
 @pytest.mark.parametrize(("forge", "words"), FORGED.values(), ids=FORGED)

@@ -18,7 +18,10 @@ WORD = 2**64
 
 
 def philox(key: int, counter: int) -> list[int]:
-    """The four words of a block of Philox4x64-10, from the paper: Salmon, Moraes, Dror, Shaw, SC 2011."""
+    """The four words of a block of Philox4x64-10, from the paper:
+
+    Salmon, Moraes, Dror, Shaw, SC 2011.
+    """
     c0, c1, c2, c3 = ((counter >> 64 * i) % WORD for i in range(4))
     k0, k1 = key % WORD, key >> 64
     for _ in range(10):
@@ -28,12 +31,19 @@ def philox(key: int, counter: int) -> list[int]:
     return [c0, c1, c2, c3]
 
 
-@pytest.mark.parametrize(("name", "index", "number"), [
-    ("van_der_pol/noise@1", 0, ""), ("pendulum_network/heavy@1", 7, ""), ("furuta/sine@1", 123_456, NUMBER),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "index", "number"),
+    [
+        ("van_der_pol/noise@1", 0, ""),
+        ("pendulum_network/heavy@1", 7, ""),
+        ("furuta/sine@1", 123_456, NUMBER),
+    ],
+)
 def test_an_instance_is_drawn_as_the_rules_say(name, index, number):
     key = int(hashlib.sha256((name + number).encode()).hexdigest()[:32], 16)
-    side, start, mass, disturbance, seed, *_ = philox(key, 4096 * index + 1) + philox(key, 4096 * index + 2)
+    side, start, mass, disturbance, seed, *_ = philox(key, 4096 * index + 1) + philox(
+        key, 4096 * index + 2
+    )
     drawn = smc.problem(name).instance(index, number)
     assert drawn == problems.Instance(
         side=-1.0 if side < WORD // 2 else 1.0,
@@ -52,19 +62,29 @@ def test_a_scenario_has_what_its_instance_drew_and_the_rules_bounds():
         assert (scenario.mismatch, scenario.seed) == ({"mass": drawn.mass}, drawn.seed)
         assert getattr(scenario.disturbance[0], field) == 0.2 * drawn.disturbance
         assert (scenario.u_max, scenario.duration, scenario.control_period, scenario.condition) == (
-            one.u_max, one.duration, 1e-3, one.condition,
-        )  # fmt: skip
+            one.u_max,
+            one.duration,
+            1e-3,
+            one.condition,
+        )
     (heavy,) = smc.problem("duffing/heavy@1").scenarios("pid", [3])
-    assert heavy.mismatch == {"mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)}
+    assert heavy.mismatch == {
+        "mass": pytest.approx(1.3 * smc.problem("duffing/heavy@1").instance(3).mass)
+    }
 
 
-@pytest.mark.parametrize(("condition", "fields"), [
-    ("wind", lambda k: {"disturbance": (smc.signals.Wind(3.0 * k),)}),
-    ("gust", lambda k: {"disturbance": (smc.signals.Wind(6.0 * k, time=4.5, width=1.0),)}),
-    ("payload", lambda k: {"mismatch": {"payload": 0.006 * k, "mass": 1.0}}),
-    ("slow_rotors", lambda k: {"mismatch": {"rise": 0.625, "fall": 0.625, "mass": 1.0}}),
-])  # fmt: skip
-def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_from_rest(condition, fields):
+@pytest.mark.parametrize(
+    ("condition", "fields"),
+    [
+        ("wind", lambda k: {"disturbance": (smc.signals.Wind(3.0 * k),)}),
+        ("gust", lambda k: {"disturbance": (smc.signals.Wind(6.0 * k, time=4.5, width=1.0),)}),
+        ("payload", lambda k: {"mismatch": {"payload": 0.006 * k, "mass": 1.0}}),
+        ("slow_rotors", lambda k: {"mismatch": {"rise": 0.625, "fall": 0.625, "mass": 1.0}}),
+    ],
+)
+def test_an_instance_of_flight_scales_what_its_condition_adds_and_its_distance_from_rest(
+    condition, fields
+):
     one = smc.problem(f"quadrotor/{condition}@2")
     drawn, (scenario,) = one.instance(3), one.scenarios("geometric", [3])
     far = 0.2 * drawn.side * drawn.start
@@ -77,8 +97,13 @@ def test_calm_of_flight_is_of_the_rotors_commands():
     one = smc.problem("quadrotor/wind@2")
     whole = smc.run(one.scenarios("geometric", [0])[0])
     applied = np.zeros_like(whole.applied)
-    applied[::2, 2], applied[::2, 5] = 0.06, 1.0  # half of a rotor's bound; of the last channel there is no rotor
-    assert one.measures(dataclasses.replace(whole, applied=applied))["calm"] == pytest.approx(6000 * 0.5 / 6.0)
+    applied[::2, 2], applied[::2, 5] = (
+        0.06,
+        1.0,
+    )  # half of a rotor's bound; of the last channel there is no rotor
+    assert one.measures(dataclasses.replace(whole, applied=applied))["calm"] == pytest.approx(
+        6000 * 0.5 / 6.0
+    )
 
 
 def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains():
@@ -89,15 +114,18 @@ def test_visible_instances_are_the_first_and_a_name_has_its_best_shipped_gains()
     assert visible[7].law.source.kind == "shipped"
 
 
-@pytest.mark.parametrize(("call", "thing"), [
-    (lambda: smc.problem("duffing/noise"), "plant/condition@version"),
-    (lambda: smc.problem("duffin/noise@1"), "plant"),
-    (lambda: smc.problem("duffing/noize@1"), "condition"),
-    (lambda: smc.problem("duffing/noise@99"), "version"),
-    (lambda: smc.problem("duffing/noise@1").scenarios("pid", "hidden"), "hidden"),
-    (lambda: smc.problem("duffing/noise@1").scenarios("pid", [-1]), "instance"),
-    (lambda: smc.problem("duffing/noise@1").scenarios("pid", [0], "abc"), "64 hex digits"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("call", "thing"),
+    [
+        (lambda: smc.problem("duffing/noise"), "plant/condition@version"),
+        (lambda: smc.problem("duffin/noise@1"), "plant"),
+        (lambda: smc.problem("duffing/noize@1"), "condition"),
+        (lambda: smc.problem("duffing/noise@99"), "version"),
+        (lambda: smc.problem("duffing/noise@1").scenarios("pid", "hidden"), "hidden"),
+        (lambda: smc.problem("duffing/noise@1").scenarios("pid", [-1]), "instance"),
+        (lambda: smc.problem("duffing/noise@1").scenarios("pid", [0], "abc"), "64 hex digits"),
+    ],
+)
 def test_what_does_not_exist_is_refused_in_a_sentence(call, thing):
     with pytest.raises(smc.ScenarioError, match=thing):
         call()
@@ -114,15 +142,24 @@ def test_measures_by_hand():
     one = smc.problem("duffing/noise@1")
     vars(one)["_frozen"] = {"accuracy": [0.01, 0.1], "settling": [1.5, 2.5], "calm": [0.4, 0.6]}
     e = np.where(np.arange(4001) < 1000, 1.0, 0.05)  # 5 % of the start from 1 s on
-    u = np.where(np.arange(4001) % 1000 < 500, 0.0, 1.5)  # eight changes by 1.5 in 4 s, of 6: 1/2 per second
+    u = np.where(
+        np.arange(4001) % 1000 < 500, 0.0, 1.5
+    )  # eight changes by 1.5 in 4 s, of 6: 1/2 per second
     found = one.measures(made_trace(one, e, u))
     itae = 0.5 + 0.05 * (16 - 1) / 2  # the integral of t |e|
     assert found == {
-        "failed": 0.0, "accuracy": pytest.approx(0.05), "itae": pytest.approx(itae, abs=1e-3), "settling": math.inf,
-        "calm": pytest.approx(0.5), "accuracy_1": pytest.approx(math.nan, nan_ok=True), "accuracy_2": 1.0,
-        "settling_1": pytest.approx(math.nan, nan_ok=True), "settling_2": pytest.approx(math.nan, nan_ok=True),
-        "calm_1": pytest.approx(math.nan, nan_ok=True), "calm_2": 1.0,
-    }  # fmt: skip
+        "failed": 0.0,
+        "accuracy": pytest.approx(0.05),
+        "itae": pytest.approx(itae, abs=1e-3),
+        "settling": math.inf,
+        "calm": pytest.approx(0.5),
+        "accuracy_1": pytest.approx(math.nan, nan_ok=True),
+        "accuracy_2": 1.0,
+        "settling_1": pytest.approx(math.nan, nan_ok=True),
+        "settling_2": pytest.approx(math.nan, nan_ok=True),
+        "calm_1": pytest.approx(math.nan, nan_ok=True),
+        "calm_2": 1.0,
+    }
     settled = one.measures(made_trace(one, e * np.where(np.arange(4001) < 2000, 1.0, 1e-9), u))
     names = "settling", "accuracy", "accuracy_1", "settling_2", "calm_2"
     assert tuple(settled[name] for name in names) == (2.0, 1e-6, 2.0, 2.0, 1.0)
@@ -133,9 +170,16 @@ def test_an_error_that_is_small_by_chance_at_the_end_is_not_kept():
     """As that of a pendulum which swings through its goal."""
     one = smc.problem("duffing/noise@1")
     vars(one)["_frozen"] = {"accuracy": [0.1], "settling": [4.0], "calm": [9.0]}
-    found = one.measures(made_trace(one, np.where(np.arange(4001) < 3900, 1.0, 0.0), np.zeros(4001)))
+    found = one.measures(
+        made_trace(one, np.where(np.arange(4001) < 3900, 1.0, 0.0), np.zeros(4001))
+    )
     assert found.pop("settling") == math.inf
-    assert {name for name, value in found.items() if not math.isnan(value)} == {"failed", "accuracy", "itae", "calm"}
+    assert {name for name, value in found.items() if not math.isnan(value)} == {
+        "failed",
+        "accuracy",
+        "itae",
+        "calm",
+    }
 
 
 def test_a_failed_run_reaches_nothing():
@@ -145,5 +189,9 @@ def test_a_failed_run_reaches_nothing():
 
     one = smc.problem("duffing/sine@1")
     found = one.measures(smc.run(one.scenarios(broken(), [0])[0]))
-    assert (found.pop("failed"), found.pop("accuracy"), found.pop("calm")) == (1.0, math.inf, math.inf)
+    assert (found.pop("failed"), found.pop("accuracy"), found.pop("calm")) == (
+        1.0,
+        math.inf,
+        math.inf,
+    )
     assert [name for name, value in found.items() if value < math.inf] == []

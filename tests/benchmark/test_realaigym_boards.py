@@ -1,4 +1,6 @@
-"""RealAIGym's boards: published scores, the published simulator against MuJoCo, and this package's rows."""
+"""RealAIGym's boards: published scores, the published simulator against MuJoCo, and this package's
+rows.
+"""
 
 import dataclasses
 import math
@@ -29,7 +31,8 @@ ROWS = [
 ]
 # Digits of the published criteria after the point.
 DIGITS = {"torque_smoothness": 3} | dict.fromkeys(
-    ("swing_up_time", "energy", "max_torque", "integrated_torque", "torque_cost", "velocity_cost"), 2
+    ("swing_up_time", "energy", "max_torque", "integrated_torque", "torque_cost", "velocity_cost"),
+    2,
 )
 
 
@@ -50,15 +53,18 @@ def machines():
 
 @pytest.mark.parametrize(("row", "version"), ROWS)
 def test_published_criteria_give_their_published_score(row, version):
-    """Within what the rounding of the published criteria leaves open, and half a digit of the score.
+    """Within what the rounding of the published criteria leaves open, and half a digit of the
+    score.
 
-    That is up to 0.004, most of it by the smoothness: 0.0005 of 0.1 N m. Two rows of 29 are off by 0.0022, where 0.0037
-    and 0.0033 are open; all others by less than 0.002.
+    That is up to 0.004, most of it by the smoothness: 0.0005 of 0.1 N m. Two rows of 29 are off by
+    0.0022, where 0.0037 and 0.0033 are open; all others by less than 0.002.
     """
     names = VERSIONS[version]
     low, high = (
         boards.score(
-            row._asdict() | {name: getattr(row, name) + side * 0.5 * 10.0 ** -DIGITS[name] for name in names}, version
+            row._asdict()
+            | {name: getattr(row, name) + side * 0.5 * 10.0 ** -DIGITS[name] for name in names},
+            version,
         )
         for side in (1.0, -1.0)
     )
@@ -69,14 +75,23 @@ def test_published_criteria_give_their_published_score(row, version):
 
 
 def test_a_published_name_is_on_several_boards():
-    boards_of = [*boards.ROBUSTNESS.values(), *(rows for both in boards.SIMULATION.values() for rows in both.values())]
+    boards_of = [
+        *boards.ROBUSTNESS.values(),
+        *(rows for both in boards.SIMULATION.values() for rows in both.values()),
+    ]
     names = Counter(row.name for rows in boards_of for row in rows)
     assert [name for name, count in names.items() if count < 2] == ["DQN LQR"]
 
 
 def test_unrounded_criteria_give_their_unrounded_score():
     """History SAC's run on the acrobot's board: scores.csv of its data."""
-    values = (1.0000000000000007, 8.077749161960673, 1.8037118196867141, 0.009546752841345449, 88.4965605525382)
+    values = (
+        1.0000000000000007,
+        8.077749161960673,
+        1.8037118196867141,
+        0.009546752841345449,
+        88.4965605525382,
+    )
     row = dict(zip(VERSIONS["v2"], values, strict=True))
     assert boards.score(row) == pytest.approx(0.6552699844147534, abs=1e-12)
 
@@ -112,7 +127,10 @@ def test_criteria_of_a_motion_are_those_of_its_formula():
 @pytest.mark.parametrize(("height", "up"), [(0.899, False), (0.901, True)])
 def test_the_tip_is_up_above_nine_tenths_of_the_length_of_both_links(height, up):
     q = np.tile([math.acos(-height), 0.0], (9, 1))
-    assert of_arrays(0.1 * np.arange(9), q, np.zeros((9, 2)), np.zeros(9), "pendubot", l1=0.25).success is up
+    assert (
+        of_arrays(0.1 * np.arange(9), q, np.zeros((9, 2)), np.zeros(9), "pendubot", l1=0.25).success
+        is up
+    )
 
 
 def test_a_run_that_stays_down_or_diverges_scores_nothing():
@@ -139,13 +157,23 @@ def test_the_published_simulator_is_mujocos(robot, traces, machines):
 
 @ROBOTS
 def test_changed_machines_of_the_published_simulator_are_mujocos(robot, machines):
-    """Viscous friction and another mass, where MuJoCo has them: open loop, as u is the trajectory's alone."""
-    law = dict(zip(("acrobot", "pendubot"), (entries.acrobot_swing_up, entries.pendubot_swing_up), strict=True))[robot]
+    """Viscous friction and another mass, where MuJoCo has them: open loop, as u is the trajectory's
+    alone.
+    """
+    law = dict(
+        zip(
+            ("acrobot", "pendubot"),
+            (entries.acrobot_swing_up, entries.pendubot_swing_up),
+            strict=True,
+        )
+    )[robot]
     weak = law.bind({"k": 1e-9})
     changed = {"b1": 0.02, "b2": 0.01, "m2": 0.6, "Ir": 5e-5}
     plant = smc.plant(robot, **changed)
     trace = smc.run(dataclasses.replace(boards.entry(robot), plant=plant, law=weak, duration=2.0))
-    states, _ = Machine(dataclasses.replace(boards.entry(robot), law=weak)).simulate(Case(parameters=changed))
+    states, _ = Machine(dataclasses.replace(boards.entry(robot), law=weak)).simulate(
+        Case(parameters=changed)
+    )
     order = [1, 0] if robot == "acrobot" else [0, 1]
     np.testing.assert_allclose(states[:1001, :2], trace.x[:, order], atol=1e-6)
 
@@ -153,33 +181,50 @@ def test_changed_machines_of_the_published_simulator_are_mujocos(robot, machines
 def test_dry_friction_is_the_published_arctangent():
     state, known = (0.4, -0.2, 0.03, -0.05), tuple((MODEL_1_1 | {"cf1": 0.2, "cf2": -0.1}).values())
     with_it = simulator._slope(state, 0.0, 0.0, known)
-    without = simulator._slope(state, -0.2 * math.atan(3.0), -0.1 * math.atan(5.0), tuple(MODEL_1_1.values()))
+    without = simulator._slope(
+        state, -0.2 * math.atan(3.0), -0.1 * math.atan(5.0), tuple(MODEL_1_1.values())
+    )
     np.testing.assert_allclose(with_it, without, rtol=1e-12)
 
 
 def test_the_grid_is_the_published_one():
-    """Each level of each way in which the machine differs, as the table at the head of `simulator` says."""
+    """Each level of each way in which the machine differs, as the table at the head of `simulator`
+    says.
+    """
     scaled = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}
     ends = {"Ir": (0.0, 1e-4)} | dict.fromkeys(scaled, (0.75, 1.25))
     ends |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
-    expected = [
-        Case(test="model", name=name, value=value, parameters={scaled.get(name, name): value * known})
-        for name, (low, high) in ends.items()
-        for known in (MODEL_1_1[scaled[name]] if name in scaled else 1.0,)
-        for value in np.linspace(low, high, 21).tolist()
-    ]
+    expected = []
+    for name, (low, high) in ends.items():
+        for known in (MODEL_1_1[scaled[name]] if name in scaled else 1.0,):
+            for value in np.linspace(low, high, 21).tolist():
+                expected.append(
+                    Case(
+                        test="model",
+                        name=name,
+                        value=value,
+                        parameters={scaled.get(name, name): value * known},
+                    )
+                )
     for test, most in (("velocity_noise", 0.5), ("torque_noise", 1.1)):
         levels = enumerate(np.repeat(np.linspace(0.0, most, 21), 10).tolist())
-        expected += [Case(test=test, name=test, value=value, seed=k, **{test: value}) for k, value in levels]
+        expected += [
+            Case(test=test, name=test, value=value, seed=k, **{test: value}) for k, value in levels
+        ]
     answers = np.linspace(0.1, 2.0, 21).tolist()
-    expected += [Case(test="torque_response", name="torque_response", value=each, response=each) for each in answers]
+    expected += [
+        Case(test="torque_response", name="torque_response", value=each, response=each)
+        for each in answers
+    ]
     expected += [Case(test="delay", name="delay", value=k * 2e-3, delay=k) for k in range(21)]
     grid = simulator.cases()
     assert grid[:-50] == expected
     kinds = [(case.test, case.name, case.value) for case in grid[-50:]]
     assert kinds == [("perturbations", "perturbations", k) for k in range(50)]
     assert grid == simulator.cases()
-    assert [one.pulses == other.pulses for one, other in zip(grid, simulator.cases(7), strict=True)].count(False) == 50
+    assert [
+        one.pulses == other.pulses for one, other in zip(grid, simulator.cases(7), strict=True)
+    ].count(False) == 50
 
 
 def test_pulses_are_apart_in_any_order_and_of_the_published_sizes():
@@ -197,16 +242,31 @@ def test_pulses_are_apart_in_any_order_and_of_the_published_sizes():
 
 @smc.law_function(plants=boards.ROBOTS)
 def mine(y, gains, memory):
-    u = 0.3 * y.x - 0.2 * y.v + 0.1 * y.e - 0.05 * y.de + 0.07 * y.q - 0.03 * y.dq + 0.5 * y.t + 10.0 * y.dt
+    u = (
+        0.3 * y.x
+        - 0.2 * y.v
+        + 0.1 * y.e
+        - 0.05 * y.de
+        + 0.07 * y.q
+        - 0.03 * y.dq
+        + 0.5 * y.t
+        + 10.0 * y.dt
+    )
     return u + 2e-3 * (y.f + y.fq) + 1e-4 * (y.g + 2.0 * y.gq) + 0.1 * y.limit + 0.01 * y.model, y.x
 
 
 @ROBOTS
 def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
-    """Each torque from what the law may see of the states, each state from the one before by the equation of motion."""
+    """Each torque from what the law may see of the states, each state from the one before by the
+    equation of motion.
+    """
     noises, changed = {"velocity_noise": 0.1, "torque_noise": 0.2}, {"m2": 0.55, "b1": 0.03}
-    case = Case(response=1.3, delay=2, pulses=((0.02, 0.05, 1.5),), seed=4, parameters=changed, **noises)
-    scenario = dataclasses.replace(boards.on_board(robot, mine), noise_key=6, u_max=2.5, model="nominal")
+    case = Case(
+        response=1.3, delay=2, pulses=((0.02, 0.05, 1.5),), seed=4, parameters=changed, **noises
+    )
+    scenario = dataclasses.replace(
+        boards.on_board(robot, mine), noise_key=6, u_max=2.5, model="nominal"
+    )
     states, torque = Machine(scenario).simulate(case)
     noise = np.random.default_rng([simulator.SEED, 4, 6]).normal(size=(5000, 3)) * [0.1, 0.1, 0.2]
     plant, driven = smc.plant(robot), ["pendubot", "acrobot"].index(robot)
@@ -215,7 +275,9 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
     for k in range(60):
         seen = states[max(0, k - 2)]
         (x, q), (v, dq) = seen[:2][order], (seen[2:] + noise[k, :2])[order]
-        (f, g), (fq, gq) = (plant.nominal(np.array([x, q]), np.array([v, dq]), i, p) for i in range(2))
+        (f, g), (fq, gq) = (
+            plant.nominal(np.array([x, q]), np.array([v, dq]), i, p) for i in range(2)
+        )
         u = (
             0.4 * x
             - 0.25 * v
@@ -232,7 +294,9 @@ def test_torque_and_motion_of_a_case_are_those_of_its_formulas(robot):
         assert torque[k] == pytest.approx(last, abs=1e-12), k
     assert np.abs(torque).max() == 2.5
     known = tuple((MODEL_1_1 | changed).values())
-    force = np.eye(2)[driven] * (torque[:60] + 1.5 * np.exp(-(((t - 0.02) / 0.05) ** 2) / 2.0))[:, None]
+    force = (
+        np.eye(2)[driven] * (torque[:60] + 1.5 * np.exp(-(((t - 0.02) / 0.05) ** 2) / 2.0))[:, None]
+    )
     for k in range(0, 60, 7):
         slope = lambda _, state, k=k: simulator._slope.py_func(tuple(state), *force[k], known)  # noqa: E731
         end = solve_ivp(slope, (0.0, 2e-3), states[k], rtol=1e-10, atol=1e-12).y[:, -1]
@@ -251,14 +315,18 @@ def test_a_run_beyond_a_million_radians_a_second_ends_there(machines):
 
 
 def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
-    """A machine that ends up as often as its case says, of one level in the first test and three in the others."""
+    """A machine that ends up as often as its case says, of one level in the first test and three in
+    the others.
+    """
     ends = [3.4, 3.4, 0.0, 3.4, 0.0, 0.0, 3.4, 0.0]  # up, or hanging
     names = ["a", "b", "b", "b", "c", "c", "d", "d"]
     tests = ["model"] * 4 + [*simulator.TESTS[1:3], *simulator.TESTS[1:3]]
-    grid = [
-        Case(test=test, name=name, value=0.5, delay=k) for k, (test, name) in enumerate(zip(tests, names, strict=True))
-    ]
-    stub = SimpleNamespace(simulate=lambda case: (np.array([[0.0] * 4, [ends[case.delay], 0, 0, 0]]), None))
+    grid = []
+    for k, (test, name) in enumerate(zip(tests, names, strict=True)):
+        grid.append(Case(test=test, name=name, value=0.5, delay=k))
+    stub = SimpleNamespace(
+        simulate=lambda case: (np.array([[0.0] * 4, [ends[case.delay], 0, 0, 0]]), None)
+    )
     monkeypatch.setattr(simulator, "Machine", lambda scenario: stub)
     monkeypatch.setattr(simulator, "cases", lambda key: grid)
     told = []
@@ -272,7 +340,9 @@ def test_a_level_is_survived_by_more_than_half_of_its_runs(monkeypatch):
 
 def test_percent_and_score_weigh_tests_alike():
     model = (("a", 1.0, True), ("a", 2.0, False), ("b", 1.0, True), ("b", 2.0, True))
-    found = boards.Robustness({"model": model, "delay": (("delay", 0.0, False), ("delay", 1.0, True))})
+    found = boards.Robustness(
+        {"model": model, "delay": (("delay", 0.0, False), ("delay", 1.0, True))}
+    )
     assert (found.percent, found.score) == ({"model": 75.0, "delay": 50.0}, 0.625)
     assert repr(found) == "Robustness(score 0.625, survived: model 75.0 %, delay 50.0 %)"
     assert found.noise_key == 0
@@ -295,11 +365,18 @@ def test_no_law_of_a_user_s_can_know_its_noise(monkeypatch):
     scenario = boards.on_board("acrobot", mine)
     one, other = boards.robustness(scenario), boards.robustness(scenario)
     assert boards.robustness(dataclasses.replace(scenario, noise_key=one.noise_key)) == one
-    assert boards.robustness(boards.entry("acrobot")).noise_key == 0 < min(one.noise_key, other.noise_key)
+    assert (
+        boards.robustness(boards.entry("acrobot")).noise_key
+        == 0
+        < min(one.noise_key, other.noise_key)
+    )
     assert keys == [one.noise_key, other.noise_key, one.noise_key, 0]
     assert one.noise_key != other.noise_key
     noisy = simulator.Case(velocity_noise=0.3)
-    runs = [simulator.Machine(dataclasses.replace(scenario, noise_key=key)).simulate(noisy)[1] for key in keys]
+    runs = [
+        simulator.Machine(dataclasses.replace(scenario, noise_key=key)).simulate(noisy)[1]
+        for key in keys
+    ]
     assert np.array_equal(runs[0], runs[2])
     assert not np.array_equal(runs[0], runs[1])
 
@@ -316,8 +393,15 @@ def test_the_entry_swings_up_and_balances(robot, traces):
     assert np.abs(traces[robot].x[-1, order] - [math.pi, 0.0]).max() < 1e-3
     assert boards.score(found) > max(row.score for row in boards.SIMULATION[robot]["v2"])
     assert boards.board(traces[robot])[0].name == boards.NAME
-    own = {"reference": smc.Constant(0.1), "feedforward": smc.Constant(0.1), "velocity": "levant", "seed": 3}
-    designed = dataclasses.replace(traces[robot], scenario=dataclasses.replace(traces[robot].scenario, **own))
+    own = {
+        "reference": smc.Constant(0.1),
+        "feedforward": smc.Constant(0.1),
+        "velocity": "levant",
+        "seed": 3,
+    }
+    designed = dataclasses.replace(
+        traces[robot], scenario=dataclasses.replace(traces[robot].scenario, **own)
+    )
     assert boards.board(designed) == boards.board(traces[robot])
 
 
@@ -329,14 +413,18 @@ def test_a_law_of_the_python_loop_is_marked_on_the_board(traces):
         return 0.0, float(str(y.x))
 
     trace = traces["acrobot"]
-    entered = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, law=uncompiled))
+    entered = dataclasses.replace(
+        trace, scenario=dataclasses.replace(trace.scenario, law=uncompiled)
+    )
     assert boards.board(entered)[0].name == f"{boards.NAME} (unchecked)"
     assert boards.board(trace)[0].name == boards.NAME
 
 
 @ROBOTS
 def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, traces):
-    """The control experiments: the score is the trajectory's, so no row may be read as a success of sliding mode."""
+    """The control experiments: the score is the trajectory's, so no row may be read as a success of
+    sliding mode.
+    """
     rows = boards.experiments(robot)
     assert rows[boards.NAME] == traces[robot].scenario
     found = dict(zip(rows, smc.run(list(rows.values())), strict=True))
@@ -348,7 +436,9 @@ def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, tr
         assert score[f"trajectory + {name}"] == pytest.approx(score[boards.NAME], abs=2e-4)
     for name in ("trajectory + sliding", "trajectory + sliding*"):
         phi = boards.FEEDBACKS["sliding"]["phi"]
-        assert np.abs(np.diff(np.sign(found[name].s[:, 0]))).sum() > 1000  # switches about every other sample
+        assert (
+            np.abs(np.diff(np.sign(found[name].s[:, 0]))).sum() > 1000
+        )  # switches about every other sample
         assert np.mean(np.abs(found[name].s[:, 0]) > phi) > 0.5
         assert score[name] < min(row.score for row in boards.SIMULATION[robot]["v2"])
     top = np.array([row.name for row in boards.board(found)])
@@ -358,12 +448,18 @@ def test_any_smooth_feedback_scores_the_same_and_a_switching_one_loses(robot, tr
 @pytest.mark.slow
 @ROBOTS
 def test_scores_of_the_page_and_of_readme_are_those_of_the_boards(robot):
-    page, readme = ((ROOT / name).read_text(encoding="utf-8") for name in ("docs/boards.md", "README.md"))
+    page, readme = (
+        (ROOT / name).read_text(encoding="utf-8") for name in ("docs/boards.md", "README.md")
+    )
     rows, column = boards.experiments(robot), 2 * boards.ROBOTS.index(robot)
-    score = {row.name: row.score for row in boards.board(dict(zip(rows, smc.run([*rows.values()]), strict=True)))}
+    score = {}
+    for row in boards.board(dict(zip(rows, smc.run([*rows.values()]), strict=True))):
+        score[row.name] = row.score
     tested = {name: boards.robustness(scenario) for name, scenario in rows.items()}
     robust = {row.name: row.score for row in boards.robustness_board(robot, tested)}
-    told = re.findall(r"^\| ([^|]*?)(?: \(.*|,.*)?" + 4 * r" \| ([.0-9]+)" + r" \|$", page, re.MULTILINE)
+    told = re.findall(
+        r"^\| ([^|]*?)(?: \(.*|,.*)?" + 4 * r" \| ([.0-9]+)" + r" \|$", page, re.MULTILINE
+    )
     assert len(told) == 9
     for name, *cells in told:
         assert cells[column] == f"{score[name]:.3f}", name
@@ -377,9 +473,13 @@ def test_scores_of_the_page_and_of_readme_are_those_of_the_boards(robot):
 
 @ROBOTS
 def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
-    """Between nodes, the cubic of each coordinate has the accelerations of the plant's nominal model."""
+    """Between nodes, the cubic of each coordinate has the accelerations of the plant's nominal
+    model.
+    """
     table = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json")
-    x, v, a, q, dq, ddq, u = (np.array(table[key]) for key in ("x", "v", "a", "q", "dq", "ddq", "u"))
+    x, v, a, q, dq, ddq, u = (
+        np.array(table[key]) for key in ("x", "v", "a", "q", "dq", "ddq", "u")
+    )
     plant = smc.plant(robot)
     p = type("P", (), dict(plant.parameters))
     for k in range(len(u)):
@@ -388,22 +488,28 @@ def test_the_trajectory_obeys_the_equation_and_the_limits(robot):
             assert f + g * u[k] == pytest.approx(acceleration, abs=1e-6)
     step = float(table["step"])
     for place, rate in ((x, v), (q, dq)):
-        error = np.diff(place) - step / 2 * (rate[1:] + rate[:-1]) + step**2 / 12 * np.diff(a if place is x else ddq)
+        error = (
+            np.diff(place)
+            - step / 2 * (rate[1:] + rate[:-1])
+            + step**2 / 12 * np.diff(a if place is x else ddq)
+        )
         assert np.abs(error).max() < 2e-4
     assert np.abs(u).max() <= 6.0
-    assert [*x[:1], *v[:1], *q[:1], *dq[:1], u[0], u[-1], v[-1], dq[-1]] == pytest.approx([0.0] * 8, abs=1e-8)
+    assert [*x[:1], *v[:1], *q[:1], *dq[:1], u[0], u[-1], v[-1], dq[-1]] == pytest.approx(
+        [0.0] * 8, abs=1e-8
+    )
 
 
 @ROBOTS
 def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_its_end(robot):
     template, rng = getattr(entries, f"{robot}_swing_up"), np.random.default_rng(2)
-    table = {
-        key: np.array(values) for key, values in entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json").items()
-    }
+    table = {}
+    for key, values in entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json").items():
+        table[key] = np.array(values)
     nodes = float(table["step"]) * np.arange(len(table["u"]))
-    paths = [
-        CubicHermiteSpline(nodes, table[a], table[b]) for a, b in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq"))
-    ]
+    paths = []
+    for a, b in (("x", "v"), ("v", "a"), ("q", "dq"), ("dq", "ddq")):
+        paths.append(CubicHermiteSpline(nodes, table[a], table[b]))
     for t in (0.0, 0.0013, 1.2345, nodes[-2], nodes[-1] - 1e-4, nodes[-1] + 3.0):
         now, h = min(t, nodes[-1]), 0.004
         apart, turns = rng.uniform(-0.3, 0.3, 4), 2.0 * math.pi * np.array([1, 0, -2, 0])
@@ -412,7 +518,9 @@ def test_the_law_is_a_feedback_along_the_cubics_of_the_trajectory_and_stays_at_i
         y = SimpleNamespace(t=t, dt=h, x=x, v=v, q=q, dq=dq)
         u, s = template.function(y, SimpleNamespace(k=0.7, phi=1.3), None)
         assert s == pytest.approx(np.dot(rows, apart), abs=1e-9)
-        assert u == pytest.approx(np.interp(t + h / 2.0, nodes, table["u"]) - 0.7 * math.tanh(s / 1.3), abs=1e-9)
+        assert u == pytest.approx(
+            np.interp(t + h / 2.0, nodes, table["u"]) - 0.7 * math.tanh(s / 1.3), abs=1e-9
+        )
 
 
 @ROBOTS
@@ -427,7 +535,10 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
     from scipy.linalg import solve_continuous_are
 
     table, plant = entries.read_json(entries.TRAJECTORY_FOLDER / f"{robot}.json"), smc.plant(robot)
-    p, top = type("P", (), dict(plant.parameters)), np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0])
+    p, top = (
+        type("P", (), dict(plant.parameters)),
+        np.array([0.0, math.pi] if robot == "acrobot" else [math.pi, 0.0]),
+    )
     rest, e = np.zeros(2), 1e-6
     A, b = np.zeros((4, 4)), np.zeros((4, 1))
     A[:2, 2:] = np.eye(2)
@@ -435,9 +546,13 @@ def test_the_surface_is_one_of_least_quadratic_cost_at_the_top(robot):
         b[2 + i] = plant.nominal(top, rest, i, p)[1]
         for j in range(2):
             d = e * np.eye(2)[j]
-            A[2 + i, j] = (plant.nominal(top + d, rest, i, p)[0] - plant.nominal(top - d, rest, i, p)[0]) / (2 * e)
+            A[2 + i, j] = (
+                plant.nominal(top + d, rest, i, p)[0] - plant.nominal(top - d, rest, i, p)[0]
+            ) / (2 * e)
     row = (b.T @ solve_continuous_are(A, b, np.diag([1.0, 1.0, 0.1, 0.1]), [[1.0]])).ravel()
-    np.testing.assert_allclose([table[key][-1] for key in ("s_x", "s_q", "s_v", "s_dq")], row, rtol=1e-5)
+    np.testing.assert_allclose(
+        [table[key][-1] for key in ("s_x", "s_q", "s_v", "s_dq")], row, rtol=1e-5
+    )
 
 
 def test_an_entry_is_deterministic_and_runs_in_the_reference_loop_alike(traces):
@@ -462,9 +577,15 @@ def test_an_entry_is_exported_to_c():
 
 
 def found_of(survived, **percent):
-    """A result of this percent of 20 levels in each test, and this many of the 21 values of each of two parameters."""
-    levels = {test: [(test, k, 5 * k < percent.get(test, 100)) for k in range(20)] for test in simulator.TESTS}
-    return boards.Robustness(levels | {"model": [(name, k, k < survived) for name in ("Ir", "b1") for k in range(21)]})
+    """A result of this percent of 20 levels in each test, and this many of the 21 values of each of
+    two parameters.
+    """
+    levels = {}
+    for test in simulator.TESTS:
+        levels[test] = [(test, k, 5 * k < percent.get(test, 100)) for k in range(20)]
+    return boards.Robustness(
+        levels | {"model": [(name, k, k < survived) for name in ("Ir", "b1") for k in range(21)]}
+    )
 
 
 @ROBOTS
@@ -479,7 +600,9 @@ def test_a_row_stands_on_the_board_by_its_score(robot, monkeypatch):
         assert [row.score for row in board] == sorted((row.score for row in board), reverse=True)
         (mine,) = [row for row in board if row.name == "mine"]
         assert mine.score == pytest.approx(score, abs=1e-9)
-        assert {row.name for row in board} - {"mine"} == {row.name for row in boards.SIMULATION[robot]["v2"]}
+        assert {row.name for row in board} - {"mine"} == {
+            row.name for row in boards.SIMULATION[robot]["v2"]
+        }
     rows = boards.robustness_board(robot, {"a": found_of(21), "b": found_of(2, delay=10)})
     assert (rows[0].name, set(rows[0][1:-1]), rows[0].score) == ("a", {100.0}, 1.0)
     (other,) = [row for row in rows if row.name == "b"]
@@ -494,14 +617,25 @@ def test_an_entry_is_described_and_runs_by_the_rules():
         assert template.continuous
         assert robot in str(template.function.__doc__)
         (holds,) = template.conditions.values()
-        assert [holds(SimpleNamespace(k=k, phi=6.0)) for k in (2.999, 3.0, 3.001)] == [False, False, True]
-        gains = {"Riccati": (9.0, 6.0), "linear": (9e6, 6e6), "clipped": (6e6, 6e6), "sliding": (9.0, 0.06)}
+        assert [holds(SimpleNamespace(k=k, phi=6.0)) for k in (2.999, 3.0, 3.001)] == [
+            False,
+            False,
+            True,
+        ]
+        gains = {
+            "Riccati": (9.0, 6.0),
+            "linear": (9e6, 6e6),
+            "clipped": (6e6, 6e6),
+            "sliding": (9.0, 0.06),
+        }
         rules = boards.on_board(robot, "none")
         for name, run in boards.experiments(robot).items():
             law, kind = run.law.of_channel(0), name.removeprefix("trajectory + ")
             assert tuple(law.gains.values()) == pytest.approx(gains[kind.rstrip("*")])
             assert law.source.kind == "shipped"
-            assert str(run.velocity).partition("(")[0] == ("measured" if kind.endswith("*") else "savitzky_golay")
+            assert str(run.velocity).partition("(")[0] == (
+                "measured" if kind.endswith("*") else "savitzky_golay"
+            )
             assert dataclasses.replace(run, law="none", velocity="measured") == rules
         assert (rules.duration, rules.control_period, rules.resolved.u_max) == (10.0, 0.002, 6.0)
 
@@ -513,7 +647,9 @@ ALL = boards.Robustness(dict.fromkeys(boards.RobustnessRow._fields[1:-1], (("a",
 
 
 def ruled(**fields):
-    """A run of acrobot by the rules of the boards, as far as its scenario says, with some fields changed."""
+    """A run of acrobot by the rules of the boards, as far as its scenario says, with some fields
+    changed.
+    """
     short = smc.run(boards.entry("acrobot", duration=0.01))
     return dataclasses.replace(short, scenario=boards.entry("acrobot", **fields))
 
@@ -524,25 +660,36 @@ def raising(y, gains, memory):
 
 
 def test_a_mistake_is_one_sentence(refused):
-    short, duffing = boards.entry("acrobot", duration=0.01), smc.Scenario(plant="duffing", law="none", duration=0.01)
+    short, duffing = (
+        boards.entry("acrobot", duration=0.01),
+        smc.Scenario(plant="duffing", law="none", duration=0.01),
+    )
     rows, law = boards.SIMULATION["acrobot"]["v2"], {"plant": "acrobot", "law": "none"}
     mistakes = [
-        lambda: boards.entry("acrobat"), lambda: boards.entry("acrobot", "slide"),
-        lambda: boards.experiments("acrobat"), lambda: boards.board(smc.run(short)),
-        lambda: boards.board(smc.run(duffing)), lambda: boards.board(ruled(x0=3.0)),
+        lambda: boards.entry("acrobat"),
+        lambda: boards.entry("acrobot", "slide"),
+        lambda: boards.experiments("acrobat"),
+        lambda: boards.board(smc.run(short)),
+        lambda: boards.board(smc.run(duffing)),
+        lambda: boards.board(ruled(x0=3.0)),
         lambda: boards.board(ruled(plant=smc.plant("acrobot", m2=0.3))),
-        lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))), lambda: boards.board(ruled(u_max=3.0)),
-        lambda: boards.board(ruled(), "TVLQR"), lambda: boards.board(ruled(), "\n"),
+        lambda: boards.board(ruled(disturbance=smc.Sine(0.5, 1.0))),
+        lambda: boards.board(ruled(u_max=3.0)),
+        lambda: boards.board(ruled(), "TVLQR"),
+        lambda: boards.board(ruled(), "\n"),
         lambda: boards.robustness_board("acrobat", {"mine": ALL}),
         lambda: boards.robustness_board("acrobot", {boards.ROBUSTNESS["acrobot"][0].name: ALL}),
-        lambda: boards.criteria(smc.run(duffing)), lambda: boards.score({"energy": 1.0}),
-        lambda: boards.score(rows[0], "v1"), lambda: boards.score(rows[0], "v3"),
-        lambda: boards.score(rows[0]._replace(energy=-1.0)), lambda: Machine(duffing),
+        lambda: boards.criteria(smc.run(duffing)),
+        lambda: boards.score({"energy": 1.0}),
+        lambda: boards.score(rows[0], "v1"),
+        lambda: boards.score(rows[0], "v3"),
+        lambda: boards.score(rows[0]._replace(energy=-1.0)),
+        lambda: Machine(duffing),
         lambda: Machine(smc.Scenario(**law, reference=smc.Sine(1.0, 2.0))),
         lambda: Machine(smc.Scenario(**law, feedforward=smc.Constant(1.0))),
         lambda: Machine(smc.Scenario(**law, surface=smc.surface("linear", c=1.0))),
         lambda: Machine(boards.on_board("acrobot", raising())).simulate(Case()),
-    ]  # fmt: skip
+    ]
     for wrong in mistakes:
         refused(wrong)
 
@@ -570,7 +717,9 @@ def test_the_command_shows_this_packages_rows_among_the_published(capsys, tmp_pa
 @pytest.mark.parametrize("robot", boards.ROBOTS)
 def test_a_folder_enters_the_boards_in_place_of_this_packages_rows(robot, capsys):
     with pytest.raises(SystemExit) as ended:
-        command([robot, "--no-robustness", "--entry", str(ROOT / "examples" / "entries" / "soft_relay")])
+        command(
+            [robot, "--no-robustness", "--entry", str(ROOT / "examples" / "entries" / "soft_relay")]
+        )
     assert ended.value.code in (0, None)
     out = capsys.readouterr().out
     assert out.count("soft relay") == 2

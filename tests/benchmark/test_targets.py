@@ -1,4 +1,6 @@
-"""Targets are quantiles of the catalogue's medians, which the oracle reaches and u = 0 does not; and suites."""
+"""Targets are quantiles of the catalogue's medians, which the oracle reaches and u = 0 does not;
+and suites.
+"""
 
 import collections
 import math
@@ -20,8 +22,12 @@ def runs(accuracy: list[float], settling: float = 1.0, calm: float = 1.0) -> np.
 
 
 def frozen(unit: float, oracle: list[float], zero: list[float], seen: float = 1e-9) -> dict | None:
-    """The targets for laws whose medians are 1, 2, ... 21 times a unit, and for accuracies of the controls."""
-    laws = {f"{i}": runs([1e-9, unit * i, 1e9], settling=0.1 * i, calm=float(i)) for i in range(1, 22)}
+    """The targets for laws whose medians are 1, 2, ... 21 times a unit, and for accuracies of the
+    controls.
+    """
+    laws = {}
+    for i in range(1, 22):
+        laws[f"{i}"] = runs([1e-9, unit * i, 1e9], settling=0.1 * i, calm=float(i))
     of_controls = {"zero": runs(zero, math.inf, 0.0), "oracle 16 0.5": runs(oracle, 0.01, 0.01)}
     return script.targets(CELL, laws, of_controls, {"oracle 16 0.5": runs([seen], 0.01, 0.01)})
 
@@ -37,12 +43,20 @@ def test_levels_are_the_quantiles_of_the_medians():
 
 
 @pytest.mark.quick
-@pytest.mark.parametrize(("oracle", "zero", "levels"), [
-    ([0.01, 0.04], [0.9, 0.8], [0.05, 0.06, 0.1, 0.1, 0.1]),  # 0.04 x 1.25, and a tenth of the start
-    ([1e-6], [0.9, 0.12], [0.03, 0.06, 0.06, 0.06, 0.06]),  # 0.12 / 2
-    ([0.06], [0.9, 0.12], None), ([1e-6], [0.9, 0.09], None), ([math.inf], [0.9], None),
-])  # fmt: skip
-def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing(oracle, zero, levels):
+@pytest.mark.parametrize(
+    ("oracle", "zero", "levels"),
+    [
+        # 0.04 x 1.25, and a tenth of the start
+        ([0.01, 0.04], [0.9, 0.8], [0.05, 0.06, 0.1, 0.1, 0.1]),
+        ([1e-6], [0.9, 0.12], [0.03, 0.06, 0.06, 0.06, 0.06]),  # 0.12 / 2
+        ([0.06], [0.9, 0.12], None),
+        ([1e-6], [0.9, 0.09], None),
+        ([math.inf], [0.9], None),
+    ],
+)
+def test_a_level_is_no_harder_than_the_oracles_worst_and_no_easier_than_the_best_of_nothing(
+    oracle, zero, levels
+):
     found = frozen(0.01, oracle, zero)
     assert (found and found["accuracy"]) == (levels and pytest.approx(levels))
 
@@ -60,16 +74,18 @@ def test_a_level_is_no_harder_than_the_oracles_worst_on_visible_instances(seen, 
 def test_a_suite_takes_each_plant_and_condition_equally_often_and_no_law_has_a_say():
     thirty, fifty = suite.suite("smc-30@1"), suite.suite("smc-50@1")
     rules = problem.rules(1)
-    chosen = [
-        f"{plant}/{condition}@1"
-        for j, plant in enumerate(rules["plants"])
-        for i, condition in enumerate(rules["conditions"])
-        if (i + 2 * j + 1) % 5 < 3 and f"{plant}/{condition}" not in rules["frozen"]["left_out"]
-    ]
+    chosen = []
+    for j, plant in enumerate(rules["plants"]):
+        for i, condition in enumerate(rules["conditions"]):
+            if (i + 2 * j + 1) % 5 < 3 and f"{plant}/{condition}" not in rules["frozen"][
+                "left_out"
+            ]:
+                chosen.append(f"{plant}/{condition}@1")
     assert list(thirty) == chosen
     assert set(thirty) < set(fifty)
     plants, conditions = (
-        collections.Counter(p) for p in zip(*(i.split("@")[0].split("/") for i in thirty), strict=True)
+        collections.Counter(p)
+        for p in zip(*(i.split("@")[0].split("/") for i in thirty), strict=True)
     )
     assert set(plants.values()) | set(conditions.values()) <= {5, 6, 3, 2}
 
@@ -79,7 +95,9 @@ def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_boar
     for name in {name for one in suite.suites() for name in suite.suite(one)}:
         targets = smc.problem(name).targets
         assert set(targets) == set(problem.MEASURES), name
-        assert all(len(levels) == 5 and list(levels) == sorted(levels) for levels in targets.values()), name
+        assert all(
+            len(levels) == 5 and list(levels) == sorted(levels) for levels in targets.values()
+        ), name
         assert {"speed", "calm"} <= set(suite.boards(name))
     assert suite.boards("duffing/sine@1") == ("forces", "speed", "calm")
     assert suite.boards("duffing/encoder@1") == ("sensors", "speed", "calm")
@@ -88,12 +106,19 @@ def test_every_problem_of_every_suite_has_five_ordered_levels_and_informs_a_boar
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted({name for one in suite.suites() for name in suite.suite(one)}))
+@pytest.mark.parametrize(
+    "name", sorted({name for one in suite.suites() for name in suite.suite(one)})
+)
 def test_both_controls_on_instances_that_nobody_saw(name):
     one = smc.problem(name)
     instances = range(1) if "/worst" in name else range(4)
     for control, reached in (("zero", False), ("oracle", True)):
         for trace in smc.run(one.scenarios(one.controls[control], instances, FRESH)):
-            times = {key: time for key, time in one.measures(trace).items() if key.rpartition("_")[2].isdigit()}
+            times = {}
+            for key, time in one.measures(trace).items():
+                if key.rpartition("_")[2].isdigit():
+                    times[key] = time
             assert len(times) == 15
-            assert {key for key, time in times.items() if math.isnan(time) == reached} == set(), control
+            assert {key for key, time in times.items() if math.isnan(time) == reached} == set(), (
+                control
+            )

@@ -1,4 +1,6 @@
-"""What every command says of itself, and that each of its options reaches the function that does the work."""
+"""What every command says of itself, and that each of its options reaches the function that does
+the work.
+"""
 
 import importlib
 import inspect
@@ -19,23 +21,33 @@ from smc_mujoco.cli import main
 from smc_mujoco.cli.commands.options import actuator
 from smc_mujoco.common.constraints import of_parameters
 
-CALLS = {  # command line -> the functions that it calls, of which the last does the work; not for audits
+# command line -> the functions that it calls, of which the last does the work; not for audits
+CALLS = {
     "list pid": ["cli.law_pages.print_pages"],
     "list --needs continuous,two-gains": ["cli.law_pages.print_suitable"],
     "list --plant duffing": ["cli.law_pages.print_suitable"],
     "list law.c": ["exchange.c.load.check"],
-    "list law.c --gains a=1 --memory 3 --symbol f --flag=-Ia --flag=-Ib --timeout 4": ["exchange.c.load.check"],
+    "list law.c --gains a=1 --memory 3 --symbol f --flag=-Ia --flag=-Ib --timeout 4": [
+        "exchange.c.load.check"
+    ],
     "run duffing": ["cli.scene.perform"],
-    "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat": ["cli.scene.perform"],
+    "run duffing --out there --no-film --seed 7 --threads 2 --export csv,mat --no-repeat": [
+        "cli.scene.perform"
+    ],
     "view duffing": ["draw.studio.view"],
     "view duffing --law pid --port 8123 --no-browser": ["draw.studio.view"],
     "compare": ["studies.compare.compare"],
     "compare duffing,van_der_pol --law pid,classical --condition noise --seeds 3 --no-tune --worst --quick "
     "--gains default --duration 2 --x0 0.4 --relevant 0.05 --defaults --unchecked --out there --searches 2 --figure f "
-    "--latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": ["studies.compare.compare"],
+    "--latex t.tex --executor dask://a:1 --traces all --noise-key 5 --threads 2": [
+        "studies.compare.compare"
+    ],
     "compare --law all": ["studies.compare.compare"],
     "compare --law all --gains default duffing": ["studies.compare.compare"],
-    "compare --rig simple_pendulum_ak80 --seeds 1": ["studies.study.study", "studies.leaderboard.leaderboard"],
+    "compare --rig simple_pendulum_ak80 --seeds 1": [
+        "studies.study.study",
+        "studies.leaderboard.leaderboard",
+    ],
     "compare --rig simple_pendulum_ak80 --law pid --seeds 1 --duration 2 --x0 0.4 --out there "
     "--executor dask://a:1 --threads 2 --defaults --unchecked --relevant 0.05 --noise-key 0": [
         "studies.study.study",
@@ -43,7 +55,9 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     ],
     "which duffing": ["studies.adviser.which"],
     "which duffing --needs calm,fast --condition noise --law pid --quick --seeds 3 --duration 2 --x0 0.4 "
-    "--relevant 0.05 --out there --defaults --unchecked --disturbance 2 --threads 2": ["studies.adviser.which"],
+    "--relevant 0.05 --out there --defaults --unchecked --disturbance 2 --threads 2": [
+        "studies.adviser.which"
+    ],
     "tune duffing pid": ["analysis.tuning.search.tune"],
     "tune duffing pid --objective tracking --searches 2 --budget 7 --seed 3 --out there.json "
     "--condition noise --x0 0.4 --threads 2": ["analysis.tuning.search.tune"],
@@ -63,7 +77,9 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "--json s.json --threads 2": ["studies.sensitivity.sensitivity"],
     "accuracy duffing": ["evidence.accuracy.accuracy.accuracy"],
     "accuracy duffing van_der_pol --law pid --condition sine --periods 0.002,0.001 --seeds 2 --gains default "
-    "--duration 2 --x0 0.4 --out a --json a.json --threads 2": ["evidence.accuracy.accuracy.accuracy"],
+    "--duration 2 --x0 0.4 --out a --json a.json --threads 2": [
+        "evidence.accuracy.accuracy.accuracy"
+    ],
     "basin duffing": ["analysis.region_of_attraction.basin"],
     "basin duffing --law pid --points 3 --gains default --duration 2 --out b --json b.json --condition noise "
     "--threads 2": ["analysis.region_of_attraction.basin"],
@@ -71,9 +87,13 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
     "chatter duffing --law pid --actuator lag:0.01 --condition noise --gains default --duration 2": [
         "simulation.grid.case"
     ],
-    "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": ["analysis.chattering.chattering"],
+    "chatter duffing --law pid --channel 1 --out c --json c.json --threads 2": [
+        "analysis.chattering.chattering"
+    ],
     "export live/index.html": ["exchange.live.build.live"],
-    "export duffing furuta there/index.html --law pid --law classical": ["exchange.live.build.live"],
+    "export duffing furuta there/index.html --law pid --law classical": [
+        "exchange.live.build.live"
+    ],
     "export pid.c": ["exchange.c.export.law_to_c"],
     "export pid there.c --gains kp=50 --type float --joints 2": ["exchange.c.export.law_to_c"],
     "export pid.fmu": ["exchange.fmu.export.law_to_fmu"],
@@ -82,7 +102,9 @@ CALLS = {  # command line -> the functions that it calls, of which the last does
 }
 
 
-COMMANDS = {info.name: (info.rich_help_panel, info.callback) for info in main.app.registered_commands}
+COMMANDS = {
+    info.name: (info.rich_help_panel, info.callback) for info in main.app.registered_commands
+}
 
 PRINTED = [  # command lines that are run to their ends
     "show one.npz --export csv,mat",
@@ -100,19 +122,44 @@ PRINTED = [  # command lines that are run to their ends
 ]
 
 
-FLAGS = {"--no-film", "--no-repeat", "--no-browser", "--no-tune", "--worst", "--quick", "--defaults", "--unchecked"}
+FLAGS = {
+    "--no-film",
+    "--no-repeat",
+    "--no-browser",
+    "--no-tune",
+    "--worst",
+    "--quick",
+    "--defaults",
+    "--unchecked",
+}
 FLAGS |= {"--no-binary"}
-SWITCHES = {"--rig", "--needs", "--plant"}  # which function does the work; --needs and --plant of `list`
+SWITCHES = {
+    "--rig",
+    "--needs",
+    "--plant",
+}  # which function does the work; --needs and --plant of `list`
 AFTER = {"--figure", "--latex", "--json", "--out"}  # of what is done after the function
 FOLDERS = {"run", "compare", "which"}  # whose --out is a folder
 ALIASES = {  # option -> arguments that it may change, besides the one of its name
-    "--law": "laws scenario scenarios", "--condition": "conditions scenario", "--x0": "starts scenarios",
-    "--seed": "scene scenario", "--seeds": "scenarios", "--duration": "scenario scenarios", "--gains": "law scenario",
-    "--disturbance": "within over", "--bound": "within over", "--flag": "flags", "--label": "scenario",
-    "--no-film": "filming", "--no-browser": "open_browser",
-    "--no-repeat": "repeated", "--out": "folder", "--actuator": "changes", "--type": "numbers",
+    "--law": "laws scenario scenarios",
+    "--condition": "conditions scenario",
+    "--x0": "starts scenarios",
+    "--seed": "scene scenario",
+    "--seeds": "scenarios",
+    "--duration": "scenario scenarios",
+    "--gains": "law scenario",
+    "--disturbance": "within over",
+    "--bound": "within over",
+    "--flag": "flags",
+    "--label": "scenario",
+    "--no-film": "filming",
+    "--no-browser": "open_browser",
+    "--no-repeat": "repeated",
+    "--out": "folder",
+    "--actuator": "changes",
+    "--type": "numbers",
     "--period": "control_period",
-}  # fmt: skip
+}
 UNTOLD = {
     "study(scenarios)",
     "case(changes)",
@@ -132,12 +179,17 @@ def called(function: Callable, arguments: tuple, named: dict[str, Any]) -> dict[
     signature = inspect.signature(function)
     bound = signature.bind(*arguments, **named).arguments
     plain = {name: one.default for name, one in signature.parameters.items()}
-    given = {name: told(one) for name, one in bound.items() if type(one) is not type(plain[name]) or one != plain[name]}
+    given = {}
+    for name, one in bound.items():
+        if type(one) is not type(plain[name]) or one != plain[name]:
+            given[name] = told(one)
     return {f"{function.__name__}({name})": one for name, one in given.items()}
 
 
 def reached(words: list[str], paths: list[str]) -> dict[str, str]:
-    """Return with which arguments a command line calls the functions at `paths`, of which the last does the work."""
+    """Return with which arguments a command line calls the functions at `paths`, of which the last
+    does the work.
+    """
     calls: dict[str, str] = {}
 
     def stub(path: str, last: bool, patch: pytest.MonkeyPatch) -> None:
@@ -178,7 +230,9 @@ def options(words: list[str]) -> list[tuple[int, int]]:
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("line", CALLS)
 def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value(line):
-    """What is done only after the work, such as writing a file, is seen in what commands write, below."""
+    """What is done only after the work, such as writing a file, is seen in what commands write,
+    below.
+    """
     words, paths = line.split(), CALLS[line]
     whole = reached(words, paths)
     assert [name for name, value in whole.items() if not value and "(" not in name] == [
@@ -190,9 +244,14 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
             continue
         without = reached(words[:start] + words[stop:], paths)
         changed = {name for name in {*whole, *without} if whole.get(name) != without.get(name)}
-        if not changed and (option in AFTER or (words[0], option) == ("chatter", "--threads")):  # of its runs
+        if not changed and (
+            option in AFTER or (words[0], option) == ("chatter", "--threads")
+        ):  # of its runs
             continue
-        names = {option.removeprefix("--no-").strip("-").replace("-", "_"), *ALIASES.get(option, "").split()}
+        names = {
+            option.removeprefix("--no-").strip("-").replace("-", "_"),
+            *ALIASES.get(option, "").split(),
+        }
         mine = [name for name in changed if re.split(r"[()]", name)[1] in names]
         assert len(mine) == 1, (option, changed)
         assert option == "--quick" or len(changed) == 1, (option, changed)
@@ -203,13 +262,19 @@ def test_every_option_changes_the_argument_of_its_name_and_no_other_to_its_value
 
 
 FILES = {
-    line: [word for word in line.split() if word in AFTER and not (word == "--out" and line.split()[0] in FOLDERS)]
+    line: [
+        word
+        for word in line.split()
+        if word in AFTER and not (word == "--out" and line.split()[0] in FOLDERS)
+    ]
     for line in CALLS
 }
 
 
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize(("line", "option"), [(line, option) for line, its in FILES.items() for option in its])
+@pytest.mark.parametrize(
+    ("line", "option"), [(line, option) for line, its in FILES.items() for option in its]
+)
 def test_a_file_of_another_kind_is_refused_before_the_work(line, option, capsys):
     words = line.split()
     words[words.index(option) + 1] = "a.gif"
@@ -224,23 +289,41 @@ def test_drives_on_the_command_line_are_those_of_python():
 
 
 def parameters(command: Callable) -> dict[str, tuple[inspect.Parameter, Any]]:
-    """Return how each option and argument is written -> its parameter, and what typer is told of it."""
+    """Return how each option and argument is written -> its parameter, and what typer is told of
+    it.
+    """
     found = {}
     every = inspect.signature(command).parameters
     for one in [one for name, one in every.items() if name != "ctx"]:
         (info,) = one.annotation.__metadata__
-        given = [word for word in (info.default, *(info.param_decls or ())) if isinstance(word, str)]
+        given = []
+        for word in (info.default, *(info.param_decls or ())):
+            if isinstance(word, str):
+                given.append(word)
         name = one.name.replace("_", "-")
         names = [f"--{name}", *[f"--no-{name}"] * isinstance(one.default, bool)]
-        found["/".join(given or (names if isinstance(info, OptionInfo) else [one.name]))] = one, info
+        found["/".join(given or (names if isinstance(info, OptionInfo) else [one.name]))] = (
+            one,
+            info,
+        )
     return found
 
 
 def test_the_calls_above_have_every_option_of_their_commands():
     beside = {"--timing"}  # for what is done after the work, or instead of it
     for name, (_, command) in COMMANDS.items():
-        words = {word.partition("=")[0] for line in CALLS if line.split()[0] == name for word in line.split()}
-        options = [{*names.split("/")} for names in parameters(command) if names.startswith("-")] if words else []
+        words = set()
+        for line in CALLS:
+            if line.split()[0] == name:
+                for word in line.split():
+                    words.add(word.partition("=")[0])
+        if words:
+            options = []
+            for names in parameters(command):
+                if names.startswith("-"):
+                    options.append({*names.split("/")})
+        else:
+            options = []
         assert [one for one in options if not one & (words | beside)] == [], name
 
 
@@ -261,14 +344,26 @@ def test_the_least_number_that_an_option_takes_is_the_least_that_its_function_ta
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_the_examples_of_a_command_have_options_that_it_takes(name):
     command = COMMANDS[name][1]
-    taken = {one for names in parameters(command) for one in names.split("/")}
-    examples = re.findall(r"Example: smc-mujoco (\S+)(.*?)(?: && .*| > .*)?\n", f"{command.__doc__}\n")
+    taken = set()
+    for names in parameters(command):
+        for one in names.split("/"):
+            taken.add(one)
+    examples = re.findall(
+        r"Example: smc-mujoco (\S+)(.*?)(?: && .*| > .*)?\n", f"{command.__doc__}\n"
+    )
     assert examples
     assert {called for called, _ in examples} == {name}
-    assert {word for _, words in examples for word in words.split() if word.startswith("--")} <= taken
+    assert {
+        word for _, words in examples for word in words.split() if word.startswith("--")
+    } <= taken
 
 
-NAMING = {"law": "observer_free", "plant": "duffing", "plants": "duffing", "what": "pid"}  # what completes to what
+NAMING = {
+    "law": "observer_free",
+    "plant": "duffing",
+    "plants": "duffing",
+    "what": "pid",
+}  # what completes to what
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
@@ -301,7 +396,9 @@ def trace(folder):
 
 @pytest.mark.usefixtures("trace", "coarse_grid")
 @pytest.mark.parametrize("line", PRINTED, ids=lambda line: line.partition(" --")[0])
-def test_what_a_command_prints_fits_and_what_it_writes_is_parsed_as_ever(line, folder, monkeypatch, capsys, snapshot):
+def test_what_a_command_prints_fits_and_what_it_writes_is_parsed_as_ever(
+    line, folder, monkeypatch, capsys, snapshot
+):
     monkeypatch.setenv("COLUMNS", "80")
     with pytest.raises(SystemExit) as end:
         main.main(line.split())
@@ -309,35 +406,61 @@ def test_what_a_command_prints_fits_and_what_it_writes_is_parsed_as_ever(line, f
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80
     assert not re.search(r"\b(nan|None|inf|True|False)\b|[<>]smc|…", out)
-    assert not re.search(r"\b[1-9]\d*\.\d{5}|0\.0*[1-9]\d{4}", out)  # no more digits than anybody reads
+    assert not re.search(
+        r"\b[1-9]\d*\.\d{5}|0\.0*[1-9]\d{4}", out
+    )  # no more digits than anybody reads
     assert all(law in out for law in "".join(re.findall(r"--law (\S+)", line)).split(","))
-    files = {path.relative_to(folder) for path in folder.rglob("*") if path.is_file() and path.parent.name != "parts"}
+    files = set()
+    for path in folder.rglob("*"):
+        if path.is_file() and path.parent.name != "parts":
+            files.add(path.relative_to(folder))
     told = [Path(name) for name in re.findall(r"^wrote (\S+)", out, re.MULTILINE)]
     beside = {"one.npz", "noise_key.json", "classical.fmu"}
-    untold = {file for file in files - set(told) if file.name not in beside and "searches" not in str(file)}
+    untold = {
+        file
+        for file in files - set(told)
+        if file.name not in beside and "searches" not in str(file)
+    }
     assert {Path(file).name for file in map(str, untold)} <= {name.name for name in told}
     assert all((folder / name).stat().st_size > 100 for name in told)
-    assert not told or all(name.suffix in (".json", ".pdf", ".tex", ".csv", ".mat", ".parquet") for name in told)
-    parsed = [f"{HASHES.sub('', file.as_posix())}: {content(file)}" for file in sorted(files) if content(file)]
+    assert not told or all(
+        name.suffix in (".json", ".pdf", ".tex", ".csv", ".mat", ".parquet") for name in told
+    )
+    parsed = []
+    for file in sorted(files):
+        if content(file):
+            parsed.append(f"{HASHES.sub('', file.as_posix())}: {content(file)}")
     if parsed:
         assert "\n".join(parsed) == snapshot
 
 
 def content(file: Path) -> str:
-    """Return what programs read of a file: the head of CSV, LaTeX without its comments, or the names in JSON."""
+    """Return what programs read of a file: the head of CSV, LaTeX without its comments, or the
+    names in JSON.
+    """
     if file.suffix not in (".json", ".csv", ".tex"):
         return ""
     text = file.read_text(encoding="utf-8")
     if file.suffix == ".json":
         return names_in(json.loads(text))
     return words(
-        "\n".join(line for line in text.splitlines()[: None if file.suffix == ".tex" else 1] if line[:1] != "%")
+        "\n".join(
+            line
+            for line in text.splitlines()[: None if file.suffix == ".tex" else 1]
+            if line[:1] != "%"
+        )
     )
 
 
 def names_in(data: Any, depth: int = 2) -> str:
-    """Return the names in some JSON and, to some depth, those below them; of a list, those of its first item."""
-    data = data[0] if isinstance(data, list) and data else data
+    """Return the names in some JSON and, to some depth, those below them; of a list, those of its
+    first item.
+    """
+    if isinstance(data, list) and data:
+        data = data[0]
     if not depth or not isinstance(data, dict):
         return ""
-    return ", ".join(f"{name} ({below})" if (below := names_in(one, depth - 1)) else name for name, one in data.items())
+    return ", ".join(
+        f"{name} ({below})" if (below := names_in(one, depth - 1)) else name
+        for name, one in data.items()
+    )

@@ -1,4 +1,6 @@
-"""What `smc-mujoco list` promises: every law in a table that fits, one in full, and a new file found everywhere."""
+"""What `smc-mujoco list` promises: every law in a table that fits, one in full, and a new file
+found everywhere.
+"""
 
 import os
 import re
@@ -15,8 +17,12 @@ from smc_mujoco.control.law import law_function, laws
 pytestmark = pytest.mark.quick
 
 ROOT = Path(smc.__file__).parents[1]
-EVERY = [(name, t) for templates in law_pages.CATALOGUES.values() for name, t in templates().items()]
-ONE_BY_ONE = pytest.mark.parametrize(("name", "template"), EVERY, ids=lambda v: v if isinstance(v, str) else v.kind)
+EVERY = [
+    (name, t) for templates in law_pages.CATALOGUES.values() for name, t in templates().items()
+]
+ONE_BY_ONE = pytest.mark.parametrize(
+    ("name", "template"), EVERY, ids=lambda v: v if isinstance(v, str) else v.kind
+)
 
 
 @pytest.fixture
@@ -64,7 +70,9 @@ def test_a_filter_shows_the_laws_that_have_all_properties_and_no_others(call):
 
 def test_where_no_law_suits_it_says_so(call):
     out = flat(call("list", "--needs", "one-gain")[1])
-    assert out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, or --plant"
+    assert (
+        out == f"0 of {len(laws())} laws that have one gain to choose: leave out a need, or --plant"
+    )
     assert 'velocity="levant"' in flat(call("list", "--needs", "no-velocity")[1])
 
 
@@ -101,7 +109,14 @@ def test_a_page_has_all_that_is_known(name, template: Template, call):
     assert max(map(len, out.splitlines())) <= 80
     text = flat(out)
     said = law_pages.entry(template)
-    for part in (said.formula, said.title, said.source, said.known, said.discretisation, *template.conditions):
+    for part in (
+        said.formula,
+        said.title,
+        said.source,
+        said.known,
+        said.discretisation,
+        *template.conditions,
+    ):
         assert flat(part) in text
     for gain, value in template.defaults.items():
         assert re.search(rf"\b{gain} += {re.escape(f'{value:g}')}(?=\s|$)", out)
@@ -110,12 +125,19 @@ def test_a_page_has_all_that_is_known(name, template: Template, call):
 
 def test_a_page_loses_no_word_of_the_docstring():
     for name, template in EVERY:
-        words = {*re.findall(r"\w+", " ".join(law_pages.entry(template))), "Gains", "Source", "Sources"}
+        words = {
+            *re.findall(r"\w+", " ".join(law_pages.entry(template))),
+            "Gains",
+            "Source",
+            "Sources",
+        }
         assert set(re.findall(r"\w+", template.doc)) - words == set(), name
 
 
 def test_a_formula_is_an_equation():
-    """The first sentence of the docstring is `Name: formula`; of the velocity sensor there is no formula."""
+    """The first sentence of the docstring is `Name: formula`; of the velocity sensor there is no
+    formula.
+    """
     for name, template in EVERY:
         said = law_pages.entry(template)
         if name != "measured":
@@ -133,7 +155,9 @@ def test_a_page_has_ranges_degree_plants_and_how_to_use_it(call):
     assert 'smc.law("pid", kp=10, ki=5)' in out
     assert "plants inverted_pendulum" in flat(call("list", "swing_up")[1])
     assert "none on the gains alone" in flat(call("list", "classical")[1])
-    assert 'velocity=smc.estimator("filtered_difference", tau=0.005)' in flat(call("list", "filtered_difference")[1])
+    assert 'velocity=smc.estimator("filtered_difference", tau=0.005)' in flat(
+        call("list", "filtered_difference")[1]
+    )
 
 
 def test_a_name_of_a_law_and_a_surface_shows_both(call):
@@ -157,12 +181,16 @@ def test_a_plant_has_a_page_with_its_parameters_and_its_sets(call):
 
 
 @pytest.mark.parametrize(
-    ("typed", "meant"), [("supertwist", "super_twisting"), ("Classical", "classical"), ("kalmann", "kalman")]
+    ("typed", "meant"),
+    [("supertwist", "super_twisting"), ("Classical", "classical"), ("kalmann", "kalman")],
 )
 def test_an_unknown_name_is_one_sentence_with_the_nearest(typed, meant, call):
     code, out, err = call("list", typed)
     assert (code, out) == (2, "")
-    assert err == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
+    assert (
+        err
+        == f"smc-mujoco: unknown law, surface or velocity estimator {typed!r}: did you mean {meant!r}?\n"
+    )
 
 
 def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
@@ -177,8 +205,13 @@ def test_a_law_of_one_s_own_is_read_as_the_library_s_are():
 
     said = law_pages.entry(own)
     assert said == (
-        "Own law", "u = -k e", "", "Sampled, it is late.", "It is odd.", 'A. Author, "Title", J. Things 1(2):3, 1999.',
-    )  # fmt: skip
+        "Own law",
+        "u = -k e",
+        "",
+        "Sampled, it is late.",
+        "It is odd.",
+        'A. Author, "Title", J. Things 1(2):3, 1999.',
+    )
     assert law_pages.entry(law_function(lambda y, gains, memory: (0.0, 0.0))).formula == "<lambda>"
 
 
@@ -212,7 +245,9 @@ importlib.import_module("smc_mujoco.control.laws").__path__.append({folder!r})
 
 @pytest.fixture
 def added(tmp_path):
-    """A folder with one new law in it, and a plugin that stands for the file being in smc_mujoco/control/laws."""
+    """A folder with one new law in it, and a plugin that stands for the file being in
+    smc_mujoco/control/laws.
+    """
     folder = tmp_path / "more"
     folder.mkdir()
     (folder / "brand_new.py").write_text(LAW)

@@ -1,4 +1,6 @@
-"""What the command line promises: tables that fit, files where they were asked for, one sentence for every mistake."""
+"""What the command line promises: tables that fit, files where they were asked for, one sentence
+for every mistake.
+"""
 
 import dataclasses
 import functools
@@ -52,9 +54,13 @@ scene = smc.Scene(
 )
 '''
 FILES = {
-    f"calm-{LABEL.rstrip('.').replace(' ', '_')}..npz", "noisy-rough.npz", "calm.svg", "calm.png", "noisy.svg",
+    f"calm-{LABEL.rstrip('.').replace(' ', '_')}..npz",
+    "noisy-rough.npz",
+    "calm.svg",
+    "calm.png",
+    "noisy.svg",
     "noisy.png",
-}  # fmt: skip
+}
 
 
 TRACES = {name for name in FILES if name.endswith(".npz")}
@@ -65,7 +71,9 @@ python = functools.partial(commands.python, fine=False, COLUMNS="80")
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """An empty working folder, a terminal of 80 columns, and nothing of the process changed for good."""
+    """An empty working folder, a terminal of 80 columns, and nothing of the process changed for
+    good.
+    """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
@@ -100,19 +108,27 @@ def undrawn(monkeypatch):
 
 @pytest.fixture
 def trace(folder) -> Path:
-    return smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2)).save(folder / "one.npz")
+    return smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2)).save(
+        folder / "one.npz"
+    )
 
 
 def environment(**variables: str) -> dict[str, str]:
     root = Path(smc.__file__).parents[1]
-    return os.environ | {"PYTHONPATH": str(root), "COLUMNS": "80", "PYTHONIOENCODING": "utf-8"} | variables
+    return (
+        os.environ
+        | {"PYTHONPATH": str(root), "COLUMNS": "80", "PYTHONIOENCODING": "utf-8"}
+        | variables
+    )
 
 
 def refused(answer: tuple[int, str, str], *words: object) -> None:
     """Exit code 2, one sentence on stderr with these words in it, no traceback."""
     code, out, err = answer
     assert code == 2
-    assert [line for line in err.splitlines() if line.startswith("smc-mujoco: ")] == err.splitlines()[-1:]
+    assert [
+        line for line in err.splitlines() if line.startswith("smc-mujoco: ")
+    ] == err.splitlines()[-1:]
     assert "Traceback" not in out + err
     for word in words:
         assert str(word) in err
@@ -129,9 +145,19 @@ def test_list_names_everything_there_is(call):
     names = [*smc.plants(), *smc.laws(), *scenes, *smc.paper.CONDITIONS]
     names += [*smc.laws(kind="surface"), *smc.laws(kind="estimator")]
     assert [name for name in names if not re.search(rf"(?<![\w]){name}(?![\w])", out)] == []
-    titles = [line.strip() for before, line in itertools.pairwise(["", *out.splitlines()]) if not before and line]
+    titles = []
+    for before, line in itertools.pairwise(["", *out.splitlines()]):
+        if not before and line:
+            titles.append(line.strip())
     assert [title for title in titles if title[0].isupper()] == [
-        *("Plants", "Laws", "Laws of many joints", "Surfaces", "Velocity estimators", "Scenes, for smc-mujoco run"),
+        *(
+            "Plants",
+            "Laws",
+            "Laws of many joints",
+            "Surfaces",
+            "Velocity estimators",
+            "Scenes, for smc-mujoco run",
+        ),
         "Conditions, on inverted_pendulum for 10 s",
     ]
     assert "…" not in out
@@ -156,7 +182,12 @@ def test_with_its_output_closed_a_command_does_its_work(trace, folder):
     code = "from smc_mujoco.cli.main import main; main()"
     command = f'"{sys.executable}" -c "{code}" show one.npz --export csv <&- >&-'
     done = subprocess.run(
-        ["sh", "-c", command], cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True, check=False
+        ["sh", "-c", command],
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert (folder / "one.csv").read_text().startswith("t [s],")
@@ -187,11 +218,16 @@ scene = smc.Scene(title="Asked [/s]", conditions={"calm": {"only": run}}, answer
 ''')
     code, out, _ = call("run", "asks.py", "--no-film", "--out", "out")
     assert code == 0
-    assert [line.strip() for line in out.splitlines() if line][:2] == ["Does it settle?", "Asked [/s]"]
+    assert [line.strip() for line in out.splitlines() if line][:2] == [
+        "Does it settle?",
+        "Asked [/s]",
+    ]
     assert re.search(r"^only .*\n\nonly does not rest\.\n\nwrote$", out, re.MULTILINE)
 
 
-def test_what_a_scene_s_answer_raises_is_shown_as_it_is_and_its_runs_are_kept(call, undrawn, folder):
+def test_what_a_scene_s_answer_raises_is_shown_as_it_is_and_its_runs_are_kept(
+    call, undrawn, folder
+):
     (folder / "fails.py").write_text("""import smc_mujoco as smc
 run = smc.Scenario(plant="duffing", law="none", duration=0.01)
 scene = smc.Scene(title="Fails", conditions={"calm": {"only": run}}, answer=lambda runs: runs.nothing)
@@ -219,29 +255,41 @@ def test_no_number_and_no_heading_of_a_score_table_is_cut_at_80_columns_and_a_fa
     plant, fails, call, undrawn, folder
 ):
     lines = [
-        "import smc_mujoco as smc", "@smc.law_function", "def sour(y, gains, memory):", "    if y.t > 0.05:",
-        "        raise ValueError('sour')", "    return 0.0, 0.0",
+        "import smc_mujoco as smc",
+        "@smc.law_function",
+        "def sour(y, gains, memory):",
+        "    if y.t > 0.05:",
+        "        raise ValueError('sour')",
+        "    return 0.0, 0.0",
         f"common = dict(plant={plant!r}, duration=0.2, reference=smc.Constant(1e-3))",
         f"runs = {{{LABEL!r}: smc.Scenario(law='adaptive', noise=smc.Noise(0.1, 0.5), **common)}}",
         "runs |= {'sour': smc.Scenario(law=sour(), **common)}" if fails else "",
         "scene = smc.Scene(title='Wide', conditions={'nominal': runs})",
-    ]  # fmt: skip
+    ]
     (folder / "wide.py").write_text("\n".join(lines))
     code, out, _ = call("run", "wide.py", "--no-film", "--out", "out")
     assert code == 0
     table = out.partition("Wide")[2].partition("\n\n")[0].splitlines()
     assert max(map(len, table)) <= 80
     told = " ".join(out.split())
-    assert ("sour: law 'sour' raised ValueError (sour) in channel 0, at t = 0.051 s" in told) is fails
+    assert (
+        "sour: law 'sour' raised ValueError (sour) in channel 0, at t = 0.051 s" in told
+    ) is fails
     (row,) = [line for line in table if line.startswith(LABEL[:8])]
     (saved,) = [path for path in (folder / "out" / "wide").glob("*.npz") if "label" in path.name]
     values = score(smc.load(saved))
-    expected = [tables.number(values[name]) for name in tables.SCORE_COLUMNS.values() if name in values]
+    expected = []
+    for name in tables.SCORE_COLUMNS.values():
+        if name in values:
+            expected.append(tables.number(values[name]))
     assert row.split()[-len(expected) :] == expected
     headings = " ".join(line for line in table if not line.startswith((LABEL[:8], "sour")))
     assert "…" not in headings
     assert all(
-        word in headings for head, name in tables.SCORE_COLUMNS.items() if name in values for word in head.split()
+        word in headings
+        for head, name in tables.SCORE_COLUMNS.items()
+        if name in values
+        for word in head.split()
     )
 
 
@@ -265,16 +313,29 @@ def test_threads_are_as_many_as_asked_for_and_change_no_bit(call, undrawn, scene
     monkeypatch.setattr(show, "run", noted)
     for threads in (1, 2):
         assert call("run", scene, "--no-film", "--out", str(threads), "--threads", threads)[0] == 0
-    assert asked == [(k, {"progress": True}) for k in (1, 1, 2, 2)]  # the runs, then the same at half the step
-    np.testing.assert_array_equal(smc.load("1/mine/noisy-rough.npz").x, smc.load("2/mine/noisy-rough.npz").x)
+    assert asked == [
+        (k, {"progress": True}) for k in (1, 1, 2, 2)
+    ]  # the runs, then the same at half the step
+    np.testing.assert_array_equal(
+        smc.load("1/mine/noisy-rough.npz").x, smc.load("2/mine/noisy-rough.npz").x
+    )
 
 
 def test_timing_names_the_stretches_and_they_add_up(call, scene, monkeypatch):
     monkeypatch.setattr(show, "figures", lambda *_: time.sleep(0.02) or [])
     _, out, _ = call("run", scene, "--no-film", "--out", "out", "--timing")
-    spent = {name: float(seconds) for name, seconds in re.findall(r"([a-z ]+?) (\d+\.\d\d) s", out.splitlines()[-1])}
+    spent = {}
+    for name, seconds in re.findall(r"([a-z ]+?) (\d+\.\d\d) s", out.splitlines()[-1]):
+        spent[name] = float(seconds)
     total = spent.pop(" in all")
-    assert [name.strip() for name in spent] == ["loading", "compiling", "simulating", "repeating", "traces", "figures"]
+    assert [name.strip() for name in spent] == [
+        "loading",
+        "compiling",
+        "simulating",
+        "repeating",
+        "traces",
+        "figures",
+    ]
     assert total == pytest.approx(sum(spent.values()), abs=0.006 * len(spent))
     assert spent[" figures"] > 0.0
 
@@ -299,7 +360,9 @@ def test_a_word_in_mujoco_gl_that_is_no_backend_stops_no_command(folder):
     assert "none.npz" in done.stderr.splitlines()[-1]
 
 
-def test_a_film_that_fails_leaves_the_list_of_what_was_written(call, undrawn, scene, folder, monkeypatch):
+def test_a_film_that_fails_leaves_the_list_of_what_was_written(
+    call, undrawn, scene, folder, monkeypatch
+):
     def failing(*_):
         raise ScenarioError("cannot write mp4: no ffmpeg")
 
@@ -315,18 +378,28 @@ def test_a_film_that_fails_leaves_the_list_of_what_was_written(call, undrawn, sc
 def test_show_prints_every_metric_with_its_value(call, trace):
     code, out, err = call("show", trace)
     assert (code, err) == (0, "")
-    rows = {line.split()[0]: line.split()[1] for line in out.splitlines() if line and not line.startswith(" ")}
+    rows = {}
+    for line in out.splitlines():
+        if line and not line.startswith(" "):
+            rows[line.split()[0]] = line.split()[1]
     everything, realistic = score(smc.load(trace)), {m.name for m in metrics() if m.realistic}
     assert set(everything) == {m.name for m in metrics() if not m.network}
     values = {name: value for name, value in everything.items() if name not in realistic}
     assert set(rows) & realistic == set()
-    assert {name: rows[name] for name in values} == {name: tables.number(value) for name, value in values.items()}
+    assert {name: rows[name] for name in values} == {
+        name: tables.number(value) for name, value in values.items()
+    }
 
 
 def test_show_says_that_half_the_step_was_not_tried_where_it_matters(call, trace, folder):
-    smc.run(smc.Scenario(plant="duffing", law="pid", duration=0.05, friction=Viscous(0.1))).save(folder / "oiled.npz")
+    smc.run(smc.Scenario(plant="duffing", law="pid", duration=0.05, friction=Viscous(0.1))).save(
+        folder / "oiled.npz"
+    )
     note = f"{capital(UNTRIED)}."
-    assert [note in " ".join(call("show", path)[1].split()) for path in (trace, "oiled.npz")] == [False, True]
+    assert [note in " ".join(call("show", path)[1].split()) for path in (trace, "oiled.npz")] == [
+        False,
+        True,
+    ]
 
 
 def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):
@@ -335,10 +408,15 @@ def test_show_tells_the_cart_in_metres_and_its_pole_in_radians(call, folder):
     trace.save(folder / "pole.npz")
     code, out, err = call("show", "pole.npz")
     assert (code, err) == (0, "")
-    _, first, driven, second, free = re.split(r"^(driven: slide \(m\)|free: hinge \(rad\)) *$", out, flags=re.M)
+    _, first, driven, second, free = re.split(
+        r"^(driven: slide \(m\)|free: hinge \(rad\)) *$", out, flags=re.M
+    )
     assert (first, second) == ("driven: slide (m)", "free: hinge (rad)")
     for part, group, x, u in ((driven, "driven", "m", "N"), (free, "free", "rad", None)):
-        rows = {line.split()[0]: line.split()[1:3] for line in part.splitlines() if line and not line.startswith(" ")}
+        rows = {}
+        for line in part.splitlines():
+            if line and not line.startswith(" "):
+                rows[line.split()[0]] = line.split()[1:3]
         assert rows["peak"] == [tables.number(smc.scores(trace)[group]["peak"]), x]
         assert rows.get("max_u", ["", None])[1] == u
         assert "spread_bound" not in rows
@@ -365,7 +443,10 @@ def test_answers_have_a_table_per_metric_with_labels_by_conditions(call, undrawn
     assert (code, err) == (0, "")
     after = out[out.index("stick_time (s)") :]
     assert re.search(r"run +dry +wet *\n", after)
-    stick, reaction = (re.findall(r"^(light|heavy) +(.*?) *$", part, re.M) for part in after.split("peak_reaction (N)"))
+    stick, reaction = (
+        re.findall(r"^(light|heavy) +(.*?) *$", part, re.M)
+        for part in after.split("peak_reaction (N)")
+    )
     assert [label for label, _ in stick] == ["light", "heavy"]
     assert stick[0][1].split()[1] == "0"  # nothing holds it in the wet
     assert stick[1][1] == "0.300"
@@ -414,7 +495,9 @@ def test_a_name_with_a_newline_or_with_markup_is_one_line(call, folder):
     smc.run(smc.Scenario(plant="duffing", law=law, duration=0.05)).save(path)
     _, out, _ = call("show", path, "--export", "csv")
     assert out.startswith("duffing under [/b](k=4, c=2.5), 0.05 s at 0.001 s")
-    assert [line for line in out.splitlines() if line.startswith("wrote")] == [rf"wrote {folder}/a\n\x1b[31m[b].csv"]
+    assert [line for line in out.splitlines() if line.startswith("wrote")] == [
+        rf"wrote {folder}/a\n\x1b[31m[b].csv"
+    ]
 
 
 def test_show_of_a_failed_run_says_why(call, folder, monkeypatch):
@@ -431,37 +514,66 @@ def test_show_of_a_failed_run_says_why(call, folder, monkeypatch):
 
 
 REFUSED = {  # command line -> what the sentence names
-    "run duffin": ("'duffin'", "did you mean 'duffing'?"), "run xyz": ("'xyz'", "inverted_pendulum", "vdp_noise"),
-    "run not/there.py": ("not/there.py",), "run .": (".",), "run empty.py": ("empty.py", "declares no scene"),
-    "run torn.py": ("torn.py", "line 2"), "run mine.py --no-film --seed 100000000000000000000": ("seed",),
-    "show not/there.npz": ("not/there.npz",), "show torn.npz": ("torn.npz",),
-    "show one.npz --export csv,mta": ("did you mean 'mat'?",), "show one.npz --export one.csv": ("one.csv", "csv"),
-    "chatter duffing --law ,": ("',' holds no name",), "chatter duffing --actuator lagg:0.01": ("lag",),
-    "chatter duffing --actuator lag": ("lag:0.01",), "chatter duffing --actuator lag:-1": ("-1",),
-    "chatter duffing --channel 3": ("give 0 to 0",), "chatter duffing --law clasical": ("classical",),
+    "run duffin": ("'duffin'", "did you mean 'duffing'?"),
+    "run xyz": ("'xyz'", "inverted_pendulum", "vdp_noise"),
+    "run not/there.py": ("not/there.py",),
+    "run .": (".",),
+    "run empty.py": ("empty.py", "declares no scene"),
+    "run torn.py": ("torn.py", "line 2"),
+    "run mine.py --no-film --seed 100000000000000000000": ("seed",),
+    "show not/there.npz": ("not/there.npz",),
+    "show torn.npz": ("torn.npz",),
+    "show one.npz --export csv,mta": ("did you mean 'mat'?",),
+    "show one.npz --export one.csv": ("one.csv", "csv"),
+    "chatter duffing --law ,": ("',' holds no name",),
+    "chatter duffing --actuator lagg:0.01": ("lag",),
+    "chatter duffing --actuator lag": ("lag:0.01",),
+    "chatter duffing --actuator lag:-1": ("-1",),
+    "chatter duffing --channel 3": ("give 0 to 0",),
+    "chatter duffing --law clasical": ("classical",),
     "chatter duffing --out chatter.gif": ("chatter.gif",),
     "worst duffing --law pid --disturbance 2 --bound mass=": ("'mass='", "mass=0.7:1.3"),
     "worst duffing --law pid --disturbance 2 --bound mass=heavy": ("mass=heavy", "mass=0.7:1.3"),
     "worst duffing --law pid --disturbance 2 --bound mass=0.7:1.3,mass=0.5:2": ("mass twice",),
     "worst duffing --law pid --disturbance 2 --bound disturbance=1": ("--disturbance",),
-    "worst duffing --law pid --disturbance 2 --bound delai=0:1": ("'delai'", "delay", "delta", "mass"),
+    "worst duffing --law pid --disturbance 2 --bound delai=0:1": (
+        "'delai'",
+        "delay",
+        "delta",
+        "mass",
+    ),
     "which arm.xm:shoulder --quick": ("'arm.xm'", ".xml"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.usefixtures("coarse_grid", "scene", "trace")
 @pytest.mark.parametrize("line", REFUSED)
-def test_a_mistake_is_one_sentence_that_names_it_with_code_2_and_nothing_is_written(line, call, folder):
+def test_a_mistake_is_one_sentence_that_names_it_with_code_2_and_nothing_is_written(
+    line, call, folder
+):
     (folder / "empty.py").write_text("x = 1\n")
     (folder / "torn.py").write_text('"""Torn?"""\nx = (\n')
     (folder / "torn.npz").write_bytes(b"PK\x03\x04")
     before = {path: path.stat().st_size for path in folder.iterdir()}
     refused(call(*line.split()), *REFUSED[line])
-    assert {path: path.stat().st_size for path in folder.iterdir() if path.name != "__pycache__"} == before
+    assert {
+        path: path.stat().st_size for path in folder.iterdir() if path.name != "__pycache__"
+    } == before
 
 
-TOO_FAR = {"delay": "0:20", "x0": "1e12", "period": "1:1e9", "jitter": "5", "mass": "0.5:1e30", "friction": "0:1e300"}
-BOUNDS = [one.name for one in dataclasses.fields(smc.Uncertainty) if one.name not in ("disturbance", "parameters")]
+TOO_FAR = {
+    "delay": "0:20",
+    "x0": "1e12",
+    "period": "1:1e9",
+    "jitter": "5",
+    "mass": "0.5:1e30",
+    "friction": "0:1e300",
+}
+BOUNDS = [
+    one.name
+    for one in dataclasses.fields(smc.Uncertainty)
+    if one.name not in ("disturbance", "parameters")
+]
 
 
 @pytest.mark.parametrize("name", BOUNDS)
@@ -469,20 +581,37 @@ def test_a_wrong_bound_is_told_by_its_name_in_the_syntax_of_the_command_line(nam
     ranged = isinstance(getattr(smc.Uncertainty(mass=(0.7, 1.3)), name), tuple) or name == "encoder"
     for value in ["0.3" if ranged else "0.1:0.3", "0.3:0.1", "-1", TOO_FAR.get(name, "-2")]:
         bound = f"{name}={value}"
-        answer = call("sensitivity", "duffing", "--law", "pid", "--disturbance", 1, "--bound", bound)
+        answer = call(
+            "sensitivity", "duffing", "--law", "pid", "--disturbance", 1, "--bound", bound
+        )
         refused(answer, f"--bound {name}")
         assert not re.search(r"Uncertainty|\(\d|smc\.|give .* as \(|input_delay", answer[2])
 
 
 TRACEBACK = "Traceback (most recent call last):"
 SCENES = {
-    "a name that is not there": ("smc.Scene(title='T', conditions={'a': {'b': ok(plant='dufing')}})", "'duffing'"),
+    "a name that is not there": (
+        "smc.Scene(title='T', conditions={'a': {'b': ok(plant='dufing')}})",
+        "'duffing'",
+    ),
     "a gain that is not there": ("smc.law('classical', kk=1.0)", "kk"),
-    "a value out of range": ("smc.Scene(title='T', conditions={'a': {'b': ok(duration=-1.0)}})", "duration"),
+    "a value out of range": (
+        "smc.Scene(title='T', conditions={'a': {'b': ok(duration=-1.0)}})",
+        "duration",
+    ),
     "a condition that is one run": ("smc.Scene(title='T', conditions={'a': ok()})", "'a'"),
-    "two plants": ("smc.Scene(title='T', conditions={'a': {'b': ok(), 'c': ok(plant='van_der_pol')}})", "van_der_pol"),
-    "labels alike": ("smc.Scene(title='T', conditions={'a': {'B c': ok(), 'b_c': ok()}})", "B c, b_c"),
-    "no such metric": ("smc.Scene(title='T', answers=('ripples',), conditions={'a': {'b': ok()}})", "'ripple'"),
+    "two plants": (
+        "smc.Scene(title='T', conditions={'a': {'b': ok(), 'c': ok(plant='van_der_pol')}})",
+        "van_der_pol",
+    ),
+    "labels alike": (
+        "smc.Scene(title='T', conditions={'a': {'B c': ok(), 'b_c': ok()}})",
+        "B c, b_c",
+    ),
+    "no such metric": (
+        "smc.Scene(title='T', answers=('ripples',), conditions={'a': {'b': ok()}})",
+        "'ripple'",
+    ),
 }
 
 
@@ -496,7 +625,11 @@ def test_a_mistake_in_a_scene_file_names_the_file_and_the_line(mistake, call, fo
         f"scene = {expression}\n"
     )
     answer = call("run", "wrong.py", "--no-film")
-    refused(answer, "wrong.py", "line 2" if "ok(plant='dufing')" in expression or "-1.0" in expression else "line 4")
+    refused(
+        answer,
+        "wrong.py",
+        "line 2" if "ok(plant='dufing')" in expression or "-1.0" in expression else "line 4",
+    )
     assert word in answer[2]
     assert not (folder / "videos").exists()
 
@@ -504,7 +637,10 @@ def test_a_mistake_in_a_scene_file_names_the_file_and_the_line(mistake, call, fo
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("import nowhere_to_be_found", "ModuleNotFoundError: No module named 'nowhere_to_be_found'"),
+        (
+            "import nowhere_to_be_found",
+            "ModuleNotFoundError: No module named 'nowhere_to_be_found'",
+        ),
         ("open('gone.csv')", "FileNotFoundError: [Errno 2] No such file or directory: 'gone.csv'"),
         ("raise ValueError", "ValueError"),
     ],
@@ -513,18 +649,29 @@ def test_what_a_user_s_file_raises_is_shown_from_that_file_on(line, said, call, 
     (folder / "mine.py").write_text(f"{line}\n")
     for words in (["run", "mine.py"], ["compare", "duffing", "--law", "mine.py"]):
         code, _, err = call(*words)
-        shown = [text for text in err.splitlines() if set(text.strip()) != {"^"}]  # which 3.13 places elsewhere
-        assert (code, shown) == (1, [TRACEBACK, '  File "mine.py", line 1, in <module>', f"    {line}", said])
+        # which 3.13 places elsewhere
+        shown = []
+        for text in err.splitlines():
+            if set(text.strip()) != {"^"}:
+                shown.append(text)
+        assert (code, shown) == (
+            1,
+            [TRACEBACK, '  File "mine.py", line 1, in <module>', f"    {line}", said],
+        )
     with pytest.raises((ImportError, OSError, ValueError)) as raised:
         smc.grid(["duffing"], ["mine.py"])
     assert type(raised.value).__name__ == said.partition(":")[0]
 
 
-def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(call, scene, folder, monkeypatch):
+def test_a_folder_that_cannot_be_made_is_named_before_anything_runs(
+    call, scene, folder, monkeypatch
+):
     monkeypatch.setattr(show, "run", lambda *_, **__: pytest.fail("it ran"))
     (folder / "taken").write_text("")
     refused(call("run", scene, "--no-film", "--out", "taken"), "taken", "choose another folder")
-    refused(call("run", scene, "--no-film", "--out", "taken/below"), "taken", "choose another folder")
+    refused(
+        call("run", scene, "--no-film", "--out", "taken/below"), "taken", "choose another folder"
+    )
 
 
 def test_a_file_that_cannot_be_written_is_named(call, scene, folder):
@@ -535,11 +682,16 @@ def test_a_file_that_cannot_be_written_is_named(call, scene, folder):
 @pytest.mark.parametrize(
     "words",
     [
-        ["run"], ["show"], ["walk"], ["run", "duffing", "--fast"], ["run", "duffing", "--seed", "-1"],
-        ["run", "duffing", "--seed", "one"], ["run", "duffing", "--threads", "0"],
+        ["run"],
+        ["show"],
+        ["walk"],
+        ["run", "duffing", "--fast"],
+        ["run", "duffing", "--seed", "-1"],
+        ["run", "duffing", "--seed", "one"],
+        ["run", "duffing", "--threads", "0"],
     ],
     ids=" ".join,
-)  # fmt: skip
+)
 def test_a_wrong_command_line_ends_with_code_2_and_shows_the_usage(words, call):
     code, out, err = call(*words)
     assert (code, out) == (2, "")
@@ -557,7 +709,11 @@ OUTCOMES = {  # what a command raises -> its exit code and what it says
         2,
         "smc-mujoco: a.csv: No space; choose another folder or make room\n",
     ),
-    "no file": (OSError("torn"), 2, "smc-mujoco: a file: torn; choose another folder or make room\n"),
+    "no file": (
+        OSError("torn"),
+        2,
+        "smc-mujoco: a file: torn; choose another folder or make room\n",
+    ),
     "no memory": (MemoryError(), 2, "smc-mujoco: out of memory: give fewer or shorter runs\n"),
 }
 
@@ -609,7 +765,9 @@ def test_help_and_version_import_neither_mujoco_numba_nor_matplotlib(tmp_path):
     done = python("-c", HELP, folder=tmp_path)
     assert done.stderr == ""
     *said, heavy = done.stdout.split("\n")[:-1]
-    for words, text in zip((("run", "show", "list"), ("--seed", "--threads"), ("--export",), ()), said, strict=False):
+    for words, text in zip(
+        (("run", "show", "list"), ("--seed", "--threads"), ("--export",), ()), said, strict=False
+    ):
         assert "Usage: smc-mujoco" in text
         assert all(word in text for word in words)
     assert said[-1] == repr(f"smc-mujoco {smc.__version__}\n")
@@ -740,7 +898,9 @@ def stop(*_):
     raise KeyboardInterrupt("of the user's own handler")
 
 
-@pytest.mark.parametrize(("handler", "words"), [(signal.SIG_IGN, ""), (stop, "of the user's own handler")])
+@pytest.mark.parametrize(
+    ("handler", "words"), [(signal.SIG_IGN, ""), (stop, "of the user's own handler")]
+)
 def test_being_told_to_end_is_ctrl_c_also_where_that_is_ignored(handler, words):
     before = signal.signal(signal.SIGINT, handler)
     try:

@@ -1,4 +1,6 @@
-"""What a scene prints is the same at half the physics step and from a nudged start, or it is marked."""
+"""What a scene prints is the same at half the physics step and from a nudged start, or it is
+marked.
+"""
 
 import contextlib
 import dataclasses
@@ -55,7 +57,9 @@ def test_an_answer_is_the_same_with_equal_words_and_numbers_within_five_percent(
 
 
 def test_a_run_at_half_the_step_and_from_a_nudged_start_is_the_same_otherwise():
-    scenario = smc.Scenario(plant="duffing", law="classical", noise=smc.Noise(position=0.01), x0=1.0)
+    scenario = smc.Scenario(
+        plant="duffing", law="classical", noise=smc.Noise(position=0.01), x0=1.0
+    )
     half, moved = halved(scenario), nudged(scenario)
     assert half == dataclasses.replace(scenario, physics_step=5e-4)
     assert moved.x0 == (1.0 + 1e-9,)
@@ -66,8 +70,12 @@ def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
     stuck = smc.Scenario(plant="inverted_pendulum", law="adaptive", duration=1.0)
     trace = smc.run(stuck)
     larger = dataclasses.replace(trace, x=1.5 * trace.x)
-    (table,) = tables.scores("t", {"a": trace, "b": trace}, {"a": [trace, larger], "b": [trace, trace]})
-    lines = "\n".join(str(row) for row in zip(*(column._cells for column in table.columns), strict=True)).splitlines()
+    (table,) = tables.scores(
+        "t", {"a": trace, "b": trace}, {"a": [trace, larger], "b": [trace, trace]}
+    )
+    lines = "\n".join(
+        str(row) for row in zip(*(column._cells for column in table.columns), strict=True)
+    ).splitlines()
     assert MARK in lines[0]
     assert MARK not in lines[1]
     bound = smc.score(trace)["ultimate_bound"]
@@ -77,28 +85,42 @@ def test_a_score_that_changes_is_marked_with_its_range_and_others_are_not():
 
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_a_score_that_changes_by_less_is_marked_without_rk4_alone(integrator):
-    trace = smc.run(smc.Scenario(plant="duffing", law="adaptive", integrator=integrator, duration=1.0))
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law="adaptive", integrator=integrator, duration=1.0)
+    )
     larger = dataclasses.replace(trace, x=1.03 * trace.x)
     (table,) = tables.scores("t", {"a": trace}, {"a": [larger, trace]})
     assert any(MARK in cell for cell in cells(table)) == (integrator != "RK4")
     (table,) = tables.scores("t", {"a": trace}, {"a": [trace, larger]})  # a nudged start
     assert not any(MARK in cell for cell in cells(table))
     answers = "it ends at 1.00 mm", "it ends at 1.03 mm"
-    assert [show.same_answer(*answers), show.same_answer(*answers, first_order=True)] == [True, False]
+    assert [show.same_answer(*answers), show.same_answer(*answers, first_order=True)] == [
+        True,
+        False,
+    ]
 
 
 def cells(table) -> list[str]:
     """The rows of a table as text."""
-    return [" ".join(map(str, row)) for row in zip(*(column.cells for column in table.columns), strict=True)]
+    return [
+        " ".join(map(str, row))
+        for row in zip(*(column.cells for column in table.columns), strict=True)
+    ]
 
 
 def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
     fine = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.1))
     lost = dataclasses.replace(fine, diverged_at=0.05)
-    runs, again = {"a": fine, "b": lost, "c": lost}, {"a": [fine, lost], "b": [fine, fine], "c": [lost, lost]}
+    runs, again = (
+        {"a": fine, "b": lost, "c": lost},
+        {"a": [fine, lost], "b": [fine, fine], "c": [lost, lost]},
+    )
     (table,) = tables.scores("t", runs, again)
     shown = tables.number(smc.score(fine)["tv_rate"])
-    for said in (cells(table), cells(*tables.answers(["tv_rate"], {"nominal": runs}, {"nominal": again}))):
+    for said in (
+        cells(table),
+        cells(*tables.answers(["tv_rate"], {"nominal": runs}, {"nominal": again})),
+    ):
         assert [f"{shown}{MARK}\nto failed" in row for row in said] == [True, True, False]
         assert "failed" in said[2]
 
@@ -106,7 +128,10 @@ def test_a_run_that_fails_at_half_the_step_or_only_there_does_not_is_marked():
 def test_a_limit_cycle_that_half_the_step_loses_is_marked_and_the_mark_explained():
     swing = smc.run(smc.Scenario(plant="duffing", law="classical", duration=1.0))
     swing = dataclasses.replace(swing, s=np.sin(400.0 * swing.t)[:, None])
-    runs, again = {"nominal": {"a": swing}}, {"nominal": {"a": [dataclasses.replace(swing, s=0.0 * swing.s), swing]}}
+    runs, again = (
+        {"nominal": {"a": swing}},
+        {"nominal": {"a": [dataclasses.replace(swing, s=0.0 * swing.s), swing]}},
+    )
     (table,) = tables.answers(["chattering_amplitude", "chattering_frequency"], runs, again)
     amplitude, frequency = map(tables.number, channel_cycle(swing))
     assert f"none{MARK}\nto {amplitude}" in cells(table)[0]
@@ -115,7 +140,9 @@ def test_a_limit_cycle_that_half_the_step_loses_is_marked_and_the_mark_explained
 
 
 def arm(duration: float) -> smc.Scenario:
-    return dataclasses.replace(arms.scenario("sway", arms.gained("passivity_based")), duration=duration)
+    return dataclasses.replace(
+        arms.scenario("sway", arms.gained("passivity_based")), duration=duration
+    )
 
 
 def test_scores_of_a_tip_are_marked_like_all_others():
@@ -128,13 +155,19 @@ def test_scores_of_a_tip_are_marked_like_all_others():
 
 
 def test_every_number_of_a_scene_is_compared_with_its_runs_again(monkeypatch, tmp_path):
-    """Whatever tables print, a scene hands them the runs at half the step: scores, tips and answers."""
+    """Whatever tables print, a scene hands them the runs at half the step: scores, tips and
+    answers.
+    """
     runs = {"wall": {"a": arm(0.01)}}
-    scene = smc.Scene(title="t", conditions=runs, answers=("tv_rate",), answer=lambda outcome: "said")
+    scene = smc.Scene(
+        title="t", conditions=runs, answers=("tv_rate",), answer=lambda outcome: "said"
+    )
     given = []
     for name in ("scores", "tips"):
         monkeypatch.setattr(tables, name, lambda title, runs, again: given.append(again) or [])
-    monkeypatch.setattr(tables, "answers", lambda names, runs, again: given.append(again["wall"]) or [])
+    monkeypatch.setattr(
+        tables, "answers", lambda names, runs, again: given.append(again["wall"]) or []
+    )
     monkeypatch.setattr(show, "figures", lambda *_: [])
     show.perform(scene, tmp_path, False, 1, contextlib.nullcontext, Terminal(), (), "")
     steps = [[trace.scenario.resolved.physics_step for trace in again["a"]] for again in given]
@@ -143,11 +176,15 @@ def test_every_number_of_a_scene_is_compared_with_its_runs_again(monkeypatch, tm
 
 
 def test_an_answer_that_half_the_step_changes_is_printed_too():
-    runs = {law: smc.Scenario(plant="duffing", law=law, duration=0.5) for law in ("classical", "pid")}
+    runs = {}
+    for law in ("classical", "pid"):
+        runs[law] = smc.Scenario(plant="duffing", law=law, duration=0.5)
     scene = smc.Scene(
         title="t",
         conditions={"nominal": runs},
-        answer=lambda outcome: f"step {outcome.traces['nominal']['pid'].scenario.resolved.physics_step:g} s",
+        answer=lambda outcome: (
+            f"step {outcome.traces['nominal']['pid'].scenario.resolved.physics_step:g} s"
+        ),
     )
     traces, again = show.simulate(scene, 1), show.repeat(scene, 1)
     (said,) = show.other_answers(scene, traces, again, scene.sentence(traces))

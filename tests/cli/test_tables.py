@@ -38,7 +38,10 @@ def printed(shown) -> str:
 
 
 def test_a_summary_has_commands_in_volts_and_reactions_in_newton_metres():
-    lines = {line.split()[0]: line for line in printed(tables.trace_summary(VOLTS)).splitlines() if line.split()}
+    lines = {}
+    for line in printed(tables.trace_summary(VOLTS)).splitlines():
+        if line.split():
+            lines[line.split()[0]] = line
     assert " V/s " in lines["tv_rate"]
     assert " N m " in lines["peak_reaction"]
 
@@ -56,7 +59,10 @@ def test_a_film_tells_the_arrow_of_the_control_in_volts():
 def test_a_table_of_tips_has_the_scores_in_its_units():
     law, start = arms.hybrid(), arms.scenario("wall", arms.hybrid()).x0
     free, pressing = smc.run(
-        [smc.Scenario(plant="panda", law=law, x0=start, duration=0.005, contact=one) for one in ("none", "wall")]
+        [
+            smc.Scenario(plant="panda", law=law, x0=start, duration=0.005, contact=one)
+            for one in ("none", "wall")
+        ]
     )
     (table,) = tables.tips("runs", {"pressing": pressing})
     cells = {str(column.header): str(next(iter(column.cells))) for column in table.columns}
@@ -75,14 +81,29 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
         ("furuta", "lqr", 0.0, 0.1, None),
     ]
     found = [
-        Margin(plant=plant, law=law, kind="delay", value=level, unit="s", resolution=step, searched=1.0, theory=theory)
+        Margin(
+            plant=plant,
+            law=law,
+            kind="delay",
+            value=level,
+            unit="s",
+            resolution=step,
+            searched=1.0,
+            theory=theory,
+        )
         for plant, law, level, step, theory in rows
     ]
     changes = StepChange(0.05, 0.02), StepChange(0.02, 0.06)
     cycles: list[Any] = [
-        SimpleNamespace(amplitude=0.1, frequency=5.0, uncertainty=1.0, coupling=0.25, third_harmonic=0.04),
         SimpleNamespace(
-            amplitude=math.nan, frequency=math.nan, uncertainty=math.nan, coupling=1.5, third_harmonic=1.01
+            amplitude=0.1, frequency=5.0, uncertainty=1.0, coupling=0.25, third_harmonic=0.04
+        ),
+        SimpleNamespace(
+            amplitude=math.nan,
+            frequency=math.nan,
+            uncertainty=math.nan,
+            coupling=1.5,
+            third_harmonic=1.01,
         ),
     ]
     shown = [tables.margins("delay", found)]
@@ -92,10 +113,18 @@ def test_open_margins_uncertain_cycles_and_runs_that_depend_on_the_step_are_mark
         shown.append(tables.chattering(scenarios, 0, cycles[:count], measured, changes[:count]))
     tables_of = ["\n".join(printed([table]).splitlines()) for table in shown]
     cells = [[" ".join(line.split()) for line in text.splitlines()] for text in tables_of]
-    assert cells[0][-4:-1] == ["duffing pid 0.500 0.0200 0.250 s", "lqr >= 1.00 any s", "furuta lqr 0 0.100 s"]
+    assert cells[0][-4:-1] == [
+        "duffing pid 0.500 0.0200 0.250 s",
+        "lqr >= 1.00 any s",
+        "furuta lqr 0 0.100 s",
+    ]
     assert "pid 0.100 0.125 5.00 4.50 100 % 4 %" in cells[1]
     assert "classical none none* none none* > 100 %" in cells[1]
-    assert ["half the physics step" in text for text in tables_of] == [False, True, False]  # what a mark means
+    assert ["half the physics step" in text for text in tables_of] == [
+        False,
+        True,
+        False,
+    ]  # what a mark means
     assert "pid 0.100 0.125 5.00 4.50 100 % 25 %" in cells[2]
     assert ["s (m/s)" in tables_of[1], "s (rad/s)" in tables_of[2]] == [True, True]
 
@@ -104,10 +133,13 @@ def columns() -> list[Column]:
     return [Column(no_wrap=True), Column(justify="right", no_wrap=True), Column(no_wrap=True)]
 
 
-@pytest.mark.parametrize(("make", "gap"), [
-    (lambda: tables.plain(*columns()), 2),
-    (lambda: tables.titled("", *columns(), padding=0, show_edge=False, pad_edge=False), 1),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("make", "gap"),
+    [
+        (lambda: tables.plain(*columns()), 2),
+        (lambda: tables.titled("", *columns(), padding=0, show_edge=False, pad_edge=False), 1),
+    ],
+)
 def test_columns_are_apart_by_as_much_as_a_table_says_and_begin_at_its_edge(make, gap):
     table = make()
     for row in (["x" * 5, "1.000", "y"], ["x", "2", "yy"]):
@@ -116,26 +148,35 @@ def test_columns_are_apart_by_as_much_as_a_table_says_and_begin_at_its_edge(make
     assert first.startswith("xxxxx" + " " * gap + "1.000" + " " * gap + "y")
 
 
-@pytest.mark.parametrize("make", [
-    lambda: tables.trace_summary(VOLTS), lambda: tables.scores("runs", {"none": VOLTS, "a law": VOLTS}),
-    lambda: tables.answers(["tv_rate", "peak"], {"nominal": {"none": VOLTS}}),
-    lambda: [tables.catalogue("names", [("n" * k, "what it is") for k in (1, 9)])],
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: tables.trace_summary(VOLTS),
+        lambda: tables.scores("runs", {"none": VOLTS, "a law": VOLTS}),
+        lambda: tables.answers(["tv_rate", "peak"], {"nominal": {"none": VOLTS}}),
+        lambda: [tables.catalogue("names", [("n" * k, "what it is") for k in (1, 9)])],
+    ],
+)
 def test_no_two_cells_of_a_row_touch(make):
     for table in make():
         cells = [
-            [str(cell).split("\n")[0] for cell in row] for row in zip(*(c.cells for c in table.columns), strict=True)
+            [str(cell).split("\n")[0] for cell in row]
+            for row in zip(*(c.cells for c in table.columns), strict=True)
         ]
         lines = printed([table]).splitlines()
         for row in cells:
             words = [cell for cell in row if cell]
-            assert any(re.search(r"\s+".join(re.escape(word) for word in words), line) for line in lines), row
+            assert any(
+                re.search(r"\s+".join(re.escape(word) for word in words), line) for line in lines
+            ), row
 
 
 def test_an_overshoot_beyond_a_thousand_percent_has_no_digits():
     for metric, value, words in (
-        ("overshoot", 1000.0, "1000"), ("overshoot", 1000.1, "> 1000"), ("itae", 1000.1, "1000"),
+        ("overshoot", 1000.0, "1000"),
+        ("overshoot", 1000.1, "> 1000"),
+        ("itae", 1000.1, "1000"),
         ("overshoot", math.inf, "never"),
-    ):  # fmt: skip
+    ):
         assert tables._score([value], metric, VOLTS.scenario).plain == words
     assert tables.with_package("a line", "other") == "a line [other]"

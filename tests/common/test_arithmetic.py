@@ -1,4 +1,6 @@
-"""The hash of the machine's arithmetic: of the functions whose last bits differ between C libraries and processors."""
+"""The hash of the machine's arithmetic: of the functions whose last bits differ between C libraries
+and processors.
+"""
 
 import hashlib
 import math
@@ -14,12 +16,17 @@ INPUTS = [1e-3 * 1.01**k for k in range(1000)]
 
 
 def told(functions) -> str:
-    values = [f(x) for f in functions for x in INPUTS]
+    values = []
+    for f in functions:
+        for x in INPUTS:
+            values.append(f(x))
     return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
 
 
 def test_it_is_of_seven_functions_and_of_a_power_with_a_broken_exponent():
-    assert fingerprint.arithmetic() == told([*(getattr(math, name) for name in FUNCTIONS), lambda x: math.pow(x, 0.7)])
+    assert fingerprint.arithmetic() == told(
+        [*(getattr(math, name) for name in FUNCTIONS), lambda x: math.pow(x, 0.7)]
+    )
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

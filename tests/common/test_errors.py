@@ -1,4 +1,6 @@
-"""What the checks of a user's values take, at and around their bounds, and what they say of all else."""
+"""What the checks of a user's values take, at and around their bounds, and what they say of all
+else.
+"""
 
 import math
 import sys
@@ -8,7 +10,17 @@ import numpy as np
 import pytest
 
 from smc_mujoco.common import annexes, errors, extras, guard, libmujoco
-from smc_mujoco.common.errors import ScenarioError, find, items_of, name, number, one_line, shown, unknown, whole
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    find,
+    items_of,
+    name,
+    number,
+    one_line,
+    shown,
+    unknown,
+    whole,
+)
 from smc_mujoco.common.frozen import frozen
 
 pytestmark = pytest.mark.quick
@@ -61,8 +73,11 @@ TAKEN = [  # call, what it returns
     (lambda: dict(frozen({"a": 1})), {"a": 1}),
     (lambda: hash(frozen({"a": 1, "b": 2})) == hash(frozen({"b": 2, "a": 1})), True),
     (lambda: extras.missing("film", "A film", "sys", "json"), None),
-    (lambda: extras.missing("film", "It", "a_", "sys", "b_"), "It needs a_ and b_: pip install 'smc-mujoco[film]'"),
-]  # fmt: skip
+    (
+        lambda: extras.missing("film", "It", "a_", "sys", "b_"),
+        "It needs a_ and b_: pip install 'smc-mujoco[film]'",
+    ),
+]
 REFUSED = [  # call, what the sentence says
     (lambda: number("k", True), "k is True: give a number"),
     (lambda: number("k", np.timedelta64(1)), "k is np.timedelta64(1): give a number"),
@@ -80,19 +95,29 @@ REFUSED = [  # call, what the sentence says
     (lambda: name("label", " "), "label is ' ': give a name of printable characters"),
     (lambda: name("label", "a\n"), r"label is 'a\n': give a name of printable characters"),
     (lambda: name("label", 3), "label is 3: give a name of printable characters"),
-    (lambda: name("label", "a" * 101), f"label is '{'a' * 56}..., 101 characters: give at most 100"),
+    (
+        lambda: name("label", "a" * 101),
+        f"label is '{'a' * 56}..., 101 characters: give at most 100",
+    ),
     (lambda: items_of("runs", range(10**6 + 1)), "runs has more than 1,000,000 items: give fewer"),
     (lambda: items_of("runs", 3), "runs is 3: give a list"),
     (lambda: items_of("runs", Silent()), "runs is <Silent>: give a list"),
     (lambda: find("law", "lqrr", dict.fromkeys(LAWS)), "unknown law 'lqrr': did you mean 'lqr'?"),
-    (lambda: find("law", 3, dict.fromkeys(LAWS)), "unknown law 3: choose from lqr, super_twisting, terminal"),
+    (
+        lambda: find("law", 3, dict.fromkeys(LAWS)),
+        "unknown law 3: choose from lqr, super_twisting, terminal",
+    ),
 ]
 NAMES = {  # what is typed -> what is said of it
-    "STA": "did you mean 'super_twisting'?", "STSMC": "did you mean 'super_twisting'?",
-    "TSM": "did you mean 'terminal'?", "STX": "choose from lqr, super_twisting, terminal",
-    "sta": "choose from lqr, super_twisting, terminal", "Terminal": "did you mean 'terminal'?",
-    "twist": "did you mean 'super_twisting'?", "": "choose from lqr, super_twisting, terminal",
-}  # fmt: skip
+    "STA": "did you mean 'super_twisting'?",
+    "STSMC": "did you mean 'super_twisting'?",
+    "TSM": "did you mean 'terminal'?",
+    "STX": "choose from lqr, super_twisting, terminal",
+    "sta": "choose from lqr, super_twisting, terminal",
+    "Terminal": "did you mean 'terminal'?",
+    "twist": "did you mean 'super_twisting'?",
+    "": "choose from lqr, super_twisting, terminal",
+}
 
 
 @pytest.mark.parametrize("call", range(len(TAKEN)))
@@ -116,9 +141,15 @@ def test_an_unknown_name_is_answered_with_the_nearest_or_with_all(typed):
 
 
 def test_claims_are_listed_by_their_numbers_and_nothing_as_nothing():
-    assert str(unknown("claim", "x", ["10", "9", "all"])) == "unknown claim 'x': choose from all, 9, 10"
+    assert (
+        str(unknown("claim", "x", ["10", "9", "all"]))
+        == "unknown claim 'x': choose from all, 9, 10"
+    )
     assert str(unknown("claim", "x", [])) == "unknown claim 'x': there are none"
-    assert len(str(unknown("claim", "x", map(str, range(9999))))) == len("unknown claim 'x': choose from ") + 1100
+    assert (
+        len(str(unknown("claim", "x", map(str, range(9999)))))
+        == len("unknown claim 'x': choose from ") + 1100
+    )
 
 
 def test_two_laws_may_have_one_abbreviation():
@@ -159,10 +190,16 @@ def test_a_missing_package_is_named_with_its_cure(monkeypatch):
     ):
         with pytest.raises(extras.MissingPackageError) as missing, wait:
             import nope_  # noqa: F401  # pyright: ignore[reportMissingImports]
-        what = "an optional package" if "smc-mujoco" in cure else "onnx"
+        if "smc-mujoco" in cure:
+            what = "an optional package"
+        else:
+            what = "onnx"
         assert str(missing.value) == f"A film needs {what} (No module named 'nope_'): {cure}"
         assert isinstance(missing.value, ImportError | ScenarioError)
-    with pytest.raises(extras.MissingPackageError, match="no attribute 'nope'"), extras.extra("film", "A film"):
+    with (
+        pytest.raises(extras.MissingPackageError, match="no attribute 'nope'"),
+        extras.extra("film", "A film"),
+    ):
         math.nope  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
     monkeypatch.setattr(sys, "version_info", (3, 13, 0))
     assert extras.cure("dm") == "take Python 3.12, the last for which pip can install it"
@@ -175,7 +212,10 @@ def test_a_missing_annex_is_named_and_no_other_module(monkeypatch):
     monkeypatch.setattr(annexes, "installed", lambda annex: annex != "evidence")
     with pytest.raises(extras.MissingPackageError) as missing:
         annexes.module("smc_mujoco.evidence.rigs.rig", "a rig")
-    assert str(missing.value) == "a rig needs smc_mujoco.evidence, which is missing here: install all of smc-mujoco"
+    assert (
+        str(missing.value)
+        == "a rig needs smc_mujoco.evidence, which is missing here: install all of smc-mujoco"
+    )
     assert annexes.module("smc_mujoco.exchange", "C").__name__ == "smc_mujoco.exchange"
     assert annexes.module("smc_mujoco.common.text", "a number").__name__ == "smc_mujoco.common.text"
 
@@ -201,14 +241,22 @@ def test_mujoco_without_its_library_is_named(tmp_path, monkeypatch):
         (0, "ended the process with exit code 0: let it return"),
         (3, "ended the process with exit code 3: let it return"),
         (-6, "died of SIGABRT (Aborted): fix where it aborts"),
-        (-8, "died of SIGFPE (Floating point exception): fix where it divides, or traps floating-point exceptions"),
+        (
+            -8,
+            "died of SIGFPE (Floating point exception): fix where it divides, or traps floating-point exceptions",
+        ),
         (-11, "died of SIGSEGV (Segmentation fault): fix where it reads, writes or divides"),
     ],
 )
 @pytest.mark.skipif(sys.platform != "linux", reason="the system's names of signals")
 def test_how_a_trial_ended_is_told_in_words(code, words):
     failed = guard.Failed("the trial", "", code, 2.5)
-    assert (str(failed), failed.stage, failed.fault, failed.code) == (f"the trial {words}", "the trial", "", code)
+    assert (str(failed), failed.stage, failed.fault, failed.code) == (
+        f"the trial {words}",
+        "the trial",
+        "",
+        code,
+    )
     assert str(guard.Failed("the trial", "is NaN", code, 2.5)) == "is NaN"
 
 
@@ -218,11 +266,20 @@ def test_a_trial_reports_what_its_module_returns_or_raises(tmp_path, monkeypatch
     monkeypatch.setattr(guard, "limit", lambda: limits.append("set"))
     monkeypatch.setattr(sys, "path", sys.path[:])
     trials = {
-        "passes": (lambda order, say: say("loading") or {"k": order}, ["loading", '{"k": 3}', "unloading"]),
-        "is wrong": (lambda order, say: (_ for _ in ()).throw(guard.Fault("it is\nNaN")), ["Fault it is NaN"]),
+        "passes": (
+            lambda order, say: say("loading") or {"k": order},
+            ["loading", '{"k": 3}', "unloading"],
+        ),
+        "is wrong": (
+            lambda order, say: (_ for _ in ()).throw(guard.Fault("it is\nNaN")),
+            ["Fault it is NaN"],
+        ),
         "fails": (lambda order, say: {}[order], ["Fault KeyError: 3"]),
-        "is large": (lambda order, say: bytes(2**62), ["Fault takes more than 4 GiB of memory: make it smaller"]),
-    }  # fmt: skip
+        "is large": (
+            lambda order, say: bytes(2**62),
+            ["Fault takes more than 4 GiB of memory: make it smaller"],
+        ),
+    }
     for attempt, lines in trials.values():
         monkeypatch.setitem(sys.modules, "trial", types.SimpleNamespace(attempt=attempt))
         (tmp_path / "order").write_text('{"module": "trial", "order": 3, "path": ["a"]}')

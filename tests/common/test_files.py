@@ -1,4 +1,6 @@
-"""JSON has one way to write NaN and infinity, and older ways are read; damaged files are one sentence."""
+"""JSON has one way to write NaN and infinity, and older ways are read; damaged files are one
+sentence.
+"""
 
 import contextlib
 import dataclasses
@@ -38,9 +40,13 @@ from smc_mujoco.evidence.rigs import records
 from smc_mujoco.simulation import serialise
 from smc_mujoco.studies import scene
 
-WORDS = st.sampled_from(["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"])
+WORDS = st.sampled_from(
+    ["NaN", "Infinity", "-Infinity", "'NaN", "''-Infinity", "inf", "nan", "null"]
+)
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | WORDS
-DATA = st.recursive(LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text() | WORDS, inner), max_leaves=20)
+DATA = st.recursive(
+    LEAVES, lambda inner: st.lists(inner) | st.dictionaries(st.text() | WORDS, inner), max_leaves=20
+)
 
 
 def strict(text: str) -> Any:
@@ -137,12 +143,16 @@ def test_rows_of_a_study(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "error", [OSError("disk"), MemoryError(), RecursionError("deep"), KeyError("a"), OverflowError()]
+    "error",
+    [OSError("disk"), MemoryError(), RecursionError("deep"), KeyError("a"), OverflowError()],
 )
 def test_whatever_reading_raises_is_one_sentence(error, tmp_path):
     (tmp_path / "a").write_text("")
     said = rf"a is not a map \({type(error).__name__}.*\): give another$"
-    with pytest.raises(smc.ScenarioError, match=said), reading(tmp_path / "a", "map", "give another"):
+    with (
+        pytest.raises(smc.ScenarioError, match=said),
+        reading(tmp_path / "a", "map", "give another"),
+    ):
         raise error
 
 
@@ -170,11 +180,23 @@ def test_what_is_no_regular_file_is_not_opened(ending, tmp_path):
 
 @pytest.mark.parametrize("name", ["é" * 300, "a\0b", "x/" * 3000], ids=["long", "nul", "deep"])
 def test_a_name_that_no_file_can_have_is_one_sentence(name):
-    calls: list[Callable[[str], object]] = [smc.audit, writable, scene.find, lambda name: rigs.read(Path(name))]
-    calls += [lambda name: smc.exchange.law_from_c(f"{name}.c"), lambda name: smc.live("duffing", out=name)]
+    calls: list[Callable[[str], object]] = [
+        smc.audit,
+        writable,
+        scene.find,
+        lambda name: rigs.read(Path(name)),
+    ]
+    calls += [
+        lambda name: smc.exchange.law_from_c(f"{name}.c"),
+        lambda name: smc.live("duffing", out=name),
+    ]
     short: dict[str, Any] = {"seeds": 1, "duration": 0.02, "progress": False}
     runs = [smc.Scenario(plant="duffing", law="classical", duration=0.02)]
-    calls += [lambda name: smc.tune("duffing", "classical", budget=1, searches=1, folder=name, progress=False)]
+    calls += [
+        lambda name: smc.tune(
+            "duffing", "classical", budget=1, searches=1, folder=name, progress=False
+        )
+    ]
     calls += [lambda name: smc.which("duffing", "nominal", laws=["classical"], out=name, **short)]
     calls += [lambda name: smc.compare("classical", "duffing", "nominal", out=name, **short)]
     calls += [lambda name: smc.study(runs, name, progress=False)]
@@ -192,12 +214,18 @@ def test_a_table_that_unpacks_to_too_much_is_refused_before(tmp_path):
 
 @pytest.mark.parametrize(
     "make",
-    [lambda: smc.exchange.law_to_fmu("pid", "a.fmu"), lambda: smc.plant_from(f"<!-- -->{wild.ARM}", ["shoulder"])],
+    [
+        lambda: smc.exchange.law_to_fmu("pid", "a.fmu"),
+        lambda: smc.plant_from(f"<!-- -->{wild.ARM}", ["shoulder"]),
+    ],
 )
 def test_without_room_for_temporary_files_there_is_one_sentence(make, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    with pytest.raises(smc.ScenarioError, match=r"no temporary file can be written \(.*\): make room, or set TMPDIR"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"no temporary file can be written \(.*\): make room, or set TMPDIR",
+    ):
         make()
 
 
@@ -214,12 +242,17 @@ def test_a_compiler_without_room_for_its_files_is_not_blamed(compile_, tmp_path,
     monkeypatch.chdir(tmp_path)
     Path("law.c").write_text("")
     full = Path("full")
-    full.write_text("#!/bin/sh\necho 'a.c:9:1: fatal error: error writing: No space left on device' >&2\nexit 1\n")
+    full.write_text(
+        "#!/bin/sh\necho 'a.c:9:1: fatal error: error writing: No space left on device' >&2\nexit 1\n"
+    )
     full.chmod(0o755)
     monkeypatch.setenv("CC", str(full.resolve()))
     with pytest.raises(smc.ScenarioError) as refused:
         compile_()
-    assert str(refused.value) == "no temporary file can be written (No space left on device): make room, or set TMPDIR"
+    assert (
+        str(refused.value)
+        == "no temporary file can be written (No space left on device): make room, or set TMPDIR"
+    )
 
 
 @pytest.mark.parametrize("damage", ["", "[", "5", "[[]]", "[" * 10**5, '[{"plant": 1}]'])
@@ -248,7 +281,9 @@ def test_a_damaged_part_of_a_kept_report_is_computed_again(damage, tmp_path):
 
 
 def test_a_file_is_replaced_as_a_whole(tmp_path):
-    """A reader that has opened the old file still reads the old text: nothing is written into that file."""
+    """A reader that has opened the old file still reads the old text: nothing is written into that
+    file.
+    """
     path = tmp_path / "a.json"
     path.write_text("old")
     with path.open() as reader:
@@ -275,7 +310,10 @@ def test_cells_of_a_csv_file_are_between_commas_or_semicolons(tmp_path):
     file.write_text('t;"x, m"\n0,5;-1,25\n', encoding="utf-8")
     assert files.csv_rows(file) == [(1, ["t", "x. m"]), (2, ["0.5", "-1.25"])]
     file.write_text("a,b\0\n")
-    with pytest.raises(smc.ScenarioError, match=r"a.csv is not a CSV file \(it is not text|\(Error, line contains NUL"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"a.csv is not a CSV file \(it is not text|\(Error, line contains NUL",
+    ):
         files.csv_rows(file)
 
 
@@ -289,7 +327,12 @@ def test_a_file_of_more_than_2_gb_is_refused(tmp_path):
 
 
 def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
-    for name, bound in (("MAX_SIZE", 4_000_000), ("MAX_UNPACKED", 3_000_000), ("MAX_RATIO", 20), ("MAX_MEMBERS", 2)):
+    for name, bound in (
+        ("MAX_SIZE", 4_000_000),
+        ("MAX_UNPACKED", 3_000_000),
+        ("MAX_RATIO", 20),
+        ("MAX_MEMBERS", 2),
+    ):
         assert isinstance(getattr(files, name), int)
         monkeypatch.setattr(files, name, bound)
     file = tmp_path / "a"
@@ -298,12 +341,20 @@ def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
     file.write_bytes(bytes(4_100_000))
     with pytest.raises(smc.ScenarioError, match=r"^it has 4 MB, more than 4 MB$"):
         files._bounded(file)
-    for sizes, refused in (((1_000_000, 2_000_000), False), ((1_000_000, 2_000_001), True), ((1, 1, 1), True)):
+    for sizes, refused in (
+        ((1_000_000, 2_000_000), False),
+        ((1_000_000, 2_000_001), True),
+        ((1, 1, 1), True),
+    ):
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
             for i, size in enumerate(sizes):
                 archive.writestr(f"{i}", bytes(size))
         said = f"it unpacks from 0 MB to {len(sizes)} files of {sum(sizes) / 1e6:.0f} MB in all, and 2 files and 3 MB "
-        with pytest.raises(smc.ScenarioError, match=f"^{said}are allowed$") if refused else contextlib.nullcontext():
+        with (
+            pytest.raises(smc.ScenarioError, match=f"^{said}are allowed$")
+            if refused
+            else contextlib.nullcontext()
+        ):
             files._bounded(file)
     with zipfile.ZipFile(file, "w") as archive:  # large, but packed as large: its ratio is 1
         archive.writestr("a", bytes(3_500_000))
@@ -311,15 +362,24 @@ def test_files_at_and_beyond_their_bounds(tmp_path, monkeypatch):
 
 
 def test_what_cannot_be_written_or_found_is_one_sentence(tmp_path):
-    cells, beside = "give a CSV file, with commas or semicolons between cells", Path(files.__file__).parents[1]
+    cells, beside = (
+        "give a CSV file, with commas or semicolons between cells",
+        Path(files.__file__).parents[1],
+    )
     cure = r"give a name without \0, which UTF-8 can encode"
     refusals = {
-        lambda: files.with_ending("a.txt", ".json"): "cannot save to 'a.txt': end the name in .json",
+        lambda: files.with_ending(
+            "a.txt", ".json"
+        ): "cannot save to 'a.txt': end the name in .json",
         lambda: files.with_ending("a\0.json", ".json"): rf"the path is 'a\x00.json': {cure}",
-        lambda: writable(tmp_path): f"cannot write {tmp_path}: it is a folder, give the file in it a name",
+        lambda: writable(
+            tmp_path
+        ): f"cannot write {tmp_path}: it is a folder, give the file in it a name",
         lambda: writable("a\0"): rf"the path is 'a\x00': {cure}",
         lambda: writable("\ud800/a"): rf"the path is '\ud800/a': {cure}",
-        lambda: files.shipped("nope"): f"no folder 'nope' in {beside} or beside it: reinstall smc-mujoco",
+        lambda: files.shipped(
+            "nope"
+        ): f"no folder 'nope' in {beside} or beside it: reinstall smc-mujoco",
         lambda: files.csv_rows(tmp_path / "no"): f"no CSV file at {tmp_path / 'no'}: {cells}",
         lambda: files.csv_rows(3): f"cannot read 3: {cells}",  # pyright: ignore[reportArgumentType]
     }

@@ -1,4 +1,6 @@
-"""The OpenGL backend: nothing is chosen before the first picture, which then works whatever MuJoCo took."""
+"""The OpenGL backend: nothing is chosen before the first picture, which then works whatever MuJoCo
+took.
+"""
 
 import ctypes.util
 import inspect
@@ -11,7 +13,9 @@ import pytest
 
 from smc_mujoco.common import gl
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has a choice of backend")
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="only Linux has a choice of backend"
+)
 
 REPORT = """
 import os, smc_mujoco.common.gl as gl
@@ -34,9 +38,16 @@ ALL = ("EGL", "OSMesa")
 
 def fresh(code: str, **variables: str) -> str:
     """What a new process prints, which complains of nothing, at its end neither."""
-    clean = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY")}
+    clean = {}
+    for k, v in os.environ.items():
+        if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY"):
+            clean[k] = v
     done = subprocess.run(
-        [sys.executable, "-c", code], env=clean | variables, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code],
+        env=clean | variables,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
@@ -71,31 +82,78 @@ def test_choose_gl_sets_nothing_once_mujoco_is_imported():
 EGL, MESA = {"libEGL.so.1", "libGL.so.1"}, {"libOSMesa.so.6"}
 HERE = "install a renderer (Debian, Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri)"
 NEITHER = "no film: neither libEGL with libGL nor libOSMesa is here"
-BACKENDS = {  # MUJOCO_GL, libraries, PYOPENGL_PLATFORM, error of a trial -> backend, note, why pictures are missing
+# MUJOCO_GL, libraries, PYOPENGL_PLATFORM, error of a trial -> backend, note, why pictures are
+# missing
+BACKENDS = {
     "all there": ("", EGL | MESA, "", None, "egl", None, None),
     "only OSMesa": ("", MESA, "", None, "osmesa", None, None),
     "OSMesa wanted": (" OSMesa ", EGL | MESA, "", None, "osmesa", None, None),
     "no GL beside EGL": ("", {"libEGL.so.1"}, "", None, "disabled", None, f"{NEITHER}: {HERE}"),
     "nothing there": (
-        "egl", set(), "", None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
+        "egl",
+        set(),
+        "",
+        None,
+        "disabled",
+        "MUJOCO_GL=egl does not load here: films are off",
         f"{NEITHER} (and MUJOCO_GL=egl cannot be used): {HERE}",
     ),
     "OSMesa wanted, not there": (
-        "osmesa", EGL, "", None, "egl", "MUJOCO_GL=osmesa does not load here: egl is used instead", None,
+        "osmesa",
+        EGL,
+        "",
+        None,
+        "egl",
+        "MUJOCO_GL=osmesa does not load here: egl is used instead",
+        None,
     ),
-    "another word": ("x", EGL, "", None, "egl", "MUJOCO_GL=x is not a backend of MuJoCo: egl is used instead", None),
-    "turned off": ("0", EGL, "", None, "0", None, "no film: MUJOCO_GL=0 turns rendering off: unset it"),
+    "another word": (
+        "x",
+        EGL,
+        "",
+        None,
+        "egl",
+        "MUJOCO_GL=x is not a backend of MuJoCo: egl is used instead",
+        None,
+    ),
+    "turned off": (
+        "0",
+        EGL,
+        "",
+        None,
+        "0",
+        None,
+        "no film: MUJOCO_GL=0 turns rendering off: unset it",
+    ),
     "a platform for OSMesa": ("", EGL | MESA, "OSMesa", None, "osmesa", None, None),
     "a platform for neither": (
-        "egl", EGL | MESA, "glx", None, "disabled", "MUJOCO_GL=egl does not load here: films are off",
+        "egl",
+        EGL | MESA,
+        "glx",
+        None,
+        "disabled",
+        "MUJOCO_GL=egl does not load here: films are off",
         "no film: PYOPENGL_PLATFORM=glx rules out what is installed (and MUJOCO_GL=egl cannot be used): unset it",
     ),
-    "a broken driver": ("", EGL, "", "lost", "egl", None, f"no film: egl does not render (lost): {HERE}"),
+    "a broken driver": (
+        "",
+        EGL,
+        "",
+        "lost",
+        "egl",
+        None,
+        f"no film: egl does not render (lost): {HERE}",
+    ),
     "no window": (
-        "glx", EGL, "", "no display", "glx", None,
+        "glx",
+        EGL,
+        "",
+        "no display",
+        "glx",
+        None,
         "no film: MuJoCo cannot open a window to render in (no display): set MUJOCO_GL=egl",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BACKENDS)
@@ -146,7 +204,9 @@ def test_a_trial_without_a_name_leaves_the_variable_and_one_that_hangs_ends(monk
 
 def test_renderers_have_mujoco_s_size_by_default_and_are_closed_at_the_end(monkeypatch):
     sizes = [inspect.signature(made).parameters for made in (gl.renderer, mujoco.Renderer)]
-    assert [[size[name].default for name in ("height", "width")] for size in sizes] == [[240, 320]] * 2
+    assert [[size[name].default for name in ("height", "width")] for size in sizes] == [
+        [240, 320]
+    ] * 2
     closed = []
     opened = type("Opened", (), {"close": lambda self: closed.append(id(self))})()
     monkeypatch.setattr(gl, "_RENDERERS", {opened})

@@ -1,4 +1,6 @@
-"""What foreign machine code may do in its trial, and to the arithmetic of a run: found, in one sentence, and ended."""
+"""What foreign machine code may do in its trial, and to the arithmetic of a run: found, in one
+sentence, and ended.
+"""
 
 import ctypes
 import ctypes.util
@@ -41,7 +43,10 @@ def attempt(order: Mapping[str, Any], say: Callable) -> Any:
 
 
 def test_what_a_trial_returns_comes_back():
-    assert guard.tried(__name__, {"kind": "none", "more": [1.5, None]}, 60.0) == {"kind": "none", "more": [1.5, None]}
+    assert guard.tried(__name__, {"kind": "none", "more": [1.5, None]}, 60.0) == {
+        "kind": "none",
+        "more": [1.5, None],
+    }
 
 
 @pytest.mark.parametrize(
@@ -69,7 +74,10 @@ def test_a_trial_without_room_for_its_report_blames_no_module():
             guard.tried(__name__, {"kind": "exit"}, 60.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert str(refused.value) == "no temporary file can be written (File too large): make room, or set TMPDIR"
+    assert (
+        str(refused.value)
+        == "no temporary file can be written (File too large): make room, or set TMPDIR"
+    )
 
 
 def test_what_a_trial_starts_ends_with_it():
@@ -96,7 +104,10 @@ def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
         pytest.skip("the numbers of the modes are those of x86 and of the GNU C library")
     modes = {"FE_DOWNWARD": 0x400, "FE_UPWARD": 0x800, "FE_TOWARDZERO": 0xC00}
     arithmetic, three, ten, least = guard.Arithmetic(), 3.0, 10.0, 2.0**-1022
-    library, environment = arithmetic.library, ctypes.create_string_buffer(bytes(arithmetic.environment), 256)
+    library, environment = (
+        arithmetic.library,
+        ctypes.create_string_buffer(bytes(arithmetic.environment), 256),
+    )
     assert not arithmetic.changed()
     if mode in modes:
         library.fesetround(modes[mode])
@@ -109,5 +120,8 @@ def test_a_change_of_the_arithmetic_is_seen_and_undone(mode):
     assert arithmetic.changed()
     assert not arithmetic.changed()
     assert library.fegetround() == library.fegetexcept() == 0
-    assert (1.0 / three, 1.0 / ten) == (float.fromhex("0x1.5555555555555p-2"), float.fromhex("0x1.999999999999ap-4"))
+    assert (1.0 / three, 1.0 / ten) == (
+        float.fromhex("0x1.5555555555555p-2"),
+        float.fromhex("0x1.999999999999ap-4"),
+    )
     assert least / ten * 2.0**1000 > 0.0

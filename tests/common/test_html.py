@@ -18,7 +18,9 @@ def parsed(text: str) -> ElementTree.Element:
 
 
 def test_text_is_escaped_everywhere():
-    made = html.table((EVIL, "b"), [(EVIL, 1)], caption=EVIL, note=EVIL) + html.fields({EVIL: EVIL}, EVIL)
+    made = html.table((EVIL, "b"), [(EVIL, 1)], caption=EVIL, note=EVIL) + html.fields(
+        {EVIL: EVIL}, EVIL
+    )
     assert "<script>" not in made
     cells = [node.text for node in parsed(made).iter() if node.text and "script" in node.text]
     assert cells == [EVIL] * 7  # 4 of the table, 3 of the fields
@@ -34,7 +36,10 @@ def test_a_long_table_says_how_many_lines_it_leaves_out():
 
 def test_numbers_stand_at_the_right():
     root = parsed(html.table(("a", "b", "c"), [(1, 2, 3)], numbers=range(1, 2)))
-    sides = [re.findall(r"text-align:(\w+)", cell.get("style", ""))[-1] for cell in root.iter() if cell.tag == "td"]
+    sides = []
+    for cell in root.iter():
+        if cell.tag == "td":
+            sides.append(re.findall(r"text-align:(\w+)", cell.get("style", ""))[-1])
     assert sides == ["left", "right", "left"]
 
 

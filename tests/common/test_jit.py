@@ -1,4 +1,6 @@
-"""Helpers that laws call: this package's are compiled once for all laws, a user's again for each law."""
+"""Helpers that laws call: this package's are compiled once for all laws, a user's again for each
+law.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +24,9 @@ def names(function: Callable[..., Any] | None) -> dict[str, Any]:
 
 
 def test_reasons_have_no_terminal_codes_from_quoted_texts():
-    error = ValueError("\x1b[1m\x1b[31mFailed in nopython mode\nit returns Literal[str](\x1b]0;owned\x07)\x1b[0m")
+    error = ValueError(
+        "\x1b[1m\x1b[31mFailed in nopython mode\nit returns Literal[str](\x1b]0;owned\x07)\x1b[0m"
+    )
     assert reason(error) == r"it returns Literal[str](\x1b]0;owned\x07)"
 
 
@@ -47,12 +51,17 @@ def test_a_user_s_helper_follows_a_change_of_its_globals():
 def test_code_is_kept_if_no_other_process_can_number_a_function_of_it_alike_and_the_linker_adds_no_address():
     own, numbas = f"f_B1v{Numbers.FIRST}", "f_B1v7"
     for names_of, declared, filled, kept in (
-        ([own, own], [], "x", True), ([own, numbas], [], "x", False), ([numbas, own], [], "x", False),
-        ([own], [numbas], "x", True), ([own], [], numba_internals.RuntimeLinker.PREFIX, False),
-    ):  # fmt: skip
+        ([own, own], [], "x", True),
+        ([own, numbas], [], "x", False),
+        ([numbas, own], [], "x", False),
+        ([own], [numbas], "x", True),
+        ([own], [], numba_internals.RuntimeLinker.PREFIX, False),
+    ):
         functions = [SimpleNamespace(name=name, is_declaration=False) for name in names_of]
         functions += [SimpleNamespace(name=name, is_declaration=True) for name in declared]
-        module = SimpleNamespace(global_variables=[SimpleNamespace(name=filled)], functions=functions)
+        module = SimpleNamespace(
+            global_variables=[SimpleNamespace(name=filled)], functions=functions
+        )
         library: Any = SimpleNamespace(_final_module=module)
         assert _complete(library) == kept
 
@@ -60,14 +69,21 @@ def test_code_is_kept_if_no_other_process_can_number_a_function_of_it_alike_and_
 @pytest.mark.parametrize(
     ("name", "attributes"),
     [
-        ("FunctionIdentity", "_unique_ids"), ("FunctionCache", "_impl_class _index_key save_overload"),
+        ("FunctionIdentity", "_unique_ids"),
+        ("FunctionCache", "_impl_class _index_key save_overload"),
         ("IndexDataCacheFile", "_load_index _load_data _data_path _open_for_write"),
-        ("CFunc", "compile address cache_hits"), ("CPUCodeLibrary", "has_dynamic_globals add_linking_library"),
-        ("RuntimeLinker", "PREFIX"), ("Dispatcher", "compile get_call_template"), ("builtin_registry", "globals"),
+        ("CFunc", "compile address cache_hits"),
+        ("CPUCodeLibrary", "has_dynamic_globals add_linking_library"),
+        ("RuntimeLinker", "PREFIX"),
+        ("Dispatcher", "compile get_call_template"),
+        ("builtin_registry", "globals"),
         ("global_compiler_lock", "__enter__"),
-        *((name, "") for name in ("TypingError", "normalize_signature", "dynamic_modname", "dynamic_module")),
+        *(
+            (name, "")
+            for name in ("TypingError", "normalize_signature", "dynamic_modname", "dynamic_module")
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_private_name_of_numba_exists(name, attributes):
     """The next numba is to fail here, and not in a user's run."""
     thing = getattr(numba_internals, name)
@@ -76,5 +92,8 @@ def test_a_private_name_of_numba_exists(name, attributes):
 
 def test_private_names_of_numba_stand_in_one_module():
     package = Path(numba_internals.__file__).parents[1]
-    reaching = [file.name for file in package.rglob("*.py") if "from numba.core" in file.read_text(encoding="utf-8")]
+    reaching = []
+    for file in package.rglob("*.py"):
+        if "from numba.core" in file.read_text(encoding="utf-8"):
+            reaching.append(file.name)
     assert reaching == ["numba_internals.py"]

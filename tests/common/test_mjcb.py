@@ -1,4 +1,6 @@
-"""Models are compiled whatever control callback is installed, by whichever thread, and no thread waits forever."""
+"""Models are compiled whatever control callback is installed, by whichever thread, and no thread
+waits forever.
+"""
 
 import dataclasses
 import itertools
@@ -36,7 +38,13 @@ MODEL = """
   <actuator><motor joint="j"/></actuator>
 </mujoco>
 """
-SPRINGS = {"plant": "duffing", "law": "none", "mechanism": "springs", "mismatch": {"mass": 1.1}, "duration": 0.003}
+SPRINGS = {
+    "plant": "duffing",
+    "law": "none",
+    "mechanism": "springs",
+    "mismatch": {"mass": 1.1},
+    "duration": 0.003,
+}
 
 PLAY = {"actuator": smc.Backlash(gap=0.01)}
 
@@ -58,17 +66,35 @@ def still_of(trace, folder):
 
 # (own plant, a trace of it, folder) -> whether what is to come out did
 COMPILES = {
-    "a run of an own model": lambda own, trace, folder: run_of("super_twisting", own).failure is None,
-    "an environment of an own model": lambda own, trace, folder: len(PlantEnv(own).reset(seed=0)[0]) == 2,
-    "a batch of an own model": lambda own, trace, folder: BatchEnv(own, num_envs=2).reset(seed=0)[0].shape == (2, 2),
-    "a mechanism with mismatch": lambda own, trace, folder: smc.Scenario(**SPRINGS).mechanism == "springs",
-    "a mechanism's deviation": lambda own, trace, folder: fidelity.deviation("duffing", "springs") < 1.0,
+    "a run of an own model": lambda own, trace, folder: (
+        run_of("super_twisting", own).failure is None
+    ),
+    "an environment of an own model": lambda own, trace, folder: (
+        len(PlantEnv(own).reset(seed=0)[0]) == 2
+    ),
+    "a batch of an own model": lambda own, trace, folder: (
+        BatchEnv(own, num_envs=2).reset(seed=0)[0].shape == (2, 2)
+    ),
+    "a mechanism with mismatch": lambda own, trace, folder: (
+        smc.Scenario(**SPRINGS).mechanism == "springs"
+    ),
+    "a mechanism's deviation": lambda own, trace, folder: (
+        fidelity.deviation("duffing", "springs") < 1.0
+    ),
     "a picture": lambda own, trace, folder: still_of(trace, folder),
-    "an own model again": lambda own, trace, folder: smc.plant_from(own.build.source.path, ["j"], name="again").n == 1,
-    "a trace of an own model": lambda own, trace, folder: smc.load(folder / "own.npz").scenario == trace.scenario,
+    "an own model again": lambda own, trace, folder: (
+        smc.plant_from(own.build.source.path, ["j"], name="again").n == 1
+    ),
+    "a trace of an own model": lambda own, trace, folder: (
+        smc.load(folder / "own.npz").scenario == trace.scenario
+    ),
     "a plant's model": lambda own, trace, folder: own.load().nv == 1,
-    "backlash": lambda own, trace, folder: len(PlantEnv("duffing", changes=PLAY).reset(seed=0)[0]) == 2,
-    "a start among obstacles": lambda own, trace, folder: run_of("none", contact="stops").failure is None,
+    "backlash": lambda own, trace, folder: (
+        len(PlantEnv("duffing", changes=PLAY).reset(seed=0)[0]) == 2
+    ),
+    "a start among obstacles": lambda own, trace, folder: (
+        run_of("none", contact="stops").failure is None
+    ),
     "tasks of an own model": lambda own, trace, folder: "regulate" in tasks(own),
 }
 
@@ -212,7 +238,9 @@ def test_a_forked_child_waits_for_no_thread_of_its_parent():
         mjcb.compiled(mujoco.MjSpec())
         with mjcb.installed(lambda model, data: None):
             mjcb.compiled(mujoco.MjSpec())
-        os._exit(7 if own == (mujoco.get_mjcb_control(), mujoco.get_mjcb_time()) == (None, None) else 8)
+        os._exit(
+            7 if own == (mujoco.get_mjcb_control(), mujoco.get_mjcb_time()) == (None, None) else 8
+        )
     leave.set()
     slow.let.set()
     assert all(end.wait(60) for end in ends)
@@ -311,7 +339,10 @@ def test_timers_are_off_while_a_callback_is_installed_and_on_afterwards():
 @pytest.mark.parametrize("at", [10, 15, 20])
 def test_runs_whose_callback_is_taken_away_fail_from_there_on(control, at, monkeypatch):
     monkeypatch.setattr(runs, "SLICE_STEPS", 10)  # 5 of each of two runs
-    two = [smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed) for seed in range(2)]
+    two = [
+        smc.Scenario(plant="duffing", law="classical", duration=0.02, seed=seed)
+        for seed in range(2)
+    ]
     whole, done = smc.run(two), []
 
     def report(steps):
@@ -390,7 +421,9 @@ def test_a_law_that_clears_the_callback_fails_its_run(integrator):
             mujoco.set_mjcb_control(None)
         return [-0.5 * observation[0]]
 
-    trace = smc.run(smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.02, integrator=integrator))
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law=smc.policy(act), duration=0.02, integrator=integrator)
+    )
     assert "replaced MuJoCo's control callback" in (trace.failure or "")
     assert trace.diverged_at == pytest.approx({"RK4": 0.003, "Euler": 0.004}[integrator])
     k = round((trace.diverged_at or 0.0) / 1e-3)

@@ -1,4 +1,6 @@
-"""Entries of other packages: found by name, imported when asked for, and no harm if something is wrong with them."""
+"""Entries of other packages: found by name, imported when asked for, and no harm if something is
+wrong with them.
+"""
 
 import os
 import subprocess
@@ -22,9 +24,16 @@ from smc_mujoco.studies import run_key, scene
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "my_smc_package"
 CACHED = (
-    catalogue._points, law.catalogue, law.known_laws, joint_law.catalogue, surface.catalogue, estimator.catalogue,
-    plant.catalogue, scene.scenes, paper.catalogue,
-)  # fmt: skip
+    catalogue._points,
+    law.catalogue,
+    law.known_laws,
+    joint_law.catalogue,
+    surface.catalogue,
+    estimator.catalogue,
+    plant.catalogue,
+    scene.scenes,
+    paper.catalogue,
+)
 
 LAW = """
 import smc_mujoco as smc
@@ -43,7 +52,9 @@ Install = Callable[..., Path]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """A function that installs a package: its name, entry points by group, and the code of its modules."""
+    """A function that installs a package: its name, entry points by group, and the code of its
+    modules.
+    """
 
     def forget() -> None:
         for function in CACHED:
@@ -55,9 +66,9 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
         about = folder / f"{package}-1.0.dist-info"
         about.mkdir(parents=True)
         (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        lines = [
-            f"[smc_mujoco.{group}]\n" + "".join(f"{k} = {v}\n" for k, v in of.items()) for group, of in points.items()
-        ]
+        lines = []
+        for group, of in points.items():
+            lines.append(f"[smc_mujoco.{group}]\n" + "".join(f"{k} = {v}\n" for k, v in of.items()))
         (about / "entry_points.txt").write_text("\n".join(lines))
         for name, code in modules.items():
             (folder / f"{name}.py").write_text(code)
@@ -92,22 +103,33 @@ def said(call: Callable[[], object]) -> list[str]:
 def test_an_entry_runs_like_one_of_the_library(install, tmp_path):
     install(
         "theirs",
-        {"laws": {"their_law": "theirs_laws:their_law"}, "plants": {"their_plant": "theirs_plants:their_plant"}},
+        {
+            "laws": {"their_law": "theirs_laws:their_law"},
+            "plants": {"their_plant": "theirs_plants:their_plant"},
+        },
         theirs_laws=LAW.replace("NAME", "their_law"),
         theirs_plants=PLANT.replace("NAME", "their_plant"),
     )
     assert "their_law" in smc.laws()
     assert "their_law" in smc.laws("their_plant")
     assert smc.law("their_law", k=3.0).gains["k"] == 3.0
-    (run,) = smc.grid(["their_plant"], ["their_law"], ["nominal"], seeds=1, duration=0.02, gains="default")
+    (run,) = smc.grid(
+        ["their_plant"], ["their_law"], ["nominal"], seeds=1, duration=0.02, gains="default"
+    )
     trace = smc.run(run)
-    same = smc.run(smc.Scenario(plant="duffing", law="their_law", x0=run.x0, duration=0.02, u_max=run.u_max))
+    same = smc.run(
+        smc.Scenario(plant="duffing", law="their_law", x0=run.x0, duration=0.02, u_max=run.u_max)
+    )
     assert_array_equal(trace.x, same.x)
     assert smc.load(trace.save(tmp_path / "a.npz")).scenario == run
 
 
 def test_a_package_is_imported_by_the_use_of_its_entries_alone(install):
-    install("lazy", {"laws": {"lazy_law": "lazy_laws:lazy_law"}}, lazy_laws=LAW.replace("NAME", "lazy_law"))
+    install(
+        "lazy",
+        {"laws": {"lazy_law": "lazy_laws:lazy_law"}},
+        lazy_laws=LAW.replace("NAME", "lazy_law"),
+    )
     smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.01))
     assert "lazy_law" in law.known_laws()
     assert "lazy_laws" not in sys.modules
@@ -133,7 +155,8 @@ def test_an_entry_made_after_its_package_listed_the_catalogue_is_found(install):
     install(
         "forward",
         {"laws": {"forward_law": "forward_laws:forward_law"}},
-        forward_laws="import smc_mujoco as smc\nbefore = smc.laws()\n" + LAW.replace("NAME", "forward_law"),
+        forward_laws="import smc_mujoco as smc\nbefore = smc.laws()\n"
+        + LAW.replace("NAME", "forward_law"),
     )
     with pytest.warns(smc.errors.PackageWarning, match="'forward_law'"):
         import forward_laws  # pyright: ignore[reportMissingImports]
@@ -176,17 +199,26 @@ def many_estimator(y, gains, memory):
 def test_a_package_brings_the_gains_of_its_law(install):
     units = "from smc_mujoco.control.units import FORCE_PER_POSITION, Gain"
     tuned_law = LAW.replace("NAME", "tuned_law").replace("2.0", "Gain(2.0, FORCE_PER_POSITION)")
-    folder = install("tuned", {"laws": {"tuned_law": "tuned_laws:tuned_law"}}, tuned_laws=units + tuned_law)
-    with pytest.raises(smc.ScenarioError, match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune"):
+    folder = install(
+        "tuned", {"laws": {"tuned_law": "tuned_laws:tuned_law"}}, tuned_laws=units + tuned_law
+    )
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"no gains in set 'tuned' for tuned_law on duffing: .*smc-mujoco tune",
+    ):
         gain_sets.law("duffing", "tuned_law")
     budget, brief = 8, Objective(conditions=("nominal",), duration=0.2)
     tuned = smc.tune("duffing", "tuned_law", budget, objective=brief, searches=2)
     tuned.save(folder / "tuned_gains" / "tuned" / "duffing-tuned_law.json")
-    assert [gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))] == [
-        dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets
-    ]
+    assert [
+        gain_sets.law("duffing", "tuned_law", seed=seed).gains for seed in range(len(tuned.sets))
+    ] == [dict(zip(tuned.bounds, one.gains, strict=True)) for one in tuned.sets]
     shipped = gain_sets.tuned("duffing", "tuned_law").search
-    assert (shipped.rule, shipped.searches, shipped.evaluations) == (tuned.rule, 2, tuned.evaluations)
+    assert (shipped.rule, shipped.searches, shipped.evaluations) == (
+        tuned.rule,
+        2,
+        tuned.evaluations,
+    )
     assert shipped.spread == pytest.approx(tuned.spread, abs=1e-5)
 
 
@@ -227,8 +259,13 @@ file_plant = dataclasses.replace(file_plant, build=build)
     xml = (EXAMPLE / "my_smc_package/models/sprung_cart.xml").read_text()
     keys = []
     for stiffness in ("8", "9"):
-        (folder / "file_plant.xml").write_text(xml.replace('stiffness="8"', f'stiffness="{stiffness}"'))
-        keys += [run_key.key(smc.Scenario(plant="file_plant", law="none", duration=0.1)) for _ in range(2)]
+        (folder / "file_plant.xml").write_text(
+            xml.replace('stiffness="8"', f'stiffness="{stiffness}"')
+        )
+        keys += [
+            run_key.key(smc.Scenario(plant="file_plant", law="none", duration=0.1))
+            for _ in range(2)
+        ]
     assert keys[0] == keys[1] != keys[2] == keys[3]
 
 
@@ -282,8 +319,14 @@ def test_a_broken_entry_is_a_warning_where_all_are_listed_and_said_once(broken):
 
 def test_an_entry_that_fails_is_loaded_once(install, monkeypatch):
     """Else each list, and each look at a name, would take as long as the import of that package."""
-    install("slow", {"laws": {"slow_law": "slow_laws:slow_law"}}, slow_laws="raise ImportError('no torch')")
-    kind = type(catalogue.points("smc_mujoco.laws")[0])  # of importlib.metadata, or of its backport, if imported
+    install(
+        "slow",
+        {"laws": {"slow_law": "slow_laws:slow_law"}},
+        slow_laws="raise ImportError('no torch')",
+    )
+    kind = type(
+        catalogue.points("smc_mujoco.laws")[0]
+    )  # of importlib.metadata, or of its backport, if imported
     loads, real = [], kind.load
     monkeypatch.setattr(kind, "load", lambda point: loads.append(point.name) or real(point))
     sentences = set()
@@ -297,7 +340,11 @@ def test_an_entry_that_fails_is_loaded_once(install, monkeypatch):
 
 
 def test_a_name_of_the_library_is_not_taken_over(install):
-    install("grab", {"laws": {"classical": "grab_laws:classical"}}, grab_laws=LAW.replace("NAME", "classical"))
+    install(
+        "grab",
+        {"laws": {"classical": "grab_laws:classical"}},
+        grab_laws=LAW.replace("NAME", "classical"),
+    )
     (sentence,) = said(lambda: smc.law("classical"))
     assert sentence.startswith(
         "package 'grab': its law 'classical' (grab_laws:classical) has the name of an entry of the library"
@@ -308,7 +355,11 @@ def test_a_name_of_the_library_is_not_taken_over(install):
 
 def test_one_name_in_two_packages_is_one_sentence(install):
     for package in ("first", "second"):
-        install(package, {"laws": {"twin": f"{package}_laws:twin"}}, **{f"{package}_laws": LAW.replace("NAME", "twin")})
+        install(
+            package,
+            {"laws": {"twin": f"{package}_laws:twin"}},
+            **{f"{package}_laws": LAW.replace("NAME", "twin")},
+        )
     cure = "law 'twin' is in the packages 'first' and 'second': uninstall one of them, or rename it"
     with pytest.raises(smc.ScenarioError) as raised:
         smc.law("twin")
@@ -320,23 +371,34 @@ def test_one_name_in_two_packages_is_one_sentence(install):
 def test_a_group_that_does_not_exist_is_said_with_the_nearest(install):
     install("typo", {"law": {"lost": "typo_laws:lost"}}, typo_laws=LAW.replace("NAME", "lost"))
     (sentence,) = said(smc.laws)
-    assert "package 'typo': unknown group of entry points 'smc_mujoco.law': did you mean 'smc_mujoco.laws'?" in sentence
+    assert (
+        "package 'typo': unknown group of entry points 'smc_mujoco.law': did you mean 'smc_mujoco.laws'?"
+        in sentence
+    )
 
 
 def test_a_user_s_law_may_not_have_the_name_of_another_package_s(install):
-    install("theirs", {"laws": {"named_law": "named_laws:named_law"}}, named_laws=LAW.replace("NAME", "named_law"))
+    install(
+        "theirs",
+        {"laws": {"named_law": "named_laws:named_law"}},
+        named_laws=LAW.replace("NAME", "named_law"),
+    )
 
     @smc.law_function(gains={"k": 1.0})
     def named_law(y, gains, memory):
         return -gains.k * y.e, y.e
 
-    with pytest.raises(smc.ScenarioError, match="the name of a law of package 'theirs': rename its function"):
+    with pytest.raises(
+        smc.ScenarioError, match="the name of a law of package 'theirs': rename its function"
+    ):
         smc.grid(["duffing"], [named_law], ["nominal"], seeds=1)
 
 
 def test_a_paper_with_something_wrong_is_left_out_of_the_list(install, tmp_path):
     folder = install(
-        "papers", {"papers": {"their_paper": "their_papers.their_paper", "no_folder": "no_folder"}}, no_folder=""
+        "papers",
+        {"papers": {"their_paper": "their_papers.their_paper", "no_folder": "no_folder"}},
+        no_folder="",
     )
     home = folder / "their_papers" / "their_paper"
     home.mkdir(parents=True)
@@ -389,13 +451,21 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 def test_the_template_installs_offline_and_passes_its_tests(tmp_path):
-    target, clean = tmp_path / "site", {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))}
+    target, clean = (
+        tmp_path / "site",
+        {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST_", "PYTHON"))},
+    )
 
     def run(*command: object) -> str:
         words = [sys.executable, *map(str, command)]
         paths = os.pathsep.join(map(str, (target, ROOT)))
         done = subprocess.run(
-            words, cwd=tmp_path, env=clean | {"PYTHONPATH": paths}, capture_output=True, text=True, check=False
+            words,
+            cwd=tmp_path,
+            env=clean | {"PYTHONPATH": paths},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout

@@ -36,9 +36,18 @@ def test_every_text_file_is_read_and_written_as_utf_8():
     bare = []
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in POSITION:
-                stated = len(node.args) > POSITION[node.func.attr] or "encoding" in {word.arg for word in node.keywords}
-                bare += [] if stated else [f"{path.relative_to(PACKAGE)}:{node.lineno}"]
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and node.func.attr in POSITION
+            ):
+                stated = len(node.args) > POSITION[node.func.attr] or "encoding" in {
+                    word.arg for word in node.keywords
+                }
+                if stated:
+                    bare += []
+                else:
+                    bare += [f"{path.relative_to(PACKAGE)}:{node.lineno}"]
     assert bare == []
 
 
@@ -98,9 +107,13 @@ def test_without_limits_of_memory_a_model_is_tried_all_the_same(monkeypatch):
 def test_without_sigkill_a_model_s_error_is_not_one_of_memory(monkeypatch):
     """Windows has no SIGKILL; a trial that ends well has exit code 0."""
     monkeypatch.delattr(mjcf.signal, "SIGKILL")
-    monkeypatch.setattr(mjcf.signal, "Signals", [one for one in mjcf.signal.Signals if one.name != "SIGKILL"])
+    monkeypatch.setattr(
+        mjcf.signal, "Signals", [one for one in mjcf.signal.Signals if one.name != "SIGKILL"]
+    )
     source = mjcf.Source("arm.xml", "")
-    error = mjcf._complaint(source, guard.Failed("reading", "unrecognized element, line 3", 0, 1.0), 1.0)
+    error = mjcf._complaint(
+        source, guard.Failed("reading", "unrecognized element, line 3", 0, 1.0), 1.0
+    )
     assert str(error) == "MuJoCo cannot read arm.xml (unrecognized element, line 3): fix the file"
     crashed = mjcf._complaint(source, guard.Failed("compiling", "", 0xC0000005, 1.0), 1.0)
     assert "ends MuJoCo with exit code 3221225477" in str(crashed)
@@ -108,5 +121,7 @@ def test_without_sigkill_a_model_s_error_is_not_one_of_memory(monkeypatch):
 
 def test_a_law_in_c_is_one_sentence_on_windows(monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(smc.ScenarioError, match=r"law\.c' on Windows: run smc_mujoco on Linux, or in WSL"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"law\.c' on Windows: run smc_mujoco on Linux, or in WSL"
+    ):
         smc.exchange.law_from_c("law.c")

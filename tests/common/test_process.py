@@ -88,7 +88,12 @@ def test_objects_of_a_package_are_found_by_their_names(tmp_path, monkeypatch):
     assert "found_here.a" not in sys.modules
     assert [module.__name__ for module in modules("found_here")] == ["found_here.a", "found_here.b"]
     kind = sys.modules["found_here.a"].Named
-    assert [(name, value.name) for name, value in discover("found_here", kind).items()] == [("b", "b"), ("z", "z")]
+    assert [(name, value.name) for name, value in discover("found_here", kind).items()] == [
+        ("b", "b"),
+        ("z", "z"),
+    ]
     assert Files("found_here", kind)["b"].name == "b"
-    with pytest.raises(ScenarioError, match=r"a\.py has no Named 'a': name the file as what it adds"):
+    with pytest.raises(
+        ScenarioError, match=r"a\.py has no Named 'a': name the file as what it adds"
+    ):
         Files("found_here", kind)["a"]

@@ -74,11 +74,17 @@ def test_a_terminal_s_bar_vanishes_and_takes_the_time_left_from_two_minutes(monk
         columns = [type(each).__name__ for each in rich.call_args.args]
         assert columns == ["TextColumn", "BarColumn", share, "TimeRemainingColumn"]
         console = rich.call_args.kwargs["console"]
-        assert rich.call_args.kwargs == {"transient": True, "console": console, "speed_estimate_period": 120.0}
+        assert rich.call_args.kwargs == {
+            "transient": True,
+            "console": console,
+            "speed_estimate_period": 120.0,
+        }
         assert console.stderr
     task = (shown := rich.return_value.__enter__.return_value).add_task.return_value
     states = (2.0, 8.0, "runs"), (3.0, 9.0, "runs"), (3.5, 9.0, "more")
-    drawn = [call.update(task, completed=done, total=whole, description=what) for done, whole, what in states]
+    drawn = []
+    for done, whole, what in states:
+        drawn.append(call.update(task, completed=done, total=whole, description=what))
     assert shown.mock_calls[-4:] == [call.add_task("runs", total=8.0), *drawn]
 
 
@@ -90,7 +96,10 @@ def test_a_log_gets_a_line_each_ten_seconds(monkeypatch, capsys):
             now[0] += 1.0
             bar.advance(1.0)
     out, err = capsys.readouterr()
-    assert (out, err.splitlines()[:2]) == ("", ["duffing 25 %, 30 s left", "duffing 50 %, 20 s left"])
+    assert (out, err.splitlines()[:2]) == (
+        "",
+        ["duffing 25 %, 30 s left", "duffing 50 %, 20 s left"],
+    )
     assert len(err.splitlines()) == 4
 
 
@@ -119,7 +128,11 @@ def test_a_count_is_of_whole_runs_and_of_runs_a_second(monkeypatch):
         stepped(250)
     with progress.counter(0, 0, shown=True):
         pass
-    assert said == ["0 of 8 runs, 0 a second", "2 of 8 runs, 0.625 a second", "0 of 0 runs, 0 a second"]
+    assert said == [
+        "0 of 8 runs, 0 a second",
+        "2 of 8 runs, 0.625 a second",
+        "0 of 0 runs, 0 a second",
+    ]
 
 
 def test_pieces_of_work_are_reported_as_their_sum():
@@ -140,7 +153,14 @@ def test_what_is_not_shown_draws_nothing(cell, capsys):
 
 @pytest.mark.parametrize(
     ("seconds", "words"),
-    [(0.1, "1 s"), (7.4, "7 s"), (34.0, "30 s"), (94.0, "90 s"), (100.0, "2 minutes"), (3600.0, "60 minutes")],
+    [
+        (0.1, "1 s"),
+        (7.4, "7 s"),
+        (34.0, "30 s"),
+        (94.0, "90 s"),
+        (100.0, "2 minutes"),
+        (3600.0, "60 minutes"),
+    ],
 )
 def test_a_duration_is_told_in_words(seconds, words):
     assert progress.about(seconds) == f"about {words}"

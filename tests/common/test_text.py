@@ -12,25 +12,43 @@ from smc_mujoco.common.text import capital, joined, number
 pytestmark = pytest.mark.quick
 
 NUMBERS = {  # value -> with three digits, with one
-    math.nan: ("none", "none"), -math.inf: ("never", "never"), 0.0: ("0", "0"), -9.9e-10: ("<1e-9", "<1e-9"),
-    1e-9: ("1.0e-9", "1.0e-9"), 9.994e-4: ("1.0e-3", "1.0e-3"), 1e-3: ("0.00100", "0.001"),
-    -0.012345: ("-0.0123", "-0.01"), 1.0: ("1.00", "1"), 98.76: ("98.8", "99"), -12345.6: ("-12346", "-12346"),
-    1e5: ("1.0e5", "1.0e5"), 2.56e12: ("2.6e12", "2.6e12"),
-}  # fmt: skip
+    math.nan: ("none", "none"),
+    -math.inf: ("never", "never"),
+    0.0: ("0", "0"),
+    -9.9e-10: ("<1e-9", "<1e-9"),
+    1e-9: ("1.0e-9", "1.0e-9"),
+    9.994e-4: ("1.0e-3", "1.0e-3"),
+    1e-3: ("0.00100", "0.001"),
+    -0.012345: ("-0.0123", "-0.01"),
+    1.0: ("1.00", "1"),
+    98.76: ("98.8", "99"),
+    -12345.6: ("-12346", "-12346"),
+    1e5: ("1.0e5", "1.0e5"),
+    2.56e12: ("2.6e12", "2.6e12"),
+}
 LONG = "a_name_that_is_longer than_twenty"
 TABLE = Tabular(
     title="Laws & gains",
     headings=["law", "gains", "ITAE (m s^2)", "bound (m)", "time until it rests (s)"],
     rows=[
         [
-            Cell("pid", "yours"), "kp=3_0", Cell("1.2e-4", "1.1–1.3", strong=True), "3 %",
+            Cell("pid", "yours"),
+            "kp=3_0",
+            Cell("1.2e-4", "1.1–1.3", strong=True),
+            "3 %",
             Cell("never", alarm="2 of 9 fail"),
         ],
-        [Cell(LONG, colour="red"), "", Cell("2.5", "2.25–12.75"), Cell("−4 ± 1", "a\nb"), "λ₂ < x²"],
+        [
+            Cell(LONG, colour="red"),
+            "",
+            Cell("2.5", "2.25–12.75"),
+            Cell("−4 ± 1", "a\nb"),
+            "λ₂ < x²",
+        ],
     ],
     notes=["A note.", "Another."],
     left=2,
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("value", NUMBERS)
@@ -39,7 +57,12 @@ def test_a_number_has_as_many_digits_as_are_asked_for(value):
 
 
 def test_a_list_reads_as_a_sentence():
-    assert [joined(""), joined("a"), joined("ab"), joined("abc")] == ["", "a", "a and b", "a, b and c"]
+    assert [joined(""), joined("a"), joined("ab"), joined("abc")] == [
+        "",
+        "a",
+        "a and b",
+        "a, b and c",
+    ]
 
 
 def test_the_first_letter_becomes_a_capital_and_the_others_stay():
@@ -52,7 +75,18 @@ def test_a_table_fits_into_a_width_with_all_its_words_marks_and_notes(width):
     rows = text.splitlines()
     assert max(map(len, rows)) <= width
     told = re.sub(r"[\s─]", "", text)
-    for word in ("Laws&gains", "law", "pid", "yours", "1.2e-4", "3%", "never", "12.75", "Anote.", "Another."):
+    for word in (
+        "Laws&gains",
+        "law",
+        "pid",
+        "yours",
+        "1.2e-4",
+        "3%",
+        "never",
+        "12.75",
+        "Anote.",
+        "Another.",
+    ):
         assert word in told
     ruled = min(k for k, line in enumerate(rows) if "─" in line)
     assert any("law" in line for line in rows[:ruled])

@@ -1,4 +1,6 @@
-"""The baselines are what their textbooks say: PID, LQR, computed torque, and a pendulum swung up by its energy.
+"""The baselines are what their textbooks say:
+
+PID, LQR, computed torque, and a pendulum swung up by its energy.
 
 Most runs are on a free unit mass, x'' = u + d: the Duffing oscillator without its springs.
 """
@@ -14,19 +16,28 @@ import smc_mujoco as smc
 from smc_mujoco.control import design
 from smc_mujoco.control.component import GainWarning
 
-PLANTS = ("inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network")
+PLANTS = (
+    "inverted_pendulum",
+    "van_der_pol",
+    "duffing",
+    "pendulum_network",
+    "inverted_pendulum_network",
+)
 FREE = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
 
 
 def called(law, times=1, memory=None, **y):
     """The law's last u after some calls."""
-    memory = np.zeros(law.memory) if memory is None else memory
+    if memory is None:
+        memory = np.zeros(law.memory)
     return [plants_ab.called(law, plants_ab.measured(**y), memory)[0] for _ in range(times)][-1]
 
 
 def free(law, **fields):
     """A run on the free mass."""
-    return smc.run(smc.Scenario(**({"plant": FREE, "law": law, "x0": 1.0, "u_max": math.inf} | fields)))
+    return smc.run(
+        smc.Scenario(**({"plant": FREE, "law": law, "x0": 1.0, "u_max": math.inf} | fields))
+    )
 
 
 # PID
@@ -65,19 +76,27 @@ def test_only_the_integral_leaves_no_error_under_a_constant_force():
 
 
 def test_the_filter_takes_the_noise_from_the_derivative():
-    """White noise through tau D' = n - D, backward Euler: sigma sqrt(h / (2 tau + h)), and delta u = kd D."""
+    """White noise through tau D' = n - D, backward Euler: sigma sqrt(h / (2 tau + h)), and delta u
+    = kd D.
+    """
     law, rng = smc.law("pid", kp=0.0, ki=0.0, kd=2.0, tau=9.5e-3), np.random.default_rng(0)
     memory = np.zeros(law.memory)
     u = [called(law, memory=memory, de=n) for n in 0.1 * rng.normal(size=20_000)]
-    assert np.std(u[100:]) == pytest.approx(2.0 * 0.1 * math.sqrt(1e-3 / (2 * 9.5e-3 + 1e-3)), rel=0.05)
+    assert np.std(u[100:]) == pytest.approx(
+        2.0 * 0.1 * math.sqrt(1e-3 / (2 * 9.5e-3 + 1e-3)), rel=0.05
+    )
 
 
 def test_back_calculation_holds_the_integrator_where_the_bound_is_barely_exceeded():
-    """Held at e = 1 the integrator rests where (sat(u) - u) / tt = ki e: u exceeds the bound by ki tt."""
+    """Held at e = 1 the integrator rests where (sat(u) - u) / tt = ki e: u exceeds the bound by ki
+    tt.
+    """
     with pytest.warns(smc.errors.GainWarning, match="kp kd > ki"):
         law = smc.law("pid", kp=10.0, ki=5.0, kd=0.0, tt=0.5)
     assert called(law, 20_000, e=1.0, limit=6.0) == pytest.approx(-(6.0 + 5.0 * 0.5), rel=1e-6)
-    assert called(law, 1001, e=1.0) == pytest.approx(-(10.0 + 5.0), rel=1e-9)  # no bound: it winds up as ki t
+    assert called(law, 1001, e=1.0) == pytest.approx(
+        -(10.0 + 5.0), rel=1e-9
+    )  # no bound: it winds up as ki t
 
 
 def test_a_design_that_cannot_be_is_one_sentence(refused):
@@ -142,7 +161,9 @@ def test_design_linearises_a_plant_at_the_origin():
 def test_without_the_model_computed_torque_is_a_pd_law():
     law = smc.law("computed_torque", kp=9.0, kd=4.0)
     assert called(law, e=0.5, de=-0.2, f=3.0, g=7.0, ddr=11.0) == -(9.0 * 0.5 + 4.0 * -0.2)
-    assert called(law, e=0.5, de=-0.2, f=3.0, g=7.0, ddr=11.0, model=1.0) == (-3.7 - 3.0 + 11.0) / 7.0
+    assert (
+        called(law, e=0.5, de=-0.2, f=3.0, g=7.0, ddr=11.0, model=1.0) == (-3.7 - 3.0 + 11.0) / 7.0
+    )
 
 
 # swing-up
@@ -157,9 +178,14 @@ def energy(trace):
 
 @pytest.mark.parametrize("u_max", [0.3, 0.5, 1.0, 2.0, 6.0])
 def test_swing_up_lifts_the_hanging_pendulum_by_a_torque_that_cannot_hold_it(u_max):
-    """m g l = 2.45 N m. Without friction the energy never falls before the catch, and then the pendulum stays up."""
+    """m g l = 2.45 N m.
+
+    Without friction the energy never falls before the catch, and then the pendulum stays up.
+    """
     plant = smc.plant("inverted_pendulum", b=0.0)
-    trace = smc.run(smc.Scenario(plant=plant, law="swing_up", x0=math.pi, u_max=u_max, duration=15.0))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law="swing_up", x0=math.pi, u_max=u_max, duration=15.0)
+    )
     E, up = energy(trace), np.cos(trace.x[:, 0])
     caught = np.argmax(up > math.cos(1.0))
     assert E[0] == pytest.approx(-2 * J * W**2)
@@ -173,16 +199,26 @@ def test_swing_up_lifts_the_hanging_pendulum_by_a_torque_that_cannot_hold_it(u_m
 
 def test_swing_up_also_works_with_friction_and_with_the_model():
     for model in ("none", "nominal"):
-        common = {"plant": "inverted_pendulum", "law": "swing_up", "model": model, "u_max": 1.0, "x0": math.pi}
+        common = {
+            "plant": "inverted_pendulum",
+            "law": "swing_up",
+            "model": model,
+            "u_max": 1.0,
+            "x0": math.pi,
+        }
         trace = smc.run(smc.Scenario(duration=10.0, **common))
         assert np.cos(trace.x[-1000:, 0]).min() > 1.0 - 1e-9
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_catch_holds_all_that_its_torque_can_hold_and_nothing_more(side):
-    """Upright with the speed v0, s = v0: it returns for |v0| < u_max / (J w), else it falls whatever the law."""
+    """Upright with the speed v0, s = v0: it returns for |v0| < u_max / (J w), else it falls
+    whatever the law.
+    """
     for part, holds in ((0.95, True), (1.05, False)):
         v0 = side * part * 0.3 / (J * W)
         law = smc.law("swing_up", part=0.99)
-        trace = smc.run(smc.Scenario(plant="inverted_pendulum", law=law, x0=0.0, v0=v0, u_max=0.3, duration=3.0))
+        trace = smc.run(
+            smc.Scenario(plant="inverted_pendulum", law=law, x0=0.0, v0=v0, u_max=0.3, duration=3.0)
+        )
         assert (np.abs(trace.x).max() < 1.0) == holds

@@ -24,14 +24,21 @@ def zero(y, gains, memory):
 
 
 def test_gain_keeps_its_unit_and_the_decorators_sign():
-    made = smc.law_function(gains={"a": Gain(1.0, RATE), "b": 2.0}, positive=("a",), nonnegative=("b",))(zero)
+    made = smc.law_function(
+        gains={"a": Gain(1.0, RATE), "b": 2.0}, positive=("a",), nonnegative=("b",)
+    )(zero)
     assert made.gains == {"a": Gain(1.0, RATE, positive=True), "b": Gain(2.0, nonnegative=True)}
     assert made.defaults == {"a": 1.0, "b": 2.0}
 
 
-@pytest.mark.parametrize("decorator", [smc.surface_function, smc.estimator_function, smc.law_function])
+@pytest.mark.parametrize(
+    "decorator", [smc.surface_function, smc.estimator_function, smc.law_function]
+)
 def test_option_of_no_such_component_is_one_sentence(decorator):
-    option = "colours" if decorator is smc.law_function else "plants"
+    if decorator is smc.law_function:
+        option = "colours"
+    else:
+        option = "plants"
     with pytest.raises(smc.ScenarioError, match=f"unknown option of .*{option}"):
         decorator(**{option: ()})
 
@@ -56,12 +63,17 @@ def test_a_channel_without_a_gain_in_a_list_has_the_last_and_one_number_is_each_
 
 
 def test_unit_of_a_gain_that_is_a_text_is_refused():
-    with pytest.raises(smc.ScenarioError, match=r"^unit of gain k is '1/s': write .*Gain\(2, UNIT\).* where UNIT is "):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"^unit of gain k is '1/s': write .*Gain\(2, UNIT\).* where UNIT is ",
+    ):
         smc.law_function(gains={"k": Gain(2.0, "1/s")})  # pyright: ignore[reportArgumentType]
 
 
 def test_template_prints_as_name_and_gains():
-    template = smc.law_function(gains={"k": 2.0, "w": Gain((1.0, 0.5))})(lambda y, gains, memory: (0.0, 0.0))
+    template = smc.law_function(gains={"k": 2.0, "w": Gain((1.0, 0.5))})(
+        lambda y, gains, memory: (0.0, 0.0)
+    )
     assert repr(template) == "<Template of law('<lambda>', k=2, w=(1, 0.5))>"
 
 
@@ -79,7 +91,20 @@ def test_what_python_cannot_print_is_refused(value):
 # conditions
 
 TEMPLATES = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalogue().values()]
-VALUES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 4.0, 64.0, 128.0, 256.0, 257.0)  # many of them lie on bounds
+VALUES = (
+    0.0,
+    0.25,
+    0.5,
+    0.75,
+    1.0,
+    1.5,
+    2.0,
+    4.0,
+    64.0,
+    128.0,
+    256.0,
+    257.0,
+)  # many of them lie on bounds
 RATIOS = 1.0 + np.geomspace(1e-3, 1e3, 500)
 AS_PYTHON = (
     (r", (for|or|else) .*", ""),  # what follows from the condition, or from its opposite
@@ -109,12 +134,19 @@ def test_a_condition_holds_exactly_where_its_words_say():
     for template in TEMPLATES:
         for words, holds in template.conditions.items():
             names = [name for name in template.gains if re.search(rf"\b{name}\b", words)]
-            allowed = [[v for v in VALUES if v or not template.gains[name].positive] for name in names]
-            every = [dict(zip(names, values, strict=True)) for values in itertools.product(*allowed)]
+            allowed = []
+            for name in names:
+                allowed.append([v for v in VALUES if v or not template.gains[name].positive])
+            every = []
+            for values in itertools.product(*allowed):
+                every.append(dict(zip(names, values, strict=True)))
             with contextlib.suppress(SyntaxError, NameError):  # of a sentence
                 means = meaning(words)
                 said = [bool(means(gains)) for gains in every]
-                assert said == [holds(SimpleNamespace(**gains)) for gains in every], (template.name, words)
+                assert said == [holds(SimpleNamespace(**gains)) for gains in every], (
+                    template.name,
+                    words,
+                )
                 both += {False, True} == set(said)
     assert both >= 30
 

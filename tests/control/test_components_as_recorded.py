@@ -1,7 +1,8 @@
 """Every law, surface and estimator has the gains and computes the numbers that are recorded.
 
-Theorems hold for every gain, so they do not see a default, a unit or an order that has changed, which would change
-published numbers. Here all of it is seen at once. What is added to a catalogue is tested once it is recorded.
+Theorems hold for every gain, so they do not see a default, a unit or an order that has changed,
+which would change published numbers. Here all of it is seen at once. What is added to a catalogue
+is tested once it is recorded.
 """
 
 import math
@@ -23,18 +24,24 @@ from smc_mujoco.simulation import python_controller
 pytestmark = pytest.mark.quick
 
 KINDS = {"law": laws, "joint law": joint_law, "surface": surface, "estimator": estimator}
-TEMPLATES = {f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room.catalogue().items()}
+TEMPLATES = {
+    f"{kind} {name}": law for kind, room in KINDS.items() for name, law in room.catalogue().items()
+}
 COUNT, DT, JOINTS = 60, 0.05, 3
 
 
 def moved(template):
     """Gains beside their defaults: 7 % more, 0.3 for 0 and 2 for infinity."""
     changed = {0.0: 0.3, math.inf: 2.0}
-    return template.bind({gain: changed.get(value, 1.07 * value) for gain, value in template.defaults.items()})
+    return template.bind(
+        {gain: changed.get(value, 1.07 * value) for gain, value in template.defaults.items()}
+    )
 
 
 def seen(shape=()):
-    """Errors and speeds of both signs and all sizes from 1 to 0.001, exact zeros among them, and other readings."""
+    """Errors and speeds of both signs and all sizes from 1 to 0.001, exact zeros among them, and
+    other readings.
+    """
     random = np.random.default_rng(7)
     sizes = 10.0 ** np.linspace(0.0, -3.0, COUNT).reshape(-1, *(1 for _ in shape))
     e, de, others = (random.normal(size=(COUNT, *shape)) for _ in range(3))
@@ -46,31 +53,69 @@ def seen(shape=()):
 def measurements(model, has_surface):
     for k, (e, de, other) in enumerate(seen()):
         yield Measurement(
-            t=0.5 + DT * k, dt=DT, x=e + 0.3, v=de - 0.2, e=e, de=de, r=0.3, dr=-0.2, ddr=0.7, f=other, g=1.7,
-            a=2.0 * other, limit=3.0, model=model, has_surface=has_surface, s=e - 0.5 * de, v_eq=0.4 * other,
-            q=e + 0.1 * de, dq=de - 0.1 * e, fq=-other, gq=0.6,
-        )  # fmt: skip
+            t=0.5 + DT * k,
+            dt=DT,
+            x=e + 0.3,
+            v=de - 0.2,
+            e=e,
+            de=de,
+            r=0.3,
+            dr=-0.2,
+            ddr=0.7,
+            f=other,
+            g=1.7,
+            a=2.0 * other,
+            limit=3.0,
+            model=model,
+            has_surface=has_surface,
+            s=e - 0.5 * de,
+            v_eq=0.4 * other,
+            q=e + 0.1 * de,
+            dq=de - 0.1 * e,
+            fq=-other,
+            gq=0.6,
+        )
 
 
 def joints(component):
     """The number of channels of a law of many joints: those of a free body are six."""
-    return 2 * JOINTS if FREE_BODY in component.plants else JOINTS
+    if FREE_BODY in component.plants:
+        return 2 * JOINTS
+    return JOINTS
 
 
 def joint_measurements(model, n):
     turned = np.array([[0.0, 0.3, -0.2], [-0.3, 0.0, 0.5], [0.2, -0.5, 0.0]])
-    dynamics = SimpleNamespace(coriolis=lambda w: turned @ w, jacobian=lambda: np.eye(JOINTS) + turned)
+    dynamics = SimpleNamespace(
+        coriolis=lambda w: turned @ w, jacobian=lambda: np.eye(JOINTS) + turned
+    )
     M, ones = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]]), np.ones(n)
     M = np.kron(np.eye(n // JOINTS), M)
     for k, (e, de, other) in enumerate(seen((n,))):
         yield JointMeasurement(
-            t=DT * k, dt=DT, model=model, dynamics=dynamics, x=e + 0.3, v=de - 0.2, e=e, de=de, r=0.3 * ones,
-            dr=-0.2 * ones, ddr=0.7 * other, a=other, limit=3.0 * ones, M=M, h=0.5 * other - de, g=0.5 * other,
-        )  # fmt: skip
+            t=DT * k,
+            dt=DT,
+            model=model,
+            dynamics=dynamics,
+            x=e + 0.3,
+            v=de - 0.2,
+            e=e,
+            de=de,
+            r=0.3 * ones,
+            dr=-0.2 * ones,
+            ddr=0.7 * other,
+            a=other,
+            limit=3.0 * ones,
+            M=M,
+            h=0.5 * other - de,
+            g=0.5 * other,
+        )
 
 
 def readings():
-    return (Reading(dt=DT, x=math.sin(0.2 * k) + 0.1 * e, v=de) for k, (e, de, _) in enumerate(seen()))
+    return (
+        Reading(dt=DT, x=math.sin(0.2 * k) + 0.1 * e, v=de) for k, (e, de, _) in enumerate(seen())
+    )
 
 
 def ways(template):
@@ -81,7 +126,9 @@ def ways(template):
         n = joints(template)
         return {"alone": joint_measurements(0.0, n), "with the model": joint_measurements(1.0, n)}
     both = {"alone": measurements(0.0, 0.0), "with the model": measurements(1.0, 0.0)}
-    return both | {"on a surface": measurements(1.0, 1.0)} if template.kind == "law" else both
+    if template.kind == "law":
+        return both | {"on a surface": measurements(1.0, 1.0)}
+    return both
 
 
 def computed(component, inputs):
@@ -96,20 +143,37 @@ def computed(component, inputs):
 
 
 def text(template):
-    """What of a template changes published numbers: orders, sizes, gains, and what it computes, in one line."""
+    """What of a template changes published numbers: orders, sizes, gains, and what it computes, in
+    one line.
+    """
     component = moved(template)
     g = SimpleNamespace(**component.gains)
     said = [flag for flag in ("continuous", "joint", "requires_model") if getattr(template, flag)]
-    said += [f"{template.finite_time} = 0 after a finite time"] if template.finite_time else []
-    said += [f"order of {what} {template.order(what, component.gains):.7g}" for what in template.accuracy]
+    if template.finite_time:
+        said += [f"{template.finite_time} = 0 after a finite time"]
+    else:
+        said += []
+    said += [
+        f"order of {what} {template.order(what, component.gains):.7g}" for what in template.accuracy
+    ]
     said += [f"admits {what} below {bound(g):.7g}" for what, bound in template.admits.items()]
-    said += [f"degree {template.relative_degree}", f"memory {template.memory}", f"for {template.plants or 'all'}"]
+    said += [
+        f"degree {template.relative_degree}",
+        f"memory {template.memory}",
+        f"for {template.plants or 'all'}",
+    ]
     parts = [", ".join(said)]
     for name, gain in template.gains.items():
         unit = gain.unit_at(component.gains)
-        marks = [flag for flag in ("positive", "nonnegative", "held", "shared") if getattr(gain, flag)]
+        marks = []
+        for flag in ("positive", "nonnegative", "held", "shared"):
+            if getattr(gain, flag):
+                marks.append(flag)
         marks += [f"over {gain.over}"] if gain.over else []
-        size = "no unit" if unit is None else "F^{:.4g} X^{:.4g} T^{:.4g}".format(*unit)
+        if unit is None:
+            size = "no unit"
+        else:
+            size = "F^{:.4g} X^{:.4g} T^{:.4g}".format(*unit)
         parts.append(", ".join([f"{name} = {gain_text(gain.default)}", size, *marks]))
     if template.rest:
         numbers = [*template.rest.linear(g), *template.rest.force(g, np.array([-0.2, 0.05, 3.0]))]
@@ -117,7 +181,9 @@ def text(template):
     sums: dict[str, list[str]] = {}  # of the ways that compute the same
     for way, inputs in ways(template).items():
         sums.setdefault(computed(component, inputs), []).append(way)
-    return "; ".join([*parts, *(f"{' and '.join(names)}: {numbers}" for numbers, names in sums.items())])
+    return "; ".join(
+        [*parts, *(f"{' and '.join(names)}: {numbers}" for numbers, names in sums.items())]
+    )
 
 
 def test_a_component_is_and_computes_what_is_recorded(snapshot):

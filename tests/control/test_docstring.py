@@ -9,16 +9,24 @@ pytestmark = pytest.mark.quick
 
 PARTS = {  # docstring -> title, formula, what the gains are, discretisation, what is known, source
     "Plain: u = -k s. It is odd. Sampled, s is O(dt).\n\nIt holds for a. b too.\n\nSources: A. Body, 1. B. Other, 2.": (
-        "Plain", "u = -k s", "", "Sampled, s is O(dt).", "It is odd. It holds for a. b too.",
+        "Plain",
+        "u = -k s",
+        "",
+        "Sampled, s is O(dt).",
+        "It is odd. It holds for a. b too.",
         "A. Body, 1. B. Other, 2.",
     ),
     "Split, by:\n\n    u = -k s,\n    w' = e\n\nS. Gutman proved it. |u| <= k. `Explicit` it is.\nGains: k, explicit "
     "[N]; c, slope [1/s].\nSource: a page.": (
-        "Split, by", "u = -k s, w' = e", "k, explicit [N]; c, slope [1/s].", "`Explicit` it is.",
-        "S. Gutman proved it. |u| <= k.", "a page.",
+        "Split, by",
+        "u = -k s, w' = e",
+        "k, explicit [N]; c, slope [1/s].",
+        "`Explicit` it is.",
+        "S. Gutman proved it. |u| <= k.",
+        "a page.",
     ),
     "Only words": ("", "Only words", "", "", "", ""),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", PARTS)

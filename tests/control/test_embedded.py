@@ -20,7 +20,12 @@ GRID = np.concatenate([-HALF[:0:-1], HALF])
 def forces(law, e, de):
     """u and s at many states, (N, 2)."""
     gains, memory = python_controller.gains_of(law), np.zeros(law.memory)
-    return np.array([law.function(measured(float(a), float(b)), gains, memory) for a, b in zip(e, de, strict=True)])
+    return np.array(
+        [
+            law.function(measured(float(a), float(b)), gains, memory)
+            for a, b in zip(e, de, strict=True)
+        ]
+    )
 
 
 def squash(name, s=GRID, **gains):
@@ -47,12 +52,22 @@ def test_a_size_that_divides_nothing_gets_at_least_its_steps(size):
 def test_the_table_is_exact_at_its_nodes_and_one_beyond_its_end():
     nodes = np.arange(64) * 5.0 / 64
     np.testing.assert_allclose(squash("observer_free_table", nodes), np.tanh(nodes), rtol=1e-15)
-    assert squash("observer_free_table", np.array([5.0, 6.0, 1e9, -5.0, -1e9])).tolist() == [1, 1, 1, -1, -1]
+    assert squash("observer_free_table", np.array([5.0, 6.0, 1e9, -5.0, -1e9])).tolist() == [
+        1,
+        1,
+        1,
+        -1,
+        -1,
+    ]
 
 
 @pytest.mark.parametrize(("terms", "error"), [(1, 3.3e-3), (3, 5.5e-6), (5, 2.3e-7)])
 def test_the_series_is_as_close_as_its_terms_allow(terms, error):
-    assert 0.75 * error < np.abs(squash("observer_free_taylor", terms=terms) - np.tanh(GRID)).max() <= error
+    assert (
+        0.75 * error
+        < np.abs(squash("observer_free_taylor", terms=terms) - np.tanh(GRID)).max()
+        <= error
+    )
 
 
 @pytest.mark.parametrize("name", FORMS)
@@ -60,7 +75,9 @@ def test_every_form_is_odd_bounded_and_rises(name):
     T = squash(name)
     np.testing.assert_array_equal(T, -T[::-1])
     assert np.abs(T).max() <= 1.0
-    slack = {"observer_free_single": 2e-7, "observer_free_taylor": 1e-6}.get(name, 0.0)  # their last bits ripple
+    slack = {"observer_free_single": 2e-7, "observer_free_taylor": 1e-6}.get(
+        name, 0.0
+    )  # their last bits ripple
     assert np.diff(T).min() >= -slack
 
 
@@ -111,7 +128,9 @@ def test_single_precision_rounds_every_operation_to_24_bits():
 
 
 def firmware(e, de, lam=LAM, k1=K1, e_range=4.0, de_range=8.0, u_range=8.0):
-    """The fixed-point law as its C would run: int16 words and int32 sums of numpy, where an overflow would wrap."""
+    """The fixed-point law as its C would run: int16 words and int32 sums of numpy, where an
+    overflow would wrap.
+    """
     word, wide = np.int16, np.int32
 
     def held(n):
@@ -126,8 +145,13 @@ def firmware(e, de, lam=LAM, k1=K1, e_range=4.0, de_range=8.0, u_range=8.0):
         assert np.array_equal(full, a.astype(np.int64) * b.astype(np.int64))
         return np.sign(full) * ((np.abs(full) + wide(1 << (bits - 1))) >> bits)
 
-    gain = [convert([g], unit) for g, unit in ((k1 * e_range / 8, 16.0), (de_range / 8, 16.0), (lam, u_range))]
-    total = multiply(gain[0], convert(e, e_range), 11) + multiply(gain[1], convert(de, de_range), 11)
+    gain = [
+        convert([g], unit)
+        for g, unit in ((k1 * e_range / 8, 16.0), (de_range / 8, 16.0), (lam, u_range))
+    ]
+    total = multiply(gain[0], convert(e, e_range), 11) + multiply(
+        gain[1], convert(de, de_range), 11
+    )
     s = held(total)
     table = q15.TABLE.astype(word)
     assert np.array_equal(table, q15.TABLE)
@@ -166,7 +190,15 @@ def test_fixed_point_saturates_each_word_at_its_range():
 
 
 def test_words_round_to_the_nearest_away_from_zero():
-    for a, n in ((0.0, 0), (0.5, 1), (-0.5, -1), (0.49, 0), (1.5, 2), (40_000, 32767), (-40_000, -32767)):
+    for a, n in (
+        (0.0, 0),
+        (0.5, 1),
+        (-0.5, -1),
+        (0.49, 0),
+        (1.5, 2),
+        (40_000, 32767),
+        (-40_000, -32767),
+    ):
         assert q15.word.py_func(a / 32768, 1.0) == n
     for a, b, bits, n in ((3, 1, 1, 2), (-3, 1, 1, -2), (5, 1, 2, 1), (6, 1, 2, 2), (0, -5, 3, 0)):
         assert q15.product.py_func(a, b, bits) == n

@@ -62,7 +62,9 @@ def test_filtered_difference_of_a_ramp_is_its_slope_after_an_exponential(tau, h)
 
 @pytest.mark.parametrize("tau", [0.0, 5e-3, 0.05])
 def test_filtered_difference_passes_noise_by_its_formula(tau):
-    """The impulse response is (1-a)/h (1, -(1-a), -(1-a) a, ...): its energy is 2 (1-a)^2 / ((1+a) h^2)."""
+    """The impulse response is (1-a)/h (1, -(1-a), -(1-a) a, ...): its energy is 2 (1-a)^2 / ((1+a)
+    h^2).
+    """
     gain = math.sqrt(2.0 / ((tau + H) * (2.0 * tau + H)))
     impulse = np.zeros(5000)
     impulse[1] = 1.0
@@ -84,14 +86,18 @@ def show_acceleration(y, gains, memory):
     return 0.0, y.a
 
 
-@pytest.mark.parametrize(("name", "period"), list(zip(FROM_POSITION, itertools.cycle([1e-3, 5e-3]))))
+@pytest.mark.parametrize(
+    ("name", "period"), list(zip(FROM_POSITION, itertools.cycle([1e-3, 5e-3])))
+)
 def test_in_a_run_every_channel_has_its_own_estimate_of_what_it_measures(name, period):
     """Memory shared between channels or runs, or a dt from elsewhere, would show."""
     estimator = smc.estimator(name)
     common = {"plant": "pendulum_network", "duration": 0.3, "control_period": period, "seed": 2}
     common |= {"velocity": estimator, "noise": smc.Noise(position=0.01, velocity=9.0)}
     laws = (show_position(), show_velocity(), show_acceleration(), show_velocity())
-    x, v, a, again = (trace.s for trace in smc.run([smc.Scenario(law=law, **common) for law in laws]))
+    x, v, a, again = (
+        trace.s for trace in smc.run([smc.Scenario(law=law, **common) for law in laws])
+    )
     np.testing.assert_array_equal(again, v)
     for i in range(5):
         expected = both(estimator, x[:, i], h=period)
@@ -137,8 +143,14 @@ def test_an_estimate_of_second_order_is_exact_on_parabolas(name):
 @ESTIMATORS
 def test_defaults_carry_the_paper_s_laws_through_noise_on_every_plant(name):
     """Without a velocity sensor."""
-    laws = scenarios.LAWS if name == "levant" else ("observer_free",)
-    pairs = [(plant, law) for plant in scenarios.GAINS for law in laws]
+    if name == "levant":
+        laws = scenarios.LAWS
+    else:
+        laws = ("observer_free",)
+    pairs = []
+    for plant in scenarios.GAINS:
+        for law in laws:
+            pairs.append((plant, law))
     changes = {"velocity": name, "noise": smc.Noise(position=0.01), "integrator": "Euler"}
     traces = smc.run([scenarios.scenario(*pair, duration=5.0, changes=changes) for pair in pairs])
     for pair, trace in zip(pairs, traces, strict=True):
@@ -159,7 +171,9 @@ def gains_of(name, **gains):
 @pytest.mark.parametrize("w", [20.0, 100.0, 1000.0])
 def test_observers_pass_noise_by_their_formulas(w):
     b = math.exp(-w * H)
-    assert gains_of("high_gain", w=w)[0] == pytest.approx(math.sqrt(2 * (1 - b) ** 3 / (1 + b) ** 3) / H, rel=1e-6)
+    assert gains_of("high_gain", w=w)[0] == pytest.approx(
+        math.sqrt(2 * (1 - b) ** 3 / (1 + b) ** 3) / H, rel=1e-6
+    )
     v = math.sqrt((1 - b) ** 3 * (13 + 50 * b + 49 * b * b) / (2 * (1 + b) ** 5)) / H
     a = math.sqrt(6 * (1 - b) ** 5 / (1 + b) ** 5) / H**2
     np.testing.assert_allclose(gains_of("extended_state_observer", w=w), [v, a], rtol=1e-6)
@@ -167,7 +181,9 @@ def test_observers_pass_noise_by_their_formulas(w):
 
 @pytest.mark.parametrize("w", [10.0, 30.0])
 def test_the_integral_chain_passes_less_noise_than_the_observer_of_its_poles(w):
-    """For small w h its energies are those in continuous time, w^3 / 16 and 3 w^5 / 16, times h for sampled noise."""
+    """For small w h its energies are those in continuous time, w^3 / 16 and 3 w^5 / 16, times h for
+    sampled noise.
+    """
     v, a = gains_of("integral_chain", w=w)
     np.testing.assert_allclose([v, a], np.sqrt([H * w**3 / 16, H * 3 * w**5 / 16]), rtol=0.025)
     assert v < gains_of("extended_state_observer", w=w)[0] / 4
@@ -214,13 +230,19 @@ def test_kalman_s_gains_are_those_of_the_riccati_equation(lam):
         z = z + K * (reading - z[0])
         expected.append(z[1:])
     for h in (1.0, 1e-3):
-        out = both(smc.estimator("kalman", sigma=0.01, q=lam * 1e-4 / h**5), x, h=h) * np.array([[h], [h * h]])
-        np.testing.assert_allclose(out, np.transpose(expected), rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+        out = both(smc.estimator("kalman", sigma=0.01, q=lam * 1e-4 / h**5), x, h=h) * np.array(
+            [[h], [h * h]]
+        )
+        np.testing.assert_allclose(
+            out, np.transpose(expected), rtol=1e-5, atol=1e-7 * np.abs(expected).max()
+        )
 
 
 def test_the_square_roots_of_kalman_s_factors_are_those_of_complex_numbers():
     for a, b in itertools.product((-3.0, -1.0, 0.0, 0.5, 4.0), repeat=2):
-        assert complex(*square_root.py_func(a, b)) == pytest.approx(cmath.sqrt(complex(a, b)), rel=1e-15)
+        assert complex(*square_root.py_func(a, b)) == pytest.approx(
+            cmath.sqrt(complex(a, b)), rel=1e-15
+        )
 
 
 @pytest.mark.parametrize(("window", "degree"), [(2, 1), (5, 2), (15, 3), (31, 2), (128, 4)])
@@ -228,9 +250,14 @@ def test_savitzky_golay_is_scipy_s_filter_at_the_last_point(window, degree):
     x = np.random.default_rng(0).normal(size=400)
     out = both(smc.estimator("savitzky_golay", window=window, degree=degree), x)
     for order in (1, 2):
-        c = savgol_coeffs(window, degree, deriv=order, delta=H, pos=window - 1, use="dot") if degree >= order else [0.0]
+        if degree >= order:
+            c = savgol_coeffs(window, degree, deriv=order, delta=H, pos=window - 1, use="dot")
+        else:
+            c = [0.0]
         expected = np.convolve(x, c[::-1], "valid")[-200:]
-        np.testing.assert_allclose(out[order - 1, -200:], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+        np.testing.assert_allclose(
+            out[order - 1, -200:], expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max()
+        )
 
 
 def test_levant_s_default_gain_is_the_largest_jerk_of_the_study_s_actuator():
@@ -239,14 +266,17 @@ def test_levant_s_default_gain_is_the_largest_jerk_of_the_study_s_actuator():
         for plant in map(smc.plant, scenarios.PLANTS)
     )
     lag = scenarios.scenario("duffing", "none", "lag_20ms").actuator[0].tau
-    assert smc.estimator("levant").gains["L"] == pytest.approx(2.0 * g * scenarios.U_MAX / lag, rel=1e-9)
+    assert smc.estimator("levant").gains["L"] == pytest.approx(
+        2.0 * g * scenarios.U_MAX / lag, rel=1e-9
+    )
 
 
 def test_levant_is_lost_on_what_is_rougher_than_its_gain():
     """|x''| = 4 against L = 1: the estimate cannot turn as fast."""
     t = np.arange(10_000) * H
     lost, held = (
-        np.abs(estimates(smc.estimator("levant", L=L, order=1), np.sin(2 * t)) - 2 * np.cos(2 * t)) for L in (1, 4)
+        np.abs(estimates(smc.estimator("levant", L=L, order=1), np.sin(2 * t)) - 2 * np.cos(2 * t))
+        for L in (1, 4)
     )
     assert held[5000:].max() < 0.02
     assert lost[5000:].max() > 0.5

@@ -1,4 +1,6 @@
-"""Laws of free bodies on a Crazyflie: the closed forms of steady errors, the shorter way, and a lemniscate."""
+"""Laws of free bodies on a Crazyflie: the closed forms of steady errors, the shorter way, and a
+lemniscate.
+"""
 
 import math
 from types import SimpleNamespace
@@ -21,16 +23,38 @@ TEXT = (shipped("models").parent / "examples" / "quadrotor.xml").read_text(encod
 J, G = 16.8e-6, 9.81
 TORQUE = 3e-4  # N m
 SLIDING = ["quaternion_sliding", "adaptive_quaternion_sliding"]
-LAWS = ["geometric", *SLIDING, "super_twisting_attitude", "indi_attitude", "adrc_attitude", "cascaded_pid"]
+LAWS = [
+    "geometric",
+    *SLIDING,
+    "super_twisting_attitude",
+    "indi_attitude",
+    "adrc_attitude",
+    "cascaded_pid",
+]
 SOURCE = {  # the numbers of arXiv 2508.06568, with rotors of 50 ms as in another coding of its laws
-    'mass="0.0319"': 'mass="0.032"', '"16.8e-6 16.8e-6 29.8e-6"': '"16.6e-6 16.6e-6 29.3e-6"', '"0.0625"': '"0.05"'
-}  # fmt: skip
+    'mass="0.0319"': 'mass="0.032"',
+    '"16.8e-6 16.8e-6 29.8e-6"': '"16.6e-6 16.6e-6 29.3e-6"',
+    '"0.0625"': '"0.05"',
+}
 # it turns its heading
-PATH = [smc.Sine(0.5, 2.0), smc.Sine(0.4, 3.0), smc.Sine(0.3, 1.0), *[smc.Constant(0.0)] * 2, smc.Sine(0.8, 4.0)]
+PATH = [
+    smc.Sine(0.5, 2.0),
+    smc.Sine(0.4, 3.0),
+    smc.Sine(0.3, 1.0),
+    *[smc.Constant(0.0)] * 2,
+    smc.Sine(0.8, 4.0),
+]
 NOWHERE = {  # gains that leave the position alone, so that the wanted attitude is level
     **{law: {"kx": 1e-9, "kv": 1e-9} for law in ("geometric", "indi_attitude", "adrc_attitude")},
     **{law: {"c": 1e-9, "Kx": 1e-9} for law in ("quaternion_sliding", "super_twisting_attitude")},
-    "adaptive_quaternion_sliding": {"c": 1e-9, "cz": 1e-9, "Kx": 1e-9, "Kz": 1e-9, "Gx": 0.0, "mux": 0.0},
+    "adaptive_quaternion_sliding": {
+        "c": 1e-9,
+        "cz": 1e-9,
+        "Kx": 1e-9,
+        "Kz": 1e-9,
+        "Gx": 0.0,
+        "mux": 0.0,
+    },
 }
 
 
@@ -65,7 +89,9 @@ def pushed(law, torque=roll):
     base = njit(law.function)
     gains = {name: Gain(value, shared=True) for name, value in law.gains.items()}
 
-    @smc.law_function(joint=True, requires_model=True, plants=("a free body",), gains=gains, memory=law.memory)
+    @smc.law_function(
+        joint=True, requires_model=True, plants=("a free body",), gains=gains, memory=law.memory
+    )
     def with_torque(y, gains, memory):
         u, s = base(y, gains, memory)
         u[3:] += torque(y)
@@ -85,29 +111,43 @@ def grown(trace, i, K0, G, rho, eps):
 
 
 @pytest.mark.parametrize(
-    ("law", "expected"), [("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)), ("geometric", 0.19 * G / 7.0)]
+    ("law", "expected"),
+    [("quaternion_sliding", sag(5.0, 1.0, 1.25, 1.19)), ("geometric", 0.19 * G / 7.0)],
 )
 def test_an_unknown_weight_sags_by_the_closed_form(drone, law, expected):
-    scenario = smc.Scenario(plant=drone, law=law, mismatch={"m": 1.19}, duration=12.0, control_period=2e-3)
+    scenario = smc.Scenario(
+        plant=drone, law=law, mismatch={"m": 1.19}, duration=12.0, control_period=2e-3
+    )
     assert -smc.run(scenario).e[-1, 2] == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.slow
 def test_an_unknown_torque_turns_the_body_by_the_closed_form(drone):
-    """The body hovers level, so that the wanted attitude is the one that is off, and the position with it."""
-    law, common = smc.law("quaternion_sliding"), {"plant": drone, "duration": 10.0, "control_period": 2e-3}
+    """The body hovers level, so that the wanted attitude is the one that is off, and the position
+    with it.
+    """
+    law, common = (
+        smc.law("quaternion_sliding"),
+        {"plant": drone, "duration": 10.0, "control_period": 2e-3},
+    )
     s = math.atanh(TORQUE / (J * law.gains["K"])) / law.gains["rho"]
     trace = smc.run(smc.Scenario(law=pushed(law), **common))
     assert trace.s[-1, 3] == pytest.approx(s, rel=1e-6)
-    tilt = 2.0 * math.asin(s / law.gains["lam"])  # of the wanted thrust, m (c Kx rhox e) sideways and m g upwards
+    tilt = 2.0 * math.asin(
+        s / law.gains["lam"]
+    )  # of the wanted thrust, m (c Kx rhox e) sideways and m g upwards
     sideways = 5.0 * math.tanh(1.25 * abs(trace.e[-1, 1])) / G
     assert math.atan(sideways) == pytest.approx(tilt, rel=1e-4)
     law = smc.law("geometric")
     trace = smc.run(smc.Scenario(law=pushed(law), **common))
-    assert math.atan(7.0 * abs(trace.e[-1, 1]) / G) == pytest.approx(math.asin(TORQUE / (J * 421.7)), rel=1e-4)
+    assert math.atan(7.0 * abs(trace.e[-1, 1]) / G) == pytest.approx(
+        math.asin(TORQUE / (J * 421.7)), rel=1e-4
+    )
 
 
-def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_what_was_published(original):
+def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_what_was_published(
+    original,
+):
     """0.05 N along each axis, which K outgrows slowly: 0.147 m. 6 g on 32 g cost 0.34 m after 10 s."""
     common = {"plant": original, "law": "adaptive_quaternion_sliding", "control_period": 2e-3}
     f = 0.05
@@ -124,7 +164,9 @@ def test_a_constant_force_leaves_the_adaptive_law_its_closed_form_and_a_weight_w
 @pytest.mark.slow
 def test_an_unknown_torque_turns_the_adaptive_law_by_its_closed_form(original):
     law = smc.law("adaptive_quaternion_sliding")
-    trace = smc.run(smc.Scenario(plant=original, law=pushed(law), duration=10.0, control_period=2e-3))
+    trace = smc.run(
+        smc.Scenario(plant=original, law=pushed(law), duration=10.0, control_period=2e-3)
+    )
     K = grown(trace, 3, 400.0, 20.0, 0.2, 0.005)
     s = math.atanh(TORQUE / (16.6e-6 * K)) / 0.2
     assert trace.s[-1, 3] == pytest.approx(s, rel=2e-3)
@@ -135,7 +177,9 @@ def test_an_unknown_torque_turns_the_adaptive_law_by_its_closed_form(original):
 @pytest.mark.parametrize("law", ["super_twisting_attitude", "indi_attitude", "adrc_attitude"])
 def test_an_unknown_torque_leaves_no_error_where_something_integrates_it(drone, law):
     """The mean of the last 2 s: the rotors' lag leaves a limit cycle under super-twisting."""
-    trace = smc.run(smc.Scenario(plant=drone, law=pushed(smc.law(law)), duration=12.0, control_period=2e-3))
+    trace = smc.run(
+        smc.Scenario(plant=drone, law=pushed(smc.law(law)), duration=12.0, control_period=2e-3)
+    )
     assert np.abs(trace.e[-1000:, :3].mean(axis=0)).max() < 1e-3
     assert np.abs(trace.e[: len(trace.t) // 10, 1]).max() > 0.01
 
@@ -152,11 +196,26 @@ def test_the_cascades_gains_are_those_of_the_firmware_in_si_units():
     pwm, degree = 0.12 / 65535.0, math.pi / 180.0  # N of a motor
     roll, yaw = 2.0 * 0.03253 * pwm / degree / 16.57e-6, 4.0 * 0.00735 * pwm / degree / 29.26e-6
     expected = {
-        "Pr": 250.0 * roll, "Ir": 500.0 * roll, "Dr": 2.5 * roll, "Prz": 120.0 * yaw, "Irz": 16.7 * yaw,
-        "Pv": 25.0 * degree * G, "Iv": degree * G, "Pvz": 25e3 * 4.0 * pwm / 0.0319, "Ivz": 15e3 * 4.0 * pwm / 0.0319,
-        "P": 2.0, "Pz": 2.0, "Iz": 0.5, "Pa": 6.0, "Ia": 3.0, "Paz": 6.0, "Iaz": 1.0, "Daz": 0.35,
-        "speed": 1.0, "tilt": 20.0 * degree,
-    }  # fmt: skip
+        "Pr": 250.0 * roll,
+        "Ir": 500.0 * roll,
+        "Dr": 2.5 * roll,
+        "Prz": 120.0 * yaw,
+        "Irz": 16.7 * yaw,
+        "Pv": 25.0 * degree * G,
+        "Iv": degree * G,
+        "Pvz": 25e3 * 4.0 * pwm / 0.0319,
+        "Ivz": 15e3 * 4.0 * pwm / 0.0319,
+        "P": 2.0,
+        "Pz": 2.0,
+        "Iz": 0.5,
+        "Pa": 6.0,
+        "Ia": 3.0,
+        "Paz": 6.0,
+        "Iaz": 1.0,
+        "Daz": 0.35,
+        "speed": 1.0,
+        "tilt": 20.0 * degree,
+    }
     assert smc.law("cascaded_pid").gains == pytest.approx(expected, rel=5e-4)
 
 
@@ -179,8 +238,13 @@ def lemniscate(plant, law, period):
 @pytest.mark.slow
 def test_errors_on_a_lemniscate_have_the_order_and_the_size_of_another_coding(original):
     """The geometric law is last, and errors grow as the period falls."""
-    laws = {name: smc.law(name) for name in LEMNISCATES} | {"geometric": smc.law("geometric", kv=2.0)}
-    rms = {name: [lemniscate(original, law, period) for period in (6.0, 4.0, 3.0)] for name, law in laws.items()}
+    laws = {name: smc.law(name) for name in LEMNISCATES} | {
+        "geometric": smc.law("geometric", kv=2.0)
+    }
+    rms = {
+        name: [lemniscate(original, law, period) for period in (6.0, 4.0, 3.0)]
+        for name, law in laws.items()
+    }
     for name, published in LEMNISCATES.items():
         assert rms[name] == pytest.approx(published, rel=0.25)
         assert sorted(rms[name]) == rms[name]
@@ -196,24 +260,43 @@ def test_times_to_five_degrees_are_those_of_another_coding(original, law, publis
     starts = [(0.0, 0.0, 30.0, math.radians(angle), 0.0, 0.0) for angle in (60.0, 120.0, 178.0)]
     common = {"plant": original, "law": law, "duration": 1.6, "control_period": 2e-3}
     traces = smc.run([smc.Scenario(x0=start, **common) for start in starts])
-    over = [np.flatnonzero(np.linalg.norm(trace.x[:, 3:], axis=1) > math.radians(5.0))[-1] for trace in traces]
-    assert [trace.t[k] for trace, k in zip(traces, over, strict=True)] == pytest.approx(published, rel=0.1)
+    over = []
+    for trace in traces:
+        over.append(np.flatnonzero(np.linalg.norm(trace.x[:, 3:], axis=1) > math.radians(5.0))[-1])
+    assert [trace.t[k] for trace, k in zip(traces, over, strict=True)] == pytest.approx(
+        published, rel=0.1
+    )
 
 
 def test_the_adaptive_gains_grow_by_the_published_rule_and_stay_within_their_bounds():
     """K grows above eps / rho, falls below it, creeps by mu at K0, and stays at K_up."""
     law = smc.law("adaptive_quaternion_sliding", K_up=430.0, Kx_up=4.4)
-    base, memory, gains, dt = plain(law), np.zeros((6, law.memory)), SimpleNamespace(**law.gains), 0.05
+    base, memory, gains, dt = (
+        plain(law),
+        np.zeros((6, law.memory)),
+        SimpleNamespace(**law.gains),
+        0.05,
+    )
     K0, up = np.array([4.0, 4.0, 3.0, 400.0, 400.0, 400.0]), [4.4, 430]
     K = K0.copy()
     seen = {"grows": 0, "falls": 0, "creeps": 0, "stays": 0}
     for k in range(400):
         at = 0.4 if k < 200 else 1e-4
-        y = measured(np.array([at, -at, at, 1.5 * at, -at, at]), np.array([at, at, at, 3.0 * at, -at, 2.0 * at]), dt)
+        y = measured(
+            np.array([at, -at, at, 1.5 * at, -at, at]),
+            np.array([at, at, at, 3.0 * at, -at, 2.0 * at]),
+            dt,
+        )
         _, s = base(y, gains, memory)
         for i in range(6):
-            G, rho, eps, mu = (0.1, 0.9, 0.001, 0.01) if i < 3 else (20.0, 0.2, 0.005, 0.01)
-            change = G * abs(s[i]) * math.tanh(rho * abs(s[i]) - eps) if K[i] > K0[i] else mu
+            if i < 3:
+                G, rho, eps, mu = (0.1, 0.9, 0.001, 0.01)
+            else:
+                G, rho, eps, mu = (20.0, 0.2, 0.005, 0.01)
+            if K[i] > K0[i]:
+                change = G * abs(s[i]) * math.tanh(rho * abs(s[i]) - eps)
+            else:
+                change = mu
             seen["creeps" if K[i] <= K0[i] else ("grows" if change > 0.0 else "falls")] += 1
             seen["stays"] += K[i] + dt * change > up[i // 3]
             K[i] = min(K[i] + dt * change, up[i // 3])
@@ -230,13 +313,18 @@ def measured(x, v, dt, r=None, J=(16.8e-6, 16.8e-6, 29.8e-6), m=0.0319, limit=1.
     """What a law of a Crazyflie measures; r has r, r' and r'', (3, 6), all 0 by default."""
     r, dr, ddr = np.zeros((3, 6)) if r is None else r
     M, w = np.diag([m, m, m, *J]), v[3:]
-    h, g = np.array([0.0, 0.0, m * G, *np.cross(w, np.array(J) * w)]), np.array([0.0, 0.0, m * G, 0.0, 0.0, 0.0])
+    h, g = (
+        np.array([0.0, 0.0, m * G, *np.cross(w, np.array(J) * w)]),
+        np.array([0.0, 0.0, m * G, 0.0, 0.0, 0.0]),
+    )
     limits = np.broadcast_to(limit, 6).copy()
     return JointMeasurement(0.0, dt, 1.0, 0, x, v, x - r, v - dr, r, dr, ddr, ddr, limits, M, h, g)
 
 
 def test_adrc_turns_its_states_round_on_the_other_side_of_half_a_turn():
-    """From y = 2 with y' = -3 to the same on the other side: z1 = -2 and z2 = 3, of which s is z2 + wc z1 / 2."""
+    """From y = 2 with y' = -3 to the same on the other side: z1 = -2 and z2 = 3, of which s is z2 +
+    wc z1 / 2.
+    """
     law = smc.law("adrc_attitude", **NOWHERE["adrc_attitude"])
     memory, x = np.zeros((6, law.memory)), np.array([0.0, 0.0, 0.0, math.radians(-179.9), 0.0, 0.0])
     memory[3, 2:5] = 1.0, 2.0, -3.0
@@ -252,18 +340,25 @@ def test_the_cascade_adds_no_gyroscopic_torque():
 
 
 def test_indi_adds_no_torque_that_it_measures_already():
-    """At its first sample, of a body whose inertia is not that of a ball, where wd is 0: J v alone."""
+    """At its first sample, of a body whose inertia is not that of a ball, where wd is 0:
+
+    J v alone.
+    """
     law, x, w = smc.law("indi_attitude", **NOWHERE["indi_attitude"]), np.zeros(6), [3.0, -5.0, 4.0]
     x[3:5] = 0.3, -0.2
     J = (12e-6, 20e-6, 29.8e-6)
     seen = measured(x, np.array([0, 0, 0, *w]), 2e-3, J=J)
     u, _ = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
     q = Rotation.from_rotvec(x[3:]).as_quat(scalar_first=True)
-    np.testing.assert_allclose(u[3:], np.array(J) * (-240.0 * q[1:] - 24.0 * np.array(w)), rtol=1e-6)
+    np.testing.assert_allclose(
+        u[3:], np.array(J) * (-240.0 * q[1:] - 24.0 * np.array(w)), rtol=1e-6
+    )
 
 
 def test_the_cascade_bounds_speed_tilt_and_the_least_thrust():
-    """Level and at rest, 3 m too high and 3 m too far ahead; the period is so short that nothing integrates."""
+    """Level and at rest, 3 m too high and 3 m too far ahead; the period is so short that nothing
+    integrates.
+    """
     law, weight = smc.law("cascaded_pid"), 0.0319 * G
     seen = measured(np.array([3.0, 0.0, 3.0, 0.0, 0.0, 0.0]), np.zeros(6), 1e-9)
     u, s = plain(law)(seen, SimpleNamespace(**law.gains), np.zeros((6, law.memory)))
@@ -288,7 +383,9 @@ def test_the_cascade_bounds_speed_tilt_and_the_least_thrust():
 def test_each_integral_of_the_cascade_leaves_no_error_alone(drone, torque, gains):
     law, common = smc.law("cascaded_pid", **gains), {"duration": 12.0, "control_period": 2e-3}
     heavy = {} if torque else {"mismatch": {"m": 1.19}}
-    trace = smc.run(smc.Scenario(plant=drone, law=pushed(law) if torque else law, **common, **heavy))
+    trace = smc.run(
+        smc.Scenario(plant=drone, law=pushed(law) if torque else law, **common, **heavy)
+    )
     assert np.abs(trace.e[-1, :3]).max() < 2e-3
     assert np.abs(trace.e[:, :3]).max() > 0.01
 
@@ -297,29 +394,42 @@ def test_each_integral_of_the_cascade_leaves_no_error_alone(drone, torque, gains
 def test_commands_are_those_of_the_law_in_python(drone, law):
     """From a tumbling start, which brings q and -q."""
     start = {"x0": (0.3, -0.2, 1.0, 2.4, -0.9, 0.8), "v0": (0.5, -0.4, 0.3, 6.0, -9.0, 7.0)}
-    trace = smc.run(smc.Scenario(plant=drone, law=law, reference=PATH, duration=0.2, control_period=2e-3, **start))
+    trace = smc.run(
+        smc.Scenario(
+            plant=drone, law=law, reference=PATH, duration=0.2, control_period=2e-3, **start
+        )
+    )
     own, limits = smc.law(law), np.array(trace.scenario.limits)
     function, gains = plain(own), SimpleNamespace(**own.gains)
     memory = np.zeros((6, own.memory))
     for k, t in enumerate(trace.t[:-1]):
         r = np.array([[of(one, t) for one in PATH] for of in (value, rate, acceleration)])
-        u, s = function(measured(trace.x[k].copy(), trace.v[k].copy(), 2e-3, r, limit=limits), gains, memory)
+        u, s = function(
+            measured(trace.x[k].copy(), trace.v[k].copy(), 2e-3, r, limit=limits), gains, memory
+        )
         np.testing.assert_allclose(trace.u[k], np.clip(u, -limits, limits), rtol=1e-8, atol=1e-12)
         np.testing.assert_allclose(trace.s[k], s, rtol=1e-8, atol=1e-10)
 
 
 @pytest.mark.slow
-def test_super_twisting_stays_within_the_square_of_the_period_without_a_lag_and_in_a_cycle_behind_one(drone):
-    """|d'| < 40 = L; then harmonic balance of the yaw, with G = (p + lam / 2) / (p (mu p^2 + p + lam / 2))."""
-    text = TEXT.replace('dyntype="filter" dynprm="0.0625" ', "").replace(' act="0.0782 0.0782 0.0782 0.0782"', "")
+def test_super_twisting_stays_within_the_square_of_the_period_without_a_lag_and_in_a_cycle_behind_one(
+    drone,
+):
+    """|d'| < 40 = L; then harmonic balance of the yaw, with G = (p + lam / 2) / (p (mu p^2 + p +
+    lam / 2)).
+    """
+    text = TEXT.replace('dyntype="filter" dynprm="0.0625" ', "").replace(
+        ' act="0.0782 0.0782 0.0782 0.0782"', ""
+    )
     quick, L = smc.plant_from(text, channels=["body"], name="quick", keyframe="hover"), 45.0
     law = pushed(smc.law("super_twisting_attitude"), wave)
     law = law(k1=1.5 * math.sqrt(L), k2=1.1 * L, **NOWHERE["super_twisting_attitude"])
     common = {"plant": quick, "law": law, "duration": 3.0, "x0": (0.0, 0.0, 30.0, 0.1, 0.0, 0.2)}
-    ends = [
-        np.abs(trace.s[trace.t > 2.0, 3:]).max()
-        for trace in smc.run([smc.Scenario(control_period=dt, physics_step=1e-3, **common) for dt in (4e-3, 2e-3)])
-    ]
+    ends = []
+    for trace in smc.run(
+        [smc.Scenario(control_period=dt, physics_step=1e-3, **common) for dt in (4e-3, 2e-3)]
+    ):
+        ends.append(np.abs(trace.s[trace.t > 2.0, 3:]).max())
     assert ends[0] / ends[1] == pytest.approx(4.0, rel=0.3)
     assert ends[1] < 6.0 * L * 2e-3**2
 
@@ -332,7 +442,12 @@ def test_super_twisting_stays_within_the_square_of_the_period_without_a_lag_and_
 
     amplitude, omega = np.exp(fsolve(balance, np.log([0.05, 40.0])))
     cycle = smc.run(
-        smc.Scenario(plant=drone, law="super_twisting_attitude", x0=(0.0, 0.0, 1.0, 0.0, 0.0, 0.01), duration=6.0)
+        smc.Scenario(
+            plant=drone,
+            law="super_twisting_attitude",
+            x0=(0.0, 0.0, 1.0, 0.0, 0.0, 0.01),
+            duration=6.0,
+        )
     )
     s = cycle.s[cycle.t > 4.0, 5]
     crossings = np.count_nonzero(np.diff(np.sign(s)))
@@ -344,7 +459,12 @@ def turn(plant, law, axis, **fields):
     """A run from a small angle about one axis, with the position left alone."""
     start = [0.0, 0.0, 30.0, 0.0, 0.0, 0.0]
     start[3 + axis] = 0.05
-    common = {"plant": plant, "law": smc.law(law, **NOWHERE[law]), "duration": 1.0, "control_period": 1e-3}
+    common = {
+        "plant": plant,
+        "law": smc.law(law, **NOWHERE[law]),
+        "duration": 1.0,
+        "control_period": 1e-3,
+    }
     return smc.run(smc.Scenario(x0=tuple(start), **common | fields))
 
 
@@ -359,7 +479,10 @@ def linear(A, x0, times):
 @pytest.mark.parametrize("axis", range(3))
 def test_indi_leaves_the_rotors_lag_between_what_it_asks_for_and_the_acceleration(drone, axis):
     """lag a' + a = -kq angle - kw w, whatever the filter."""
-    trace, A = turn(drone, "indi_attitude", axis), np.array([[0, 1, 0], [0, 0, 1], [-120.0, -24.0, -1.0]])
+    trace, A = (
+        turn(drone, "indi_attitude", axis),
+        np.array([[0, 1, 0], [0, 0, 1], [-120.0, -24.0, -1.0]]),
+    )
     A[2] /= 0.0625
     angle = linear(A, [0.05, 0.0, 0.0], trace.t)[:, 0]
     np.testing.assert_allclose(trace.x[:, 3 + axis], angle, atol=0.03 * 0.05)
@@ -367,9 +490,17 @@ def test_indi_leaves_the_rotors_lag_between_what_it_asks_for_and_the_acceleratio
 
 @pytest.mark.parametrize("axis", range(3))
 def test_adrc_near_its_attitude_is_its_linear_observer_and_loop(drone, axis):
-    wc, wo, lag, loop = 4.0, 40.0, 0.0625, np.zeros((7, 7))  # z1, z2, z3, A v, angle, w, acceleration
+    wc, wo, lag, loop = (
+        4.0,
+        40.0,
+        0.0625,
+        np.zeros((7, 7)),
+    )  # z1, z2, z3, A v, angle, w, acceleration
     loop[0, 1] = loop[1, 2] = loop[1, 3] = loop[4, 5] = loop[5, 6] = 1.0
-    corrections, feedback = np.array([3.0 * wo, 3.0 * wo**2, wo**3]), np.array([wc**2, 2.0 * wc, 1.0])
+    corrections, feedback = (
+        np.array([3.0 * wo, 3.0 * wo**2, wo**3]),
+        np.array([wc**2, 2.0 * wc, 1.0]),
+    )
     loop[:3, 0] -= corrections
     loop[:3, 4] += corrections
     loop[[3, 6], :3] = -feedback / lag
@@ -381,13 +512,18 @@ def test_adrc_near_its_attitude_is_its_linear_observer_and_loop(drone, axis):
 
 @pytest.mark.slow
 def test_indi_takes_the_torque_of_rotors_that_speed_up_into_account():
-    """Of the plant's rotors, F = k1 W + k2 W^2: spin = Jr / (F' c), 0.058 s. Without it the yaw is off by 10 %."""
+    """Of the plant's rotors, F = k1 W + k2 W^2: spin = Jr / (F' c), 0.058 s.
+
+    Without it the yaw is off by 10 %.
+    """
     plant = smc.plant("quadrotor")
     p, lag, off = plant.parameters, np.array([[0, 1, 0], [0, 0, 1], [-1920.0, -384.0, -16.0]]), []
     force_per_speed = math.sqrt(p["k1"] ** 2 + p["k2"] * p["m"] * p["grav"])  # at hover
     for spin in (0.0, p["Jr"] / (force_per_speed * p["c"])):
         law = smc.law("indi_attitude", **NOWHERE["indi_attitude"], spin=spin)
-        trace = smc.run(smc.Scenario(plant=plant, law=law, x0=(0.0, 0.0, 20.0, 0.0, 0.0, 0.05), duration=1.0))
+        trace = smc.run(
+            smc.Scenario(plant=plant, law=law, x0=(0.0, 0.0, 20.0, 0.0, 0.0, 0.05), duration=1.0)
+        )
         angle = linear(lag, [0.05, 0.0, 0.0], trace.t)[:, 0]
         off.append(np.abs(trace.x[:, 5] - angle).max() / 0.05)
     assert off[0] > 0.08
@@ -396,7 +532,9 @@ def test_indi_takes_the_torque_of_rotors_that_speed_up_into_account():
 
 @pytest.mark.slow
 def test_laws_that_are_told_a_long_lag_fly_behind_it():
-    """crazyflow's identified 0.136 s, behind which the published gains of `geometric` leave a limit cycle."""
+    """crazyflow's identified 0.136 s, behind which the published gains of `geometric` leave a limit
+    cycle.
+    """
     plant = smc.plant("quadrotor", set="crazyflow")
     start = (0.2, -0.2, 1.2, 0.2, -0.2, 0.2)
     laws = ["geometric", smc.law("indi_attitude", lag=0.136), smc.law("adrc_attitude", lag=0.136)]
@@ -408,7 +546,9 @@ def test_laws_that_are_told_a_long_lag_fly_behind_it():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_turn_across_the_back_takes_the_shorter_way(drone, law):
-    """From a heading of 160 to one of -160 degrees it turns by 40 degrees, not by 320, as from 40 to 0."""
+    """From a heading of 160 to one of -160 degrees it turns by 40 degrees, not by 320, as from 40
+    to 0.
+    """
     paths = []
     for start, end in ((160.0, -160.0), (40.0, 0.0)):
         goal = [smc.Constant(value) for value in (0.0, 0.0, 1.0, 0.0, 0.0, math.radians(end))]
@@ -423,17 +563,29 @@ def test_a_turn_across_the_back_takes_the_shorter_way(drone, law):
 @pytest.mark.parametrize("law", LAWS)
 def test_it_recovers_from_upside_down(drone, law):
     """170 degrees of roll, turning, at rest in the air with room below."""
-    start = {"x0": (0.0, 0.0, 30.0, math.radians(170.0), 0.0, 0.0), "v0": (0.0, 0.0, 0.0, 10.0, 5.0, 3.0)}
+    start = {
+        "x0": (0.0, 0.0, 30.0, math.radians(170.0), 0.0, 0.0),
+        "v0": (0.0, 0.0, 0.0, 10.0, 5.0, 3.0),
+    }
     goal = [smc.Constant(value) for value in (0.0, 0.0, 30.0, 0.0, 0.0, 0.0)]
-    trace = smc.run(smc.Scenario(plant=drone, law=law, reference=goal, duration=14.0, control_period=2e-3, **start))
+    trace = smc.run(
+        smc.Scenario(
+            plant=drone, law=law, reference=goal, duration=14.0, control_period=2e-3, **start
+        )
+    )
     assert np.abs(trace.e[-1]).max() < 0.05
     assert trace.x[:, 2].min() > 15.0
 
 
-@pytest.mark.parametrize(("law", "kq", "kw"), [("geometric", 421.7, 69.27), ("quaternion_sliding", 400.0, 104.0)])
-def test_noise_leaves_millimetres_and_a_delay_beyond_the_margin_of_the_attitude_loses_it(drone, law, kq, kw):
-    """With w' = -kw w - kq angle behind the rotors' lag, whose phase at the crossover decides; no path, all gains
-    published. Wanted attitudes from sample to sample lost the drone in noise: 28 and 77 m.
+@pytest.mark.parametrize(
+    ("law", "kq", "kw"), [("geometric", 421.7, 69.27), ("quaternion_sliding", 400.0, 104.0)]
+)
+def test_noise_leaves_millimetres_and_a_delay_beyond_the_margin_of_the_attitude_loses_it(
+    drone, law, kq, kw
+):
+    """With w' = -kw w - kq angle behind the rotors' lag, whose phase at the crossover decides; no
+    path, all gains published. Wanted attitudes from sample to sample lost the drone in noise: 28
+    and 77 m.
     """
     w = np.geomspace(1.0, 100.0, 100_000)
     loop = (1j * w * kw + kq) / ((1j * w) ** 2 * (0.0625j * w + 1.0))
@@ -441,7 +593,9 @@ def test_noise_leaves_millimetres_and_a_delay_beyond_the_margin_of_the_attitude_
     margin = (math.pi + np.angle(loop[cross])) / w[cross]
     common = {"plant": drone, "law": law, "x0": (0.2, -0.2, 1.2, 0.2, -0.2, 0.2), "duration": 8.0}
     noisy = {"noise": smc.Noise(0.01, 0.05), "input_delay": 5e-3}
-    seen, lost = smc.run([smc.Scenario(**common, **noisy), smc.Scenario(**common, input_delay=10e-3)])
+    seen, lost = smc.run(
+        [smc.Scenario(**common, **noisy), smc.Scenario(**common, input_delay=10e-3)]
+    )
     assert np.abs(seen.e[len(seen.t) // 2 :, :3]).max() < 0.02
     assert 5e-3 < margin < 10e-3
     assert np.abs(lost.e[-1, :3]).max() > 10.0
@@ -455,9 +609,13 @@ def rate_by_differences(F, r, dr, h=1e-6):
 
 @pytest.mark.parametrize("F", [(0.1, -0.2, 0.3), (0.5, 0.1, -0.2), (-0.3, 0.9, -2.0)])
 def test_the_rate_of_the_wanted_attitude_is_that_of_its_differences(F):
-    F, dF, r, dr = (np.array(one) for one in (F, (0.4, -1.1, 0.8), (0.2, -0.3, 0.6), (1.0, 0.5, -2.0)))
+    F, dF, r, dr = (
+        np.array(one) for one in (F, (0.4, -1.1, 0.8), (0.2, -0.3, 0.6), (1.0, 0.5, -2.0))
+    )
     expected = rate_by_differences(lambda t: F + t * dF, r, dr)
-    np.testing.assert_allclose(rate_of(of_thrust(F, r), F, dF, r, dr), expected, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(
+        rate_of(of_thrust(F, r), F, dF, r, dr), expected, rtol=1e-6, atol=1e-7
+    )
 
 
 def test_the_rate_of_an_attitude_along_the_heading_turns_with_it():
@@ -468,7 +626,9 @@ def test_the_rate_of_an_attitude_along_the_heading_turns_with_it():
 
     dF = (F(1e-6) - F(-1e-6)) / 2e-6
     expected = rate_by_differences(F, r, dr)
-    np.testing.assert_allclose(rate_of(of_thrust(F(0.0), r), F(0.0), dF, r, dr), expected, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(
+        rate_of(of_thrust(F(0.0), r), F(0.0), dF, r, dr), expected, rtol=1e-6, atol=1e-7
+    )
 
 
 def attitude_of(F, heading):
@@ -482,7 +642,10 @@ def attitude_of(F, heading):
 def geometric_torque(error, turning):
     E = error.as_matrix()
     antisymmetric = 0.5 * (E - E.T)
-    return -421.7 * np.array([antisymmetric[2, 1], antisymmetric[0, 2], antisymmetric[1, 0]]) - 69.27 * turning
+    return (
+        -421.7 * np.array([antisymmetric[2, 1], antisymmetric[0, 2], antisymmetric[1, 0]])
+        - 69.27 * turning
+    )
 
 
 def sliding_torque(error, turning, lam=8.0, rho=0.25):
@@ -504,30 +667,63 @@ def adaptive_force(e, de):
     ("law", "force", "torque"),
     [
         (smc.law("geometric"), lambda e, de: -7.0 * e - 4.0 * de, geometric_torque),
-        (smc.law("quaternion_sliding"), lambda e, de: -1.25 * de - 5.0 * np.tanh(de + 1.25 * e), sliding_torque),
-        (smc.law("adaptive_quaternion_sliding", G=0.0, Gx=0.0, mu=0.0, mux=0.0), adaptive_force, adaptive_torque),
+        (
+            smc.law("quaternion_sliding"),
+            lambda e, de: -1.25 * de - 5.0 * np.tanh(de + 1.25 * e),
+            sliding_torque,
+        ),
+        (
+            smc.law("adaptive_quaternion_sliding", G=0.0, Gx=0.0, mu=0.0, mux=0.0),
+            adaptive_force,
+            adaptive_torque,
+        ),
     ],
     ids=lambda value: getattr(value, "name", ""),
 )
 def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law, force, torque):
-    """By rotation matrices, on a path that turns its heading. The inertia is not that of a ball, so w x J w counts."""
+    """By rotation matrices, on a path that turns its heading.
+
+    The inertia is not that of a ball, so w x J w counts.
+    """
     start = {"x0": (0.3, -0.2, 1.0, 0.4, -0.3, 0.2), "v0": (0.5, -0.4, 0.3, 6.0, -9.0, 7.0)}
-    body = smc.plant_from(TEXT.replace('"16.8e-6 16.8e-6', '"12e-6 20e-6'), channels=["body"], keyframe="hover")
-    trace = smc.run(smc.Scenario(plant=body, law=law, reference=PATH, duration=0.1, control_period=2e-3, **start))
-    J, dt, before, limits = np.diag([12e-6, 20e-6, 29.8e-6]), 2e-3, None, np.array(trace.scenario.limits)
+    body = smc.plant_from(
+        TEXT.replace('"16.8e-6 16.8e-6', '"12e-6 20e-6'), channels=["body"], keyframe="hover"
+    )
+    trace = smc.run(
+        smc.Scenario(
+            plant=body, law=law, reference=PATH, duration=0.1, control_period=2e-3, **start
+        )
+    )
+    J, dt, before, limits = (
+        np.diag([12e-6, 20e-6, 29.8e-6]),
+        2e-3,
+        None,
+        np.array(trace.scenario.limits),
+    )
     free, h = 0, 1e-5  # torques within their bounds
     for k, t in enumerate(trace.t[:-1]):
-        r, dr, ddr = (np.array([of(one, t) for one in PATH[:3]]) for of in (value, rate, acceleration))
+        r, dr, ddr = (
+            np.array([of(one, t) for one in PATH[:3]]) for of in (value, rate, acceleration)
+        )
         R, w, e, de = (
-            Rotation.from_rotvec(trace.x[k, 3:].copy()), trace.v[k, 3:], trace.x[k, :3] - r, trace.v[k, :3] - dr,
-        )  # fmt: skip
+            Rotation.from_rotvec(trace.x[k, 3:].copy()),
+            trace.v[k, 3:],
+            trace.x[k, :3] - r,
+            trace.v[k, :3] - dr,
+        )
         slow, earlier = before or (de, ddr)
-        slow = (slow + dt * 20.0 * de) / (1.0 + dt * 20.0)  # the implicit step of slow' = 20 (de - slow)
+        slow = (slow + dt * 20.0 * de) / (
+            1.0 + dt * 20.0
+        )  # the implicit step of slow' = 20 (de - slow)
         dde, jerk, before = 20.0 * (de - slow), (ddr - earlier) / dt, (slow, ddr)
 
         def wanted(ahead, t=t, e=e, de=de, ddr=ddr, dde=dde, jerk=jerk):
-            F = 0.0319 * (ddr + ahead * jerk + force(e + ahead * de, de + ahead * dde) + [0.0, 0.0, G])
-            return F, attitude_of(F, np.array([0.0, 0.0, value(PATH[5], t) + ahead * rate(PATH[5], t)]))
+            F = 0.0319 * (
+                ddr + ahead * jerk + force(e + ahead * de, de + ahead * dde) + [0.0, 0.0, G]
+            )
+            return F, attitude_of(
+                F, np.array([0.0, 0.0, value(PATH[5], t) + ahead * rate(PATH[5], t)])
+            )
 
         F, goal = wanted(0.0)
         turning = (wanted(-h)[1].inv() * wanted(h)[1]).as_rotvec() / (2.0 * h)
@@ -535,19 +731,29 @@ def test_commands_of_a_body_that_tumbles_are_the_formula_coded_again(drone, law,
         moving = error.inv().apply(turning)
         change = torque(error, w - moving) - np.cross(w, moving)
         up = R.apply([0.0, 0.0, 1.0])
-        command = np.array([*(max(F @ up, 0.127 * 0.0319 * G) * up), *(J @ change + np.cross(w, J @ w))])
-        np.testing.assert_allclose(trace.u[k], np.clip(command, -limits, limits), rtol=1e-6, atol=1e-10)
+        command = np.array(
+            [*(max(F @ up, 0.127 * 0.0319 * G) * up), *(J @ change + np.cross(w, J @ w))]
+        )
+        np.testing.assert_allclose(
+            trace.u[k], np.clip(command, -limits, limits), rtol=1e-6, atol=1e-10
+        )
         free += np.sum(np.abs(command[3:]) < limits[3:])
     assert free > 50
 
 
 def value(path, t):
-    return path.amplitude * math.sin(path.omega * t) if isinstance(path, smc.Sine) else path.amplitude
+    if isinstance(path, smc.Sine):
+        return path.amplitude * math.sin(path.omega * t)
+    return path.amplitude
 
 
 def rate(path, t):
-    return path.amplitude * path.omega * math.cos(path.omega * t) if isinstance(path, smc.Sine) else 0.0
+    if isinstance(path, smc.Sine):
+        return path.amplitude * path.omega * math.cos(path.omega * t)
+    return 0.0
 
 
 def acceleration(path, t):
-    return -(path.omega**2) * value(path, t) if isinstance(path, smc.Sine) else 0.0
+    if isinstance(path, smc.Sine):
+        return -(path.omega**2) * value(path, t)
+    return 0.0

@@ -52,12 +52,17 @@ def tuned():
 @pytest.mark.parametrize(
     ("text", "name", "gains"),
     [
-        ("twisting", "twisting", {}), ("twisting(r1=5, r2=2e0)", "twisting", {"r1": 5.0, "r2": 2.0}),
-        ("slow: twisting(r1=5)", "slow", {"r1": 5.0}), ("twisting(r1=(5, 6))", "twisting", {"r1": (5.0, 6.0)}),
-        ("mine.py", "mine", {"k": 2.0}), ("bound.py", "mine", {"k": 2.0}), ("theirs.py", "theirs", {}),
-        ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}), ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
+        ("twisting", "twisting", {}),
+        ("twisting(r1=5, r2=2e0)", "twisting", {"r1": 5.0, "r2": 2.0}),
+        ("slow: twisting(r1=5)", "slow", {"r1": 5.0}),
+        ("twisting(r1=(5, 6))", "twisting", {"r1": (5.0, 6.0)}),
+        ("mine.py", "mine", {"k": 2.0}),
+        ("bound.py", "mine", {"k": 2.0}),
+        ("theirs.py", "theirs", {}),
+        ("./mine.py(k=4)", "mine", {"k": 4.0, "c": 1.0}),
+        ("fast: mine.py(k=4)", "fast", {"k": 4.0}),
     ],
-)  # fmt: skip
+)
 def test_a_text_is_its_law(files, text, name, gains):
     law = smc.law(text)
     assert law.name == name
@@ -71,7 +76,11 @@ def test_a_tuning_is_its_law_and_keeps_its_source(files, tuned):
     law = smc.law("st.json")
     assert (law, law.source) == (tuned.law, tuned.law.source)
     assert law.source.kind == "tuned here"
-    assert smc.law("st.json", c=9.0).gains == smc.law(tuned.law, c=9.0).gains == {**tuned.law.gains, "c": 9.0}
+    assert (
+        smc.law("st.json", c=9.0).gains
+        == smc.law(tuned.law, c=9.0).gains
+        == {**tuned.law.gains, "c": 9.0}
+    )
     assert smc.law(tuned.law.template, c=9.0) == tuned.law.template(c=9.0)
     assert {s.law for s in smc.grid("duffing", ["st.json"], seeds=2)} == {tuned.law}
 
@@ -84,12 +93,23 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
     for words in (
         ("export", "st.json", "st.c"),
         ("export", "st.json", "st.fmu", "--no-binary"),
-        ("compare", "duffing", "--law", "st.json,two.py", "--seeds", "1", "--duration", "0.1", "--condition", "nominal",
-         "--no-tune"),
+        (
+            "compare",
+            "duffing",
+            "--law",
+            "st.json,two.py",
+            "--seeds",
+            "1",
+            "--duration",
+            "0.1",
+            "--condition",
+            "nominal",
+            "--no-tune",
+        ),
         ("margins", "duffing", "--law", "st.json", "--kinds", "delay", "--quick"),
         ("basin", "duffing", "--law", "st.json", "--points", "2", "--duration", "0.1"),
         ("tune", "duffing", "st.json", "--budget", "1"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(SystemExit) as end:
             cli.main([*words])
         assert not end.value.code, (words, capsys.readouterr().err)
@@ -100,13 +120,22 @@ def test_a_tuning_goes_through_every_door(files, tuned, capsys):
 def test_gains_of_your_own_law_are_named_where_its_code_is_missing(files):
     smc.tune("duffing", smc.law("mine.py"), budget=1, searches=1).save("mine.json")
     gains = json.loads((files / "mine.json").read_text())["scenario"]["law"]["gains"]
-    with pytest.raises(smc.ScenarioError, match=r"law mine of mine\.json is your own: give .* FILE\.py\(k=") as error:
+    with pytest.raises(
+        smc.ScenarioError, match=r"law mine of mine\.json is your own: give .* FILE\.py\(k="
+    ) as error:
         smc.law("mine.json")
     text = str(error.value).rpartition("FILE.py")[2]
     assert smc.law(f"mine.py{text}").gains == gains
 
 
-TEXTS = ("twistin", "twisting(5)", "twisting(r1=5", "twisting(r1=__import__('os'))", "twisting(r9=5)", "none.py")
+TEXTS = (
+    "twistin",
+    "twisting(5)",
+    "twisting(r1=5",
+    "twisting(r1=__import__('os'))",
+    "twisting(r9=5)",
+    "none.py",
+)
 TEXTS += ("two.py", "notes.txt", "empty.json", "bare.py", ".", "\0", 3)
 GAINS = ("lam", "lam=", "3=4", "lam=x", "a=1,a=2", "a=nan")
 

@@ -1,4 +1,6 @@
-"""The sets of gains: shipped gains come from the same rule, are near-optimal as stored, and each run has its own."""
+"""The sets of gains: shipped gains come from the same rule, are near-optimal as stored, and each
+run has its own.
+"""
 
 import dataclasses
 import itertools
@@ -18,8 +20,13 @@ SETS = list(itertools.product(gains.OBJECTIVES, scenarios.PLANTS))
 
 
 def shipped(gain_set: str, plant: str) -> dict[str, gains.TunedGains]:
-    """The gains of the laws of the first page, and of all others that have some: a new law has none yet."""
-    others = gains.general_laws([plant], gain_set) if gain_set == "tuned" else ()
+    """The gains of the laws of the first page, and of all others that have some: a new law has none
+    yet.
+    """
+    if gain_set == "tuned":
+        others = gains.general_laws([plant], gain_set)
+    else:
+        others = ()
     return {name: gains.tuned(plant, name, gain_set) for name in {*gains.LAWS, *others}}
 
 
@@ -68,11 +75,17 @@ def test_run_i_of_a_law_has_gain_set_i():
         sets = gains.tuned("duffing", name).sets
         assert len(sets) > 1
         ran = [s.law.gains for s in made if s.law.name == name]
-        assert all(law[gain] == value for k, law in enumerate(ran) for gain, value in sets[k % len(sets)].items())
+        assert all(
+            law[gain] == value
+            for k, law in enumerate(ran)
+            for gain, value in sets[k % len(sets)].items()
+        )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")])
+@pytest.mark.parametrize(
+    ("gain_set", "law"), [("tuned", "observer_free"), ("tracking", "super_twisting")]
+)
 def test_shipped_gains_cost_what_their_record_says(gain_set, law):
     """Set i in the runs of search i."""
     known = gains.tuned("duffing", law, gain_set)
@@ -88,13 +101,18 @@ def test_shipped_gains_cost_what_their_record_says(gain_set, law):
 def test_the_first_shipped_search_comes_out_again():
     known = gains.tuned("duffing", "observer_free")
     again = search.tune("duffing", "observer_free", seed=known.seed, searches=1)
-    assert again.objective == pytest.approx(known.objectives[0], rel=1e-3)  # another processor rounds otherwise
+    assert again.objective == pytest.approx(
+        known.objectives[0], rel=1e-3
+    )  # another processor rounds otherwise
 
 
 @pytest.mark.parametrize("plant", scenarios.PLANTS)
 def test_the_first_set_is_the_studys(plant):
     for law, values in scenarios.GAINS[plant].items():
-        assert dict(gains.law(plant, law, "study").gains) == dict(gains.law(plant, law, "default").gains) | values
+        assert (
+            dict(gains.law(plant, law, "study").gains)
+            == dict(gains.law(plant, law, "default").gains) | values
+        )
         assert scenarios.scenario(plant, law).law == gains.law(plant, law, "study")
 
 
@@ -106,14 +124,25 @@ def test_forms_of_a_law_take_its_gains_in_the_first_set(name):
 
 @pytest.mark.parametrize("gain_set", gains.OBJECTIVES)
 def test_the_law_without_a_clamp_takes_the_gains_of_its_rival(gain_set):
-    one, other = (gains.law("duffing", law, gain_set) for law in ("super_twisting", "super_twisting_unclamped"))
+    one, other = (
+        gains.law("duffing", law, gain_set)
+        for law in ("super_twisting", "super_twisting_unclamped")
+    )
     assert other.name == "super_twisting_unclamped"
     assert dict(one.gains) == dict(other.gains) | {"w_max": one.gains["w_max"]}
 
 
 def test_what_has_no_gains_gets_a_sentence(refused):
-    wrong = [("duffing", "classical", "best"), ("duffing", "hierarchical", "tuned"), ("duffing", "twisting", "study")]
-    wrong += [("overhead_crane", "classical", "tuned"), ("duffing", "clasical", "study"), ("cart_pole", "pid", "study")]
+    wrong = [
+        ("duffing", "classical", "best"),
+        ("duffing", "hierarchical", "tuned"),
+        ("duffing", "twisting", "study"),
+    ]
+    wrong += [
+        ("overhead_crane", "classical", "tuned"),
+        ("duffing", "clasical", "study"),
+        ("cart_pole", "pid", "study"),
+    ]
     for arguments in wrong:
         refused(lambda arguments=arguments: gains.law(*arguments))
     refused(lambda: gains.paper_plant(3))

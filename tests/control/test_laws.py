@@ -1,4 +1,5 @@
-"""The laws of the study are held to what is proved of them, mostly on plant A: s' = u + d, u held between samples.
+"""The laws of the study are held to what is proved of them, mostly on plant A: s' = u + d, u held
+between samples.
 
 What every law must have walks the catalogue in test_laws_catalogue.py.
 """
@@ -31,18 +32,24 @@ def test_classical_fails_below_the_disturbance_and_holds_above_it():
 
 
 TWIST = {"k1": 1.5, "k2": 1.1}
-# Multiples of a power of the period: k + D, D and L where |d| <= D and |d'| <= L, of `dynamic` and the explicit
-# super-twisting law as measured.
+# Multiples of a power of the period: k + D, D and L where |d| <= D and |d'| <= L, of `dynamic` and
+# the explicit super-twisting law as measured.
 RESIDUALS = [
-    ("classical", {"k": 2.0}, 1, 3.5), ("implicit_first_order", {"k": 2.0}, 1, 1.5),
-    ("implicit_super_twisting", TWIST, 1, 1.5), ("implicit_super_twisting", {"k1": 6.0, "k2": 8.0}, 1, 1.5),
-    ("dynamic", {"k": 10.0, "q": 3.0}, 1, 0.58), ("super_twisting", TWIST, 2, 6.0),
-    ("discrete_time", {"k": 2.0}, 2, 1.0), ("proper_super_twisting", TWIST, 2, 1.0),
-]  # fmt: skip
+    ("classical", {"k": 2.0}, 1, 3.5),
+    ("implicit_first_order", {"k": 2.0}, 1, 1.5),
+    ("implicit_super_twisting", TWIST, 1, 1.5),
+    ("implicit_super_twisting", {"k1": 6.0, "k2": 8.0}, 1, 1.5),
+    ("dynamic", {"k": 10.0, "q": 3.0}, 1, 0.58),
+    ("super_twisting", TWIST, 2, 6.0),
+    ("discrete_time", {"k": 2.0}, 2, 1.0),
+    ("proper_super_twisting", TWIST, 2, 1.0),
+]
 
 
 @pytest.mark.parametrize(("name", "gains", "power", "multiple"), RESIDUALS)
-def test_a_sampled_law_ends_within_a_multiple_of_a_power_of_the_period_and_not_far_below(name, gains, power, multiple):
+def test_a_sampled_law_ends_within_a_multiple_of_a_power_of_the_period_and_not_far_below(
+    name, gains, power, multiple
+):
     h = np.array([1e-3, 1e-4])
     shares = orders(smc.law(name, **gains), steps=h)[1] / (multiple * h**power)
     assert np.all((shares > 0.9) & (shares < 1.0 + 1e-5)), shares
@@ -110,7 +117,9 @@ def test_observer_free_is_bounded_by_lam_and_saturates_there():
     forces = np.array([one(law, e=e, de=de)[0] for e, de in states])
     assert np.abs(forces).max() <= 2.5
     assert one(law, e=1e9)[0] == -2.5
-    np.testing.assert_allclose(forces, -2.5 * np.tanh(states[:, 1] + 3.0 * states[:, 0]), rtol=1e-14)
+    np.testing.assert_allclose(
+        forces, -2.5 * np.tanh(states[:, 1] + 3.0 * states[:, 0]), rtol=1e-14
+    )
 
 
 # Plant, (J, D, K) of its linearisation J x'' + D x' + K x = u at the origin, lam, k1.
@@ -130,7 +139,11 @@ def test_observer_free_is_locally_stable_just_where_its_condition_says(plant, li
     """The envelope of a tiny error grows or dies at the rate of the linearisation's slowest root."""
     J, D, K = linear
     law = smc.law("observer_free", lam=lam, k1=k1)
-    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=1e-6, duration=20.0, control_period=2e-3, u_max=math.inf))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant, law=law, x0=1e-6, duration=20.0, control_period=2e-3, u_max=math.inf
+        )
+    )
     closed = np.array([[0.0, 1.0], [-(K + lam * k1) / J, -(D + lam) / J]])
     stable = lam > -D and lam * k1 > -K
     assert stable == bool(np.linalg.eigvals(closed).real.max() < 0)

@@ -1,7 +1,9 @@
-"""What every law of the library must have, walked over the catalogue: a law added is tested here without an edit.
+"""What every law of the library must have, walked over the catalogue: a law added is tested here
+without an edit.
 
-On every plant that it applies to, a law with its default gains ends within 5 % of where it began, with the model or
-without. Memory belongs to a channel and a run, and a law is odd in what it measures.
+On every plant that it applies to, a law with its default gains ends within 5 % of where it began,
+with the model or without. Memory belongs to a channel and a run, and a law is odd in what it
+measures.
 """
 
 import dataclasses
@@ -32,7 +34,9 @@ MODELLED = {"hierarchical": "a joint without an actuator is moved through its no
 
 
 def plants(name):
-    """The plants that a law applies to: those that it names, or the study's, networks of three to save time."""
+    """The plants that a law applies to: those that it names, or the study's, networks of three to
+    save time.
+    """
     if named := catalogue()[name].plants:
         return named
     return [smc.plant(plant, n=3) if plant.endswith("network") else plant for plant in paper.GAINS]
@@ -40,20 +44,26 @@ def plants(name):
 
 @functools.cache
 def traces():
-    """Every law on every plant that it applies to, on one without the model and on the next with it: law -> traces.
+    """Every law on every plant that it applies to, on one without the model and on the next with
+    it: law -> traces.
 
-    Euler's rule in steps of 2 ms takes a sixth of the time of Runge and Kutta's in steps of 1 ms, and no bound here is
-    near its error. Van der Pol's oscillator without its model takes the longest to settle.
+    Euler's rule in steps of 2 ms takes a sixth of the time of Runge and Kutta's in steps of 1 ms,
+    and no bound here is near its error. Van der Pol's oscillator without its model takes the
+    longest to settle.
     """
     common = {"integrator": "Euler", "control_period": 2e-3, "physics_step": 2e-3}
     found = {}
     for name in smc.laws():
-        first = zlib.crc32(name.encode()) % 2  # one half of the laws each, whichever laws there are beside it
+        first = (
+            zlib.crc32(name.encode()) % 2
+        )  # one half of the laws each, whichever laws there are beside it
         models = itertools.cycle(("none", "nominal") if first else ("nominal", "none"))
         if name in MODELLED or name == "none":
             models = itertools.repeat("nominal" if name in MODELLED else "none")
         found[name] = [
-            smc.Scenario(plant=plant, law=name, model=model, duration=8.0 if plant in SLOW else 6.0, **common)
+            smc.Scenario(
+                plant=plant, law=name, model=model, duration=8.0 if plant in SLOW else 6.0, **common
+            )
             for plant, model in zip(plants(name), models, strict=False)
         ]
     ran = iter(smc.run([scenario for scenarios in found.values() for scenario in scenarios]))
@@ -73,8 +83,12 @@ def test_default_gains_end_within_five_percent_on_every_plant_with_the_model_or_
 
 
 def test_none_leaves_each_plant_where_its_equation_takes_it():
-    """The pendulums fall from upright, Van der Pol goes round, Duffing goes to a well beside 0, the chain swings."""
-    ends = {trace.scenario.plant.name: np.abs(trace.x[trace.t > 2.0]).max() for trace in traces()["none"]}
+    """The pendulums fall from upright, Van der Pol goes round, Duffing goes to a well beside 0, the
+    chain swings.
+    """
+    ends = {}
+    for trace in traces()["none"]:
+        ends[trace.scenario.plant.name] = np.abs(trace.x[trace.t > 2.0]).max()
     assert ends["inverted_pendulum"] > math.pi
     assert ends["inverted_pendulum_network"] > 1.0
     assert ends["van_der_pol"] == pytest.approx(2.0, abs=0.05)
@@ -85,7 +99,9 @@ def test_none_leaves_each_plant_where_its_equation_takes_it():
 @LAWS
 def test_a_law_is_odd_in_what_it_measures_and_commands_nothing_where_there_is_no_error(name):
     law = smc.law(name)
-    plain = rebuild(law.function, lambda helper: helper)  # numba would compile the helpers of mpc for seconds
+    plain = rebuild(
+        law.function, lambda helper: helper
+    )  # numba would compile the helpers of mpc for seconds
     law, memory = dataclasses.replace(law, function=plain), np.zeros(law.memory)
     for _ in range(3):
         assert called(law, measured(limit=6.0), memory) == (0.0, 0.0)
@@ -106,16 +122,22 @@ def test_a_first_order_law_pushes_towards_its_surface():
 
 @functools.cache
 def swings():
-    """Uncoupled pendulums, one at rest and two mirrored, under every law, each twice: name -> two traces."""
+    """Uncoupled pendulums, one at rest and two mirrored, under every law, each twice: name -> two
+    traces.
+    """
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
     names = [name for name in smc.laws() if not catalogue()[name].plants]
-    scenarios = [smc.Scenario(plant=plant, law=name, x0=(0.5, 0.0, -0.5), duration=0.1) for name in names]
+    scenarios = []
+    for name in names:
+        scenarios.append(smc.Scenario(plant=plant, law=name, x0=(0.5, 0.0, -0.5), duration=0.1))
     ran = smc.run(scenarios + scenarios[::-1])
     return {name: (ran[i], ran[-1 - i]) for i, name in enumerate(names)}
 
 
 def test_memory_belongs_to_a_channel_and_a_run():
-    """The pendulum at rest stays at rest, the others stay mirrored; a second run beside the first is the same."""
+    """The pendulum at rest stays at rest, the others stay mirrored; a second run beside the first
+    is the same.
+    """
     for name, (trace, again) in swings().items():
         assert not trace.x[:, 1].any(), name
         np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])
@@ -129,7 +151,9 @@ ALL = [*known_laws().values(), *surface.catalogue().values(), *estimator.catalog
 
 @pytest.mark.parametrize("template", ALL, ids=lambda t: f"{t.kind}-{t.name}")
 def test_the_gains_in_a_docstring_are_those_of_the_function(template):
-    """Each part of `Gains: a, what it is; b and c, what they are.` begins with gains, and every gain is named."""
+    """Each part of `Gains: a, what it is; b and c, what they are.` begins with gains, and every
+    gain is named.
+    """
     said = re.search(r"^Gains?: (.*?)(?:\.$|\.\nSource|\Z)", template.doc, re.MULTILINE | re.DOTALL)
     assert bool(said) is bool(template.gains)
     parts = said[1].split(";") if said else []

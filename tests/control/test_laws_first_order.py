@@ -1,10 +1,23 @@
-"""First-order laws beside the study's, each held to what its docstring states, on plants A and B sampled exactly."""
+"""First-order laws beside the study's, each held to what its docstring states, on plants A and B
+sampled exactly.
+"""
 
 import math
 
 import numpy as np
 import pytest
-from helpers.plants_ab import called, constant, measured, on_surface, one, plant_a, plant_b, rest, sine, wave
+from helpers.plants_ab import (
+    called,
+    constant,
+    measured,
+    on_surface,
+    one,
+    plant_a,
+    plant_b,
+    rest,
+    sine,
+    wave,
+)
 from scipy.optimize import brentq
 
 import smc_mujoco as smc
@@ -31,10 +44,15 @@ def test_exponential_reaching_keeps_its_time_against_a_disturbance_and_classical
     k, q, h = 2.0, 3.0, 1e-3
     run = plant_a(smc.law("exponential_reaching", k=k, q=q), wave, s=s0)
     assert run.reached(h * (k + D)) <= math.log(1 + q * s0 / (k - D)) / q + 2 * h
-    assert plant_a(smc.law("classical", k=k), wave, s=100.0, duration=20.0).reached(h * (k + D)) == math.inf
+    assert (
+        plant_a(smc.law("classical", k=k), wave, s=100.0, duration=20.0).reached(h * (k + D))
+        == math.inf
+    )
 
 
-@pytest.mark.parametrize(("k", "a", "s0"), [(2.0, 0.5, 4.0), (6.0, 0.5, 1.0), (1.0, 0.25, -2.0), (3.0, 0.75, 1.0)])
+@pytest.mark.parametrize(
+    ("k", "a", "s0"), [(2.0, 0.5, 4.0), (6.0, 0.5, 1.0), (1.0, 0.25, -2.0), (3.0, 0.75, 1.0)]
+)
 def test_power_rate_takes_the_time_of_its_formula(k, a, s0):
     h = 1e-4
     run = plant_a(smc.law("power_rate", k=k, a=a), s=s0, h=h)
@@ -56,7 +74,12 @@ def test_fixed_time_reaches_before_its_bound_over_six_decades(s0):
     law = smc.law("fixed_time", k1=k1, k2=k2, a=a, b=b, k=k)
     bound = 1 / (k1 * (1 - a)) + 1 / (k2 * (b - 1))
     assert plant_a(law, wave, s=s0, duration=4.0).reached(2 * h * (k + D)) <= bound
-    assert plant_a(smc.law("fixed_time", k1=k1, k2=k2, a=a, b=b, k=0.0), s=s0, duration=4.0).reached(1e-4) <= bound
+    assert (
+        plant_a(smc.law("fixed_time", k1=k1, k2=k2, a=a, b=b, k=0.0), s=s0, duration=4.0).reached(
+            1e-4
+        )
+        <= bound
+    )
 
 
 def test_fixed_time_explicit_diverges_beyond_the_bound_of_its_docstring():
@@ -93,7 +116,9 @@ def test_implicit_varies_a_thousand_times_less_than_explicit():
 
 
 def test_implicit_is_classical_while_it_reaches():
-    implicit, classical = (plant_a(smc.law(name, k=2.0), wave, s=3.0) for name in ("implicit_first_order", "classical"))
+    implicit, classical = (
+        plant_a(smc.law(name, k=2.0), wave, s=3.0) for name in ("implicit_first_order", "classical")
+    )
     far = np.abs(classical.s) > 0.01
     first = np.argmin(far)
     np.testing.assert_array_equal(implicit.u[:first], classical.u[:first])
@@ -125,7 +150,14 @@ def test_discrete_reaching_follows_its_recursion_on_the_sampled_double_integrato
     run = plant_b(law, x=(1.0, 0.3), h=h, f=-2.0, g=3.0, model=1.0)
     s = run.sigma
     np.testing.assert_allclose(s[1:], (1 - q * h) * s[:-1] - eps * h * np.sign(s[:-1]), atol=1e-12)
-    euler = plant_b(smc.law("exponential_reaching", k=eps, q=q, c=c), x=(1.0, 0.3), h=h, f=-2.0, g=3.0, model=1.0).sigma
+    euler = plant_b(
+        smc.law("exponential_reaching", k=eps, q=q, c=c),
+        x=(1.0, 0.3),
+        h=h,
+        f=-2.0,
+        g=3.0,
+        model=1.0,
+    ).sigma
     assert np.abs(euler[1:] - (1 - q * h) * euler[:-1] + eps * h * np.sign(euler[:-1])).max() > 1e-4
 
 
@@ -247,7 +279,8 @@ def test_dynamic_does_not_wind_up():
 # what mends the paper's law
 
 
-# J, D, K of J x'' + D x' + K x = u + d; lam, k1, ki; d. The condition is an equality between the pairs.
+# J, D, K of J x'' + D x' + K x = u + d; lam, k1, ki; d. The condition is an equality between the
+# pairs.
 INTEGRAL = [
     ((1.0, 0.0, 0.0), (2.0, 1.0, 1.8), 0.0), ((1.0, 0.0, 0.0), (2.0, 1.0, 2.2), 0.0),
     ((1.0, 0.0, 0.0), (2.0, 1.0, 1.3), 1.0), ((1.0, 0.0, 0.0), (2.0, 1.0, 1.7), 1.0),
@@ -258,7 +291,9 @@ INTEGRAL = [
 
 
 @pytest.mark.parametrize(("linear", "gains", "d"), INTEGRAL)
-def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_say(linear, gains, d):
+def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_say(
+    linear, gains, d
+):
     (J, damping, K), (lam, k1, ki) = linear, gains
     m = lam * (1 - (d / lam) ** 2)
     stable = m > -damping and ki > 0 and (damping + m) * (K + m * k1) > J * m * ki
@@ -266,7 +301,15 @@ def test_observer_free_integral_is_locally_stable_just_where_routh_and_hurwitz_s
     assert stable == bool(roots.real.max() < 0)
     law = smc.law("observer_free_integral", lam=lam, k1=k1, ki=ki)
     size, rest = 1e-6, [math.atanh(d / lam) / ki]  # beside the rest that the load leaves
-    run = plant_b(law, x=(size, 0.0), f=d / J, g=1 / J, rates=(-K / J, -damping / J), memory=rest, duration=60.0)
+    run = plant_b(
+        law,
+        x=(size, 0.0),
+        f=d / J,
+        g=1 / J,
+        rates=(-K / J, -damping / J),
+        memory=rest,
+        duration=60.0,
+    )
     assert (np.abs(run.s[-2000:]).max() < size) == stable
 
 
@@ -279,13 +322,19 @@ def winding(y, gains, memory):
 
 
 def test_observer_free_integral_does_not_wind_up():
-    """A load beyond lam carries the plant away: z is constant. From afar, z stays small, and so does the overshoot."""
+    """A load beyond lam carries the plant away: z is constant.
+
+    From afar, z stays small, and so does the overshoot.
+    """
     law = smc.law("observer_free_integral", lam=2.0, k1=1.0, ki=1.0)
     lost = plant_b(law, constant(3.0), x=(0.0, 0.0))
     assert lost.s[-1] > 10
     assert np.ptp(lost.memory[2000:, 0]) == 0.0
     assert abs(lost.memory[-1, 0]) < 2.0
-    gains, common = {"lam": 2.0, "k1": 1.0, "ki": 0.3}, {"x": (30.0, 0.0), "h": 1e-2, "duration": 60.0}
+    gains, common = (
+        {"lam": 2.0, "k1": 1.0, "ki": 0.3},
+        {"x": (30.0, 0.0), "h": 1e-2, "duration": 60.0},
+    )
     near = plant_b(smc.law("observer_free_integral", **gains), constant(0.5), **common)
     far = plant_b(winding(**gains), constant(0.5), **common)
     z, s = near.memory[:, 0], near.sigma - 0.3 * near.memory[:, 0]
@@ -305,7 +354,10 @@ def test_observer_free_adaptive_rests_where_its_docstring_says(d):
 
 
 def test_observer_free_adaptive_is_the_plain_law_within_its_dead_zone_and_forgets():
-    law, base = smc.law("observer_free_adaptive", lam=4.0, leak=2.0), smc.law("observer_free", lam=4.0)
+    law, base = (
+        smc.law("observer_free_adaptive", lam=4.0, leak=2.0),
+        smc.law("observer_free", lam=4.0),
+    )
     y = measured(0.01, 0.02)
     assert one(law, e=0.01, de=0.02) == one(base, e=0.01, de=0.02)
     memory = np.array([30.0])
@@ -323,11 +375,20 @@ def test_observer_free_adaptive_does_not_grow_without_end_under_noise():
     assert plant_a(capped, wave, noise=noise, duration=40.0).memory.max() == 10.0
 
 
-EXACT = ("exponential_reaching", "implicit_first_order", "fixed_time", "discrete_time", "barrier_adaptive", "dynamic")
+EXACT = (
+    "exponential_reaching",
+    "implicit_first_order",
+    "fixed_time",
+    "discrete_time",
+    "barrier_adaptive",
+    "dynamic",
+)
 
 
 def test_surface_and_own_sliding_variable_give_the_same_first_order_law():
-    """On the linear surface of another slope a law is itself with that slope; the model adds what the surface asks."""
+    """On the linear surface of another slope a law is itself with that slope; the model adds what
+    the surface asks.
+    """
     forms = [f"observer_free_{form}" for form in ("table", "taylor", "single", "q15")]
     state = {"f": 0.7, "g": 2.0, "model": 1.0}
     for name in (*EXACT, "power_rate", "fuzzy_gain", "prescribed_time", "integral", *forms):

@@ -1,6 +1,8 @@
-"""Super-twisting laws, laws of relative degree 2 and 3, and terminal laws, each held to what is proved of it.
+"""Super-twisting laws, laws of relative degree 2 and 3, and terminal laws, each held to what is
+proved of it.
 
-On the chains of plants_ab.py, sampled without error; relative degree 3 on mechanisms behind an actuator lag.
+On the chains of plants_ab.py, sampled without error; relative degree 3 on mechanisms behind an
+actuator lag.
 """
 
 import math
@@ -49,7 +51,10 @@ def law(name, **gains):
 def test_implicit_laws_vary_their_command_as_the_disturbance_does_and_the_explicit_one_chatters():
     d, turns = constant(0.5), {}
     for name in ("super_twisting", "implicit_super_twisting", "proper_super_twisting", "classical"):
-        gains = {"k": 2.0} if name == "classical" else {"k1": 1.5, "k2": 1.1}
+        if name == "classical":
+            gains = {"k": 2.0}
+        else:
+            gains = {"k1": 1.5, "k2": 1.1}
         turns[name] = plant_a(law(name, **gains), d).variation()
     assert max(turns["implicit_super_twisting"], turns["proper_super_twisting"]) < 1e-6
     assert turns["super_twisting"] > 0.3
@@ -58,7 +63,9 @@ def test_implicit_laws_vary_their_command_as_the_disturbance_does_and_the_explic
 
 @pytest.mark.parametrize("name", ["implicit_super_twisting", "proper_super_twisting"])
 def test_implicit_laws_solve_their_inclusion(name):
-    """5,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2 sgn(z)."""
+    """5,000 random gains, periods and states: u + k1 [z]^(1/2) - w+ is 0, and w+ is in w - dt k2
+    sgn(z).
+    """
     rng = np.random.default_rng(12)
     k1, k2, dt = 10.0 ** rng.uniform((-1, -1, -4), (1, 1, 0), (5_000, 3)).T
     s, w = rng.normal(size=(2, 5_000)) * 10.0 ** rng.uniform(-6, 0, (2, 5_000))
@@ -79,7 +86,9 @@ def test_implicit_laws_solve_their_inclusion(name):
             on += 1
             assert abs(after - w_) <= h * k2_ * (1.0 + 1e-12) + 1e-15, values
         else:
-            assert after == pytest.approx(w_ - h * k2_ * math.copysign(1.0, z), rel=1e-12, abs=1e-15), values
+            assert after == pytest.approx(
+                w_ - h * k2_ * math.copysign(1.0, z), rel=1e-12, abs=1e-15
+            ), values
     assert 250 < on < 4_750
 
 
@@ -95,7 +104,9 @@ def test_a_disturbance_of_slope_below_k2_is_followed_and_one_above_is_not(name):
 def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_model():
     """With f and g known, the plant s' = -5 + 4 u + d is the plant s' = v + d with v in [-13, 3]."""
     given = {"f": -5.0, "g": 4.0, "model": 1.0, "limit": 2.0}
-    run = plant_a(law("conditioned_super_twisting", k1=1.5, k2=1.1), wave, s=-20.0, duration=20.0, **given)
+    run = plant_a(
+        law("conditioned_super_twisting", k1=1.5, k2=1.1), wave, s=-20.0, duration=20.0, **given
+    )
     assert run.residual() < 20 * 1e-3**2
     assert run.s.max() < 3.0**2 / (2 * 1.1)
     assert run.memory[:, 0].max() <= 3.0 + 2e-3
@@ -103,13 +114,15 @@ def test_conditioned_super_twisting_bounds_the_command_itself_and_so_knows_the_m
 
 def test_super_twisting_without_a_clamp_is_the_law_as_published():
     gains = {"k1": 1.5, "k2": 1.1}
-    plain, published = (plant_a(law(n, **gains), wave) for n in ("super_twisting", "super_twisting_unclamped"))
+    plain, published = (
+        plant_a(law(n, **gains), wave) for n in ("super_twisting", "super_twisting_unclamped")
+    )
     np.testing.assert_array_equal(plain.x, published.x)
     np.testing.assert_array_equal(plain.u, published.u)
     for sign in (1.0, -1.0):  # w grows at k2 without end
-        assert plant_a(law("super_twisting", **gains), s=sign * 1e9, limit=1.0).memory[-1, 0] == pytest.approx(
-            -sign * 1.1 * 9.999
-        )
+        assert plant_a(law("super_twisting", **gains), s=sign * 1e9, limit=1.0).memory[
+            -1, 0
+        ] == pytest.approx(-sign * 1.1 * 9.999)
 
 
 def test_clamped_super_twisting_keeps_its_integral_within_w_max_and_its_accuracy_below_it():
@@ -119,13 +132,17 @@ def test_clamped_super_twisting_keeps_its_integral_within_w_max_and_its_accuracy
         assert np.abs(beyond.memory).max() == 0.5
         assert beyond.s[-1] == pytest.approx(sign * (0.3 / 1.5) ** 2, rel=1e-6)
     below = constant(0.2) + sine(0.2, 3.0)  # |d| <= 0.4
-    clamped, plain = (plant_a(law("super_twisting", **gains | {"w_max": w}), below) for w in (0.5, math.inf))
+    clamped, plain = (
+        plant_a(law("super_twisting", **gains | {"w_max": w}), below) for w in (0.5, math.inf)
+    )
     assert clamped.residual() == pytest.approx(plain.residual(), rel=0.2)
     assert clamped.residual() < 10 * 1e-3**2
 
 
 def test_clamped_super_twisting_on_van_der_pol_is_that_of_an_independent_integration():
-    """The study's first gains, held input, Runge and Kutta's rule in steps of 0.25 ms: to 1e-3 m over 10 s."""
+    """The study's first gains, held input, Runge and Kutta's rule in steps of 0.25 ms: to 1e-3 m
+    over 10 s.
+    """
     k1, k2, c, bound, h = 4.567, 45.47, 2.16, 6.0, 1e-3
     x, v, w, states = 2.0, 0.0, 0.0, np.empty((10_001, 2))
 
@@ -143,7 +160,10 @@ def test_clamped_super_twisting_on_van_der_pol_is_that_of_an_independent_integra
             bx, bv = rate(x + h / 8 * ax, v + h / 8 * av)
             dx, dv = rate(x + h / 8 * bx, v + h / 8 * bv)
             ex, ev = rate(x + h / 4 * dx, v + h / 4 * dv)
-            x, v = x + h / 24 * (ax + 2 * bx + 2 * dx + ex), v + h / 24 * (av + 2 * bv + 2 * dv + ev)
+            x, v = (
+                x + h / 24 * (ax + 2 * bx + 2 * dx + ex),
+                v + h / 24 * (av + 2 * bv + 2 * dv + ev),
+            )
     trace = smc.run(smc.paper.scenario("van_der_pol", "super_twisting"))
     assert trace.scenario.law == law("super_twisting", k1=k1, k2=k2, c=c, w_max=bound)
     np.testing.assert_allclose(trace.x[:, 0], states[: len(trace.x), 0], rtol=0, atol=1e-3)
@@ -162,7 +182,10 @@ def test_adaptive_super_twisting_finds_gains_for_disturbances_of_any_size_and_le
         assert run.residual() < 10 * mu
     K = k0 + run.memory[:, 1]
     assert 10.0 < K[-1] < 40.0
-    assert plant_a(law("super_twisting", k1=k0, k2=k0), sine(20.0), duration=20.0).residual() > 100 * mu
+    assert (
+        plant_a(law("super_twisting", k1=k0, k2=k0), sine(20.0), duration=20.0).residual()
+        > 100 * mu
+    )
     quiet = plant_a(rule, rest, duration=20.0)
     assert k0 + quiet.memory[-1, 1] == pytest.approx(least, abs=0.01)
     assert (k0 + quiet.memory[:, 1]).min() >= least - 1e-3 * rule.gains["rate"] - 1e-12
@@ -228,7 +251,8 @@ def test_discontinuous_laws_of_degree_2_are_accurate_to_the_second_power_of_the_
 
 
 @pytest.mark.parametrize(
-    ("name", "power"), [("terminal", 1 / 0.6), ("nonsingular_terminal", 1.6), ("nonsingular_fast_terminal", 1.6)]
+    ("name", "power"),
+    [("terminal", 1 / 0.6), ("nonsingular_terminal", 1.6), ("nonsingular_fast_terminal", 1.6)],
 )
 def test_terminal_laws_are_accurate_to_the_power_of_their_surface_or_better(name, power):
     """de = O(dt), and on the surface |e| goes as |de|^power."""
@@ -247,7 +271,10 @@ TERMINAL_LAWS = pytest.mark.parametrize(
     [
         ("terminal", lambda g, e: g["b"] * e ** g["p"]),
         ("nonsingular_terminal", lambda g, e: (g["B"] * e) ** (1 / g["p"])),
-        ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"])),
+        (
+            "nonsingular_fast_terminal",
+            lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"]),
+        ),
     ],
 )
 
@@ -279,7 +306,9 @@ def test_the_linear_term_of_the_fast_terminal_law_brings_it_in_from_afar():
 
 @TERMINAL_LAWS
 def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_too(name, speed):
-    """From the surface, g = 3, |f| = 1: s stays where k g > |f| + |g - 1| |eq|, and leaves where k g > |f| alone."""
+    """From the surface, g = 3, |f| = 1: s stays where k g > |f| + |g - 1| |eq|, and leaves where k
+    g > |f| alone.
+    """
     e, f, g = 1.5, 1.0, 3.0
     rule = law(name)
     start = (e, -speed(rule.gains, e))
@@ -288,11 +317,15 @@ def test_without_the_model_k_must_cover_what_g_makes_of_the_equivalent_control_t
     needed = (abs(f) + (g - 1.0) * abs(eq)) / g
     for share, stays in ((1.1, True), (0.9, False)):
         assert share * needed * g > abs(f)
-        run = plant_b(law(name, k=share * needed), x=start, f=math.copysign(f, eq), g=g, duration=0.1)
+        run = plant_b(
+            law(name, k=share * needed), x=start, f=math.copysign(f, eq), g=g, duration=0.1
+        )
         assert (np.diff(np.sign(run.sigma[2:50])) != 0.0).any() == stays, share
 
 
-@pytest.mark.parametrize("name", ["twisting", "suboptimal", "terminal", "nonsingular_terminal", "continuous_twisting"])
+@pytest.mark.parametrize(
+    "name", ["twisting", "suboptimal", "terminal", "nonsingular_terminal", "continuous_twisting"]
+)
 def test_the_model_takes_the_plant_out_of_a_law_of_degree_2(name):
     """f = -9.81 and g = 4 known: the run is that of e'' = v + d."""
     bare = plant_b(law(name), HUM, duration=3.0)
@@ -302,7 +335,9 @@ def test_the_model_takes_the_plant_out_of_a_law_of_degree_2(name):
 
 
 def test_twisting_is_siconos_explicit_one():
-    """An independent implementation, x'' = 19 x - 2 x' + u, u held over 50 ms: the published (x, x')."""
+    """An independent implementation, x'' = 19 x - 2 x' + u, u held over 50 ms: the published (x,
+    x').
+    """
     plant = smc.plant("duffing", M=1.0, delta=2.0, alpha=-19.0, beta=0.0)
     scenario = smc.Scenario(
         plant=plant,
@@ -344,14 +379,22 @@ def test_observer_free_law_of_degree_3_is_locally_stable_just_where_its_conditio
         (1.0, 9.0, 1.0, 6.0),
     ):
         rule = law("observer_free_third", lam=lam, k1=k1, k2=k2)
-        run = np.abs(plant_c(rule, x=(1e-6,) * 3, g=1 / tau, rates=(0.0, 0.0, -1 / tau), duration=20.0).s)
+        run = np.abs(
+            plant_c(rule, x=(1e-6,) * 3, g=1 / tau, rates=(0.0, 0.0, -1 / tau), duration=20.0).s
+        )
         assert ((1 + lam) * k2 > tau * k1) == (run[-4000:].max() < run[-12_000:-8000].max())
 
 
-BEHIND_A_LAG = [("duffing", 200.0), ("van_der_pol", 200.0), ("inverted_pendulum", 1000.0), ("pendulum_network", 1000.0)]
+BEHIND_A_LAG = [
+    ("duffing", 200.0),
+    ("van_der_pol", 200.0),
+    ("inverted_pendulum", 1000.0),
+    ("pendulum_network", 1000.0),
+]
 
 
-# Not the paper's law on the network: one of the five pendulums keeps a cycle of 0.036 rad, also at a step of 5 us.
+# Not the paper's law on the network: one of the five pendulums keeps a cycle of 0.036 rad, also at
+# a step of 5 us.
 @pytest.mark.parametrize(
     ("name", "plant", "L"),
     [("nested_third_order", *each) for each in BEHIND_A_LAG]

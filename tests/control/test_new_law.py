@@ -1,4 +1,6 @@
-"""A new law is one file: it alone makes the law listed, tunable, coloured, labelled, reported and known to theory."""
+"""A new law is one file: it alone makes the law listed, tunable, coloured, labelled, reported and
+known to theory.
+"""
 
 import json
 
@@ -67,7 +69,9 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """What a fresh interpreter finds out about two laws whose files were put beside those of the library."""
+    """What a fresh interpreter finds out about two laws whose files were put beside those of the
+    library.
+    """
     folder = tmp_path_factory.mktemp("more")
     (folder / "brand_new.py").write_text(NEW)
     (folder / "plain_one.py").write_text(PLAIN)
@@ -78,7 +82,9 @@ def found(tmp_path_factory):
     ("name", "label", "short", "linear"),
     [("brand_new", "Brand-new", "NEW", [12.0, 2.5]), ("plain_one", "Plain one", "PO", None)],
 )
-def test_new_law_is_listed_ranked_labelled_and_known_to_linear_theory(found, name, label, short, linear):
+def test_new_law_is_listed_ranked_labelled_and_known_to_linear_theory(
+    found, name, label, short, linear
+):
     one = found[name]
     assert (one["listed"], one["ranked"]) == (True, True)
     assert one["label"] == one["report"] == label
@@ -93,7 +99,9 @@ def test_new_law_is_tuned_in_the_box_of_its_units(found):
     assert set(bounds) == set(scales)  # n is held
     for gain, scale in scales.items():
         assert bounds[gain] == pytest.approx([scale / 10**1.5, scale * 10**1.5])
-    assert found["plain_one"]["bounds"]["k"] == pytest.approx([u_max * T / X / 10**1.5, u_max * T / X * 10**1.5])
+    assert found["plain_one"]["bounds"]["k"] == pytest.approx(
+        [u_max * T / X / 10**1.5, u_max * T / X * 10**1.5]
+    )
 
 
 def test_new_law_has_its_colour_or_one_that_nobody_else_has(found):

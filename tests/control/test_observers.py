@@ -1,4 +1,6 @@
-"""Laws with an observer of the disturbance, held to what is proved of them on plant B: x1' = x2, x2' = f + g u + d."""
+"""Laws with an observer of the disturbance, held to what is proved of them on plant B: x1' = x2,
+x2' = f + g u + d.
+"""
 
 import math
 
@@ -43,8 +45,12 @@ def test_a_constant_disturbance_is_found_and_taken_away(name):
 @OBSERVERS
 @pytest.mark.parametrize("speed", [20.0, 60.0])
 @pytest.mark.parametrize("omega", [1.0, 5.0, 50.0])
-def test_the_estimate_is_within_the_bound_that_the_rate_of_the_disturbance_gives(name, speed, omega):
-    """|d - d^| <= J / l, or 3 J / w, J = 2 omega, and half a period's change that sampling adds to each."""
+def test_the_estimate_is_within_the_bound_that_the_rate_of_the_disturbance_gives(
+    name, speed, omega
+):
+    """|d - d^| <= J / l, or 3 J / w, J = 2 omega, and half a period's change that sampling adds to
+    each.
+    """
     run = plant_b(observer(name, **{SPEED[name]: speed}), sine(2.0, omega))
     J, share = 2.0 * omega, 3.0 if name == "extended_state" else 1.0
     miss = np.abs(2.0 * np.sin(omega * run.t[:-1]) - estimate(name, run))[3000:]
@@ -60,8 +66,13 @@ def test_a_ramp_attains_the_bound(name):
 
 
 @OBSERVERS
-def test_a_gain_above_the_estimate_s_error_keeps_the_surface_though_it_is_far_below_the_disturbance(name):
-    """d = 5 sin t: k = 1 > |d - d^|, and the residual is k's, not d's. Classical needs k > 5 and chatters with it."""
+def test_a_gain_above_the_estimate_s_error_keeps_the_surface_though_it_is_far_below_the_disturbance(
+    name,
+):
+    """d = 5 sin t: k = 1 > |d - d^|, and the residual is k's, not d's.
+
+    Classical needs k > 5 and chatters with it.
+    """
     d = sine(5.0, 1.0)
     ours = np.abs(slid(plant_b(observer(name, k=1.0, **{SPEED[name]: 60.0}), d))[8000:]).max()
     assert ours <= 2.0 * H * (1.0 + 3.0 * 5.0 / 60.0)
@@ -87,7 +98,9 @@ def test_defaults_hold_for_the_input_gains_of_the_plants(name, g):
 
 
 def test_the_extended_state_law_s_observer_has_all_its_poles_where_it_says():
-    """Without input its error moves by a matrix whose characteristic polynomial is (z - exp(-w h))^3."""
+    """Without input its error moves by a matrix whose characteristic polynomial is (z - exp(-w
+    h))^3.
+    """
     for w, h in 10.0 ** np.random.default_rng(3).uniform((0, -4), (3, -1), (200, 2)):
         law = smc.law("extended_state", w=w)
         moved = np.empty((3, 3))
@@ -119,8 +132,12 @@ def test_the_disturbance_observer_s_loop_is_stable_just_where_its_condition_says
 
 @OBSERVERS
 def test_saturation_does_not_wind_the_estimate_up(name):
-    """Thrown at 2 m/s with |u| <= 0.7, the estimate stays at the d there is, and the way back does not overshoot."""
-    run = plant_b(observer(name, k=0.5, c=0.2), constant(0.3), x=(0.0, 2.0), limit=0.7, duration=50.0)
+    """Thrown at 2 m/s with |u| <= 0.7, the estimate stays at the d there is, and the way back does
+    not overshoot.
+    """
+    run = plant_b(
+        observer(name, k=0.5, c=0.2), constant(0.3), x=(0.0, 2.0), limit=0.7, duration=50.0
+    )
     assert (run.u == -0.7).sum() > 1000
     assert np.abs(estimate(name, run)[500:] - 0.3).max() < 1e-4
     assert run.x[:, 0].min() >= -1e-3
@@ -128,8 +145,12 @@ def test_saturation_does_not_wind_the_estimate_up(name):
 
 
 @OBSERVERS
-def test_with_the_model_gravity_and_the_reference_s_acceleration_are_fed_forward_and_not_estimated(name):
-    """At rest on a reference that accelerates with the plant's own f + g u, u is (r'' - f) / g and d^ stays 0."""
+def test_with_the_model_gravity_and_the_reference_s_acceleration_are_fed_forward_and_not_estimated(
+    name,
+):
+    """At rest on a reference that accelerates with the plant's own f + g u, u is (r'' - f) / g and
+    d^ stays 0.
+    """
     law = smc.law(name)
     memory = np.zeros(law.memory)
     for _ in range(50):

@@ -1,8 +1,8 @@
 """Our laws against opensmc 2.0.0's own functions where those are right.
 
-opensmc counts its error the other way round, e = r - x, and its default plant is x'' = u + d: at r = 0 its controllers'
-u is ours with the nominal model f = 0, g = 1; its reaching laws give our model-free u. Left out where opensmc is not
-installed (make bench installs it).
+opensmc counts its error the other way round, e = r - x, and its default plant is x'' = u + d: at r
+= 0 its controllers' u is ours with the nominal model f = 0, g = 1; its reaching laws give our
+model-free u. Left out where opensmc is not installed (make bench installs it).
 """
 
 import math
@@ -20,9 +20,17 @@ opensmc = pytest.importorskip("opensmc")
 controllers, reaching, surfaces, estimators, metrics, utils, simulator, core, plants = (
     pytest.importorskip(f"opensmc.{name}")
     for name in (
-        "controllers", "reaching", "surfaces", "estimators", "metrics", "utils", "simulator", "core", "plants",
+        "controllers",
+        "reaching",
+        "surfaces",
+        "estimators",
+        "metrics",
+        "utils",
+        "simulator",
+        "core",
+        "plants",
     )
-)  # fmt: skip
+)
 
 H = 1e-3
 STATES = np.random.default_rng(0).normal(scale=(1.0, 2.0), size=(400, 2))
@@ -31,7 +39,9 @@ STATES = np.random.default_rng(0).normal(scale=(1.0, 2.0), size=(400, 2))
 def own(component, **given):
     """A law or a surface of this package with its memory, as a function."""
     memory = np.zeros(component.memory)
-    return lambda e=0.0, de=0.0, **more: called(component, measured(e, de, **(given | more)), memory)
+    return lambda e=0.0, de=0.0, **more: called(
+        component, measured(e, de, **(given | more)), memory
+    )
 
 
 def along(ours, theirs, states=STATES, rtol=1e-12):
@@ -47,7 +57,9 @@ def controlled(controller, **more):
 
 @pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
 def test_their_controller_is_a_law_in_one_line():
-    theirs = smc.law_from(controllers.LQR(A=[[0.0, 1.0], [0.0, 0.0]], B=[[0.0], [1.0]], Q=np.diag([9.0, 1.0])))
+    theirs = smc.law_from(
+        controllers.LQR(A=[[0.0, 1.0], [0.0, 0.0]], B=[[0.0], [1.0]], Q=np.diag([9.0, 1.0]))
+    )
     ours = smc.law("lqr", q1=9.0, q2=1.0, r=1.0, a1=0.0, a2=0.0, b=1.0)
     plain = {"plant": "duffing", "reference": smc.Sine(0.3, 2.0), "duration": 1.0}
     runs = smc.run([smc.Scenario(law=law, **plain) for law in (theirs, ours)])
@@ -61,10 +73,16 @@ def test_their_controller_is_a_law_in_one_line():
     ("law", "theirs"),
     [
         (smc.law("classical", k=2.0), lambda: reaching.ConstantRate(k=2.0)),
-        (smc.law("exponential_reaching", k=2.0, q=3.0), lambda: reaching.ExponentialRate(k=2.0, q=3.0)),
+        (
+            smc.law("exponential_reaching", k=2.0, q=3.0),
+            lambda: reaching.ExponentialRate(k=2.0, q=3.0),
+        ),
         (smc.law("power_rate", k=2.0, a=0.7), lambda: reaching.PowerRate(k=2.0, alpha=0.7)),
         (smc.law("boundary_layer", k=2.0, phi=0.4), lambda: reaching.Saturation(k=2.0, phi=0.4)),
-        (smc.law("super_twisting", k1=2.0, k2=3.0), lambda: reaching.SuperTwisting(k1=2.0, k2=3.0, dt=H)),
+        (
+            smc.law("super_twisting", k1=2.0, k2=3.0),
+            lambda: reaching.SuperTwisting(k1=2.0, k2=3.0, dt=H),
+        ),
     ],
     ids=lambda v: getattr(v, "name", ""),
 )
@@ -79,7 +97,10 @@ def test_reaching_laws_agree(law, theirs):
 @pytest.mark.parametrize(
     ("law", "theirs"),
     [
-        (smc.law("exponential_reaching", k=1.1, q=4.0, c=3.0), lambda: controllers.ClassicalSMC(c=3.0, k=4.0, eta=1.1)),
+        (
+            smc.law("exponential_reaching", k=1.1, q=4.0, c=3.0),
+            lambda: controllers.ClassicalSMC(c=3.0, k=4.0, eta=1.1),
+        ),
         (
             smc.law("fixed_time", k1=2.0, k2=3.0, a=0.6, b=1.4, k=0.0, c=3.0),
             lambda: controllers.FixedTimeSMC(c=3.0, alpha=2.0, beta=3.0, p=0.6, q=1.4),
@@ -90,7 +111,9 @@ def test_reaching_laws_agree(law, theirs):
         ),
         (
             smc.law("lqr", q1=10.0, q2=2.0, r=0.5),
-            lambda: controllers.LQR([[0, 1], [0, 0]], [[0], [1]], Q=np.diag([10.0, 2.0]), R=[[0.5]]),
+            lambda: controllers.LQR(
+                [[0, 1], [0, 0]], [[0], [1]], Q=np.diag([10.0, 2.0]), R=[[0.5]]
+            ),
         ),
         (smc.law("pid", kp=5.0, ki=0.0, kd=2.0, tau=0.0), lambda: controllers.PID(Kp=5.0, Kd=2.0)),
         (smc.law("computed_torque", kp=5.0, kd=2.0), lambda: controllers.PID(Kp=5.0, Kd=2.0)),
@@ -104,7 +127,10 @@ def test_controllers_agree(law, theirs):
 
 def test_the_integral_of_a_pid_agrees_but_for_one_sample():
     """Theirs counts the sample's own error before it acts, ours after."""
-    ours, theirs = own(smc.law("pid", kp=5.0, ki=3.0, kd=2.0, tau=0.0)), controlled(controllers.PID(5.0, 2.0, 3.0, H))
+    ours, theirs = (
+        own(smc.law("pid", kp=5.0, ki=3.0, kd=2.0, tau=0.0)),
+        controlled(controllers.PID(5.0, 2.0, 3.0, H)),
+    )
     along(lambda e, de: ours(e, de)[0] - 3.0 * H * e, theirs)
 
 
@@ -131,7 +157,10 @@ def test_the_adaptive_gain_agrees_but_for_one_sample():
 )
 def test_second_order_laws_agree_when_theirs_are_told_sigma_and_its_rate(law, theirs):
     name, alpha, betas = theirs
-    ours, other = own(law), getattr(controllers, name)(order=2, alpha=alpha, betas=betas, g_sign=1.0)
+    ours, other = (
+        own(law),
+        getattr(controllers, name)(order=2, alpha=alpha, betas=betas, g_sign=1.0),
+    )
     along(
         lambda e, de: ours(e, de)[0],
         lambda e, de: other.compute(0.0, None, None, sigma_derivs=[e, de])[0],
@@ -147,7 +176,10 @@ class Itself(core.SlidingSurface):
 
 
 def test_twisting_agrees_when_theirs_is_handed_a_variable_of_relative_degree_2():
-    ours, theirs = own(smc.law("twisting", r1=3.0, r2=2.0)), controllers.TwistingSMC(3.0, 2.0, surface=Itself())
+    ours, theirs = (
+        own(smc.law("twisting", r1=3.0, r2=2.0)),
+        controllers.TwistingSMC(3.0, 2.0, surface=Itself()),
+    )
     along(lambda e, de: ours(e, de)[0], controlled(theirs))
 
 
@@ -159,7 +191,10 @@ def test_twisting_agrees_when_theirs_is_handed_a_variable_of_relative_degree_2()
     [
         (surface("linear", c=3.0), lambda: surfaces.LinearSurface(c=3.0)),
         (surface("terminal", b=2.0, p=5 / 7), lambda: surfaces.TerminalSurface(beta=2.0, p=5, q=7)),
-        (surface("nonsingular_terminal", B=2.0, p=7 / 5), lambda: surfaces.NonsingularTerminalSurface(2.0, 5, 7)),
+        (
+            surface("nonsingular_terminal", B=2.0, p=7 / 5),
+            lambda: surfaces.NonsingularTerminalSurface(2.0, 5, 7),
+        ),
     ],
     ids=lambda v: getattr(v, "name", ""),
 )
@@ -171,11 +206,16 @@ def test_surfaces_agree(ours, theirs):
 def test_the_global_surface_agrees():
     ours, theirs = own(surface("global_", c=3.0, q=2.0)), surfaces.GlobalSurface(c=3.0, alpha=2.0)
     for k, (e, de) in enumerate(STATES.tolist()):
-        assert ours(e, de, t=k * H)[0] == pytest.approx(float(theirs.compute(e, de, t=k * H)), abs=1e-12)
+        assert ours(e, de, t=k * H)[0] == pytest.approx(
+            float(theirs.compute(e, de, t=k * H)), abs=1e-12
+        )
 
 
 def test_the_integral_of_a_pid_surface_agrees_but_for_one_sample():
-    ours, theirs = own(surface("pid", kp=3.0, ki=2.0)), surfaces.PIDSurface(alpha=1.0, beta=3.0, gamma=2.0, dt=H)
+    ours, theirs = (
+        own(surface("pid", kp=3.0, ki=2.0)),
+        surfaces.PIDSurface(alpha=1.0, beta=3.0, gamma=2.0, dt=H),
+    )
     along(lambda e, de: ours(e, de)[0] + 2.0 * H * e, theirs.compute)
 
 
@@ -191,7 +231,9 @@ def estimated(ours, theirs, h, until):
 
 
 def test_levant_s_first_order_differentiator_agrees():
-    """Theirs starts at 0, as sin t does, and gives the state after the sample's step: ours one sample later."""
+    """Theirs starts at 0, as sin t does, and gives the state after the sample's step: ours one
+    sample later.
+    """
     theirs = estimators.LevantDifferentiator(order=1, L=4.0, dt=H)
     ours, other = estimated(estimator("levant", L=4.0, order=1), theirs, H, 3.0)
     np.testing.assert_allclose(ours[1:], other[:-1], atol=1e-12)
@@ -200,13 +242,24 @@ def test_levant_s_first_order_differentiator_agrees():
 @pytest.mark.parametrize(
     ("name", "make"),
     [
-        ("high_gain", lambda h: estimators.HighGainObserver(alpha1=1.0, alpha2=2.0, epsilon=0.05, dt=h)),
-        ("extended_state_observer", lambda h: estimators.ExtendedStateObserver(3.0, 3.0, 1.0, 0.05, dt=h)),
-        ("integral_chain", lambda h: estimators.IntegralChainDifferentiator(order=2, epsilon=0.05, dt=h)),
+        (
+            "high_gain",
+            lambda h: estimators.HighGainObserver(alpha1=1.0, alpha2=2.0, epsilon=0.05, dt=h),
+        ),
+        (
+            "extended_state_observer",
+            lambda h: estimators.ExtendedStateObserver(3.0, 3.0, 1.0, 0.05, dt=h),
+        ),
+        (
+            "integral_chain",
+            lambda h: estimators.IntegralChainDifferentiator(order=2, epsilon=0.05, dt=h),
+        ),
     ],
 )
 def test_linear_observers_agree_to_the_order_of_the_period(name, make):
-    """Theirs are explicit Euler steps of the same equations, w = 1 / epsilon; ours are exact or as good."""
+    """Theirs are explicit Euler steps of the same equations, w = 1 / epsilon; ours are exact or as
+    good.
+    """
     apart = []
     for h in (2e-3, 2e-4):
         ours, other = estimated(estimator(name, w=20.0), make(h), h, 3.0)

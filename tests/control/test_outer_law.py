@@ -1,4 +1,6 @@
-"""A law of one channel on computed torque meets the double integrator of its theorem, in each joint."""
+"""A law of one channel on computed torque meets the double integrator of its theorem, in each
+joint.
+"""
 
 import numpy as np
 import pytest
@@ -10,7 +12,13 @@ pytestmark = pytest.mark.quick
 
 
 def run(law, **changes):
-    fields = {"plant": "double_pendulum", "x0": [0.3, -0.2], "u_max": 200.0, "duration": 2.0, "control_period": 2e-4}
+    fields = {
+        "plant": "double_pendulum",
+        "x0": [0.3, -0.2],
+        "u_max": 200.0,
+        "duration": 2.0,
+        "control_period": 2e-4,
+    }
     return smc.run(smc.Scenario(law=law.on_computed_torque(), **(fields | changes)))
 
 
@@ -25,16 +33,22 @@ def test_each_joint_obeys_the_outer_loop_whatever_the_others_do():
 SLOWLY = pytest.param("mpc", {}, marks=pytest.mark.slow)  # compiled
 
 
-@pytest.mark.parametrize(("name", "gains"), [("adrc", {}), ("pd_observer", {}), ("lqi", {"q0": 5e3}), SLOWLY])
+@pytest.mark.parametrize(
+    ("name", "gains"), [("adrc", {}), ("pd_observer", {}), ("lqi", {"q0": 5e3}), SLOWLY]
+)
 def test_an_outer_law_leaves_no_error_under_a_constant_force(name, gains):
-    trace = run(smc.law(name, **gains), disturbance=smc.Constant(1.0), duration=8.0, control_period=1e-3)
+    trace = run(
+        smc.law(name, **gains), disturbance=smc.Constant(1.0), duration=8.0, control_period=1e-3
+    )
     assert np.abs(trace.x[-1]).max() < 1e-3
     proportional = run(smc.law("computed_torque"), disturbance=smc.Constant(1.0), duration=8.0)
     assert np.abs(proportional.x[-1]).max() > 1e-2
 
 
 def test_an_observer_knows_the_acceleration_that_the_motor_can_give():
-    """Where the motors saturate for long, its estimate stays bounded; told of no bound it would swing up."""
+    """Where the motors saturate for long, its estimate stays bounded; told of no bound it would
+    swing up.
+    """
     law, changes = smc.law("adrc", wc=20.0, w=60.0), {"x0": [1.0, 0.5], "duration": 6.0}
     trace = run(law, **changes, control_period=1e-3)
     assert (np.abs(trace.u) == 6.0).sum() > 200  # the limit of its motors

@@ -1,4 +1,6 @@
-"""Laws on the Panda: perfect computed torque follows minimum jerk, and without a model gravity remains."""
+"""Laws on the Panda: perfect computed torque follows minimum jerk, and without a model gravity
+remains.
+"""
 
 import numpy as np
 import pytest
@@ -10,12 +12,22 @@ MOVE = np.array([0.3, 0.0, -0.2, 0.1, 0.4, -0.3, 0.0])  # rad, beyond the ready 
 
 
 def moving(period, **fields):
-    """A run with the perfect model from home to beyond the ready pose, with minimum jerk in 1 s. Its largest error."""
+    """A run with the perfect model from home to beyond the ready pose, with minimum jerk in 1 s.
+
+    Its largest error.
+    """
     panda = smc.plant("panda")
     goal = np.array(panda.rest) + MOVE
     law = smc.law("computed_torque_sliding", k=200.0, c=100.0, width=0.5)
-    common = {"control_period": period, "physics_step": period, "integrator": "RK4", "duration": 1.2}
-    reference = [smc.signals.Waypoints((0.0, 1.0), pair) for pair in zip(panda.x0, goal, strict=True)]
+    common = {
+        "control_period": period,
+        "physics_step": period,
+        "integrator": "RK4",
+        "duration": 1.2,
+    }
+    reference = []
+    for pair in zip(panda.x0, goal, strict=True):
+        reference.append(smc.signals.Waypoints((0.0, 1.0), pair))
     trace = smc.run(smc.Scenario(plant=panda, law=law, reference=reference, **common, **fields))
     assert trace.failure is None
     assert np.abs(trace.u).max(axis=0).tolist() < list(trace.scenario.limits)
@@ -41,4 +53,6 @@ def test_without_gravity_compensation_gravity_over_lam_k1_remains(name):
     e = (trace.x - trace.r)[-1]
     assert np.abs(gravity).max() > 15.0
     np.testing.assert_allclose(e, -gravity / (lam * k1), rtol=0.02, atol=1e-5)
-    np.testing.assert_allclose(lam * np.tanh(k1 * e), -gravity, rtol=1e-3, atol=1e-3)  # exactly, of any size
+    np.testing.assert_allclose(
+        lam * np.tanh(k1 * e), -gravity, rtol=1e-3, atol=1e-3
+    )  # exactly, of any size

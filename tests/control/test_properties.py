@@ -1,4 +1,6 @@
-"""Properties of laws are compared with what the laws do: what they read, where u jumps, how they arrive."""
+"""Properties of laws are compared with what the laws do: what they read, where u jumps, how they
+arrive.
+"""
 
 import functools
 import itertools
@@ -27,9 +29,18 @@ def changes(name):
     for _ in range(40):
         numbers = random.normal(size=len(Measurement._fields))
         model, has_surface = random.choice([0.0, 1.0], size=2)
-        known = {"t": abs(numbers[0]), "dt": 1e-3, "limit": 3.0, "model": model, "has_surface": has_surface, "g": 2.0}
+        known = {
+            "t": abs(numbers[0]),
+            "dt": 1e-3,
+            "limit": 3.0,
+            "model": model,
+            "has_surface": has_surface,
+            "g": 2.0,
+        }
         y = Measurement(*numbers)._replace(**known)
-        memory = np.abs(random.normal(size=law.memory)) * random.choice([0.0, 1.0])  # at the first sample, and later
+        memory = np.abs(random.normal(size=law.memory)) * random.choice(
+            [0.0, 1.0]
+        )  # at the first sample, and later
         one = memory.copy()
         result = [*called(law, y, one), *one]
         for field in {*Measurement._fields} - found:
@@ -63,19 +74,27 @@ def test_what_a_law_reads_is_found_through_functions_and_else_is_everything():
     assert reads(position_only) == {"e", "g"}
     assert PROPERTIES["no-velocity"].holds(position_only)
     assert reads(hands_on) == set(Measurement._fields)
-    assert {"has_surface", "model", "ddr"} <= reads(catalogue()["classical"])  # in `sliding` and `command`
+    assert {"has_surface", "model", "ddr"} <= reads(
+        catalogue()["classical"]
+    )  # in `sliding` and `command`
 
 
 # continuity
 
 
 def jump(name, model):
-    """The largest step of u, as a share of its range, along short dense lines through states where laws switch."""
+    """The largest step of u, as a share of its range, along short dense lines through states where
+    laws switch.
+    """
     law, random = smc.law(name), np.random.default_rng(1)
     slope = next((value for gain, value in law.gains.items() if gain in ("c", "k1")), 2.5)
     on_surface = [(0.4, -0.4 * slope, 0.0), (-0.3, 0.3 * slope, 0.0)]
     centres = [(0.0, 0.0, 0.0), *on_surface, (2.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.0, -0.5, 0.0)]
-    along, common, worst = np.linspace(-1e-8, 1e-8, 101), {"limit": 6.0, "model": model, "g": 1.1}, 0.0
+    along, common, worst = (
+        np.linspace(-1e-8, 1e-8, 101),
+        {"limit": 6.0, "model": model, "g": 1.1},
+        0.0,
+    )
     for centre, fresh in itertools.product(centres, (True, False)):
         memory = np.zeros(law.memory)
         for k in range(20):  # what a run would leave in it
@@ -84,7 +103,10 @@ def jump(name, model):
                 called(law, measured(e, de, a=a, dt=1e-3, t=1e-3 * k, **common), memory)
         called(law, measured(*centre[:2], a=centre[2], dt=STEP, t=7.31, **common), memory)
         line = centre + np.outer(along, random.normal(size=3))
-        us = [called(law, measured(e, de, a=a, dt=STEP, t=7.31, **common), memory.copy())[0] for e, de, a in line]
+        us = [
+            called(law, measured(e, de, a=a, dt=STEP, t=7.31, **common), memory.copy())[0]
+            for e, de, a in line
+        ]
         worst = max(worst, np.abs(np.diff(us)).max() / 6.0)
     return worst
 
@@ -101,7 +123,9 @@ def test_u_is_continuous_where_a_law_says_so_and_jumps_where_it_does_not():
 
 @functools.cache
 def arrival(name):
-    """From 1, how long s (or e) takes from 0.01 to 0.001, over how long from 0.1 to 0.01: 1 if it falls as exp(-t)."""
+    """From 1, how long s (or e) takes from 0.01 to 0.001, over how long from 0.1 to 0.01: 1 if it
+    falls as exp(-t).
+    """
     law, known = smc.law(name), catalogue()[name]
     h = 1e-4 if known.relative_degree == 1 else 5e-4
     ran = plant_a(law, rest, h=h, duration=2.0)
@@ -109,18 +133,33 @@ def arrival(name):
         g = 20.0 if known.relative_degree == 3 else 1.0  # as behind a lag of 50 ms
         ran = chain(law, rest, (1.0, 0.0, 0.0)[: known.relative_degree], h, 15.0, g=g)
     values = np.abs(ran.s if known.finite_time == "e" else ran.sigma)
-    times = [np.flatnonzero(np.append(True, values > level))[-1] * h for level in (0.1, 0.01, 0.001)]
+    times = []
+    for level in (0.1, 0.01, 0.001):
+        times.append(np.flatnonzero(np.append(True, values > level))[-1] * h)
     assert times[-1] < ran.t[-1], times
-    return (times[2] - times[1]) / (times[1] - times[0]) if times[1] else 0.0
+    if times[1]:
+        return (times[2] - times[1]) / (times[1] - times[0])
+    return 0.0
 
 
 def test_laws_with_finite_time_approach_ever_faster():
-    slow = {name: arrival(name) for name, law in catalogue().items() if law.finite_time and arrival(name) >= 0.6}
+    slow = {
+        name: arrival(name)
+        for name, law in catalogue().items()
+        if law.finite_time and arrival(name) >= 0.6
+    }
     assert not slow
 
 
 def test_laws_that_decay_exponentially_do_not_approach_ever_faster():
-    names = ("observer_free", "observer_free_third", "boundary_layer", "pid", "lqr", "computed_torque")
+    names = (
+        "observer_free",
+        "observer_free_third",
+        "boundary_layer",
+        "pid",
+        "lqr",
+        "computed_torque",
+    )
     for name in (*names, "barrier_adaptive"):
         assert arrival(name) > 0.7, name
 
@@ -134,7 +173,9 @@ def names(*needs, **options):
 
 def test_laws_are_chosen_by_all_that_is_asked():
     assert names() == smc.laws()
-    assert {"continuous_twisting"} == {"continuous_twisting", "twisting", "lqr"} & {*names("finite-time", "continuous")}
+    assert {"continuous_twisting"} == {"continuous_twisting", "twisting", "lqr"} & {
+        *names("finite-time", "continuous")
+    }
     assert set(names("two-gains")) < set(smc.laws())
     assert "lqr" in names("two-gains")  # its weight r and its plant are held
     assert {"none"} == {"none", "pid", "classical"} & {*names("no-velocity")}

@@ -1,4 +1,6 @@
-"""Laws without a sliding mode that want to win are what their textbooks say, with foreign solvers as judges."""
+"""Laws without a sliding mode that want to win are what their textbooks say, with foreign solvers
+as judges.
+"""
 
 import dataclasses
 import json
@@ -41,16 +43,28 @@ def call(law, memory, **fields):
 def answer(law, memory, omega, h, samples=80_000):
     """The complex factor from e = cos(omega t) to the law's u, once it has settled."""
     t, gains = h * np.arange(samples), python_controller.gains_of(law)
-    u = np.array([law.function(measured(e=math.cos(omega * one), de=0.0, dt=h), gains, memory)[0] for one in t])
+    u = np.array(
+        [
+            law.function(measured(e=math.cos(omega * one), de=0.0, dt=h), gains, memory)[0]
+            for one in t
+        ]
+    )
     last = t > t[-1] - 4.0 * math.pi / omega
-    basis = np.stack([np.cos(omega * t[last]), -np.sin(omega * t[last]), np.ones(last.sum())], axis=1)
+    basis = np.stack(
+        [np.cos(omega * t[last]), -np.sin(omega * t[last]), np.ones(last.sum())], axis=1
+    )
     real, imaginary, _ = np.linalg.lstsq(basis, u[last], rcond=None)[0]
     return complex(real, imaginary)
 
 
 def bounded(name):
-    """The law with b = 1, on e'' = u where it knows a plant, and with an integral of a rate of 1 / s or more."""
-    gains = {} if name in ("adrc", "pd_observer") else UNIT
+    """The law with b = 1, on e'' = u where it knows a plant, and with an integral of a rate of 1 /
+    s or more.
+    """
+    if name in ("adrc", "pd_observer"):
+        gains = {}
+    else:
+        gains = UNIT
     return smc.law(name, **({"b": 1.0} | gains | ({"wi": 1.0} if name == "loop_shaping" else {})))
 
 
@@ -66,8 +80,14 @@ def test_a_constant_disturbance_leaves_no_error(name):
 
 @pytest.mark.parametrize("name", RIVALS)
 def test_a_law_that_does_not_see_its_bound_swings_up_and_one_that_does_comes_to_rest(name):
-    """From a start that holds u at its bound for seconds. A law that is told of no bound has no anti-windup."""
-    own, blind = (plant_b(bounded(name), x=(5.0, 0.0), limit=1.0, told=told, duration=30.0) for told in (None, 1e9))
+    """From a start that holds u at its bound for seconds.
+
+    A law that is told of no bound has no anti-windup.
+    """
+    own, blind = (
+        plant_b(bounded(name), x=(5.0, 0.0), limit=1.0, told=told, duration=30.0)
+        for told in (None, 1e9)
+    )
     assert (np.abs(own.u) == 1.0).sum() > 2000
     assert own.residual() < 0.05
     assert own.x.min() > -5.0
@@ -84,7 +104,9 @@ def test_an_observer_does_not_take_the_bound_for_a_disturbance(name):
 
 @pytest.mark.parametrize(("name", "cell", "truth"), [("mpc", 3, 0.0), ("loop_shaping", 4, 1.0)])
 def test_an_observer_that_knows_the_plant_is_right_about_it(name, cell, truth):
-    """The estimate of no disturbance, and the prediction of e, are wrong by what changes within a sample."""
+    """The estimate of no disturbance, and the prediction of e, are wrong by what changes within a
+    sample.
+    """
     a1, a2, b = 5.0, -4.0, 0.4
     law, wrong = smc.law(name, a1=a1, a2=a2, b=b), []
     for h in (1e-3, 1e-4):
@@ -98,12 +120,15 @@ def test_an_observer_that_knows_the_plant_is_right_about_it(name, cell, truth):
 @pytest.mark.parametrize("name", RIVALS)
 @pytest.mark.parametrize("limit", [math.inf, 3.0])
 def test_with_the_model_the_law_controls_the_acceleration(name, limit):
-    """g u + f - r'' is the v of the law without the model on e'' = v, whatever f, g and r'' are at a sample.
+    """g u + f - r'' is the v of the law without the model on e'' = v, whatever f, g and r'' are at
+    a sample.
 
     Where u has a bound, f is r'', so that the bound on v is symmetric and g times as large.
     """
     plain, rng = bounded(name), np.random.default_rng(0)
-    informed = smc.law(name, **{key: value for key, value in plain.gains.items() if key not in UNIT})
+    informed = smc.law(
+        name, **{key: value for key, value in plain.gains.items() if key not in UNIT}
+    )
     own, other, g = np.zeros(plain.memory), np.zeros(plain.memory), -2.0
     for _ in range(200):
         e, de, f = rng.normal(size=3)
@@ -116,7 +141,9 @@ def test_with_the_model_the_law_controls_the_acceleration(name, limit):
 @pytest.mark.parametrize("name", ["lqi", "mpc", "loop_shaping"])
 def test_a_scenario_gives_the_law_the_plant_that_it_runs_on(name):
     given = smc.Scenario(plant="inverted_pendulum", law=name).resolved.law.gains
-    assert tuple(given[key] for key in UNIT) == design.linearised(smc.plant("inverted_pendulum"), "lqr")
+    assert tuple(given[key] for key in UNIT) == design.linearised(
+        smc.plant("inverted_pendulum"), "lqr"
+    )
     own = smc.Scenario(plant="inverted_pendulum", law=smc.law(name, **UNIT)).resolved.law.gains
     assert {key: own[key] for key in UNIT} == UNIT
 
@@ -133,17 +160,30 @@ def test_adrc_gives_the_control_of_a_foreign_implementation(vectors):
     for case in vectors["adrc"]:
         law, memory = smc.law("adrc", wc=case["wc"], w=case["w"], b=case["b"]), np.zeros(5)
         for k, (e, u) in enumerate(zip(case["e"], case["u"], strict=True)):
-            got = call(law, memory, e=e, de=case["de0"] if k == 0 else 0.0, dt=case["dt"], limit=case["limit"])
+            got = call(
+                law,
+                memory,
+                e=e,
+                de=case["de0"] if k == 0 else 0.0,
+                dt=case["dt"],
+                limit=case["limit"],
+            )
             assert abs(got - u) <= 1e-12 * case["limit"]
         np.testing.assert_allclose(memory[1:4], case["z_end"], rtol=1e-12, atol=1e-12)
 
 
 def test_adrc_is_a_pid_controller_with_a_filter_of_second_order():
-    """Its answer to e = cos(omega t), at a short period, is that of the transfer function in its docstring."""
+    """Its answer to e = cos(omega t), at a short period, is that of the transfer function in its
+    docstring.
+    """
     wc, w, b, omega, h = 3.0, 8.0, 0.7, 5.0, 1e-4
     law, memory = smc.law("adrc", wc=wc, w=w, b=b), np.zeros(5)
     got, p = answer(law, memory, omega, h), 1j * omega
-    top = wc**2 * w**3 + (3 * wc**2 * w**2 + 2 * wc * w**3) * p + (3 * w * wc**2 + 6 * wc * w**2 + w**3) * p**2
+    top = (
+        wc**2 * w**3
+        + (3 * wc**2 * w**2 + 2 * wc * w**3) * p
+        + (3 * w * wc**2 + 6 * wc * w**2 + w**3) * p**2
+    )
     exact = -top / (b * p * (p**2 + (3 * w + 2 * wc) * p + 3 * w**2 + 6 * w * wc + wc**2))
     assert got == pytest.approx(exact, rel=5e-3)
 
@@ -174,7 +214,10 @@ def test_pd_observer_is_incremental_dynamic_inversion():
 @pytest.mark.parametrize("q", [(1.0, 10.0, 2.0), (300.0, 5.0, 0.0), (1e-3, 100.0, 16.0)])
 def test_lqi_solves_its_riccati_equation(plant, q):
     a1, a2, b = plant
-    A, B = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]]), np.array([[0.0], [0.0], [b]])
+    A, B = (
+        np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, a1, a2]]),
+        np.array([[0.0], [0.0], [b]]),
+    )
     ki, k1, k2 = (B.T @ solve_continuous_are(A, B, np.diag(q), np.eye(1)))[0]
     np.testing.assert_allclose(lqi.feedback(a1, a2, b, *q), (k1, k2, ki), rtol=1e-9)
 
@@ -206,10 +249,12 @@ def test_the_end_s_weight_of_mpc_solves_the_discrete_riccati_equation(plant):
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize(("q1", "q2"), [(100.0, 16.0), (3751.0, 48.0)])
 def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, q2):
-    """From the last plan, its active set or from none: it has one solution. With the larger weights whole steps cycle.
+    """From the last plan, its active set or from none: it has one solution.
 
-    One of 200 jumps to another state may end before its solution, as the law's docstring says. Small moves of e, de
-    and d, some of them out of the active set, follow each jump.
+    With the larger weights whole steps cycle.
+
+    One of 200 jumps to another state may end before its solution, as the law's docstring says.
+    Small moves of e, de and d, some of them out of the active set, follow each jump.
     """
     rng, n = np.random.default_rng(0), mpc.MOVES
     law = smc.law("mpc", q1=q1, q2=q2, **dict(zip(("a1", "a2", "b"), plant, strict=True)))
@@ -223,11 +268,21 @@ def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, 
         memory[:5] = 1.0, e, de, d, 0.0
         u = call(law, memory, e=e, de=de, dt=1e-12, limit=limit)
         us = -d / plant[2]
-        H, rows = memory[mpc.HESSIAN : mpc.FACTOR].reshape(n, n), memory[mpc.PLAN : mpc.GRADIENT].reshape(n, mpc.ROW)
+        H, rows = (
+            memory[mpc.HESSIAN : mpc.FACTOR].reshape(n, n),
+            memory[mpc.PLAN : mpc.GRADIENT].reshape(n, mpc.ROW),
+        )
         g = rows[:, mpc.BY_E - mpc.PLAN] * e + rows[:, mpc.BY_DE - mpc.PLAN] * de
         v, factor, index = np.zeros(n), np.zeros((n, n + 7)), np.zeros(n, np.int32)
-        rank = mujoco.mju_boxQP(v, factor, index, np.ascontiguousarray(H), g, np.full(n, -limit - us),
-                                np.full(n, limit - us))  # fmt: skip
+        rank = mujoco.mju_boxQP(
+            v,
+            factor,
+            index,
+            np.ascontiguousarray(H),
+            g,
+            np.full(n, -limit - us),
+            np.full(n, limit - us),
+        )
         assert rank >= 0
         wrong = abs(u - min(max(v[0] + us, -limit), limit))
         if (memory[mpc.AT_E : mpc.AT_REACH] == (e, de, -us)).all():
@@ -240,7 +295,9 @@ def test_mpc_s_plan_is_mujoco_s_solution_of_the_same_bounded_problem(plant, q1, 
 
 
 def test_only_the_ratios_of_mpc_s_weights_matter():
-    one, other = (smc.law("mpc", q1=share * 90.0, q2=share * 7.0, r=share, **UNIT) for share in (1.0, 5.0))
+    one, other = (
+        smc.law("mpc", q1=share * 90.0, q2=share * 7.0, r=share, **UNIT) for share in (1.0, 5.0)
+    )
     for e, de in ((0.1, -0.3), (1.0, 2.0)):
         u, again = (call(law, np.zeros(law.memory), e=e, de=de, limit=6.0) for law in (one, other))
         assert u == pytest.approx(again, rel=1e-12)
@@ -268,7 +325,10 @@ def shaped(a1, a2, b, k, wi):
 @pytest.mark.parametrize(("k", "wi"), [(20.0, 0.5), (4.0, 2.0), (100.0, 5.0)])
 def test_loop_shaping_solves_both_riccati_equations(plant, k, wi):
     A, B, C = shaped(*plant, k, wi)
-    X, Z = solve_continuous_are(A, B, C.T @ C, np.eye(1)), solve_continuous_are(A.T, C.T, B @ B.T, np.eye(1))
+    X, Z = (
+        solve_continuous_are(A, B, C.T @ C, np.eye(1)),
+        solve_continuous_are(A.T, C.T, B @ B.T, np.eye(1)),
+    )
     gamma = 1.1 * math.sqrt(1.0 + np.linalg.eigvals(Z @ X).real.max())
     F = -np.linalg.solve((1.0 - gamma**-2) * np.eye(3) - gamma**-2 * X @ Z, np.eye(3)).T @ B
     got = loop_shaping.design(*plant, k, wi)

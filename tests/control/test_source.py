@@ -1,4 +1,6 @@
-"""Where gains come from: set where they are chosen, kept with the law, and never left on gains that were replaced."""
+"""Where gains come from: set where they are chosen, kept with the law, and never left on gains that
+were replaced.
+"""
 
 import copy
 import dataclasses
@@ -34,8 +36,12 @@ def sets(name=LAW):
 def test_one_name_with_three_sets_of_gains_is_told_apart():
     laws = sets()
     runs = smc.run([smc.Scenario(plant=PLANT, law=law, duration=3.0) for law in laws.values()])
-    settled = {kind: smc.score(trace)["settling_time"] for kind, trace in zip(laws, runs, strict=True)}
-    assert settled["default"] > 3 * max(settled["shipped"], settled["study"])  # 1.61, 0.41 and 0.32 s
+    settled = {
+        kind: smc.score(trace)["settling_time"] for kind, trace in zip(laws, runs, strict=True)
+    }
+    assert settled["default"] > 3 * max(
+        settled["shipped"], settled["study"]
+    )  # 1.61, 0.41 and 0.32 s
     for kind, trace in zip(laws, runs, strict=True):
         assert trace.scenario.law.source.kind == kind
         assert f"gains: {kind}" in repr(trace)
@@ -43,11 +49,19 @@ def test_one_name_with_three_sets_of_gains_is_told_apart():
 
 
 def test_a_law_is_the_users_only_with_gains_of_the_user():
-    assert [law.source.kind for law in (my_law(), my_law(k=2.0), smc.law("pid"), smc.law("pid", kp=9.0))] == [
-        "default", "yours", "default", "yours",
-    ]  # fmt: skip
+    assert [
+        law.source.kind for law in (my_law(), my_law(k=2.0), smc.law("pid"), smc.law("pid", kp=9.0))
+    ] == [
+        "default",
+        "yours",
+        "default",
+        "yours",
+    ]
     assert smc.Scenario(plant=PLANT, law=my_law).law.source.kind == "default"
-    assert (smc.law("none").source.kind, smc.law("none").named("idle").source.kind) == ("none", "none")
+    assert (smc.law("none").source.kind, smc.law("none").named("idle").source.kind) == (
+        "none",
+        "none",
+    )
     assert gain_sets.law(PLANT, LAW, "default").source.kind == "default"
 
 
@@ -57,7 +71,9 @@ def test_the_search_is_that_of_the_file():
     assert law.source.search == source.Search(
         rule=tuning.rule, evaluations=tuning.evaluations, searches=len(tuning.sets), spread=spread
     )
-    assert f", {tuning.evaluations} evaluations, {len(tuning.sets)} searches, J up to" in str(law.source)
+    assert f", {tuning.evaluations} evaluations, {len(tuning.sets)} searches, J up to" in str(
+        law.source
+    )
 
 
 @pytest.mark.parametrize("kind", sets())
@@ -65,10 +81,14 @@ def test_copies_keep_the_source(kind, tmp_path):
     law = sets()[kind]
     its = law.source
     kept = [
-        pickle.loads(pickle.dumps(law)), pickle.loads(pickle.dumps(law.named("other"))), copy.deepcopy(law),
-        dataclasses.replace(law, memory=9), dataclasses.replace(law, gains=dict(law.gains)), by_channel([law, law]),
+        pickle.loads(pickle.dumps(law)),
+        pickle.loads(pickle.dumps(law.named("other"))),
+        copy.deepcopy(law),
+        dataclasses.replace(law, memory=9),
+        dataclasses.replace(law, gains=dict(law.gains)),
+        by_channel([law, law]),
         by_channel([law, smc.law("none").named("x")]).of_channel(0),
-    ]  # fmt: skip
+    ]
     trace = smc.run(smc.Scenario(plant=PLANT, law=law, duration=0.01))
     kept.append(smc.load(trace.save(tmp_path / "trace.npz")).scenario.law)
     assert [one.source for one in kept] == [its] * len(kept)
@@ -84,7 +104,12 @@ def test_replaced_gains_are_the_users():
 def test_gains_by_channel_are_of_their_common_source():
     default, shipped = smc.law("pid"), gain_sets.law("duffing", "pid")
     both = by_channel(
-        [shipped, dataclasses.replace(shipped, gains=default.gains, source=shipped.source.with_gains(default.gains))]
+        [
+            shipped,
+            dataclasses.replace(
+                shipped, gains=default.gains, source=shipped.source.with_gains(default.gains)
+            ),
+        ]
     )
     assert both.source.kind == both.of_channel(1).source.kind == "shipped"
     assert by_channel([default, shipped]).source.kind == "yours"
@@ -99,7 +124,10 @@ def test_laws_with_equal_gains_are_equal():
 
 
 def test_searches_of_several_laws_are_one_phrase():
-    first, other = (source.Search(rule="CMA-ES", evaluations=30 * n, searches=n, spread=n / 100) for n in (3, 12))
+    first, other = (
+        source.Search(rule="CMA-ES", evaluations=30 * n, searches=n, spread=n / 100)
+        for n in (3, 12)
+    )
     laws = {
         "a": [smc.law("pid").sourced("shipped", first).source],
         "b": [smc.law("pid").sourced("shipped", other).source],

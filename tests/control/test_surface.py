@@ -50,7 +50,9 @@ def slide(name, e=1.0, de=0.0, duration=6.0, k=2.0, disturbance=HUM, **gains):
 
 @pytest.mark.parametrize("name", SECOND)
 def test_eq_is_the_acceleration_that_keeps_s(name):
-    """From any state, one short step under e'' = eq changes s by O(h^2), and under another e'' by O(h)."""
+    """From any state, one short step under e'' = eq changes s by O(h^2), and under another e'' by
+    O(h).
+    """
     slid, h, random = surface(name), 1e-6, np.random.default_rng(0)
     for _ in range(100):
         e, de = np.sign(random.normal(size=2)) * random.uniform(0.2, 1.5, size=2)
@@ -94,12 +96,18 @@ def second_order(k2, k1, v, t):
     return ((v - slow) * np.exp(fast * t) - (v - fast) * np.exp(slow * t)) / (fast - slow)
 
 
-RESPONSES = [  # e'(0), and e from e(0) = 1; the integral and the global surface have no reaching phase
+# e'(0), and e from e(0) = 1; the integral and the global surface have no reaching phase
+RESPONSES = [
     ("linear", {"c": 2.0}, -2.0, lambda t: np.exp(-2.0 * t)),
     ("integral", {"k1": 2.0, "k2": 3.0}, 0.0, lambda t: second_order(3.0, 2.0, 0.0, t)),
     ("integral", {"k1": 2.0, "k2": 3.0}, 1.5, lambda t: second_order(3.0, 2.0, 1.5, t)),
     ("pid", {"kp": 3.0, "ki": 2.0}, -3.0, lambda t: second_order(3.0, 2.0, -3.0, t)),
-    ("global_", {"c": 2.5, "q": 1.5}, 0.0, lambda t: np.exp(-2.5 * t) + 2.5 * (np.exp(-1.5 * t) - np.exp(-2.5 * t))),
+    (
+        "global_",
+        {"c": 2.5, "q": 1.5},
+        0.0,
+        lambda t: np.exp(-2.5 * t) + 2.5 * (np.exp(-1.5 * t) - np.exp(-2.5 * t)),
+    ),
 ]
 
 
@@ -111,7 +119,11 @@ def test_from_its_surface_the_error_follows_the_closed_form(name, gains, de, due
 
 
 TERMINAL = [  # speed on s = 0, and the time it takes from e
-    ("terminal", lambda g, e: g["b"] * e ** g["p"], lambda g, e: e ** (1 - g["p"]) / (g["b"] * (1 - g["p"]))),
+    (
+        "terminal",
+        lambda g, e: g["b"] * e ** g["p"],
+        lambda g, e: e ** (1 - g["p"]) / (g["b"] * (1 - g["p"])),
+    ),
     (
         "fast_terminal",
         lambda g, e: g["a"] * e + g["b"] * e ** g["p"],
@@ -122,7 +134,11 @@ TERMINAL = [  # speed on s = 0, and the time it takes from e
         lambda g, e: (g["B"] * e) ** (1 / g["p"]),
         lambda g, e: e ** (1 - 1 / g["p"]) / (g["B"] ** (1 / g["p"]) * (1 - 1 / g["p"])),
     ),
-    ("nonsingular_fast_terminal", lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"]), None),
+    (
+        "nonsingular_fast_terminal",
+        lambda g, e: ((e + g["a"] * e ** g["q"]) / g["b"]) ** (1 / g["p"]),
+        None,
+    ),
     (
         "predefined_time",
         lambda g, e: math.exp(e ** g["p"]) * e ** (1 - g["p"]) / (g["p"] * g["T"]),
@@ -138,27 +154,36 @@ TERMINAL = [  # speed on s = 0, and the time it takes from e
 )
 def test_on_a_terminal_surface_the_error_ends_at_the_stated_time(name, speed, due, e):
     slid = surface(name)
-    assert at(slid, np.zeros(slid.memory), e, -speed(slid.gains, e))[0] == pytest.approx(0.0, abs=1e-12)
+    assert at(slid, np.zeros(slid.memory), e, -speed(slid.gains, e))[0] == pytest.approx(
+        0.0, abs=1e-12
+    )
     whole = quad(lambda r: 1 / speed(slid.gains, r), 0.0, e)[0]
     if due is not None:
         assert due(slid.gains, e) == pytest.approx(whole, rel=1e-6)
     trace = slide(name, e=e, de=-speed(slid.gains, e))
     outside = np.flatnonzero(np.abs(trace.x[:, 0]) > 0.01)
-    assert trace.t[outside[-1]] == pytest.approx(quad(lambda r: 1 / speed(slid.gains, r), 0.01, e)[0], rel=0.02)
+    assert trace.t[outside[-1]] == pytest.approx(
+        quad(lambda r: 1 / speed(slid.gains, r), 0.01, e)[0], rel=0.02
+    )
     assert np.abs(trace.x[trace.t > 1.05 * whole + 0.05]).max() < 2e-3
 
 
 def shares(name, law):
     """Ultimate bounds over the start, of a law on a surface, on three plants."""
     plants = ("duffing", "van_der_pol", "inverted_pendulum")
-    runs = [smc.Scenario(plant=p, law=law, surface=name, duration=8.0, integrator="Euler") for p in plants]
+    runs = []
+    for p in plants:
+        runs.append(smc.Scenario(plant=p, law=law, surface=name, duration=8.0, integrator="Euler"))
     traces = smc.run(runs)
     assert not any(trace.failure for trace in traces)
     return [smc.score(trace)["ultimate_bound"] / np.abs(trace.x[0]).max() for trace in traces]
 
 
 @pytest.mark.parametrize(
-    ("name", "law"), list(zip(laws(kind="surface"), itertools.cycle(["observer_free", "boundary_layer", "classical"])))
+    ("name", "law"),
+    list(
+        zip(laws(kind="surface"), itertools.cycle(["observer_free", "boundary_layer", "classical"]))
+    ),
 )
 def test_first_order_laws_settle_every_plant_on_every_surface(name, law):
     if name.startswith("nonsingular"):
@@ -179,7 +204,9 @@ def test_first_order_laws_take_the_surface_of_order_3_behind_an_actuator_lag(law
         "actuator": smc.Lag(0.05),
         "velocity": smc.estimator("levant", order=2, L=200.0),
     }
-    for trace in smc.run([smc.Scenario(plant=p, law=law, **common) for p in ("duffing", "van_der_pol")]):
+    for trace in smc.run(
+        [smc.Scenario(plant=p, law=law, **common) for p in ("duffing", "van_der_pol")]
+    ):
         assert trace.failure is None
         assert smc.score(trace)["ultimate_bound"] <= 0.05 * np.abs(trace.x[0]).max()
 
@@ -196,14 +223,18 @@ def test_the_surface_of_order_3_holds_its_polynomial_on_s_equal_to_zero():
 def test_the_surface_replaces_the_laws_own():
     """c of the law is of no account, and the trace's s is the surface's."""
     common = {"plant": "duffing", "duration": 0.5, "surface": surface("linear", c=2.0)}
-    one, other = smc.run([smc.Scenario(law=smc.law("classical", c=c), **common) for c in (1.0, 9.0)])
+    one, other = smc.run(
+        [smc.Scenario(law=smc.law("classical", c=c), **common) for c in (1.0, 9.0)]
+    )
     np.testing.assert_array_equal(one.u, other.u)
     np.testing.assert_allclose(one.s, one.v + 2.0 * one.x, atol=1e-12)
 
 
 def test_memory_of_a_surface_belongs_to_a_channel_and_a_run():
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
-    scenario = smc.Scenario(plant=plant, law="classical", surface="integral", x0=(0.5, 0.0, -0.5), duration=0.5)
+    scenario = smc.Scenario(
+        plant=plant, law="classical", surface="integral", x0=(0.5, 0.0, -0.5), duration=0.5
+    )
     trace, again = smc.run([scenario, scenario])
     assert not trace.x[:, 1].any()
     np.testing.assert_array_equal(trace.x[:, 2], -trace.x[:, 0])

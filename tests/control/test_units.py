@@ -1,4 +1,5 @@
-"""Units of the gains of surfaces and estimators: converted by their units, they do the same in every system of units.
+"""Units of the gains of surfaces and estimators: converted by their units, they do the same in
+every system of units.
 
 Those of laws are tested the same way in tests/analysis/tuning/test_search_space.py.
 """
@@ -16,15 +17,24 @@ from smc_mujoco.control.law import laws
 
 pytestmark = pytest.mark.quick
 
-SYSTEMS = [{"F": 4.0, "X": X, "T": T} for X, T in ((4.0, 1.0), (1.0, 4.0), (16.0, 0.25), (0.25, 0.25))]
-ALIKE = {"predefined_time": [{"F": 1.0, "X": 1.0, "T": T} for T in (4.0, 0.25)]}  # exp(|e|^p) has a special unit
+SYSTEMS = [
+    {"F": 4.0, "X": X, "T": T} for X, T in ((4.0, 1.0), (1.0, 4.0), (16.0, 0.25), (0.25, 0.25))
+]
+ALIKE = {
+    "predefined_time": [{"F": 1.0, "X": 1.0, "T": T} for T in (4.0, 0.25)]
+}  # exp(|e|^p) has a special unit
 WAY = np.random.default_rng(0).normal(size=(20, 4))
 
 
 def converted(component, system):
     """The component with its gains in another system of units."""
     units = {name: gain.unit_at(component.gains) for name, gain in component.template.gains.items()}
-    gains = {name: value * units[name].of(system) if units[name] else value for name, value in component.gains.items()}
+    gains = {}
+    for name, value in component.gains.items():
+        if units[name]:
+            gains[name] = value * units[name].of(system)
+        else:
+            gains[name] = value
     return dataclasses.replace(component, gains=gains)
 
 
@@ -52,11 +62,15 @@ def test_surface_does_the_same_in_every_system_of_units(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "gains"), [*((name, {}) for name in laws(kind="estimator")), *(("levant", {"order": n}) for n in (1, 3))]
+    ("name", "gains"),
+    [*((name, {}) for name in laws(kind="estimator")), *(("levant", {"order": n}) for n in (1, 3))],
 )
 def test_estimator_does_the_same_in_every_system_of_units(name, gains):
     def seen(X, T):
-        return [Reading(dt=0.01 * T, x=X * (math.sin(0.3 * i) + x), v=v * X / T) for i, (x, v, *_) in enumerate(WAY)]
+        return [
+            Reading(dt=0.01 * T, x=X * (math.sin(0.3 * i) + x), v=v * X / T)
+            for i, (x, v, *_) in enumerate(WAY)
+        ]
 
     one = estimator.estimator(name, **gains)
     plain = called(one, seen(1.0, 1.0)).reshape(len(WAY), -1)

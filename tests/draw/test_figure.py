@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.sketch import failed
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -17,18 +18,21 @@ from smc_mujoco.draw import decimate, panels, style
 from smc_mujoco.draw import figure as draw_figure
 from smc_mujoco.draw.page import FORMATS, files, write
 from smc_mujoco.metrics.conventions import groups
-from helpers import reference
 
 LAWS = ("observer_free", "classical")
 
 
 def figure(traces, path, format="svg", **options) -> list:
-    """The files that a figure is written to: an SVG, whose words can be read, to save the time of the PNG."""
+    """The files that a figure is written to: an SVG, whose words can be read, to save the time of
+    the PNG.
+    """
     draw_figure.figure(traces, path, format=format, **options)
     return files(path, format)
 
 
-def runs(plant: str = "duffing", condition: str = "nominal", duration: float = 1.0) -> list[smc.Trace]:
+def runs(
+    plant: str = "duffing", condition: str = "nominal", duration: float = 1.0
+) -> list[smc.Trace]:
     return smc.run(list(smc.paper.comparison(plant, condition, LAWS, duration=duration).values()))
 
 
@@ -89,12 +93,17 @@ def test_a_jump_is_marked_with_what_has_changed(tmp_path):
 
 
 def cart_and_pole(**fields) -> smc.Trace:
-    return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields))
+    return smc.run(
+        smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=1.0, **fields)
+    )
 
 
 def test_the_band_around_each_joint_is_that_of_its_own_scale():
     trace = cart_and_pole()
-    shown = [panel for name in ("x", "spread", "u", "force", "s") for panel in panels.over_groups([trace], name)]
+    shown = []
+    for name in ("x", "spread", "u", "force", "s"):
+        for panel in panels.over_groups([trace], name):
+            shown.append(panel)
     widths = []
     for row in shown[:2]:
         ax = Figure().subplots()
@@ -102,15 +111,20 @@ def test_the_band_around_each_joint_is_that_of_its_own_scale():
         (band,) = ax.collections
         widths.append(band.get_datalim(ax.transData).height)
     assert [row.quantity for row in shown] == ["x", "x", "u", "s"]
-    assert widths == pytest.approx([2 * 0.02, 2 * 0.02 * 0.3])  # the cart starts at 0: 1 m; the pole at 0.3 rad
+    assert widths == pytest.approx(
+        [2 * 0.02, 2 * 0.02 * 0.3]
+    )  # the cart starts at 0: 1 m; the pole at 0.3 rad
 
 
 def test_a_film_has_a_chart_of_each_joint():
     trace = cart_and_pole()
     parts = panels.strip([trace])
     assert [(name, group.unit) for name, group, *_ in parts] == [
-        ("x", "m"), ("x", "rad"), ("settling", "m"), ("u", "m"),
-    ]  # fmt: skip
+        ("x", "m"),
+        ("x", "rad"),
+        ("settling", "m"),
+        ("u", "m"),
+    ]
     np.testing.assert_array_equal(parts[1][2][0].x[:, 0], trace.x[:, 1])
 
 
@@ -118,7 +132,9 @@ def test_commands_in_volts_and_in_newton_metres_share_no_axes(tmp_path):
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0)
     torque = smc.Scenario(plant="furuta", law="none", duration=0.01, actuator=motor)
     volts = dataclasses.replace(torque, actuator=dataclasses.replace(motor, command="voltage"))
-    with pytest.raises(smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"):
+    with pytest.raises(
+        smc.ScenarioError, match="traces of furuta have u in N m and V: draw those of one unit"
+    ):
         figure(smc.run([volts, torque]), tmp_path / "c")
 
 
@@ -126,14 +142,22 @@ def test_short_impacts_are_marked_beyond_the_range_of_lasting_reactions_and_told
     """Two of the first run, to both sides; the other run has none."""
     spikes = np.zeros_like(pair[0].u)
     spikes[100:103], spikes[200] = 900.0, -400.0
-    calm = [dataclasses.replace(one, u=0.0 * one.u + 5.0, reaction=one.reaction * 0.0) for one in pair]
-    for first, title in ((dataclasses.replace(calm[0], reaction=spikes), "|reaction| up to 900 N"), (calm[0], "")):
+    calm = []
+    for one in pair:
+        calm.append(dataclasses.replace(one, u=0.0 * one.u + 5.0, reaction=one.reaction * 0.0))
+    for first, title in (
+        (dataclasses.replace(calm[0], reaction=spikes), "|reaction| up to 900 N"),
+        (calm[0], ""),
+    ):
         ax, shown = (
             Figure().add_subplot(),
             types.SimpleNamespace(traces=[first, calm[1]], group=groups(first.scenario.plant)[0]),
         )
         panels.clip_impacts(ax, shown, ["r", "b"])  # pyright: ignore[reportArgumentType]
-        marks = [(line.get_color(), line.get_marker(), *line.get_xydata().tolist()) for line in ax.lines]  # pyright: ignore
+        # pyright: ignore
+        marks = []
+        for line in ax.lines:
+            marks.append((line.get_color(), line.get_marker(), *line.get_xydata().tolist()))
         sides = [("r", 2, [first.t[100], 5.8]), ("r", 3, [first.t[200], -5.8]), ("b", 2), ("b", 3)]
         assert (ax.get_title(loc="right"), marks) == (title, sides if title else [])
 
@@ -143,14 +167,26 @@ def test_chattering_that_cannot_be_seen_has_no_words(pair, tmp_path):
     """A ripple of a thousandth of the largest |u|, on a run that is long enough to be averaged."""
     (trace,) = runs(duration=1.0)[:1]
     for ripple, told in ((1e-3, False), (0.1, True)):
-        u = trace.u + ripple * np.abs(trace.u).max() * np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0)[:, None]
+        u = (
+            trace.u
+            + ripple
+            * np.abs(trace.u).max()
+            * np.where(np.arange(len(trace.t)) % 2, 1.0, -1.0)[:, None]
+        )
         text = words(draw_figure.figure([dataclasses.replace(trace, u=u)]))
         assert ("where it chatters" in text) == told
 
 
 def test_labels_are_the_laws_names_unless_given(pair):
-    assert style.labels([*pair, pair[0]], None) == ["Observer-free 1", "Classical", "Observer-free 2"]
-    assert style.labels(pair, ["observer_free", "heavy"]) == ["observer_free", "heavy"]  # as they are given
+    assert style.labels([*pair, pair[0]], None) == [
+        "Observer-free 1",
+        "Classical",
+        "Observer-free 2",
+    ]
+    assert style.labels(pair, ["observer_free", "heavy"]) == [
+        "observer_free",
+        "heavy",
+    ]  # as they are given
 
     @smc.law_function
     def my_law(y, gains, memory):
@@ -180,23 +216,36 @@ def test_windows_have_the_range_and_mean_of_what_is_held_in_them():
 
 def test_chattering_is_drawn_as_its_mean_without_teeth():
     t, rng = np.arange(10_001) * 1e-3, np.random.default_rng(0)
-    switching = np.where(np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0)  # each value held 1 sample, or more
+    switching = np.where(
+        np.cumsum(rng.integers(1, 3, 10_001)) % 2, 6.0, -6.0
+    )  # each value held 1 sample, or more
     drift = np.clip(np.cumsum(rng.normal(size=10_001)), -0.1, 0.1)
-    for u in (np.where(np.arange(10_001) % 2, 6.0, -6.0), np.tile([6.0, 6.0, -6.0, -6.0, 6.0, -6.0], 1667)[:10_001]):
+    for u in (
+        np.where(np.arange(10_001) % 2, 6.0, -6.0),
+        np.tile([6.0, 6.0, -6.0, -6.0, 6.0, -6.0], 1667)[:10_001],
+    ):
         mean = decimate.smooth(u, 100)
         assert np.abs(mean).max() < 0.15  # to the ends
         assert np.abs(mean[50:-50]).max() < 0.02
         at, low, high = decimate.band(t, u[:, None])
         assert len(at) <= 360
         assert (low.min(), high.max()) == (-6.0, 6.0)
-    assert np.abs(decimate.smooth(switching, 100) - decimate.smooth(switching + drift, 100)).max() < 0.2
+    assert (
+        np.abs(decimate.smooth(switching, 100) - decimate.smooth(switching + drift, 100)).max()
+        < 0.2
+    )
 
 
 def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests():
-    """For a window of 40 samples: each within 10 of the one before, rests of up to 10, 39 and 40 samples."""
+    """For a window of 40 samples: each within 10 of the one before, rests of up to 10, 39 and 40
+    samples.
+    """
 
     def parts(*pieces):
-        return [(int(each.start), int(each.stop)) for each in decimate.chattering_parts(np.concatenate(pieces), 40)]
+        return [
+            (int(each.start), int(each.stop))
+            for each in decimate.chattering_parts(np.concatenate(pieces), 40)
+        ]
 
     def switching(count, size=1.0):
         return np.resize([size, -size], count)
@@ -217,7 +266,9 @@ def test_chattering_is_six_reversals_close_together_and_reaches_over_short_rests
 
 def test_what_does_not_chatter_is_drawn_as_it_is():
     t = np.arange(10_001) * 1e-3
-    bang = np.where(t < 1.2, -6.0, np.where(t < 2.0, 6.0, np.where(np.arange(10_001) % 2, 6.0, -6.0)))
+    bang = np.where(
+        t < 1.2, -6.0, np.where(t < 2.0, 6.0, np.where(np.arange(10_001) % 2, 6.0, -6.0))
+    )
     mean = decimate.smooth(bang, 100)
     assert (mean[:2000] == bang[:2000]).all()
     assert np.abs(mean[2002:]).max() < 0.15
@@ -243,13 +294,17 @@ def switching(lengths) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(6))
 def test_within_chattering_the_line_is_a_whole_mean_whatever_is_held_shorter_than_the_window(seed):
     rng = np.random.default_rng(seed)
-    within = switching([*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)])  # 40: the window
+    within = switching(
+        [*rng.integers(1, 10, 6), *rng.integers(1, 41, 60), *rng.integers(1, 10, 6)]
+    )  # 40: the window
     u = np.concatenate([np.full(300, 6.0), within, np.full(300, -within[-1])])
     (part,) = decimate.chattering_parts(u, 40)
     assert (part.start, part.stop) == (300, 300 + len(within))
     mean, line = triangle(within, 20), decimate.smooth(u, 40)
     np.testing.assert_allclose(line[319:-319], mean, atol=1e-12)
-    np.testing.assert_allclose(line[300:319], mean[0])  # no needle where it begins, no dip where it ends
+    np.testing.assert_allclose(
+        line[300:319], mean[0]
+    )  # no needle where it begins, no dip where it ends
     np.testing.assert_allclose(line[-319:-300], mean[-1])
     assert (np.delete(line, slice(300, -300)) == np.delete(u, slice(300, -300))).all()
 
@@ -265,14 +320,21 @@ def test_chattering_to_the_end_of_a_run_ends_in_a_whole_mean():
 def test_the_line_is_the_same_read_backwards(seed):
     rng = np.random.default_rng(seed)
     lengths = rng.choice([1, 3, 8, 20, 39, 41, 80], 300, p=[0.3, 0.3, 0.2, 0.1, 0.04, 0.03, 0.03])
-    u = switching([*[1] * 9, *lengths, *[1] * 9])  # a long hold is no chattering at the start, but is at the end
+    u = switching(
+        [*[1] * 9, *lengths, *[1] * 9]
+    )  # a long hold is no chattering at the start, but is at the end
     u += np.sin(np.arange(len(u)) / 50) + rng.normal(0.0, 0.02, len(u))
-    np.testing.assert_allclose(decimate.smooth(u[::-1], 40)[::-1], decimate.smooth(u, 40), atol=1e-12)
+    np.testing.assert_allclose(
+        decimate.smooth(u[::-1], 40)[::-1], decimate.smooth(u, 40), atol=1e-12
+    )
 
 
 def test_a_noisy_ramp_starts_and_ends_where_it_does_and_a_first_hold_is_drawn():
     k, noise = np.arange(2001), np.random.default_rng(0).normal(0.0, 0.03, 2001)
-    for y in (np.exp(-k / 40) + noise, np.exp((k - 2000) / 40) + noise):  # as s in the first and last 0.1 s
+    for y in (
+        np.exp(-k / 40) + noise,
+        np.exp((k - 2000) / 40) + noise,
+    ):  # as s in the first and last 0.1 s
         line = decimate.smooth(y, 100)
         truth = y - noise
         assert np.abs(line - truth).max() < 0.13  # the nearest whole mean is 0.65 off
@@ -294,9 +356,19 @@ def test_the_legend_says_what_line_and_band_are(pair, tmp_path):
 
 
 @pytest.mark.slow
-def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(pair, tmp_path):
-    alone, listed = figure(pair[0], tmp_path / "deep" / "lam_0.5", None), figure(pair[:1], tmp_path / "b.png", None)
-    assert [path.name for path in (*alone, *listed)] == ["lam_0.5.svg", "lam_0.5.png", "b.svg", "b.png"]
+def test_one_trace_is_drawn_like_a_list_of_one_and_the_same_traces_give_the_same_files(
+    pair, tmp_path
+):
+    alone, listed = (
+        figure(pair[0], tmp_path / "deep" / "lam_0.5", None),
+        figure(pair[:1], tmp_path / "b.png", None),
+    )
+    assert [path.name for path in (*alone, *listed)] == [
+        "lam_0.5.svg",
+        "lam_0.5.png",
+        "b.svg",
+        "b.png",
+    ]
     with Image.open(alone[1]) as image:
         assert image.size[0] == 1760
     assert [path.read_bytes() for path in alone] == [path.read_bytes() for path in listed]
@@ -310,7 +382,9 @@ def test_the_close_up_shows_no_round_off(pair, level):
     ends = np.where(pair[0].t[:, None] < 0.5, pair[0].u, held)
     for u in (ends, held, np.full_like(held, level)):
         ax = Figure().subplots()
-        panels.last_samples(ax, shown._replace(traces=[dataclasses.replace(pair[0], u=u)]), ["#000000"], pair[:1])
+        panels.last_samples(
+            ax, shown._replace(traces=[dataclasses.replace(pair[0], u=u)]), ["#000000"], pair[:1]
+        )
         low, high = ax.get_ylim()
         assert high - low >= 0.0199 * np.abs(u).max()
         assert (low + high) / 2 == pytest.approx(level, abs=1e-6)

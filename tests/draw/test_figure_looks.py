@@ -1,4 +1,6 @@
-"""Looks of figures, measured: words apart and inside, one width of line, no colour twice, no clipped reference."""
+"""Looks of figures, measured: words apart and inside, one width of line, no colour twice, no
+clipped reference.
+"""
 
 import dataclasses
 import itertools
@@ -20,20 +22,34 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation.trace import ARRAYS
 
 PAGE, COLUMN = "ieee-page", "ieee-column"
-TEN = ("observer_free", "classical", "adaptive", "super_twisting", "boundary_layer", "fixed_time", "integral", "pid")
+TEN = (
+    "observer_free",
+    "classical",
+    "adaptive",
+    "super_twisting",
+    "boundary_layer",
+    "fixed_time",
+    "integral",
+    "pid",
+)
 TEN += ("twisting", "terminal")
 
 
 @pytest.fixture(scope="module")
 def one() -> smc.Trace:
-    scenario = smc.Scenario(plant="duffing", law="classical", duration=1.5, reference=smc.Step(0.5, time=0.3))
+    scenario = smc.Scenario(
+        plant="duffing", law="classical", duration=1.5, reference=smc.Step(0.5, time=0.3)
+    )
     return smc.run(scenario)
 
 
 def under(trace: smc.Trace, law: str, factor: float) -> smc.Trace:
     """The trace as if another law had made it, a little otherwise."""
     scenario = dataclasses.replace(trace.scenario, law=smc.law(law))
-    x, changed = trace.r + factor * (trace.x - trace.r), {name: factor * getattr(trace, name) for name in "vus"}
+    x, changed = (
+        trace.r + factor * (trace.x - trace.r),
+        {name: factor * getattr(trace, name) for name in "vus"},
+    )
     return dataclasses.replace(trace, scenario=scenario, x=x, **changed)
 
 
@@ -48,9 +64,13 @@ def arm(tmp_path_factory) -> list[smc.Trace]:
     bodies = "".join(link.format(i) for i in range(7)) + "</body>" * 7
     motors = "".join(f'<motor joint="j{i}"/>' for i in range(7))
     path = tmp_path_factory.mktemp("arm") / "arm.xml"
-    path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><actuator>{motors}</actuator></mujoco>")
+    path.write_text(
+        f"<mujoco><worldbody>{bodies}</worldbody><actuator>{motors}</actuator></mujoco>"
+    )
     plant = smc.plant_from(path, [f"j{i}" for i in range(7)])
-    trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.3, x0=0.2, reference=smc.Step(0.3)))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law="classical", duration=0.3, x0=0.2, reference=smc.Step(0.3))
+    )
     return [trace, under(trace, "super_twisting", 0.8)]
 
 
@@ -58,14 +78,21 @@ def texts(page) -> list[matplotlib.text.Text]:
     """The visible words on a page, without the numbers of a hidden axis."""
     page.draw_without_rendering()
     every = page.findobj(matplotlib.text.Text)
-    found = [text for text in every if text.get_visible() and text.get_text().strip() and text.get_color() != "none"]
+    found = []
+    for text in every:
+        if text.get_visible() and text.get_text().strip() and text.get_color() != "none":
+            found.append(text)
     hidden = set()
     for ax in page.axes:
         for axis in (ax.xaxis, ax.yaxis):
             low, high = sorted(axis.get_view_interval())
             for tick in [*axis.get_major_ticks(), *axis.get_minor_ticks()]:
                 out = not low - 1e-12 <= tick.get_loc() <= high + 1e-12
-                hidden |= {id(label) for label in (tick.label1, tick.label2) if out or not label.get_visible()}
+                hidden |= {
+                    id(label)
+                    for label in (tick.label1, tick.label2)
+                    if out or not label.get_visible()
+                }
     return [text for text in found if id(text) not in hidden]
 
 
@@ -84,16 +111,27 @@ def check(page) -> None:
 @pytest.mark.parametrize(
     ("kind", "size"),
     [
-        ("one", None), ("ten", COLUMN), ("failed", COLUMN), ("jump", COLUMN), ("short", COLUMN),
-        ("arm", PAGE), ("arm", COLUMN),
+        ("one", None),
+        ("ten", COLUMN),
+        ("failed", COLUMN),
+        ("jump", COLUMN),
+        ("short", COLUMN),
+        ("arm", PAGE),
+        ("arm", COLUMN),
     ],
-)  # fmt: skip
+)
 def test_words_are_apart_and_on_the_page(kind, size, one, arm):
-    jumps = [dataclasses.replace(one.scenario, jump=smc.Jump(at, {"mass": 2.0})) for at in (0.5, 0.6)]
+    jumps = []
+    for at in (0.5, 0.6):
+        jumps.append(dataclasses.replace(one.scenario, jump=smc.Jump(at, {"mass": 2.0})))
     traces = {
         "one": [one],
         "ten": ten(one),
-        "failed": [one, failed(under(one, "pid", 0.5), 400), failed(under(one, "adaptive", 0.5), 1)],
+        "failed": [
+            one,
+            failed(under(one, "pid", 0.5), 400),
+            failed(under(one, "adaptive", 0.5), 1),
+        ],
         "jump": [dataclasses.replace(one, scenario=jump) for jump in jumps],
         "short": [dataclasses.replace(one, **{name: getattr(one, name)[:20] for name in ARRAYS})],
         "arm": arm,
@@ -105,15 +143,26 @@ def test_words_are_apart_and_on_the_page(kind, size, one, arm):
 
 def test_words_of_signals_are_apart_and_each_condition_is_told(one):
     laws = {"Observer-free": ten(one)[0], "Classical": one}
-    page = signals({"calm": laws, "noisy": laws, "late": laws}, None, "Control signals, Duffing oscillator")
+    page = signals(
+        {"calm": laws, "noisy": laws, "late": laws}, None, "Control signals, Duffing oscillator"
+    )
     check(page)
     titles = [column.legends[0].get_title().get_text() for column in page.subfigs]
-    assert [page.get_suptitle(), *titles] == ["Control signals, Duffing oscillator", "calm", "noisy", "late"]
+    assert [page.get_suptitle(), *titles] == [
+        "Control signals, Duffing oscillator",
+        "calm",
+        "noisy",
+        "late",
+    ]
 
 
 def curves(ax) -> list:
     """The lines of traces, without those of single channels of several."""
-    return [line for line in ax.lines if len(line.get_xdata()) > 20 and line.get_gid() is None and not line.get_alpha()]
+    return [
+        line
+        for line in ax.lines
+        if len(line.get_xdata()) > 20 and line.get_gid() is None and not line.get_alpha()
+    ]
 
 
 def calm(trace: smc.Trace) -> smc.Trace:
@@ -127,15 +176,22 @@ def rows(ax) -> list:
 
 def test_every_curve_has_one_width_and_a_colour_of_its_own(one):
     for ax in figure(ten(one)).axes:
-        lines = [line for row in rows(ax) for line in curves(row)]
+        lines = []
+        for row in rows(ax):
+            for line in curves(row):
+                lines.append(line)
         assert len(lines) == 10
         assert len({line.get_linewidth() for line in lines}) == 1
         assert len({to_hex(line.get_color()) for line in lines}) == 10
 
 
 def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
-    three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u) for k, trace in enumerate(ten(one)[:3])]
-    assert [len(rows(ax)) for ax in figure([*map(calm, three[:2]), three[2]], panels=["u", "end"]).axes] == [1, 1]
+    three = []
+    for k, trace in enumerate(ten(one)[:3]):
+        three.append(dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u))
+    assert [
+        len(rows(ax)) for ax in figure([*map(calm, three[:2]), three[2]], panels=["u", "end"]).axes
+    ] == [1, 1]
     bang = [dataclasses.replace(trace, u=6.0 * np.sign(trace.u + 1e-9)) for trace in three]
     (ax,) = figure(bang, panels=["u"]).axes
     assert {tuple(row.get_yticks()) for row in rows(ax)} == {(-6.0, 6.0)}, "the bound"
@@ -146,18 +202,23 @@ def test_controls_whose_bands_would_hide_each_other_have_a_row_each(one):
         assert names == ["Observer-free", "Classical", "Adaptive"]
         assert len({row.get_ylim() for row in rows(ax)}) == 1
         assert [to_hex(curves(row)[0].get_color()) for row in rows(ax)] == [
-            to_hex(colour) for colour in style.law_colours(["observer_free", "classical", "adaptive"])
+            to_hex(colour)
+            for colour in style.law_colours(["observer_free", "classical", "adaptive"])
         ]
 
 
 def test_a_run_that_fails_does_not_set_the_range_of_the_rows_of_others(one):
-    three = [dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u - 20.0) for k, trace in enumerate(ten(one)[:3])]
+    three = []
+    for k, trace in enumerate(ten(one)[:3]):
+        three.append(dataclasses.replace(trace, u=(1.0 - 0.1 * k) * trace.u - 20.0))
     lost = failed(dataclasses.replace(under(one, "pid", 1.0), u=1e4 * one.u), 400)
     over_time, end = figure([*three, lost], panels=["u", "end"]).axes
     assert [len(rows(ax)) for ax in (over_time, end)] == [4, 4]
     assert {row.get_ylim() for row in rows(over_time)} == {panels.limits(three, "u")}
     (cross,) = [line for row in rows(over_time) for line in row.lines if line.get_marker() == "X"]
-    assert cross.get_ydata()[0] in panels.limits(three, "u")  # at the edge of the range: it lies far outside
+    assert cross.get_ydata()[0] in panels.limits(
+        three, "u"
+    )  # at the edge of the range: it lies far outside
     assert max(row.get_ylim()[1] for row in rows(end)) < 0.0
     assert [text.get_text() for row in rows(end) for text in row.texts] == ["the run failed"]
 
@@ -174,14 +235,21 @@ def test_the_legend_of_ten_laws_and_the_title_take_less_than_a_quarter_of_a_colu
 def test_a_column_leaves_what_lines_and_bands_mean_to_its_caption(one, tmp_path):
     chatters = dataclasses.replace(one, u=one.u + 0.5 * (-1.0) ** np.arange(len(one.t))[:, None])
     pages_of = {
-        size: figure([one, chatters], tmp_path / f"{size}.svg", size=size, format="svg") for size in (COLUMN, PAGE)
+        size: figure([one, chatters], tmp_path / f"{size}.svg", size=size, format="svg")
+        for size in (COLUMN, PAGE)
     }
-    names = {size: [text.get_text() for text in page.legends[0].get_texts()] for size, page in pages_of.items()}
+    names = {}
+    for size, page in pages_of.items():
+        names[size] = [text.get_text() for text in page.legends[0].get_texts()]
     labels = style.labels([one, chatters], None)
     assert names[COLUMN] == labels
     assert names[PAGE][:2] == labels
     caption = pages_of[COLUMN].get_label()
-    assert caption == pages_of[PAGE].get_label() == "; ".join(" ".join(words.split()) for words in names[PAGE][2:])
+    assert (
+        caption
+        == pages_of[PAGE].get_label()
+        == "; ".join(" ".join(words.split()) for words in names[PAGE][2:])
+    )
     assert caption.startswith("dashes: reference; grey: reference ± 2 %; band: range of u")
     assert caption in (tmp_path / f"{COLUMN}.svg").read_text(encoding="utf-8")
 
@@ -189,12 +257,16 @@ def test_a_column_leaves_what_lines_and_bands_mean_to_its_caption(one, tmp_path)
 def test_the_reference_is_drawn_over_the_curves_and_never_clipped(one):
     far = dataclasses.replace(one, r=one.r + 100.0)
     page = figure([far, under(one, "pid", 0.9)], size=COLUMN, panels=["x", "error", "channels"])
-    drawn = [(ax, line) for ax in page.axes for line in ax.lines if line.get_gid() == panels.REFERENCE]
+    drawn = [
+        (ax, line) for ax in page.axes for line in ax.lines if line.get_gid() == panels.REFERENCE
+    ]
     assert drawn
     for ax, line in drawn:
         low, high = ax.get_ylim()
         assert low < line.get_ydata().min() <= line.get_ydata().max() < high
-        assert line.get_zorder() > max(curve.get_zorder() for curve in ax.lines if curve.get_gid() != panels.REFERENCE)
+        assert line.get_zorder() > max(
+            curve.get_zorder() for curve in ax.lines if curve.get_gid() != panels.REFERENCE
+        )
 
 
 def test_a_reference_that_moves_is_in_the_phase_portrait_without_its_jumps(one):
@@ -209,37 +281,70 @@ def test_a_reference_that_moves_is_in_the_phase_portrait_without_its_jumps(one):
 
 def test_runs_of_one_law_are_told_apart_by_what_differs(one):
     scenario = one.scenario
-    slow = dataclasses.replace(one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=2.0)))
-    fast = dataclasses.replace(one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=5.0)))
+    slow = dataclasses.replace(
+        one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=2.0))
+    )
+    fast = dataclasses.replace(
+        one, scenario=dataclasses.replace(scenario, law=smc.law("classical", k=3.0, c=5.0))
+    )
     other = under(one, "pid", 0.5)
-    assert style.labels([slow, fast, other], None) == ["Classical: c = 2", "Classical: c = 5", "PID"]
-    noisy = dataclasses.replace(slow, scenario=dataclasses.replace(slow.scenario, input_delay=0.005))
-    assert style.labels([slow, noisy], None) == ["Classical: input delay = 0", "Classical: input delay = 0.005"]
+    assert style.labels([slow, fast, other], None) == [
+        "Classical: c = 2",
+        "Classical: c = 5",
+        "PID",
+    ]
+    noisy = dataclasses.replace(
+        slow, scenario=dataclasses.replace(slow.scenario, input_delay=0.005)
+    )
+    assert style.labels([slow, noisy], None) == [
+        "Classical: input delay = 0",
+        "Classical: input delay = 0.005",
+    ]
     assert style.labels([slow, slow], None) == ["Classical 1", "Classical 2"]
 
 
 def test_labels_are_words_and_numbers_have_the_digits_that_tell_them_apart(one):
     def told(*fields):
-        runs = [dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, **each)) for each in fields]
+        runs = []
+        for each in fields:
+            runs.append(
+                dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, **each))
+            )
         return [label.removeprefix("Classical: ") for label in style.labels(runs, None)]
 
     rubbed = [{"friction": Coulomb(level)} for level in (0.005, 0.0050001)]
-    assert told({}, *rubbed) == ["no friction", "friction Coulomb 0.005", "friction Coulomb 0.0050001"]
+    assert told({}, *rubbed) == [
+        "no friction",
+        "friction Coulomb 0.005",
+        "friction Coulomb 0.0050001",
+    ]
     drives = [{"actuator": part} for part in (smc.Lag(0.05), smc.DCMotor(), smc.Backlash(0.02))]
-    assert told(*drives) == ["actuator Lag 0.05", "actuator DC motor", "actuator Backlash, gap 0.02"]
+    assert told(*drives) == [
+        "actuator Lag 0.05",
+        "actuator DC motor",
+        "actuator Backlash, gap 0.02",
+    ]
     waves = [{"disturbance": smc.Sine(0.2, omega)} for omega in (5.0, 6.0)]
     assert told(*waves) == ["disturbance omega = 5", "disturbance omega = 6"]
     mixed = [{"disturbance": smc.Constant(0.1)}, waves[0]]
     assert told(*mixed) == ["disturbance Constant 0.1", "disturbance Sine, amplitude 0.2, omega 5"]
-    assert told({}, {"noise": smc.Noise(0.01, 0.05)}) == ["no noise", "noise position 0.01, velocity 0.05"]
+    assert told({}, {"noise": smc.Noise(0.01, 0.05)}) == [
+        "no noise",
+        "noise position 0.01, velocity 0.05",
+    ]
     assert told({}, {"sensor": smc.Encoder(2000)}) == ["no sensor", "sensor Encoder, counts 2000"]
     laws = [{"law": smc.law("classical", k=k)} for k in (2.0, 2.0001, 3.0)]
     assert told(*laws) == ["k = 2", "k = 2.0001", "k = 3"]
 
 
 def test_heads_say_what_is_drawn_of_which_plant_under_which_condition(one):
-    named = [dataclasses.replace(one, scenario=one.scenario.named(name)) for name in ("slow_noise", "friction")]
-    for runs, words in ((named[:1] * 2, "Duffing oscillator, slow noise"), (named, "Duffing oscillator")):
+    named = []
+    for name in ("slow_noise", "friction"):
+        named.append(dataclasses.replace(one, scenario=one.scenario.named(name)))
+    for runs, words in (
+        (named[:1] * 2, "Duffing oscillator, slow noise"),
+        (named, "Duffing oscillator"),
+    ):
         assert head(figure(runs, panels=["x"])) == words
         assert style.head([run.scenario for run in runs]) == words, "that of a film too"
     rows = Rows()
@@ -256,7 +361,9 @@ def head(page) -> str:
 def test_runs_under_several_conditions_have_their_names_inside_the_page(one):
     late = [dataclasses.replace(one.scenario, input_delay=delay) for delay in (0.0, 0.01, 0.02)]
     words = ["nominal", "late", "w" * 90]
-    runs = [dataclasses.replace(one, scenario=run.named(name)) for run, name in zip(late, words, strict=True)]
+    runs = []
+    for run, name in zip(late, words, strict=True):
+        runs.append(dataclasses.replace(one, scenario=run.named(name)))
     assert style.labels(runs, None) == [f"Classical: {name}" for name in words]
     starts = [dataclasses.replace(late[1], x0=(x0,)).named("late") for x0 in (0.5, 0.7)]
     several = [runs[0], *(dataclasses.replace(one, scenario=run) for run in starts)]
@@ -267,7 +374,10 @@ def test_runs_under_several_conditions_have_their_names_inside_the_page(one):
     ]
     page = figure(runs, panels=["u", "end"])
     page.draw_without_rendering()  # matplotlib warns where words leave axes no room
-    titles = [row._left_title for ax in page.axes for row in rows(ax)]
+    titles = []
+    for ax in page.axes:
+        for row in rows(ax):
+            titles.append(row._left_title)
     assert len(titles) == 6
     assert max(title.get_window_extent().x1 for title in titles) <= page.bbox.x1
 
@@ -282,9 +392,13 @@ def test_labels_of_laws_are_written_one_way():
 
 
 def test_curves_that_agree_are_drawn_once_in_ink_until_they_part(one):
-    """Until 1.9 s a relay covered three other laws of the Furuta pendulum; elsewhere they were dashed in turn."""
+    """Until 1.9 s a relay covered three other laws of the Furuta pendulum; elsewhere they were
+    dashed in turn.
+    """
     half = one.t[-1] / 2
-    later = dataclasses.replace(one, x=one.x + 0.5 * np.where(one.t > half, one.t - half, 0.0)[:, None])
+    later = dataclasses.replace(
+        one, x=one.x + 0.5 * np.where(one.t > half, one.t - half, 0.0)[:, None]
+    )
     same = [one, later, dataclasses.replace(later, u=-one.u)]
     for ax in figure(same, labels=list("abc"), panels=["x", "settling"]).axes:
         ink = [line for line in ax.lines if line.get_gid() == panels.AGREED]
@@ -322,7 +436,9 @@ def test_a_panel_that_is_asked_for_is_drawn_for_each_joint_of_an_arm(arm):
 
 
 def test_words_of_a_jump_do_not_cover_curves(one):
-    jump = dataclasses.replace(one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0})))
+    jump = dataclasses.replace(
+        one, scenario=dataclasses.replace(one.scenario, jump=smc.Jump(0.5, {"mass": 2.0}))
+    )
     for shown in (None, ["channels"]):
         page = figure([jump], panels=shown)
         page.draw_without_rendering()
@@ -332,7 +448,9 @@ def test_words_of_a_jump_do_not_cover_curves(one):
 
 def test_panels_over_time_end_where_all_rest_and_never_before_something_happens(one):
     at = int(0.2 * len(one.t))
-    still = dataclasses.replace(one, x=np.where(np.arange(len(one.t)) < at, 1.0, 0.01)[:, None], d=0.0 * one.d)
+    still = dataclasses.replace(
+        one, x=np.where(np.arange(len(one.t)) < at, 1.0, 0.01)[:, None], d=0.0 * one.d
+    )
     assert panels.horizon([still]) == pytest.approx(1.3 * one.t[at - 1])
     whole = one.t[-1]
     late = np.where(np.arange(len(one.t)) < 0.9 * len(one.t), 0.0, 1.0)[:, None]
@@ -355,7 +473,9 @@ def test_the_error_is_the_largest_within_its_window_on_a_logarithmic_axis(one):
     for time, value in zip(t[::17], y[::17], strict=True):
         near = np.abs(one.t - time) <= half + one.scenario.control_period
         assert value <= e[near].max() + 1e-12
-        assert value >= e[np.abs(one.t - time) <= half - one.scenario.control_period].max(initial=panels.MIN_ERROR)
+        assert value >= e[np.abs(one.t - time) <= half - one.scenario.control_period].max(
+            initial=panels.MIN_ERROR
+        )
 
 
 def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path):
@@ -368,7 +488,9 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
     mine = Figure(figsize=(9.0, 6.0))
     assert figure(one, fig=mine) is mine
-    left, right = Figure(figsize=(12.0, 6.0), layout="constrained").subfigures(1, 2, squeeze=False)[0]
+    left, right = Figure(figsize=(12.0, 6.0), layout="constrained").subfigures(1, 2, squeeze=False)[
+        0
+    ]
     assert figure(one, fig=left) is left
     assert len(right.axes) == 0
 
@@ -376,9 +498,18 @@ def test_a_figure_is_returned_in_any_size_and_written_where_asked(one, tmp_path)
 class Rows:
     """A table of made-up runs."""
 
-    def __init__(self, laws=("classical", "super_twisting", "pid"), seeds=6, still="", mixed=False, tiny=False):
+    def __init__(
+        self,
+        laws=("classical", "super_twisting", "pid"),
+        seeds=6,
+        still="",
+        mixed=False,
+        tiny=False,
+    ):
         self.still, self.mixed, self.tiny = still, mixed, tiny
-        cells = itertools.product(("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds))
+        cells = itertools.product(
+            ("duffing", "van_der_pol"), ("nominal", "noise"), laws, range(seeds)
+        )
         self.rows = [(*cell, 1.0 + 0.1 * k % 0.7) for k, cell in enumerate(cells)]
 
     def scenario(self, i):
@@ -392,14 +523,24 @@ class Rows:
         if name in empty:
             return empty[name]
         if name in ("plant", "condition", "law", "seed"):
-            return np.array([row[("plant", "condition", "law", "seed").index(name)] for row in self.rows], object)
-        never = [name == "settling_time" and (row[2] == "pid" or row[0] == self.still) for row in self.rows]
+            return np.array(
+                [row[("plant", "condition", "law", "seed").index(name)] for row in self.rows],
+                object,
+            )
+        never = []
+        for row in self.rows:
+            never.append(name == "settling_time" and (row[2] == "pid" or row[0] == self.still))
         sizes = [float(row[4]) for row in self.rows]
         if self.mixed:  # the interval of pid, the fastest, reaches to "never"
             never = [one and int(row[3]) % 2 > 0 for one, row in zip(never, self.rows, strict=True)]
-            sizes = [size - 0.9 * (row[2] == "pid") for size, row in zip(sizes, self.rows, strict=True)]
+            sizes = [
+                size - 0.9 * (row[2] == "pid") for size, row in zip(sizes, self.rows, strict=True)
+            ]
         if self.tiny:
-            sizes = [size * (1e-22 if row[2] == "pid" else 1.0) for size, row in zip(sizes, self.rows, strict=True)]
+            sizes = [
+                size * (1e-22 if row[2] == "pid" else 1.0)
+                for size, row in zip(sizes, self.rows, strict=True)
+            ]
         return np.where(never, np.inf, sizes)
 
 
@@ -419,20 +560,33 @@ def test_a_board_has_a_dot_and_an_interval_for_each_law_and_condition(size):
 
 
 @pytest.mark.parametrize("size", [None, COLUMN])
-def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_settles_is_hollow(size):
+def test_marks_of_a_board_are_medians_by_law_from_above_and_a_law_that_never_settles_is_hollow(
+    size,
+):
     laws = ("classical", "super_twisting", "adaptive")
     rows = Rows(laws=laws, still="duffing" if size else "")
     rows.rows = [row for row in rows.rows if row[0] == "duffing"]
     page = smc.plot(rows, metrics=["settling_time", "ultimate_bound", "settles"], size=size)
     settling, bound, settles = page.axes
     for k, (law, colour) in enumerate(zip(laws, style.law_colours(laws), strict=True)):
-        sizes = [[row[4] for row in rows.rows if row[1:3] == (name, law)] for name in ("nominal", "noise")]
+        sizes = []
+        for name in ("nominal", "noise"):
+            sizes.append([row[4] for row in rows.rows if row[1:3] == (name, law)])
         dots = [line for line in bound.lines if line.get_marker() not in ("None", None, "")]
-        mine = [np.array(dot.get_xydata()).tolist()[0] for dot in dots if to_hex(dot.get_color()) == to_hex(colour)]
+        mine = [
+            np.array(dot.get_xydata()).tolist()[0]
+            for dot in dots
+            if to_hex(dot.get_color()) == to_hex(colour)
+        ]
         assert mine == [[pytest.approx(np.median(each)), k + 4 * i] for i, each in enumerate(sizes)]
-    fills = {str(dot.get_mfc()).lower() for dot in settling.lines if dot.get_marker() in ("o", "s", "D")}
+    fills = {
+        str(dot.get_mfc()).lower() for dot in settling.lines if dot.get_marker() in ("o", "s", "D")
+    }
     assert (fills == {style.PAPER.lower()}) == (size is not None)
-    shares = {float(np.array(dot.get_xdata())[0]) for dot in settles.lines if dot.get_marker() in ("o", "s", "D")}
+    shares = set()
+    for dot in settles.lines:
+        if dot.get_marker() in ("o", "s", "D"):
+            shares.add(float(np.array(dot.get_xdata())[0]))
     assert shares == {0.0 if size else 1.0}
 
 
@@ -441,7 +595,9 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
         def column(self, name):
             if name != "scenario":
                 return super().column(name)
-            return np.array([json.dumps({"plant": {}, "law": seed % 3}) for *_, seed, _ in self.rows], object)
+            return np.array(
+                [json.dumps({"plant": {}, "law": seed % 3}) for *_, seed, _ in self.rows], object
+            )
 
         def scenario(self, i):
             raise smc.ScenarioError("it has none")
@@ -453,7 +609,11 @@ def test_a_board_s_intervals_are_those_of_the_table_where_runs_share_gains():
     assert "a median's is the range of fewer than 6 samples" in " ".join(
         " ".join(text.get_text().split()) for text in texts(page)
     )
-    drawn = {tuple(line.get_xdata()) for ax in page.axes for line in ax.lines if len(line.get_xdata()) == 2}
+    drawn = set()
+    for ax in page.axes:
+        for line in ax.lines:
+            if len(line.get_xdata()) == 2:
+                drawn.add(tuple(line.get_xdata()))
     for board in boards:
         for entry in board.entries:
             assert entry.interval.n == 3
@@ -472,12 +632,17 @@ def test_labels_of_the_default_metrics_of_a_board_are_apart(size):
     page = smc.plot(Rows(), size=size)
     check(page)
     room = {PAGE: " ", COLUMN: "\n"}[size]
-    assert [ax.get_xlabel() for ax in page.axes[:2]] == [f"settling time{room}(s)", f"ultimate bound{room}(m)"]
+    assert [ax.get_xlabel() for ax in page.axes[:2]] == [
+        f"settling time{room}(s)",
+        f"ultimate bound{room}(m)",
+    ]
 
 
 def test_sizes_of_rounding_are_drawn_at_its_bound():
     ax = smc.plot(Rows(tiny=True), metrics=["ultimate_bound"]).axes[0]
-    sizes = np.concatenate([np.asarray(line.get_xdata()) for line in ax.lines if line.get_color() != style.RULE])
+    sizes = np.concatenate(
+        [np.asarray(line.get_xdata()) for line in ax.lines if line.get_color() != style.RULE]
+    )
     assert sizes.min() == 1e-9
     assert sizes.max() > 0.9
 
@@ -492,7 +657,10 @@ def test_a_panel_of_a_board_in_which_no_law_settles_has_no_numbers():
     rows = Rows(still="duffing")
     rows.rows = [row for row in rows.rows if row[:2] != ("van_der_pol", "noise")]
     page = smc.plot(rows, metrics=["settling_time"])
-    assert [ax.get_title(loc="left") for ax in page.axes] == ["Duffing oscillator", "Van der Pol oscillator"]
+    assert [ax.get_title(loc="left") for ax in page.axes] == [
+        "Duffing oscillator",
+        "Van der Pol oscillator",
+    ]
     assert [[label.get_text() for label in ax.get_yticklabels()] for ax in page.axes] == [
         ["nominal", "noise"],
         ["nominal"],

@@ -1,4 +1,6 @@
-"""What every figure holds to, whatever it shows: names with units, colours in the legend, data whole and inside."""
+"""What every figure holds to, whatever it shows: names with units, colours in the legend, data
+whole and inside.
+"""
 
 import dataclasses
 import math
@@ -28,8 +30,24 @@ from smc_mujoco.mechanisms.hardware.friction import Coulomb
 from smc_mujoco.simulation.trace import PLANT_DIVERGED
 
 SINE = smc.Sine(0.3, 4.0)
-ALL = ("x", "error", "spread", "v", "u", "delivered", "reaction", "d", "s", "channels", "phase", "settling", "end")
-NEUTRAL = {to_hex(colour) for colour in (style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID)}
+ALL = (
+    "x",
+    "error",
+    "spread",
+    "v",
+    "u",
+    "delivered",
+    "reaction",
+    "d",
+    "s",
+    "channels",
+    "phase",
+    "settling",
+    "end",
+)
+NEUTRAL = {
+    to_hex(colour) for colour in (style.INK, style.MUTED, style.RULE, style.PAPER, style.GRID)
+}
 UNIT = re.compile(r"\((?:s|ms|1/s|s²|unit of s|[µm]?(?:m|rad|N|N·m|V)(?:/s)?)\)")
 SPARK = re.compile(r"[\d.]+ [µm]?(?:m|rad|N|N·m|V)")  # beside a sparkline
 UNITLESS = re.compile(r"share of .*|(real|imaginary) part|.*\bs")  # also s, whose unit is the law's
@@ -56,11 +74,17 @@ def machines() -> list[smc.Trace]:
 
 def network() -> list[smc.Trace]:
     plant = smc.plant("pendulum_network", n=11)
-    return [made(smc.Scenario(plant=plant, law=law, duration=0.3)) for law in ("classical", "adaptive")]
+    return [
+        made(smc.Scenario(plant=plant, law=law, duration=0.3)) for law in ("classical", "adaptive")
+    ]
 
 
 def cart() -> list[smc.Trace]:
-    trace = made(smc.Scenario(plant="cart_pole", law="classical", duration=0.4, contact="none", friction=Coulomb(0.01)))
+    trace = made(
+        smc.Scenario(
+            plant="cart_pole", law="classical", duration=0.4, contact="none", friction=Coulomb(0.01)
+        )
+    )
     return [dataclasses.replace(trace, x=0.01 * trace.x, u=0.02 * trace.u)]
 
 
@@ -73,14 +97,24 @@ def arm() -> list[smc.Trace]:
 def conditions() -> dict[str, dict[str, smc.Trace]]:
     calm = [duffing("classical"), switching(duffing("super_twisting"), 0.7)]
     jumps = [dataclasses.replace(one.scenario, jump=smc.Jump(0.4, {"mass": 2.0})) for one in calm]
-    jump = [dataclasses.replace(one, scenario=scenario) for one, scenario in zip(calm, jumps, strict=True)]
+    jump = []
+    for one, scenario in zip(calm, jumps, strict=True):
+        jump.append(dataclasses.replace(one, scenario=scenario))
     jump[1] = failed(jump[1], 300, "the law raised ValueError: no")
-    return {"calm": dict(zip("ab", calm, strict=True)), "heavier": dict(zip("ab", jump, strict=True))}
+    return {
+        "calm": dict(zip("ab", calm, strict=True)),
+        "heavier": dict(zip("ab", jump, strict=True)),
+    }
 
 
 def lags():
-    """Two laws whose amplitudes are equal at a lag of 50 ms; half the step changes the run at 10 ms."""
-    times, laws = (0.002, 0.01, 0.05), {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)}
+    """Two laws whose amplitudes are equal at a lag of 50 ms; half the step changes the run at 10
+    ms.
+    """
+    times, laws = (
+        (0.002, 0.01, 0.05),
+        {"relay": ("classical", 3.0, 1.0), "smooth": ("super_twisting", 60.0, 2.0)},
+    )
     sizes, runs = {}, {f"{tau:g} s": {} for tau in times}
     for label, (law, factor, power) in laws.items():
         for tau in times:
@@ -99,37 +133,66 @@ def lags():
 def balance():
     lag = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 1.2}
     scenarios = [smc.Scenario(law=law, **lag) for law in ("super_twisting", "observer_free")]
-    cycle = Chattering(amplitude=0.2, amplitude_x=0.01, frequency=8.0, response=complex(-0.02, 0.003))
+    cycle = Chattering(
+        amplitude=0.2, amplitude_x=0.01, frequency=8.0, response=complex(-0.02, 0.003)
+    )
     changes = [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
     return nyquist(scenarios, 0, [cycle, Chattering()], [made(one) for one in scenarios], changes)
 
 
-def accuracy(law: str, plant: str = "duffing", order: float = 1.9, theory: float | None = 2.0) -> Accuracy:
-    """Errors of two starts that fall with a power of the period; the longest period is not in the fit."""
+def accuracy(
+    law: str, plant: str = "duffing", order: float = 1.9, theory: float | None = 2.0
+) -> Accuracy:
+    """Errors of two starts that fall with a power of the period; the longest period is not in the
+    fit.
+    """
     periods = (4e-3, 2e-3, 1e-3, 5e-4)
     errors = tuple(tuple(start * (1e3 * h) ** 2 for h in periods) for start in (0.3, 0.5))
-    scaling = Scaling(errors=errors, used=periods[1:], order=order, low=1.8, high=2.1, theory=theory, why="")
+    scaling = Scaling(
+        errors=errors, used=periods[1:], order=order, low=1.8, high=2.1, theory=theory, why=""
+    )
     names = {"plant": plant, "condition": "slow_noise", "law": law, "gains": "shipped", "unit": "m"}
     return Accuracy(**names, periods=periods, e=scaling, s=scaling, runs=8, failed=0, floor=1e-9)
 
 
 def basins() -> list[Basin]:
-    outcome = np.array([[CONVERGES, CONVERGES, DOES_NOT], [CONVERGES, UNDECIDED, DOES_NOT]], np.int8)
+    outcome = np.array(
+        [[CONVERGES, CONVERGES, DOES_NOT], [CONVERGES, UNDECIDED, DOES_NOT]], np.int8
+    )
     decided = np.array([[2.0, 4.0, 8.0], [8.0, 16.0, 1.0]])
-    names = {"plant": "van_der_pol", "unit": "m", "duration": 16.0, "outcome": outcome, "decided_at": decided}
+    names = {
+        "plant": "van_der_pol",
+        "unit": "m",
+        "duration": 16.0,
+        "outcome": outcome,
+        "decided_at": decided,
+    }
     grid = {"x": np.array([-1.0, 0.0, 2.0]), "v": np.array([-3.0, 3.0])}
-    return [Basin(law="classical", source="tuned here", **names, **grid), Basin(law="adaptive", **names, **grid)]
+    return [
+        Basin(law="classical", source="tuned here", **names, **grid),
+        Basin(law="adaptive", **names, **grid),
+    ]
 
 
-LAWS = [accuracy("super_twisting"), accuracy("classical", theory=None), accuracy("adaptive", order=math.nan)]
+LAWS = [
+    accuracy("super_twisting"),
+    accuracy("classical", theory=None),
+    accuracy("adaptive", order=math.nan),
+]
 PAGES = {
-    "machines": lambda: figure(machines()), "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
+    "machines": lambda: figure(machines()),
+    "network": lambda: figure(network(), title="Pendulums", size=(9.0, 6.0)),
     "every panel": lambda: figure(cart(), size="ieee-column", panels=ALL, labels=["small"]),
-    "arm": lambda: figure(arm(), labels=["near", "far"]), "signals": lambda: signals(conditions(), None, "Duffing"),
-    "lags": lags, "balance": balance,
-    "orders": lambda: orders([accuracy("super_twisting"), accuracy("super_twisting", "van_der_pol")]),
-    "orders of laws": lambda: orders(LAWS, size="ieee-column"), "maps": lambda: region.draw(basins()),
-}  # fmt: skip
+    "arm": lambda: figure(arm(), labels=["near", "far"]),
+    "signals": lambda: signals(conditions(), None, "Duffing"),
+    "lags": lags,
+    "balance": balance,
+    "orders": lambda: orders(
+        [accuracy("super_twisting"), accuracy("super_twisting", "van_der_pol")]
+    ),
+    "orders of laws": lambda: orders(LAWS, size="ieee-column"),
+    "maps": lambda: region.draw(basins()),
+}
 
 
 def places(line: Line2D) -> np.ndarray:
@@ -140,12 +203,21 @@ def places(line: Line2D) -> np.ndarray:
 def every(page) -> list[Axes]:
     """All axes that show data, also those within others."""
     outer = [*page.axes, *(ax for part in getattr(page, "subfigs", []) for ax in part.axes)]
-    return list(dict.fromkeys(ax for each in outer for ax in [each, *each.child_axes] if ax.lines or ax.collections))
+    return list(
+        dict.fromkeys(
+            ax for each in outer for ax in [each, *each.child_axes] if ax.lines or ax.collections
+        )
+    )
 
 
 def legends(page) -> list:
     parts = [page, *getattr(page, "subfigs", []), *page.axes]
-    return [one for part in parts for one in getattr(part, "legends", [getattr(part, "legend_", None)]) if one]
+    return [
+        one
+        for part in parts
+        for one in getattr(part, "legends", [getattr(part, "legend_", None)])
+        if one
+    ]
 
 
 @pytest.mark.parametrize("kind", PAGES)
@@ -154,17 +226,34 @@ def test_every_axis_has_its_unit_every_colour_its_name_and_every_mark_a_place(ki
     page.draw_without_rendering()
     outer = [ax for ax in page.axes if ax.get_visible()]
     words = {axis.get_label_text() for ax in outer for axis in (ax.xaxis, ax.yaxis)} - {""}
-    beside = {ax.get_ylabel() for ax in outer if any(SPARK.fullmatch(text.get_text()) for text in ax.texts)}
-    assert not [label for label in words - beside if not UNIT.search(label) and not UNITLESS.fullmatch(label)]
+    beside = {
+        ax.get_ylabel()
+        for ax in outer
+        if any(SPARK.fullmatch(text.get_text()) for text in ax.texts)
+    }
+    assert not [
+        label
+        for label in words - beside
+        if not UNIT.search(label) and not UNITLESS.fullmatch(label)
+    ]
     assert all(ax.get_ylabel() for ax in outer)
     labelled = [ax for ax in every(page) if ax.get_xlabel()]
     for ax in every(page):
         assert ax in labelled or any(np.allclose(ax.get_xlim(), one.get_xlim()) for one in labelled)
-        (low, high), shown = sorted(ax.get_xlim()), [line for line in ax.lines if line.get_transform() == ax.transData]
-        assert not [line for line in shown if len(places(line)) == 1 and not low <= places(line)[0, 0] <= high]
+        (low, high), shown = (
+            sorted(ax.get_xlim()),
+            [line for line in ax.lines if line.get_transform() == ax.transData],
+        )
+        assert not [
+            line
+            for line in shown
+            if len(places(line)) == 1 and not low <= places(line)[0, 0] <= high
+        ]
     handles = [one for legend in legends(page) for one in legend.legend_handles]
     assert all(text.get_text() for legend in legends(page) for text in legend.get_texts())
-    entries = {to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor()) for one in handles}
+    entries = set()
+    for one in handles:
+        entries.add(to_hex(one.get_color() if isinstance(one, Line2D) else one.get_facecolor()))
     drawn = {to_hex(line.get_color()) for ax in every(page) for line in ax.lines} - NEUTRAL
     assert drawn <= entries
 
@@ -179,9 +268,14 @@ def shown(page, label: str) -> Axes:
 
 
 def curve(ax: Axes, colour: str) -> np.ndarray:
-    """The line of a trace as (times, values), with what it has in common with others, without its marks."""
+    """The line of a trace as (times, values), with what it has in common with others, without its
+    marks.
+    """
     common = [places(line) for line in ax.lines if line.get_gid() == panels.AGREED]
-    lines = [line for line in ax.lines if to_hex(line.get_color()) == to_hex(colour) and line.get_marker() == "None"]
+    lines = []
+    for line in ax.lines:
+        if to_hex(line.get_color()) == to_hex(colour) and line.get_marker() == "None":
+            lines.append(line)
     assert len(lines) == 1
     own = places(lines[0])
     return (np.concatenate([*common, own]) if not len(own) or own[0, 0] > 0.0 else own).T
@@ -193,31 +287,54 @@ ARM = """
   <body pos=".3 0 0"><joint name="turn" axis="0 1 0"/><geom size=".1" contype="0"/></body></body></worldbody>
 <actuator><motor joint="lift"/><motor joint="turn"/></actuator></mujoco>"""
 PANELS = {  # what is run -> labels that a figure of it has, and parts of labels that it has not
-    "ideal": ({"plant": "duffing"}, ["position x (m)", "control u (N)", "velocity v (m/s)"], ["reaction", "delivered"]),
+    "ideal": (
+        {"plant": "duffing"},
+        ["position x (m)", "control u (N)", "velocity v (m/s)"],
+        ["reaction", "delivered"],
+    ),
     "friction": ({"plant": "duffing", "friction": Coulomb(0.5)}, ["reaction (N)"], ["delivered"]),
     "a drive": ({"plant": "duffing", "actuator": smc.Lag(0.05)}, ["delivered (N)"], ["reaction"]),
     "a pole": (
         {"plant": "cart_pole", "law": "hierarchical", "model": "nominal"},
-        ["position x (m)", "velocity v (m/s)", "free angle q (rad)", "velocity q′ (rad/s)", "control u (N)"],
+        [
+            "position x (m)",
+            "velocity v (m/s)",
+            "free angle q (rad)",
+            "velocity q′ (rad/s)",
+            "control u (N)",
+        ],
         ["reaction", "sliding variable s ("],  # whose unit is the law's
     ),
     "a pole with friction": (
-        {"plant": "cart_pole", "friction": Coulomb(0.01)}, ["reaction (N)", "reaction on q (N·m)"], [],
+        {"plant": "cart_pole", "friction": Coulomb(0.01)},
+        ["reaction (N)", "reaction on q (N·m)"],
+        [],
     ),
     "a network with friction": (
         {"plant": "pendulum_network", "friction": Coulomb(0.2)},
-        ["angle x (rad)", "max − min x (rad)", "control u (N·m)", "reaction (N·m)"], ["mean x"],
+        ["angle x (rad)", "max − min x (rad)", "control u (N·m)", "reaction (N·m)"],
+        ["mean x"],
     ),
     "a slide and a hinge": (
         {"plant": smc.plant_from(ARM, ["lift", "turn"], name="own")},
-        ["lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"], ["mean"],
+        ["lift x (m)", "turn x (rad)", "lift u (N)", "turn u (N·m)"],
+        ["mean"],
     ),
     "volts": (
-        {"plant": "furuta", "law": "none", "actuator": dataclasses.replace(MOTOR, command="voltage")},
-        ["control u (V)", "reaction (N·m)"], ["u (N·m)", "sliding variable"],  # the law has none
+        {
+            "plant": "furuta",
+            "law": "none",
+            "actuator": dataclasses.replace(MOTOR, command="voltage"),
+        },
+        ["control u (V)", "reaction (N·m)"],
+        ["u (N·m)", "sliding variable"],  # the law has none
     ),
-    "torques": ({"plant": "furuta", "law": "none", "actuator": MOTOR}, ["control u (N·m)"], ["(V)"]),
-}  # fmt: skip
+    "torques": (
+        {"plant": "furuta", "law": "none", "actuator": MOTOR},
+        ["control u (N·m)"],
+        ["(V)"],
+    ),
+}
 
 
 @pytest.mark.parametrize("kind", PANELS)
@@ -237,18 +354,32 @@ def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
     traces = machines()
     page, colours = figure(traces), style.law_colours([trace.scenario.law for trace in traces])
     ends = [1.2, 1.2, 0.699]
-    for label, values in {"position x (m)": "x", "reaction (N)": "reaction", "delivered (N)": "force"}.items():
+    for label, values in {
+        "position x (m)": "x",
+        "reaction (N)": "reaction",
+        "delivered (N)": "force",
+    }.items():
         for trace, colour, end in zip(traces, colours, ends, strict=True):
             t, y = curve(shown(page, label), colour)
             t, y = t[t < end + 1e-6], y[t < end + 1e-6]
             truth = getattr(trace, values)[trace.t <= end + 1e-9, 0]
-            crosses = [places(line)[0].tolist() for line in shown(page, label).lines if line.get_marker() == "X"]
+            crosses = [
+                places(line)[0].tolist()
+                for line in shown(page, label).lines
+                if line.get_marker() == "X"
+            ]
             assert end == 1.2 or crosses == [pytest.approx([end, truth[-1]])]
             assert (t[0], t[-1]) == pytest.approx((0.0, end))
-            assert (y[0], y[-1], y.min(), y.max()) == pytest.approx((truth[0], truth[-1], truth.min(), truth.max()))
+            assert (y[0], y[-1], y.min(), y.max()) == pytest.approx(
+                (truth[0], truth[-1], truth.min(), truth.max())
+            )
     rows = shown(page, "control u (N)").child_axes
     keys = [row.get_legend() for row in rows]
-    names = [(text.get_text(), text.get_color()) for key in keys if key for text in key.get_texts()]
+    names = []
+    for key in keys:
+        if key:
+            for text in key.get_texts():
+                names.append((text.get_text(), text.get_color()))
     assert names == [(name, style.INK) for name in ("Classical", "Super-twisting", "Adaptive")]
     for trace, row in zip(traces, rows, strict=True):
         (band,) = row.collections
@@ -258,14 +389,19 @@ def test_lines_and_bands_are_the_run_from_its_start_to_its_end_or_its_failure():
     marks = [line for ax in every(page) for line in ax.lines if line.get_marker() == "X"]
     assert {to_hex(mark.get_color()) for mark in marks} == {to_hex(colours[2])}
     assert sum(places(mark)[0, 0] == pytest.approx(0.699) for mark in marks) >= 5
-    jumps = [line for line in shown(page, "position x (m)").lines if places(line)[:, 0].tolist() == [0.5, 0.5]]
+    jumps = []
+    for line in shown(page, "position x (m)").lines:
+        if places(line)[:, 0].tolist() == [0.5, 0.5]:
+            jumps.append(line)
     assert len(jumps) == 1
 
 
 def test_the_settling_band_is_two_percent_around_the_reference():
     traces = machines()
     ax = shown(figure(traces), "position x (m)")
-    band = next(one for one in ax.collections if to_hex(one.get_facecolor()[0]) == to_hex(style.BAND))
+    band = next(
+        one for one in ax.collections if to_hex(one.get_facecolor()[0]) == to_hex(style.BAND)
+    )
     low, high = band.get_paths()[0].get_extents().intervaly
     half = 0.02 * abs(traces[0].x[0, 0] - traces[0].r[0, 0])
     assert (low, high) == pytest.approx((traces[0].r.min() - half, traces[0].r.max() + half))
@@ -277,7 +413,9 @@ def test_the_slowest_channel_of_a_network_is_thick_and_none_is_left_out():
         lines = [line for line in row.lines if line.get_gid() is None]
         assert len(lines) == 11
         thick = max(lines, key=lambda line: line.get_linewidth())
-        np.testing.assert_allclose(thick.get_ydata(), trace.x[:, np.abs(trace.x - trace.r).sum(axis=0).argmax()])
+        np.testing.assert_allclose(
+            thick.get_ydata(), trace.x[:, np.abs(trace.x - trace.r).sum(axis=0).argmax()]
+        )
 
 
 def test_the_worst_joint_of_an_arm_is_large_and_others_are_sparklines_beside_their_largest_values():
@@ -286,26 +424,42 @@ def test_the_worst_joint_of_an_arm_is_large_and_others_are_sparklines_beside_the
     page = figure(traces, labels=["near", "far"])
     assert page.bbox.height / page.dpi * DPI <= 1100
     error = np.abs(traces[1].x - traces[1].r)
-    assert error[:, 0].mean() > error[:, 2].mean(), "but lift's is the largest of all scales: 1 m and 0.6 rad"
+    assert error[:, 0].mean() > error[:, 2].mean(), (
+        "but lift's is the largest of all scales: 1 m and 0.6 rad"
+    )
     assert [ax.get_ylabel() for ax in page.axes[:2]] == ["lift e (rad)", "lift u (N·m)"]
     sparks = [ax for ax in page.axes if any(SPARK.fullmatch(text.get_text()) for text in ax.texts)]
     assert [ax.get_ylabel() for ax in sparks] == ["reach e", "u", "turn e", "u"]
-    told = [text.get_text() for ax in sparks for text in ax.texts if SPARK.fullmatch(text.get_text())]
+    told = []
+    for ax in sparks:
+        for text in ax.texts:
+            if SPARK.fullmatch(text.get_text()):
+                told.append(text.get_text())
     u = np.max([np.abs(trace.u).max(axis=0) for trace in traces], axis=0)
     sizes = [(error[:, 0], "m"), (u[0], "N"), (error[:, 1], "rad"), (u[1], "N·m")]
     assert told == [f"{np.max(size):.3g} {unit}" for size, unit in sizes]
 
 
-@pytest.mark.parametrize(("size", "unit", "factor"), [(3e-6, "µm", 1e6), (0.02, "mm", 1e3), (0.3, "m", 1.0)])
+@pytest.mark.parametrize(
+    ("size", "unit", "factor"), [(3e-6, "µm", 1e6), (0.02, "mm", 1e3), (0.3, "m", 1.0)]
+)
 def test_no_axis_has_an_exponent_and_its_numbers_are_in_its_unit(size, unit, factor):
     trace = duffing("classical")
-    small = dataclasses.replace(trace, **{name: size * getattr(trace, name) for name in ("x", "r", "v", "s", "u")})
+    small = dataclasses.replace(
+        trace, **{name: size * getattr(trace, name) for name in ("x", "r", "v", "s", "u")}
+    )
     page = figure(small)
     page.draw_without_rendering()
     ax = shown(page, f"position x ({unit})")
-    numbers = {float(text.get_text().replace("−", "-")): float(text.get_position()[1]) for text in ax.get_yticklabels()}
+    numbers = {}
+    for text in ax.get_yticklabels():
+        numbers[float(text.get_text().replace("−", "-"))] = float(text.get_position()[1])
     assert [value * factor for value in numbers.values()] == pytest.approx([*numbers])
-    linear = [axis for each in every(page) for axis in (each.xaxis, each.yaxis) if axis.get_scale() == "linear"]
+    linear = []
+    for each in every(page):
+        for axis in (each.xaxis, each.yaxis):
+            if axis.get_scale() == "linear":
+                linear.append(axis)
     assert not [axis.offsetText.get_text() for axis in linear if axis.offsetText.get_text()]
 
 
@@ -326,17 +480,26 @@ def test_laws_whose_amplitudes_are_equal_at_a_lag_are_marked_there_and_doubtful_
 
 
 @pytest.mark.parametrize("order", [1.9, math.nan])
-def test_marks_of_errors_are_the_means_of_all_starts_filled_in_the_fit_with_the_slopes_of_fit_and_theory(order):
+def test_marks_of_errors_are_the_means_of_all_starts_filled_in_the_fit_with_the_slopes_of_fit_and_theory(
+    order,
+):
     page = orders([accuracy("super_twisting", order=order)])
     for ax in page.axes:
         marks = {places(line)[0, 0]: line for line in ax.lines if line.get_marker() == "o"}
-        means = {h: math.sqrt(0.6) * largest for h, largest in {4: 8, 2: 2, 1: 0.5, 0.5: 0.125}.items()}
+        means = {}
+        for h, largest in {4: 8, 2: 2, 1: 0.5, 0.5: 0.125}.items():
+            means[h] = math.sqrt(0.6) * largest
         assert {h: places(line)[0, 1] for h, line in marks.items()} == pytest.approx(means)
         assert [h for h, line in marks.items() if line.get_mfc() == "none"] == [4.0]
         ends = [places(line) for line in ax.lines if len(places(line)) == 2]
-        slopes = [np.log(y[0] / y[1]) / np.log(x[0] / x[1]) for x, y in (pair.T for pair in ends) if x[0] != x[1]]
+        slopes = []
+        for x, y in (pair.T for pair in ends):
+            if x[0] != x[1]:
+                slopes.append(np.log(y[0] / y[1]) / np.log(x[0] / x[1]))
         assert slopes == pytest.approx([2.0, 1.9] if order == 1.9 else [])
-        assert [text.get_text() for text in ax.texts] == ["1.90 ±0.20 (2)" if order == 1.9 else "untold (2)"]
+        assert [text.get_text() for text in ax.texts] == [
+            "1.90 ±0.20 (2)" if order == 1.9 else "untold (2)"
+        ]
 
 
 def test_shares_of_a_map_are_those_of_its_states_and_add_up():
@@ -345,9 +508,17 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
         legend = ax.get_legend()
         assert legend is not None
         texts = [text.get_text() for text in legend.get_texts()]
-        shares = {words: float(share.removesuffix(" %")) for words, share in (text.split(": ") for text in texts)}
+        shares = {}
+        for words, share in (text.split(": ") for text in texts):
+            shares[words] = float(share.removesuffix(" %"))
         assert [*shares.values()] == pytest.approx([16.7, 16.7, 16.7, 16.7, 33.3])
-        assert [re.findall(r"[\d.]+ s", words) for words in shares] == [["2 s"], ["4 s"], ["8 s"], [], ["16 s"]]
+        assert [re.findall(r"[\d.]+ s", words) for words in shares] == [
+            ["2 s"],
+            ["4 s"],
+            ["8 s"],
+            [],
+            ["16 s"],
+        ]
         (mesh,) = ax.collections
         assert np.ravel(mesh.get_array()).tolist() == [0, 1, 4, 2, 3, 4]
         colours = [to_hex(colour) for colour in mesh.get_cmap()(range(5))]
@@ -359,36 +530,81 @@ def test_shares_of_a_map_are_those_of_its_states_and_add_up():
 
 
 def test_equal_blues_of_maps_side_by_side_are_equal_times():
-    names = {"law": "classical", "plant": "van_der_pol", "unit": "m", "duration": 8.0, "x": np.ones(2), "v": np.ones(2)}
+    names = {
+        "law": "classical",
+        "plant": "van_der_pol",
+        "unit": "m",
+        "duration": 8.0,
+        "x": np.ones(2),
+        "v": np.ones(2),
+    }
     outcome = np.full((2, 2), CONVERGES, np.int8)
-    maps = [Basin(**names, outcome=outcome, decided_at=np.full((2, 2), time)) for time in (2.0, 8.0)]
+    maps = []
+    for time in (2.0, 8.0):
+        maps.append(Basin(**names, outcome=outcome, decided_at=np.full((2, 2), time)))
     shades = [ax.collections[0].get_array() for ax in region.draw(maps).axes]
     assert [np.unique(shade).tolist() for shade in shades] == [[0], [1]]
 
 
-ONE, OTHER = (made(smc.Scenario(plant=name, law="classical", duration=0.01)) for name in ("duffing", "van_der_pol"))
+ONE, OTHER = (
+    made(smc.Scenario(plant=name, law="classical", duration=0.01))
+    for name in ("duffing", "van_der_pol")
+)
 REFUSED = {  # call -> arguments, and what replaces them
-    figure: ({"traces": ONE}, [
-        {"traces": []}, {"traces": [ONE, OTHER]}, {"traces": [ONE, 3]}, {"traces": 5},
-        {"labels": ["a", "b"]}, {"labels": "a"},
-        {"path": ""}, {"path": "a\0"}, {"path": "a.gif"}, {"path": "a.png", "format": "svg"}, {"format": "svg"},
-        {"path": "a", "format": "gif"}, {"size": (1.9, 5.0)}, {"size": (5.0, 101.0)}, {"size": "ieee"}, {"size": 3.0},
-        {"panels": ["y"]}, {"panels": []}, {"size": (5.0,)}, {"size": (5.0, 4.0), "fig": Figure()},
-        {"format": 10**5000},
-    ]),
+    figure: (
+        {"traces": ONE},
+        [
+            {"traces": []},
+            {"traces": [ONE, OTHER]},
+            {"traces": [ONE, 3]},
+            {"traces": 5},
+            {"labels": ["a", "b"]},
+            {"labels": "a"},
+            {"path": ""},
+            {"path": "a\0"},
+            {"path": "a.gif"},
+            {"path": "a.png", "format": "svg"},
+            {"format": "svg"},
+            {"path": "a", "format": "gif"},
+            {"size": (1.9, 5.0)},
+            {"size": (5.0, 101.0)},
+            {"size": "ieee"},
+            {"size": 3.0},
+            {"panels": ["y"]},
+            {"panels": []},
+            {"size": (5.0,)},
+            {"size": (5.0, 4.0), "fig": Figure()},
+            {"format": 10**5000},
+        ],
+    ),
     orders: ({"rows": []}, [{}]),
     region.draw: ({"maps": []}, [{}]),
     pareto: ({"tunings": []}, [{}]),
     smc.plot: ({"table": ONE}, [{}]),
     smc.show: ({"what": ONE}, [{}]),
-    smc.film: ({"traces": ONE, "at": 0.0, "path": "a.png", "size": (320, 180)}, [
-        {"at": -0.1}, {"at": 0.02}, {"at": None}, {"path": "a.jpg"}, {"path": "a.mp4"}, {"size": (318, 180)},
-        {"size": (1922, 1080)}, {"size": (481, 270)}, {"span": (0.0, 1.0)}, {"at": None, "path": "a"},
-        {"at": None, "path": "a.mp4", "fps": 0.5}, {"at": None, "path": "a.mp4", "speed": 0.005},
-        {"at": None, "path": "a.mp4", "speed": 101.0}, {"at": None, "path": "a.mp4", "span": (5.0, 6.0)},
-        {"camera": (0.0, 91.0)}, {"traces": [ONE] * 9}, {"traces": []},
-    ]),
-}  # fmt: skip
+    smc.film: (
+        {"traces": ONE, "at": 0.0, "path": "a.png", "size": (320, 180)},
+        [
+            {"at": -0.1},
+            {"at": 0.02},
+            {"at": None},
+            {"path": "a.jpg"},
+            {"path": "a.mp4"},
+            {"size": (318, 180)},
+            {"size": (1922, 1080)},
+            {"size": (481, 270)},
+            {"span": (0.0, 1.0)},
+            {"at": None, "path": "a"},
+            {"at": None, "path": "a.mp4", "fps": 0.5},
+            {"at": None, "path": "a.mp4", "speed": 0.005},
+            {"at": None, "path": "a.mp4", "speed": 101.0},
+            {"at": None, "path": "a.mp4", "span": (5.0, 6.0)},
+            {"camera": (0.0, 91.0)},
+            {"traces": [ONE] * 9},
+            {"traces": []},
+        ],
+    ),
+}
 
 
 @pytest.mark.parametrize("call", REFUSED, ids=lambda call: call.__name__)
@@ -400,7 +616,12 @@ def test_what_cannot_be_drawn_is_refused(call, refused):
 
 def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators():
     """Its tilt follows from the force, and its actuators are not its channels."""
-    traces = smc.run([smc.Scenario(plant="quadrotor", law=law, duration=0.1) for law in ("geometric", "cascaded_pid")])
+    traces = smc.run(
+        [
+            smc.Scenario(plant="quadrotor", law=law, duration=0.1)
+            for law in ("geometric", "cascaded_pid")
+        ]
+    )
     labels = [panel.label for panel in panels.worst_first(traces)]
     assert sorted(labels) == ["body_rz e (rad)", "body_x e (m)", "body_y e (m)", "body_z e (m)"]
     shown = panels.actuators(traces)
@@ -408,4 +629,9 @@ def test_a_free_body_has_the_errors_that_count_and_the_forces_of_its_actuators()
     for i, panel in enumerate(shown):
         np.testing.assert_array_equal(panel.traces[0].u, traces[0].applied[:, i : i + 1])
     drawn = " ".join(ax.get_ylabel() for ax in figure(traces).axes)
-    assert sorted(map("".join, re.findall(r"actuator (\d)|\bu (\d)", drawn))) == ["1", "2", "3", "4"]
+    assert sorted(map("".join, re.findall(r"actuator (\d)|\bu (\d)", drawn))) == [
+        "1",
+        "2",
+        "3",
+        "4",
+    ]

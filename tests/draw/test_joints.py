@@ -13,7 +13,9 @@ from smc_mujoco.draw.figure import figure
 @pytest.fixture(scope="module")
 def trace():
     law = smc.law("computed_torque_sliding", c=8.0)
-    return smc.run(smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, duration=0.3))
+    return smc.run(
+        smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, duration=0.3)
+    )
 
 
 def test_a_blow_and_a_payload_are_marked_and_named(trace):
@@ -21,12 +23,20 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
     hit = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, disturbance=push))
     page = figure([hit])
     shown = page.axes[:3]
-    assert [ax.get_ylabel() for ax in shown] == ["reach e (m)", "reach u (N)", "tip off its path (mm)"]
+    assert [ax.get_ylabel() for ax in shown] == [
+        "reach e (m)",
+        "reach u (N)",
+        "tip off its path (mm)",
+    ]
     assert [text.get_text() for ax in shown for text in ax.texts] == ["blow of 50 N for 20 ms"]
     assert all([0.1, 0.1] in [list(line.get_xdata()) for line in ax.lines] for ax in shown)
     push = smc.Push("link5", y=30.0, z=40.0, time=0.001, width=0.02)
     picked = smc.Scenario(
-        plant="panda", law="none", jump=smc.Jump(0.001, {"payload": 2.0}), disturbance=push, duration=0.002
+        plant="panda",
+        law="none",
+        jump=smc.Jump(0.001, {"payload": 2.0}),
+        disturbance=push,
+        duration=0.002,
     )
     (run,) = smc.run([picked])
     assert style.marks([run], ["none"]) == {0.001: "blow of 50 N for 20 ms; payload + 2 kg"}
@@ -35,5 +45,13 @@ def test_a_blow_and_a_payload_are_marked_and_named(trace):
 
 def test_panels_below_a_film_of_an_arm_tell_what_the_tip_does(trace):
     strip = panels.strip([trace])
-    assert [panel.quantity for panel in strip] == ["tip", "settling", "settling"]  # joints that slide and that turn
-    assert [panel.label for panel in strip] == ["tip off its path (mm)", "|x − r| (m)", "|x − r| (rad)"]
+    assert [panel.quantity for panel in strip] == [
+        "tip",
+        "settling",
+        "settling",
+    ]  # joints that slide and that turn
+    assert [panel.label for panel in strip] == [
+        "tip off its path (mm)",
+        "|x − r| (m)",
+        "|x − r| (rad)",
+    ]

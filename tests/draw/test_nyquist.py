@@ -14,7 +14,9 @@ def page():
     fields = {"plant": "duffing", "actuator": smc.Lag(0.01), "duration": 2.0, "x0": 0.05}
     scenarios = [smc.Scenario(law=law, **fields) for law in ("super_twisting", "observer_free")]
     cycles = [predict(scenario, ranges=False) for scenario in scenarios]
-    return nyquist(scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.06, 0.0), StepChange(0.04, 0.05)])
+    return nyquist(
+        scenarios, 0, cycles, smc.run(scenarios), [StepChange(0.06, 0.0), StepChange(0.04, 0.05)]
+    )
 
 
 def test_both_curves_pass_minus_one_where_the_mark_is(page):

@@ -1,4 +1,6 @@
-"""Legends have as many columns as fit, and pages one column of panels where two would be too narrow."""
+"""Legends have as many columns as fit, and pages one column of panels where two would be too
+narrow.
+"""
 
 import numpy as np
 import pytest
@@ -13,16 +15,20 @@ from smc_mujoco.draw import page, style
 
 def wide(labels: list[str], columns: int, size: float) -> float:
     """The width in points of labels with their samples in so many columns."""
-    widths = [
-        max(style.width(line, size) for line in label.split("\n")) + (page.ENTRY_SAMPLE + page.ENTRY_SPACE) * size
-        for label in labels
-    ]
+    widths = []
+    for label in labels:
+        widths.append(
+            max(style.width(line, size) for line in label.split("\n"))
+            + (page.ENTRY_SAMPLE + page.ENTRY_SPACE) * size
+        )
     return sum(max(part) for part in np.array_split(widths, columns))
 
 
 @pytest.mark.parametrize("width", [3.5, 5.0, 7.16, 12.8])
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 9, 14])
-def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_longer_than_its_share(width, count):
+def test_a_legend_has_the_most_columns_that_fit_on_its_page_and_no_entry_is_longer_than_its_share(
+    width, count
+):
     handles = [Line2D([], [], label="law " * (1 + 7 * k % 5)) for k in range(count)]
     with style.page(width):
         labels, columns = page._legend(handles, width)
@@ -41,7 +47,9 @@ def test_the_ends_of_the_range_of_a_side_are_sizes_and_what_lies_beyond_is_none(
         page.measure((5.0, float(beyond)))
 
 
-def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letters_of_16_points(tmp_path):
+def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letters_of_16_points(
+    tmp_path,
+):
     """At 800 px ticks had 8 px. A column's PNG had 150 dots an inch."""
     trace = smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.2))
     whole = smc.figure(trace)
@@ -50,7 +58,9 @@ def test_letters_have_11_px_in_a_readme_and_a_slide_has_three_panels_with_letter
     slide = smc.figure(trace, size="slide")
     assert slide.get_size_inches().tolist() == [13.3, 7.5]
     assert len(slide.axes) == 3
-    assert {label.get_fontsize() for ax in slide.axes for label in (ax.xaxis.label, ax.yaxis.label)} == {16.0}
+    assert {
+        label.get_fontsize() for ax in slide.axes for label in (ax.xaxis.label, ax.yaxis.label)
+    } == {16.0}
     smc.figure(trace, tmp_path / "a.png", size="ieee-column")
     with Image.open(tmp_path / "a.png") as image:
         assert image.width == 1400

@@ -1,4 +1,6 @@
-"""The figure of Pareto fronts: every law with its staircase and its chosen gains, and no unfair comparison."""
+"""The figure of Pareto fronts: every law with its staircase and its chosen gains, and no unfair
+comparison.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -19,7 +21,10 @@ LEAN = Objective(conditions=("nominal",), duration=0.5)
 
 @pytest.fixture(scope="module")
 def pair() -> list[Tuned]:
-    return [tune("duffing", law, budget=12, objective=LEAN, searches=1) for law in ("observer_free", "classical")]
+    return [
+        tune("duffing", law, budget=12, objective=LEAN, searches=1)
+        for law in ("observer_free", "classical")
+    ]
 
 
 def with_history(tuned: Tuned, history: Sequence[Evaluation]) -> Tuned:
@@ -39,12 +44,16 @@ def pareto(tunings, path) -> list:
 def page(monkeypatch) -> list[Figure]:
     """The pages that are drawn."""
     drawn, write = [], pages.write
-    monkeypatch.setattr(pages, "write", lambda page, paths: (drawn.append(page), write(page, paths))[1])
+    monkeypatch.setattr(
+        pages, "write", lambda page, paths: (drawn.append(page), write(page, paths))[1]
+    )
     return drawn
 
 
 @pytest.mark.parametrize("size", [None, (6.0, 4.0)])
-def test_a_front_is_the_best_that_was_tried_each_axis_has_its_unit_and_the_better_law_is_named_first(pair, size):
+def test_a_front_is_the_best_that_was_tried_each_axis_has_its_unit_and_the_better_law_is_named_first(
+    pair, size
+):
     fronts = [((1.0, 90.0), (2.0, 40.0), (3.0, 60.0), (4.0, 10.0)), ((1.5, 300.0), (2.5, 0.0))]
     made = []
     for tuned, front in zip(pair, fronts, strict=True):
@@ -53,25 +62,36 @@ def test_a_front_is_the_best_that_was_tried_each_axis_has_its_unit_and_the_bette
         made.append(with_history(tuned, history))
     drawn = drawing.pareto(made[::-1], size=size, title="Fronts" if size else None)
     (ax,) = drawn.axes
-    assert [ax.get_xlabel().rpartition(" ")[2], ax.get_ylabel().rpartition(" ")[2]] == ["(s²)", "(1/s)"]
+    assert [ax.get_xlabel().rpartition(" ")[2], ax.get_ylabel().rpartition(" ")[2]] == [
+        "(s²)",
+        "(1/s)",
+    ]
     stairs = [line.get_xydata().tolist() for line in ax.lines[::2]]
     assert stairs == [[[1.0, 90.0], [2.0, 40.0], [4.0, 10.0]], [[1.5, 300.0], [2.5, MIN_VARIATION]]]
     words = [text.get_text() for text in drawn.legends[0].get_texts()]
     assert [word.split(" = ")[0] for word in words[:2]] == ["Observer-free: J", "Classical: J"]
     assert [word.split(" = ")[1] for word in words[:2]] == ["1.09 s²", "1.8 s²"]
     samples = drawn.legends[0].get_lines()[:2]
-    assert [sample.get_color() for sample in samples] == [line.get_color() for line in ax.lines[::2]]
+    assert [sample.get_color() for sample in samples] == [
+        line.get_color() for line in ax.lines[::2]
+    ]
 
 
 def test_no_tried_gains_lie_below_the_staircase_and_the_chosen_ones_are_on_it(pair, page, tmp_path):
     pareto(pair, tmp_path / "fronts")
     (ax,) = page[0].axes
     stairs, rings = ax.lines[0:4:2], ax.lines[1:4:2]
-    for tuned, stair, ring in zip(sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True):
+    for tuned, stair, ring in zip(
+        sorted(pair, key=lambda one: one.objective), stairs, rings, strict=True
+    ):
         assert stair.get_drawstyle() == "steps-post"
         corners = [(float(x), float(y)) for x, y in zip(*stair.get_data(), strict=True)]
         for one in tuned.history:
-            reached = [y for x, y in corners if x <= one.tracking]  # the stair's height above what was tried
+            # the stair's height above what was tried
+            reached = []
+            for x, y in corners:
+                if x <= one.tracking:
+                    reached.append(y)
             assert one.failed or min(reached) <= max(one.variation, MIN_VARIATION)
         (place,) = zip(*ring.get_data(), strict=True)
         assert place in corners
@@ -88,9 +108,13 @@ def test_an_axis_is_logarithmic_where_values_differ_much(pair, page, tmp_path, l
     assert {page[0].axes[0].get_xscale(), page[0].axes[0].get_yscale()} == {scale}
 
 
-def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(pair, page, tmp_path):
+def test_a_law_whose_every_run_failed_is_named_and_one_whose_command_rests_is_drawn(
+    pair, page, tmp_path
+):
     first = pair[0]
-    failed = [one._replace(tracking=1.5 * FAILURE_COST, objective=1.5 * FAILURE_COST) for one in first.history]
+    failed = []
+    for one in first.history:
+        failed.append(one._replace(tracking=1.5 * FAILURE_COST, objective=1.5 * FAILURE_COST))
     resting = [one._replace(variation=0.0) for one in pair[1].history]
     both = [with_history(first, failed), with_history(pair[1], resting)]
     svg, _ = pareto(both, tmp_path / "fronts")

@@ -34,7 +34,9 @@ def cell(monkeypatch) -> list[str]:
     shown: list[str] = []
     display = types.ModuleType("IPython.display")
     display.HTML = str
-    display.display = lambda text, **_: shown.append(text) or types.SimpleNamespace(update=lambda text: None)
+    display.display = lambda text, **_: (
+        shown.append(text) or types.SimpleNamespace(update=lambda text: None)
+    )
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     monkeypatch.setattr(html, "in_notebook", lambda: True)
     return shown
@@ -126,5 +128,7 @@ def test_where_nothing_renders_show_says_so_before_it_films(cell, trace, monkeyp
 
 
 def test_outside_of_a_notebook_show_names_what_to_call(trace):
-    with pytest.raises(smc.ScenarioError, match=r"needs a notebook: .* smc.film\(traces, 'film.mp4'\)"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"needs a notebook: .* smc.film\(traces, 'film.mp4'\)"
+    ):
         smc.show(trace)

@@ -1,4 +1,7 @@
-"""`smc-mujoco view` in a real browser: the page shows the machine. It needs MuJoCo 4, Chromium, playwright."""
+"""`smc-mujoco view` in a real browser: the page shows the machine.
+
+It needs MuJoCo 4, Chromium, playwright.
+"""
 
 import io
 import shutil
@@ -14,7 +17,12 @@ pytestmark = pytest.mark.slow
 pytest.importorskip("mujoco.studio", reason="MuJoCo 3 has no Studio")
 sync = pytest.importorskip("playwright.sync_api")
 BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
-SWITCHES = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+SWITCHES = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium: apt-get install chromium")
@@ -27,8 +35,19 @@ SWITCHES = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enab
     ],
 )
 def test_a_browser_shows_the_machine(port, words):
-    command = [sys.executable, "-m", "smc_mujoco", "view", *words.split(), "--port", str(port), "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as view:
+    command = [
+        sys.executable,
+        "-m",
+        "smc_mujoco",
+        "view",
+        *words.split(),
+        "--port",
+        str(port),
+        "--no-browser",
+    ]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as view:
         try:
             assert view.stdout
             while "Model changed" not in (line := view.stdout.readline()):

@@ -15,17 +15,37 @@ pytestmark = pytest.mark.quick
 
 SEEN = {  # linear sRGB as it looks to whom: G. M. Machado et al., IEEE TVCG 15(6), 2009, severity 1
     "all cones": np.eye(3),
-    "no red": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
-    "no green": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
-    "no blue": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+    "no red": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "no green": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "no blue": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
 }
-XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.072175], [0.0193339, 0.119192, 0.9503041]])
+XYZ = np.array(
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.072175],
+        [0.0193339, 0.119192, 0.9503041],
+    ]
+)
 
 
 def lab(colour: str, eye: str) -> np.ndarray:
     """CIELAB (D65) of a colour."""
     c = np.array(style.rgb(colour)) / 255
-    linear = np.clip(SEEN[eye] @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0.0, 1.0)
+    linear = np.clip(
+        SEEN[eye] @ np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), 0.0, 1.0
+    )
     t = XYZ @ linear / XYZ.sum(axis=1)
     x, y, z = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
     return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
@@ -33,8 +53,15 @@ def lab(colour: str, eye: str) -> np.ndarray:
 
 def least(colours, others=()) -> float:
     """The least distance of two colours in four sights, or of one of them to one of `others`."""
-    pairs = itertools.product(colours, others) if others else itertools.combinations(colours, 2)
-    return min(float(np.linalg.norm(lab(one, eye) - lab(other, eye))) for one, other in pairs for eye in SEEN)
+    if others:
+        pairs = itertools.product(colours, others)
+    else:
+        pairs = itertools.combinations(colours, 2)
+    return min(
+        float(np.linalg.norm(lab(one, eye) - lab(other, eye)))
+        for one, other in pairs
+        for eye in SEEN
+    )
 
 
 def test_laws_that_are_compared_by_default_are_apart_in_four_sights_and_apart_from_all_else_that_is_drawn():
@@ -53,7 +80,9 @@ def test_laws_of_one_picture_are_apart_in_four_sights_as_far_as_so_many_can_be(c
 
 
 def test_laws_of_a_dot_plot_that_share_a_mark_have_colours_that_nobody_mistakes():
-    """Dark purple and dark brown pluses, 14.6 apart, were two of the sixteen that are compared by default."""
+    """Dark purple and dark brown pluses, 14.6 apart, were two of the sixteen that are compared by
+    default.
+    """
     colours = style.law_colours(COMPARED)
     shared = [[k, k + len(style.MARKS)] for k in range(len(COMPARED) - len(style.MARKS))]
     assert len(set(style.MARKS)) == len(style.MARKS) >= len(COMPARED) / 2
@@ -72,7 +101,9 @@ def test_a_law_has_one_colour_in_every_picture_unless_it_would_be_mistaken():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_in_a_picture_of_many_laws_only_those_change_that_would_be_mistaken_for_one_that_keeps_its_colour(seed):
+def test_in_a_picture_of_many_laws_only_those_change_that_would_be_mistaken_for_one_that_keeps_its_colour(
+    seed,
+):
     """New colours had pushed others out in turn: of 16 laws 11 changed, and 8 do now."""
     laws = random.Random(seed).sample(sorted(smc.laws()), 16)
     wanted, given = [style.law_colour(law) for law in laws], style.law_colours(laws)
@@ -99,7 +130,9 @@ def test_a_law_at_several_values_has_shades_of_its_colour_from_light_to_dark():
         lightness = [lab(shade, "all cones")[0] for shade in shades]
         assert lightness == pytest.approx([61.0, 41.0, 21.0], abs=1.5)
         assert least(shades) > 15.0
-        hues = [np.arctan2(*lab(shade, "all cones")[:0:-1]) for shade in [style.law_colour(law), *shades]]
+        hues = []
+        for shade in [style.law_colour(law), *shades]:
+            hues.append(np.arctan2(*lab(shade, "all cones")[:0:-1]))
         assert np.ptp(np.unwrap(hues)) < 0.6
 
 
@@ -110,13 +143,20 @@ def test_law_colours_never_repeat_in_one_picture():
 
 def test_laws_that_would_share_a_colour_differ_in_signals_too(monkeypatch):
     monkeypatch.setattr(style, "law_colour", lambda law: "#0072B2")
-    runs = smc.run([smc.Scenario(plant="duffing", law=law, duration=0.05) for law in ("observer_free", "classical")])
+    runs = smc.run(
+        [
+            smc.Scenario(plant="duffing", law=law, duration=0.05)
+            for law in ("observer_free", "classical")
+        ]
+    )
     rows = figure.figure(runs, None, ["b", "b"], panels=["u"])
     assert len({to_hex(line.get_color()) for ax in rows.axes for line in ax.lines}) == 2
 
 
 def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
-    runs = [smc.Scenario(plant=smc.plant("duffing", delta=delta), law="pid", duration=0.01) for delta in (0.2, 0.5)]
+    runs = []
+    for delta in (0.2, 0.5):
+        runs.append(smc.Scenario(plant=smc.plant("duffing", delta=delta), law="pid", duration=0.01))
     labels = style.labels(smc.run(runs), None)
     assert labels == ["PID: delta = 0.2", "PID: delta = 0.5"]
     assert style.distinct(labels) == ["delta = 0.2", "delta = 0.5"]
@@ -126,8 +166,13 @@ def test_labels_tell_runs_of_one_law_apart_by_the_parameters_of_their_plants():
 
 
 def test_contrasts_are_those_of_wcag():
-    """Black on white is 21 : 1. Grey #757575 is the lightest on which white letters have 4.5 : 1."""
-    light, grey, black = (style._luminance(colour) + 0.05 for colour in ("#FFFFFF", "#757575", "#000000"))
+    """Black on white is 21 : 1.
+
+    Grey #757575 is the lightest on which white letters have 4.5 : 1.
+    """
+    light, grey, black = (
+        style._luminance(colour) + 0.05 for colour in ("#FFFFFF", "#757575", "#000000")
+    )
     assert light / black == pytest.approx(21.0)
     assert 4.5 < light / grey < 4.7
     assert (style.letters_on("#757575"), style.letters_on("#FFE000")) == (style.PAPER, style.INK)
@@ -135,7 +180,8 @@ def test_contrasts_are_those_of_wcag():
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(0.25, "0.25"), (6.0, "6"), (276.0, "280"), (99_999.0, "100000"), (2e6, "2e+06"), (0.0, "0")]
+    ("value", "text"),
+    [(0.25, "0.25"), (6.0, "6"), (276.0, "280"), (99_999.0, "100000"), (2e6, "2e+06"), (0.0, "0")],
 )
 def test_short_numbers(value, text):
     assert style.short(value) == text

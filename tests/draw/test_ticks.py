@@ -12,7 +12,9 @@ pytestmark = pytest.mark.quick
 
 
 @pytest.mark.parametrize("width", [1.0, 1.8, 3.5, 12.0])
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (0.0, 0.002), (0.0, 3.0), (-60.0, 0.0), (99.998, 100.001)])
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.0, 1.0), (0.0, 0.002), (0.0, 3.0), (-60.0, 0.0), (99.998, 100.001)]
+)
 def test_labels_do_not_touch(width, low, high):
     with style.page(3.5):
         page = Figure(figsize=(width, 1.0))

@@ -1,4 +1,6 @@
-"""dm_env environments: their physics are those of smc.run, its own tests pass, laws act, policies control."""
+"""dm_env environments: their physics are those of smc.run, its own tests pass, laws act, policies
+control.
+"""
 
 import dataclasses
 import math
@@ -10,7 +12,17 @@ import mujoco
 import numpy as np
 import pytest
 from dm_env import StepType, test_utils
-from helpers.episodes import EVERY, LAW, columns, dm_control_suite, driven_by_dm, flat, one_of_each, run_of, start
+from helpers.episodes import (
+    EVERY,
+    LAW,
+    columns,
+    dm_control_suite,
+    driven_by_dm,
+    flat,
+    one_of_each,
+    run_of,
+    start,
+)
 
 import smc_mujoco as smc
 from smc_mujoco.common import extras
@@ -30,8 +42,13 @@ from dm_control.utils import rewards  # noqa: E402
 @pytest.mark.parametrize(("plant", "task"), one_of_each(1))
 def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
     known = smc.plant(plant)
-    strong = smc.law("observer_free", lam=6.0 if known.rest else max((6.0, *known.limits)), k1=3.076)
-    law = smc.law("hierarchical") if "hierarchical" in smc.laws(plant) else strong
+    strong = smc.law(
+        "observer_free", lam=6.0 if known.rest else max((6.0, *known.limits)), k1=3.076
+    )
+    if "hierarchical" in smc.laws(plant):
+        law = smc.law("hierarchical")
+    else:
+        law = strong
     changes = {"duration": 0.3, "x0": start(plant, task)}
     environment = suite.load(plant, task, changes=changes)
     trace = smc.run(run_of(environment.task.setting, law))
@@ -78,11 +95,15 @@ def test_an_agent_has_the_memories_model_surface_and_estimator_of_its_law(law, f
 
 
 def test_an_agent_with_a_model_of_coupled_channels_starts_afresh_too():
-    """What the other channel was told last is part of the model, and must not come from the episode before."""
+    """What the other channel was told last is part of the model, and must not come from the episode
+    before.
+    """
     links = {joint: smc.Channel(motor=True) for joint in ("shoulder", "elbow")}
     arm = smc.plant_from(Path(dm_control.suite.__file__).parent / "acrobot.xml", links)
     environment = suite.load(arm, changes={"x0": [1.0, 0.5], "duration": 0.05, "u_max": 500.0})
-    act = smc.envs.agent(smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal")
+    act = smc.envs.agent(
+        smc.law("computed_torque", kp=100.0, kd=20.0), environment, model="nominal"
+    )
     first, second = driven_by_dm(environment, act), driven_by_dm(environment, act)
     assert np.array_equal(first, second)
 
@@ -96,11 +117,15 @@ def test_a_plant_of_one_s_own_starts_as_its_runs_do(tmp_path):
 </worldbody><actuator><motor joint="a"/></actuator><keyframe><key name="up" qpos="0.2 3"/></keyframe></mujoco>""")
     environment = suite.load(smc.plant_from(path, ["a"], keyframe="up"), changes={"u_max": 1.0})
     environment.reset()
-    assert environment.physics.data.qpos[1] == 3.0  # a joint without a channel, where the keyframe has it
+    assert (
+        environment.physics.data.qpos[1] == 3.0
+    )  # a joint without a channel, where the keyframe has it
 
 
 def test_making_an_environment_waits_for_runs_in_the_plain_loop():
-    """Otherwise they would continue without their laws, because all threads share MuJoCo's callback."""
+    """Otherwise they would continue without their laws, because all threads share MuJoCo's
+    callback.
+    """
     made = threading.Event()
 
     def other():
@@ -124,7 +149,9 @@ def test_the_reward_is_dm_control_s_tolerance_in_closeness_and_calm():
     for x, v in random.normal(scale=(1.0, 5.0), size=(20, 2)):
         calm = rewards.tolerance(v, margin=5.0)
         expected = rewards.tolerance(x, margin=1.0) * (4.0 + calm) / 5.0
-        assert tasks.reward(*found.errors(np.array([x]), np.array([v]), 0)) == pytest.approx(expected, rel=1e-12)
+        assert tasks.reward(*found.errors(np.array([x]), np.array([v]), 0)) == pytest.approx(
+            expected, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize(
@@ -152,13 +179,20 @@ def test_tracking_is_rewarded_where_the_plant_follows():
     found = Setting("cart_pole", "track", {"reference": smc.Sine(0.5, 2.0)})
     r, dr, _ = found.reference(300)
     assert (r, dr) == pytest.approx((0.5 * np.sin(0.6), np.cos(0.6)))
-    assert tasks.reward(*found.errors(np.array([r, 0.0]), np.array([dr, 0.0]), 300)) == pytest.approx(1.0)
-    assert tasks.reward(*found.errors(np.array([r, r]), np.array([dr, dr]), 300)) < 0.95  # the pole is to stand
+    assert tasks.reward(
+        *found.errors(np.array([r, 0.0]), np.array([dr, 0.0]), 300)
+    ) == pytest.approx(1.0)
+    assert (
+        tasks.reward(*found.errors(np.array([r, r]), np.array([dr, dr]), 300)) < 0.95
+    )  # the pole is to stand
     assert found.observe(np.zeros(2), np.zeros(2), 300).shape == (7,)
 
 
 def test_tasks_are_for_the_plants_that_have_them():
-    assert tasks.tasks("overhead_crane") == ["regulate", "track"]  # its load hangs: nothing to swing up
+    assert tasks.tasks("overhead_crane") == [
+        "regulate",
+        "track",
+    ]  # its load hangs: nothing to swing up
     assert tasks.tasks("cart_pole") == ["regulate", "track", "swing_up"]
     assert "swing_up" not in tasks.tasks("pendulum_network")
     assert {"swing_up", "synchronise"} <= set(tasks.tasks("inverted_pendulum_network"))
@@ -243,33 +277,54 @@ def test_environments_are_dm_control_s_own():
 
 def test_tasks_are_loaded_in_the_words_of_dm_control_s_suite():
     assert {("duffing", "regulate"), ("cart_pole", "swing_up")} < {*suite.ALL_TASKS} == {*EVERY}
-    ours = {"changes": {"duration": 0.2, "control_period": 0.02}, "random": 3, "flat_observation": True}
+    ours = {
+        "changes": {"duration": 0.2, "control_period": 0.02},
+        "random": 3,
+        "flat_observation": True,
+    }
     theirs = {"random": 3, "time_limit": 0.2}, {"control_timestep": 0.02, "flat_observation": True}
     one, other = suite.load("duffing", "track", *theirs), suite.load("duffing", "track", **ours)
     assert one.control_timestep() == 0.02
     for k in range(12):
         first, second = one.step([0.5]), other.step([0.5])
-        assert first.observation["observations"].tolist() == second.observation["observations"].tolist()
+        assert (
+            first.observation["observations"].tolist()
+            == second.observation["observations"].tolist()
+        )
         assert (first.last(), second.last()) == (k == 10, k == 10)
-    both = suite.load("duffing", "track", {"time_limit": 0.2}, changes={"u_max": 2.0, "duration": 3.0})
+    both = suite.load(
+        "duffing", "track", {"time_limit": 0.2}, changes={"u_max": 2.0, "duration": 3.0}
+    )
     scenario = both.task.setting.scenario
     assert (scenario.duration, scenario.resolved.u_max) == (0.2, 2.0)
 
 
 @pytest.mark.parametrize(
     ("plant", "task", "sizes"),
-    [("duffing", "regulate", {"position": 1, "velocity": 1}),
-     ("cart_pole", "track", {"position": 2, "velocity": 2, "reference": 3})],
-)  # fmt: skip
+    [
+        ("duffing", "regulate", {"position": 1, "velocity": 1}),
+        ("cart_pole", "track", {"position": 2, "velocity": 2, "reference": 3}),
+    ],
+)
 def test_an_environment_says_what_it_takes_and_gives(plant, task, sizes):
     one = suite.load(plant, task, random=0, changes={"duration": 0.05, "control_period": 0.01})
     first, action, discount = one.reset(), one.action_spec(), one.discount_spec()
-    assert (action.shape, action.minimum, action.maximum, action.dtype) == ((1,), -1.0, 1.0, np.float64)
+    assert (action.shape, action.minimum, action.maximum, action.dtype) == (
+        (1,),
+        -1.0,
+        1.0,
+        np.float64,
+    )
     assert (discount.minimum, discount.maximum, one.reward_spec().shape) == (0.0, 1.0, ())
     assert {name: (spec.shape, spec.dtype) for name, spec in one.observation_spec().items()} == {
         name: ((size,), np.float64) for name, size in sizes.items()
     }
-    assert (first.first(), first.reward, first.discount, one.control_timestep()) == (True, None, None, 0.01)
+    assert (first.first(), first.reward, first.discount, one.control_timestep()) == (
+        True,
+        None,
+        None,
+        0.01,
+    )
 
 
 def test_a_mujoco_that_dm_control_does_not_know_is_one_sentence(monkeypatch):

@@ -1,4 +1,6 @@
-"""A free body as a gymnasium environment: it moves as in smc.run, and gymnasium's own checker passes."""
+"""A free body as a gymnasium environment: it moves as in smc.run, and gymnasium's own checker
+passes.
+"""
 
 import numpy as np
 import pytest
@@ -7,7 +9,9 @@ from scipy.spatial.transform import Rotation
 import smc_mujoco as smc
 from smc_mujoco.common import gl
 
-gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+gymnasium = pytest.importorskip(
+    "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
+)
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
@@ -28,7 +32,12 @@ def test_gymnasiums_own_checker_passes():
 
 def test_thrusts_of_a_run_as_actions_give_its_motion():
     path = [smc.Sine(0.5, 1.0), *[smc.Constant(value) for value in (0.0, 1.0, 0.0, 0.0, 0.3)]]
-    common = {"duration": 1.0, "control_period": 2e-3, "reference": path, "mismatch": {"Dx": 2.0}} | START
+    common = {
+        "duration": 1.0,
+        "control_period": 2e-3,
+        "reference": path,
+        "mismatch": {"Dx": 2.0},
+    } | START
     trace = smc.run(smc.Scenario(plant="quadrotor", law="geometric", **common))
     environment = FlightEnv("quadrotor", "track", common)
     observation, info, reward = *environment.reset(options=START), 0.0
@@ -42,7 +51,9 @@ def test_thrusts_of_a_run_as_actions_give_its_motion():
     counted = [0, 1, 2, 5]
     e, w = info["error"][counted], observation[6:12] - observation[18:24]
     wanted = Rotation.from_rotvec(observation[15:18]) * Rotation.identity()
-    w[3:] = observation[9:12] - (Rotation.from_rotvec(observation[3:6]).inv() * wanted).apply(observation[21:24])
+    w[3:] = observation[9:12] - (Rotation.from_rotvec(observation[3:6]).inv() * wanted).apply(
+        observation[21:24]
+    )
     rms = lambda values: np.sqrt(np.mean(values**2))  # noqa: E731
     expected = 10 ** -(rms(e) ** 2) * (4 + 10 ** -((rms(w[counted]) / 5) ** 2)) / 5
     assert reward == pytest.approx(expected, rel=1e-6)
@@ -67,7 +78,9 @@ def test_episodes_begin_where_they_are_told_or_about_rest_and_end_with_a_state_t
 
 def test_copies_move_like_single_environments():
     options = {"changes": {"duration": 0.02}}
-    copies = gymnasium.make_vec("smc_mujoco:smc/Quadrotor-v0", num_envs=2, vectorization_mode="sync", **options)
+    copies = gymnasium.make_vec(
+        "smc_mujoco:smc/Quadrotor-v0", num_envs=2, vectorization_mode="sync", **options
+    )
     alone = gymnasium.make("smc_mujoco:smc/Quadrotor-v0", **options)
     copies.reset(seed=4)
     alone.reset(seed=5)

@@ -1,4 +1,6 @@
-"""gymnasium environments, single and in batches: the physics of smc.run, its own checkers pass, ids are found."""
+"""gymnasium environments, single and in batches: the physics of smc.run, its own checkers pass, ids
+are found.
+"""
 
 import copy
 import pickle
@@ -13,7 +15,9 @@ import smc_mujoco as smc
 from smc_mujoco.common import gl
 from smc_mujoco.envs import registration, tasks
 
-gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+gymnasium = pytest.importorskip(
+    "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
+)
 
 from mujoco.batch import Batch, SimulationError  # noqa: E402
 
@@ -25,7 +29,10 @@ from smc_mujoco.envs.vector_env import BatchEnv  # noqa: E402
 
 @pytest.mark.parametrize(("plant", "task"), one_of_each(0))
 def test_a_law_as_an_agent_gives_the_trace_of_its_run(plant, task):
-    law = smc.law("hierarchical") if "hierarchical" in smc.laws(plant) else LAW
+    if "hierarchical" in smc.laws(plant):
+        law = smc.law("hierarchical")
+    else:
+        law = LAW
     single = PlantEnv(plant, task, {"duration": 0.2, "x0": start(plant, task)})
     trace = smc.run(run_of(single.setting, law))
     assert np.abs(driven_by_gym(single, smc.envs.agent(law, single)) - columns(trace)).max() < 1e-9
@@ -48,10 +55,19 @@ def test_a_copy_in_a_batch_moves_as_the_single_environment_does(plant, task):
     assert truncated.all()
 
 
-@pytest.mark.parametrize("drives", [(smc.DCMotor(),), (smc.Lag(0.01), smc.Lag(0.02))], ids=["motor", "two lags"])
+@pytest.mark.parametrize(
+    "drives", [(smc.DCMotor(),), (smc.Lag(0.01), smc.Lag(0.02))], ids=["motor", "two lags"]
+)
 def test_friction_and_drives_hold_in_a_batch_too(drives):
-    changes = {"friction": smc.Coulomb(0.1), "actuator": (*drives, smc.Backlash(0.01)), "duration": 0.1}
-    many, single = BatchEnv("inverted_pendulum", 2, changes=changes), PlantEnv("inverted_pendulum", changes=changes)
+    changes = {
+        "friction": smc.Coulomb(0.1),
+        "actuator": (*drives, smc.Backlash(0.01)),
+        "duration": 0.1,
+    }
+    many, single = (
+        BatchEnv("inverted_pendulum", 2, changes=changes),
+        PlantEnv("inverted_pendulum", changes=changes),
+    )
     for _ in range(2):  # nothing is left of the episode before
         many.reset(seed=0)
         single.reset(seed=0)
@@ -61,7 +77,9 @@ def test_friction_and_drives_hold_in_a_batch_too(drives):
 
 
 class Giving(Batch):
-    """A Batch in which MuJoCo raises at the third call in the last simulation, which `asked` shows to be left alone."""
+    """A Batch in which MuJoCo raises at the third call in the last simulation, which `asked` shows
+    to be left alone.
+    """
 
     asked = ()
 
@@ -98,9 +116,15 @@ def test_an_agent_that_joins_an_episode_late_has_no_old_memory():
 def test_a_start_from_options_is_the_start_that_the_scenario_sets():
     """The rotor behind a backlash starts with its joint."""
     loose = {"actuator": (smc.DCMotor(), smc.Backlash(0.01)), "duration": 0.1}
-    one, other = (PlantEnv("inverted_pendulum", changes=loose | x) for x in ({}, {"x0": 0.3, "v0": 0.4}))
-    assert np.array_equal(one.reset(seed=0, options={"x0": 0.3, "v0": 0.4})[0], other.reset(seed=0)[0])
-    assert np.array_equal([one.step([0.5])[0] for _ in range(100)], [other.step([0.5])[0] for _ in range(100)])
+    one, other = (
+        PlantEnv("inverted_pendulum", changes=loose | x) for x in ({}, {"x0": 0.3, "v0": 0.4})
+    )
+    assert np.array_equal(
+        one.reset(seed=0, options={"x0": 0.3, "v0": 0.4})[0], other.reset(seed=0)[0]
+    )
+    assert np.array_equal(
+        [one.step([0.5])[0] for _ in range(100)], [other.step([0.5])[0] for _ in range(100)]
+    )
 
 
 @pytest.mark.parametrize(
@@ -197,16 +221,23 @@ def test_a_copy_that_is_over_begins_a_new_episode_and_the_others_go_on():
     assert (rewards_ > 0.0).all()
     o, rewards_, terminated, truncated, _ = many.step(np.ones((3, 1)))
     assert many.samples.tolist() == [0, 16, 0]
-    assert rewards_[0] == rewards_[2] == 0.0 < rewards_[1]  # a step that begins an episode gives none
+    assert (
+        rewards_[0] == rewards_[2] == 0.0 < rewards_[1]
+    )  # a step that begins an episode gives none
     assert (o[[0, 2], 1] == 0.0).all()  # nor does it move
     assert not (terminated | truncated).any()
 
 
 def test_an_episode_ends_where_a_run_diverges_with_an_observation_in_its_space():
     changes = {"x0": 9.9e5, "v0": 9e5, "control_period": 0.1}
-    single, many = PlantEnv("inverted_pendulum", changes=changes), BatchEnv("inverted_pendulum", 2, changes=changes)
+    single, many = (
+        PlantEnv("inverted_pendulum", changes=changes),
+        BatchEnv("inverted_pendulum", 2, changes=changes),
+    )
     single.reset(seed=0)
-    assert not single.setting.diverged(single.x, single.v)  # each number is below the limit of a run
+    assert not single.setting.diverged(
+        single.x, single.v
+    )  # each number is below the limit of a run
     observation, reward, terminated, _, info = single.step([0.0])
     assert (terminated, reward) == (True, 0.0)
     assert np.isnan(info["error"]).all()
@@ -226,7 +257,9 @@ def test_an_environment_is_copied_and_sent_away_as_it_stands():
     one.step([0.5])
     for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
         assert np.array_equal(other.step([1.0])[0], copy.deepcopy(one).step([1.0])[0])
-        assert np.array_equal(other.reset()[0], copy.deepcopy(one).reset()[0])  # the generator of starts, too
+        assert np.array_equal(
+            other.reset()[0], copy.deepcopy(one).reset()[0]
+        )  # the generator of starts, too
 
 
 def test_an_arm_tracks_a_reference_of_each_joint():
@@ -236,7 +269,9 @@ def test_an_arm_tracks_a_reference_of_each_joint():
     found, rest = one.setting, np.array(arm.rest)
     observation, info = one.reset(seed=0)
     assert observation.shape == found.observe(rest, 0 * rest, 0).shape == (14 + 21,)
-    np.testing.assert_array_equal(info["error"], (observation[:7] - rest) - (observation[14:21] - rest))
+    np.testing.assert_array_equal(
+        info["error"], (observation[:7] - rest) - (observation[14:21] - rest)
+    )
     assert info["time"] == 0.0
     assert one.step(np.zeros(7))[-1]["time"] == 1e-3
     r, dr, ddr = found.reference(300).reshape(3, 7)
@@ -254,7 +289,9 @@ def test_an_arm_tracks_a_reference_of_each_joint():
     several = [smc.Sine(0.1 * i, 2.0) for i in range(7)]
     own = PlantEnv(arm, "track", {"reference": several, "duration": 0.5}).setting.reference(100)
     np.testing.assert_allclose(own[:7], 0.1 * np.arange(7) * np.sin(0.2))
-    both = PlantEnv(arm, "track", {"reference": smc.Sine(0.1, 2.0), "duration": 0.5}).setting.reference(100)
+    both = PlantEnv(
+        arm, "track", {"reference": smc.Sine(0.1, 2.0), "duration": 0.5}
+    ).setting.reference(100)
     np.testing.assert_allclose(both[:7], 0.1 * np.sin(0.2))
 
 
@@ -275,15 +312,24 @@ DRAWN = [("duffing", "regulate"), ("cart_pole", "swing_up")]  # drawing takes mo
 def test_gymnasium_s_own_checker_passes(plant, task):
     from gymnasium.utils.env_checker import check_env
 
-    drawn = "rgb_array" if (plant, task) in DRAWN and not gl.missing() else None
-    environment = gymnasium.make(f"smc_mujoco:smc/{registration.camel(plant)}-v0", task=task, render_mode=drawn)
+    if (plant, task) in DRAWN and not gl.missing():
+        drawn = "rgb_array"
+    else:
+        drawn = None
+    environment = gymnasium.make(
+        f"smc_mujoco:smc/{registration.camel(plant)}-v0", task=task, render_mode=drawn
+    )
     check_env(environment.unwrapped, skip_render_check=drawn is None)
 
 
 def test_environments_step_in_processes_of_their_own():
-    workers = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, vectorization_mode="async", changes=SHORT)
+    workers = gymnasium.make_vec(
+        "smc_mujoco:Duffing-v0", num_envs=2, vectorization_mode="async", changes=SHORT
+    )
     try:
-        here = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2, vectorization_mode="sync", changes=SHORT)
+        here = gymnasium.make_vec(
+            "smc_mujoco:Duffing-v0", num_envs=2, vectorization_mode="sync", changes=SHORT
+        )
         assert np.array_equal(workers.reset(seed=0)[0], here.reset(seed=0)[0])
         assert np.array_equal(workers.step([[1.0], [0.0]])[0], here.step([[1.0], [0.0]])[0])
     finally:
@@ -295,7 +341,9 @@ def test_gymnasium_s_benchmarks_run():
 
     environment = gymnasium.make("smc_mujoco:Duffing-v0", changes=SHORT)
     assert performance.benchmark_step(environment, target_duration=0.05, seed=0) > 0.0
-    assert performance.benchmark_init(lambda: PlantEnv("duffing"), target_duration=0.05, seed=0) > 0.0
+    assert (
+        performance.benchmark_init(lambda: PlantEnv("duffing"), target_duration=0.05, seed=0) > 0.0
+    )
     if hasattr(performance, "benchmark_vector_step"):
         many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=3, changes=SHORT)
         assert performance.benchmark_vector_step(many, target_duration=0.05, seed=0) > 0.0
@@ -332,14 +380,19 @@ assert "smc/CartPole-v0" in gymnasium.registry
 """
 
 
-@pytest.mark.parametrize("imports", ["import gymnasium", RELOADED], ids=["gymnasium first", "gymnasium last"])
+@pytest.mark.parametrize(
+    "imports", ["import gymnasium", RELOADED], ids=["gymnasium first", "gymnasium last"]
+)
 def test_an_id_is_found_whichever_package_is_imported_first(imports):
     code = f"{imports}\nprint(*[environment.reset(seed=0)[0].shape[0] for environment in ({MADE})])"
     assert fresh(code) == ["2", "2"]
 
 
 def test_every_plant_has_an_id_and_gymnasium_keeps_its_own():
-    ids = {name for name, spec in gymnasium.registry.items() if "smc_mujoco" in str(spec.entry_point)}
+    ids = set()
+    for name, spec in gymnasium.registry.items():
+        if "smc_mujoco" in str(spec.entry_point):
+            ids.add(name)
     assert {f"smc/{registration.camel(plant)}-v0" for plant in smc.plants()} <= ids
     assert {"Duffing-v0", "VanDerPol-v0", "PendulumNetwork-v0", "OverheadCrane-v0"} <= ids
     assert not {"CartPole-v0", "InvertedPendulum-v0"} & ids

@@ -1,4 +1,6 @@
-"""What the annex's commands hand on, print and leave, with the work itself replaced by typed results."""
+"""What the annex's commands hand on, print and leave, with the work itself replaced by typed
+results.
+"""
 
 import contextlib
 import io
@@ -25,34 +27,69 @@ from smc_mujoco.evidence.rigs.rig import Fall
 CHECKS = {
     "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
     "largest step of u in the period, over that of the classical law (TV rate)": {
-        "value": 1.25, "relation": "<=", "limit": 1.0, "holds": False,
+        "value": 1.25,
+        "relation": "<=",
+        "limit": 1.0,
+        "holds": False,
     },
-}  # fmt: skip
+}
 EMPS = smc.rig("emps")
 CLAIMS = Claims(
     [
         Claim(
-            id="3", text="it settles", where="p. 4", measured="runs", holds_if="steps <= 1", verdict="refuted",
-            numbers={"study": CHECKS, "tuned": CHECKS}, beside={"study": {}, "tuned": {"TV rate": 12.5}},
-            verdicts={"study": "supported", "tuned": "refuted"}, flips=True, note="A note.", how="by eq. 3",
-            read="abstract", over="some", instead="It rests.", shown_by="smc-mujoco certify",
+            id="3",
+            text="it settles",
+            where="p. 4",
+            measured="runs",
+            holds_if="steps <= 1",
+            verdict="refuted",
+            numbers={"study": CHECKS, "tuned": CHECKS},
+            beside={"study": {}, "tuned": {"TV rate": 12.5}},
+            verdicts={"study": "supported", "tuned": "refuted"},
+            flips=True,
+            note="A note.",
+            how="by eq. 3",
+            read="abstract",
+            over="some",
+            instead="It rests.",
+            shown_by="smc-mujoco certify",
         ),
         Claim(
-            id="4", text="it is calm", where="p. 5", measured="runs", holds_if="calm", verdict="not testable",
-            numbers={"study": {}, "tuned": {}}, beside={"study": {}, "tuned": {}},
-            verdicts={"study": "not testable", "tuned": "not testable"}, flips=False, note="Nothing says how.",
+            id="4",
+            text="it is calm",
+            where="p. 5",
+            measured="runs",
+            holds_if="calm",
+            verdict="not testable",
+            numbers={"study": {}, "tuned": {}},
+            beside={"study": {}, "tuned": {}},
+            verdicts={"study": "not testable", "tuned": "not testable"},
+            flips=False,
+            note="Nothing says how.",
         ),
         Claim(
-            id="5", text="of one set", where="p. 6", measured="runs", holds_if="calm", verdict="not testable",
-            numbers={"study": {}}, beside={"study": {}}, verdicts={"study": "not testable"}, flips=False,
+            id="5",
+            text="of one set",
+            where="p. 6",
+            measured="runs",
+            holds_if="calm",
+            verdict="not testable",
+            numbers={"study": {}},
+            beside={"study": {}},
+            verdicts={"study": "not testable"},
+            flips=False,
         ),
     ]
-)  # fmt: skip
+)
 
 
 def identified(count):
-    """Quantities of the axis: one at the end of its range, one that may be 0, one just not; records that fit badly."""
-    rig = EMPS.with_values({"mass": 120.5, "viscous": 0.0, "coulomb": 2.0, "offset": 6.0}, "identified")
+    """Quantities of the axis: one at the end of its range, one that may be 0, one just not; records
+    that fit badly.
+    """
+    rig = EMPS.with_values(
+        {"mass": 120.5, "viscous": 0.0, "coulomb": 2.0, "offset": 6.0}, "identified"
+    )
     correlations = np.eye(4)
     correlations[0, 2] = correlations[2, 0] = -0.999
     t = np.arange(3.0)
@@ -79,7 +116,9 @@ class Notes(list):
         def noted(*given, **options):
             words = [*map(told, given), *(f"{key}={told(one)}" for key, one in options.items())]
             self.append(f"{name.rpartition('.')[2]}({', '.join(words)})")
-            return gives(*given, **options) if callable(gives) else gives
+            if callable(gives):
+                return gives(*given, **options)
+            return gives
 
         monkeypatch.setattr(f"smc_mujoco.{name}", noted)
 
@@ -101,9 +140,14 @@ def audited(about, ids, sets, quick, threads, report):
 
 def repeated(name):
     """A twin whose replays are texts."""
-    twin = SimpleNamespace(name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated)
+    twin = SimpleNamespace(
+        name=name, label=f"the rig {name}", units={"x": "m"}, start=2.0, set=repeated
+    )
     twin.columns, twin.members = SimpleNamespace(time="t"), lambda: {"set 1": twin}
-    twin.prediction = PREDICTION if name == "stepper_furuta" else None
+    if name == "stepper_furuta":
+        twin.prediction = PREDICTION
+    else:
+        twin.prediction = None
     twin.fit, twin.idle = (lambda _: {"x": 99.04, "u": 1.25}), (lambda _: {"x": -0.04, "u": 0.0})
     twin.fits = lambda _: [{"x": Fall(8.44), "u": -20.0}]
     twin.predictions = lambda _: [(f"{name} predicted", "measured", "times")]
@@ -113,14 +157,17 @@ def repeated(name):
 
 
 def predicted(twin, seeds, report):
-    """Predictions in which the first law has its recorded figures, the second twice these, and the third falls."""
+    """Predictions in which the first law has its recorded figures, the second twice these, and the
+    third falls.
+    """
     about, values = PREDICTION, {}
     for without in ("", "queue"):
         for i, law in enumerate(about.order):
             for condition in ("hold",) if without else about.conditions:
                 made = {name: (i + 1) * value for name, value in about.recorded[condition].items()}
                 values[without, "set 1", law, condition] = [
-                    made | ({"alpha_max": 90.0} if i == 2 else {"centroid": 4.0 + k}) for k in range(seeds)
+                    made | ({"alpha_max": 90.0} if i == 2 else {"centroid": 4.0 + k})
+                    for k in range(seeds)
                 ]
     return Told(prediction=about, values=values)
 
@@ -137,7 +184,9 @@ STUBS = {  # of each command: the functions replaced, and what they give
         "evidence.audit.audit.audit": audited,
         "evidence.audit.mutants.survivors": lambda *_, **__: {"3": "kept"},
         "evidence.audit.paper.new": [Path("mine/paper.toml"), Path("mine/claims.py")],
-        "evidence.audit.paper.papers": {"small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")},
+        "evidence.audit.paper.papers": {
+            "small": SimpleNamespace(authors="A. B", title="C", contents="3 claims")
+        },
         "evidence.audit.evidence.check": {
             "paper": {"authors": "A. B and others", "title": "C" * 90},
             "counts": {"supported": 2},
@@ -159,75 +208,195 @@ STUBS = {  # of each command: the functions replaced, and what they give
     },
 }
 REFUSED = (
-    "certify", "certify duffing --check d.json", "certify duffing --worst", "claims --json --mutants",
-    "claims --papers --quick", "report --paper gaber --law pid", "rig --fit emps a.csv --set mass=much",
-    "rig emps a.csv b.csv", "rig emps a.csv --starts 3", "rig emps a.csv --seeds 3",
-)  # fmt: skip
-AXIS = ("mass 120.500 0.021 95.1 kg", "offset 6.000 7 -3.16 N", "a.csv 99.0 (99.0) 81.0 (81.5)", "(correlation -0.999)")
+    "certify",
+    "certify duffing --check d.json",
+    "certify duffing --worst",
+    "claims --json --mutants",
+    "claims --papers --quick",
+    "report --paper gaber --law pid",
+    "rig --fit emps a.csv --set mass=much",
+    "rig emps a.csv b.csv",
+    "rig emps a.csv --starts 3",
+    "rig emps a.csv --seeds 3",
+)
+AXIS = (
+    "mass 120.500 0.021 95.1 kg",
+    "offset 6.000 7 -3.16 N",
+    "a.csv 99.0 (99.0) 81.0 (81.5)",
+    "(correlation -0.999)",
+)
 AXIS += ("0 N s/m", "0 (6 ± 7)", "0.0981 times")
 GIVEN = {  # line -> exit code, what is handed on, printed and left, spaces aside
-    "certify duffing --disturbance 2 --worst --out d.json --figure f": (0, [
-        "certify(Scenario(plant duffing, law observer_free, gains of kind shipped, u_max=6.0, condition='nominal')",
-        "Uncertainty(disturbance=2.0, slope=None", "'ultimate_bound', Uncertainty(disturbance=2.0", "progress=True)",
-        "figure(a Certificate, Path(f), ['a trace'], 40)", "theorem condition holds margin",
-        "saturated PD damping no -0.250 N s/m", "restoring yes 0.125", "|x| = 0.666 m", "|x| <= 0.300 m", "|d| <= 2 N",
-        "40 runs", "|x| = 0.312 m", "wrote d.json", "wrote f.svg",
-    ]),
+    "certify duffing --disturbance 2 --worst --out d.json --figure f": (
+        0,
+        [
+            "certify(Scenario(plant duffing, law observer_free, gains of kind shipped, u_max=6.0, condition='nominal')",
+            "Uncertainty(disturbance=2.0, slope=None",
+            "'ultimate_bound', Uncertainty(disturbance=2.0",
+            "progress=True)",
+            "figure(a Certificate, Path(f), ['a trace'], 40)",
+            "theorem condition holds margin",
+            "saturated PD damping no -0.250 N s/m",
+            "restoring yes 0.125",
+            "|x| = 0.666 m",
+            "|x| <= 0.300 m",
+            "|d| <= 2 N",
+            "40 runs",
+            "|x| = 0.312 m",
+            "wrote d.json",
+            "wrote f.svg",
+        ],
+    ),
     "certify duffing --law pid --condition noise --gains default --slope 3": (
-        0, ["law pid(kp=10, ki=5, kd=6, tau=0.005, tt=0.5), gains of kind default", "condition='noise'), None)"]),
-    "claims 3 --gains study,tuned --quick --threads 2": (0, [
-        "audit(a Paper gaber, ['3'], ['study', 'tuned'], True, 2, report=", "reached 1 of 2",
-        "whose the paper's, abstract: by eq. 3", "verdict refuted, flips", "study gains: supported",
-        "✓ duffing: settling time, s 2.5 < 4", "✗ largest step of u", "1.25 <= 1", "TV rate 12.5",
-        "instead It rests. (smc-mujoco certify)", "○ 1 refuted (1 of all depends on the gains)", "quick: coarser grids",
-    ]),
-    "claims --mutants --evidence e.json --badge b.svg": (1, [
-        "audit(a Paper gaber, None, None, False, None", "survivors(a Paper gaber, None, None, False, None",
-        "id study tuned", "3 ● ○ it settles ○ refuted, flips; the paper's, abstract", "= 1.25 (<= 1 asked)",
-        "4 – – it is calm – not testable; the paper's Nothing says how.", "claim 3 is kept", "wrote e.json, b.svg",
-    ]),
-    "claims 5 --quick": (0, ["audit(a Paper gaber, ['5'], None, True, None", "one set of gains of 3"]),
-    "claims 4 --json --quick": (0, [
-        "audit(a Paper gaber, ['4'], None, True, None", '"verdict": "not testable"', '"flips": false',
-        '"verdicts": {"study": "not testable", "tuned": "not testable"}']),
+        0,
+        [
+            "law pid(kp=10, ki=5, kd=6, tau=0.005, tt=0.5), gains of kind default",
+            "condition='noise'), None)",
+        ],
+    ),
+    "claims 3 --gains study,tuned --quick --threads 2": (
+        0,
+        [
+            "audit(a Paper gaber, ['3'], ['study', 'tuned'], True, 2, report=",
+            "reached 1 of 2",
+            "whose the paper's, abstract: by eq. 3",
+            "verdict refuted, flips",
+            "study gains: supported",
+            "✓ duffing: settling time, s 2.5 < 4",
+            "✗ largest step of u",
+            "1.25 <= 1",
+            "TV rate 12.5",
+            "instead It rests. (smc-mujoco certify)",
+            "○ 1 refuted (1 of all depends on the gains)",
+            "quick: coarser grids",
+        ],
+    ),
+    "claims --mutants --evidence e.json --badge b.svg": (
+        1,
+        [
+            "audit(a Paper gaber, None, None, False, None",
+            "survivors(a Paper gaber, None, None, False, None",
+            "id study tuned",
+            "3 ● ○ it settles ○ refuted, flips; the paper's, abstract",
+            "= 1.25 (<= 1 asked)",
+            "4 – – it is calm – not testable; the paper's Nothing says how.",
+            "claim 3 is kept",
+            "wrote e.json, b.svg",
+        ],
+    ),
+    "claims 5 --quick": (
+        0,
+        ["audit(a Paper gaber, ['5'], None, True, None", "one set of gains of 3"],
+    ),
+    "claims 4 --json --quick": (
+        0,
+        [
+            "audit(a Paper gaber, ['4'], None, True, None",
+            '"verdict": "not testable"',
+            '"flips": false',
+            '"verdicts": {"study": "not testable", "tuned": "not testable"}',
+        ],
+    ),
     "claims --papers": (0, ["papers()", "small A. B: C (3 claims)"]),
-    "claims --new mine --check e.json": (0, [
-        "new(Path(mine))", "check(Path(e.json))", "wrote mine/claims.py", "the seal is whole: A. B and others, C",
-        ": 2 supported, in a quick audit"]),
+    "claims --new mine --check e.json": (
+        0,
+        [
+            "new(Path(mine))",
+            "check(Path(e.json))",
+            "wrote mine/claims.py",
+            "the seal is whole: A. B and others, C",
+            ": 2 supported, in a quick audit",
+        ],
+    ),
     "report --paper gaber --quick --threads 2": (
-        0, ["report('gaber', Path(report), True, 2, progress=True)", "wrote report.html (0.3 MB)"]),
-    "report --quick --out there --seeds 2 --law pid,lqr --records r --relevant 0.1": (0, [
-        "report(Path(there), True, 2, None, progress=True, records=Path(r), laws=['pid', 'lqr'], relevant=0.1)"]),
+        0,
+        ["report('gaber', Path(report), True, 2, progress=True)", "wrote report.html (0.3 MB)"],
+    ),
+    "report --quick --out there --seeds 2 --law pid,lqr --records r --relevant 0.1": (
+        0,
+        [
+            "report(Path(there), True, 2, None, progress=True, records=Path(r), laws=['pid', 'lqr'], relevant=0.1)"
+        ],
+    ),
     "rig --fit emps a.csv b.csv c.csv --columns x=position --quantities mass,offset --set mass=5 --starts 2 --seed 3": (
-        0, ["load(Path(c.csv), {x: 'position'})", "['mass', 'offset'], start={mass: 5.0}, starts=2, seed=3", *AXIS,
-        "c.csv falls at 8.4 s (falls at 8.4 s)", "median 90.0 (90.0) 60.0 (60.0)", "the twin falls at 8.4 s",
-        "41 parameter sets, seed 3"]),
-    "rig --fit duffing a.csv b.csv --json found.json --figure fit": (0, [
-        "identify(plant duffing, [{t: a ndarray}, {t: a ndarray}], None, start={}, starts=4, seed=0, progress=True)",
-        "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))", *AXIS, "the worst fit is 60 %", "wrote run.svg",
-        "wrote found.json", '"mass": {"value": 120.5, "error": 0.0213, "unit": "kg"}', '"fits_before": [{"x": 99.0,']),
+        0,
+        [
+            "load(Path(c.csv), {x: 'position'})",
+            "['mass', 'offset'], start={mass: 5.0}, starts=2, seed=3",
+            *AXIS,
+            "c.csv falls at 8.4 s (falls at 8.4 s)",
+            "median 90.0 (90.0) 60.0 (60.0)",
+            "the twin falls at 8.4 s",
+            "41 parameter sets, seed 3",
+        ],
+    ),
+    "rig --fit duffing a.csv b.csv --json found.json --figure fit": (
+        0,
+        [
+            "identify(plant duffing, [{t: a ndarray}, {t: a ndarray}], None, start={}, starts=4, seed=0, progress=True)",
+            "{twin: {x: 99.04, u: 81.0}}, {x: 'm', u: 'V'}, Path(fit))",
+            *AXIS,
+            "the worst fit is 60 %",
+            "wrote run.svg",
+            "wrote found.json",
+            '"mass": {"value": 120.5, "error": 0.0213, "unit": "kg"}',
+            '"fits_before": [{"x": 99.0,',
+        ],
+    ),
     "rig --fit nowhere a.csv": (0, ["identify('nowhere', [{t: a ndarray}], None", *AXIS]),
-    "rig emps run.csv --columns x=position": (0, [
-        "rig('emps') load(Path(run.csv), {x: 'position'})", "x u", "twin 99.0 1.2", "do nothing 0.0 0.0"]),
-    "rig emps run.csv --sets driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4": (0, [
-        "{twin: 'emps predicted', driver: 'driver predicted', quanser: 'quanser predicted'}", "u: -20.0}}, {x: 'm'}",
-        "run(['emps from 1.5 for 6.0', 'driver from 1.5 for 6.0', 'quanser from 1.5 for 6.0'])",
-        "filmed(['measured from 1.5 for 6.0', 'emps from 1.5 for 6.0',", "'emps: run, from 4.5 s of the record'",
-        "['measured', 'twin', 'driver', 'quanser']", "driver falls at 8.4 s -20.0", "wrote run.svg wrote film.mp4"]),
-    "rig stepper_furuta --seeds 2": (0, [
-        "rig('stepper_furuta')", "bar of stepper_furuta, whole 6", "predicted(",
-        "Fitted on: linear", "alpha rms 0.439 0.439 0.844 0.844 deg",
-        "accel. rms", "resting 0.800 0.800", "two states hold 0.878 2132 0.128 4.50 0", "4.05…4.95",
-        "four states nudges all fall all fall",
-        "whole 0.439 0.878 all fall 1 of 1 1.00", "without queue 0.439 0.878 all fall",
-        "the order of the three laws on", "2 seeds each"]),
-    "rig emps run.csv --film film.mp4": (0, ["run(['emps from None for None'])", "from 5 s of the record'"]),
-}  # fmt: skip
+    "rig emps run.csv --columns x=position": (
+        0,
+        [
+            "rig('emps') load(Path(run.csv), {x: 'position'})",
+            "x u",
+            "twin 99.0 1.2",
+            "do nothing 0.0 0.0",
+        ],
+    ),
+    "rig emps run.csv --sets driver,quanser --start 1.5 --duration 6 --figure run --film film.mp4": (
+        0,
+        [
+            "{twin: 'emps predicted', driver: 'driver predicted', quanser: 'quanser predicted'}",
+            "u: -20.0}}, {x: 'm'}",
+            "run(['emps from 1.5 for 6.0', 'driver from 1.5 for 6.0', 'quanser from 1.5 for 6.0'])",
+            "filmed(['measured from 1.5 for 6.0', 'emps from 1.5 for 6.0',",
+            "'emps: run, from 4.5 s of the record'",
+            "['measured', 'twin', 'driver', 'quanser']",
+            "driver falls at 8.4 s -20.0",
+            "wrote run.svg wrote film.mp4",
+        ],
+    ),
+    "rig stepper_furuta --seeds 2": (
+        0,
+        [
+            "rig('stepper_furuta')",
+            "bar of stepper_furuta, whole 6",
+            "predicted(",
+            "Fitted on: linear",
+            "alpha rms 0.439 0.439 0.844 0.844 deg",
+            "accel. rms",
+            "resting 0.800 0.800",
+            "two states hold 0.878 2132 0.128 4.50 0",
+            "4.05…4.95",
+            "four states nudges all fall all fall",
+            "whole 0.439 0.878 all fall 1 of 1 1.00",
+            "without queue 0.439 0.878 all fall",
+            "the order of the three laws on",
+            "2 seeds each",
+        ],
+    ),
+    "rig emps run.csv --film film.mp4": (
+        0,
+        ["run(['emps from None for None'])", "from 5 s of the record'"],
+    ),
+}
 
 
 @pytest.fixture
 def called(tmp_path, monkeypatch, capsys):
-    """Run a line with the work replaced: exit code, what was handed on, what was printed and left, the error."""
+    """Run a line with the work replaced: exit code, what was handed on, what was printed and left,
+    the error.
+    """
 
     def run(line):
         monkeypatch.chdir(tmp_path)
@@ -243,8 +412,16 @@ def called(tmp_path, monkeypatch, capsys):
             main.main(line.split())
         said = capsys.readouterr()
         left = [json.dumps(json.loads(path.read_text())) for path in tmp_path.glob("*.json")]
-        out = json.dumps(json.loads(said.out)) if said.out.startswith("{") else said.out
-        return ended.value.code or 0, notes, f"{out}\n{said.err if notes else ''}{' '.join(left)}", said.err
+        if said.out.startswith("{"):
+            out = json.dumps(json.loads(said.out))
+        else:
+            out = said.out
+        return (
+            ended.value.code or 0,
+            notes,
+            f"{out}\n{said.err if notes else ''}{' '.join(left)}",
+            said.err,
+        )
 
     return run
 
@@ -265,9 +442,13 @@ def test_options_that_do_not_go_together_are_one_sentence_before_any_work(line, 
     assert said.count("\n") == 1
 
 
-@pytest.mark.parametrize(("full", "id", "verdict"), [(True, "1;36m3", "1;31m"), (False, "36m 3", "31m")])
+@pytest.mark.parametrize(
+    ("full", "id", "verdict"), [(True, "1;36m3", "1;31m"), (False, "36m 3", "31m")]
+)
 def test_a_terminal_shows_a_claim_s_id_in_cyan_and_a_refuted_one_in_red(full, id, verdict):
-    console = Console(record=True, width=80, file=io.StringIO(), force_terminal=True, color_system="standard")
+    console = Console(
+        record=True, width=80, file=io.StringIO(), force_terminal=True, color_system="standard"
+    )
     tables.print_claims(CLAIMS[:1], console, full)
     text = console.export_text(styles=True)
     assert f"\x1b[{id}\x1b[0m" in text

@@ -58,7 +58,9 @@ def test_an_action_in_si_units_is_the_fraction_times_u_max():
     assert same(run(smc.law_from(fraction)), run(smc.law_from(fraction, units="u_max")))
     assert same(run(smc.law_from(fraction)), run(smc.law_from(force, units="SI")))
     assert run(smc.law_from(force, units="SI"), u_max=math.inf).failure is None
-    assert 'u_max is inf: give u_max, or units="SI"' in str(run(smc.law_from(fraction), u_max=math.inf).failure)
+    assert 'u_max is inf: give u_max, or units="SI"' in str(
+        run(smc.law_from(fraction), u_max=math.inf).failure
+    )
 
 
 @pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")
@@ -71,7 +73,9 @@ def test_an_object_that_keeps_state_is_fresh_in_each_run():
 
 
 class Twin:
-    """The law `pid` as opensmc writes controllers: of its own error r - x, with its state in the object."""
+    """The law `pid` as opensmc writes controllers: of its own error r - x, with its state in the
+    object.
+    """
 
     def __init__(self, law, dt, limit):
         self.law, self.dt, self.limit, self.memory = law, dt, limit, np.zeros(law.memory)

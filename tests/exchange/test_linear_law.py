@@ -32,7 +32,9 @@ def text(law: Any) -> str:
 
 def sampled(K: control.StateSpace) -> control.StateSpace:
     """K by Tustin's rule, of python-control; a gain has no rule."""
-    return control.sample_system(control.ss(K), H, "tustin") if control.ss(K).nstates else K
+    if control.ss(K).nstates:
+        return control.sample_system(control.ss(K), H, "tustin")
+    return K
 
 
 def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
@@ -40,8 +42,12 @@ def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
     K = control.lqr(A, B, np.eye(2), np.eye(1))[0]
     law = smc.law_from(K)
     assert law.checked
-    trace = smc.run(smc.Scenario(plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=1.0, u_max=np.inf))
-    np.testing.assert_allclose(trace.u[:, 0], -(K[0, 0] * trace.x[:, 0] + K[0, 1] * trace.v[:, 0]), rtol=1e-12)
+    trace = smc.run(
+        smc.Scenario(plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=1.0, u_max=np.inf)
+    )
+    np.testing.assert_allclose(
+        trace.u[:, 0], -(K[0, 0] * trace.x[:, 0] + K[0, 1] * trace.v[:, 0]), rtol=1e-12
+    )
     assert smc.law_from(K[0]).function == law.function
     with pytest.raises(smc.ScenarioError, match="K has 2 outputs"):
         smc.law_from(np.eye(2))
@@ -49,14 +55,26 @@ def test_an_array_of_gains_is_state_feedback_as_lqr_gives_it():
 
 @pytest.mark.parametrize(
     ("name", "discrete"),
-    [("first order", True), ("integrator", False), ("two resonances", False), ("gain and rate", False)],
+    [
+        ("first order", True),
+        ("integrator", False),
+        ("two resonances", False),
+        ("gain and rate", False),
+    ],
 )
 def test_a_loop_is_that_of_python_control(name, discrete):
     K = CONTROLLERS[name]
     one = K.ninputs == 1
     law = smc.exchange.law_from_control(sampled(K) if discrete else K)
     scenario = smc.Scenario(
-        plant=LINEAR, law=law, x0=0.3, v0=-0.4, duration=3.0, control_period=H, u_max=np.inf, disturbance=()
+        plant=LINEAR,
+        law=law,
+        x0=0.3,
+        v0=-0.4,
+        duration=3.0,
+        control_period=H,
+        u_max=np.inf,
+        disturbance=(),
     )
     trace = smc.run(scenario)
     G = control.sample_system(smc.design.state_space(LINEAR), H, "zoh")
@@ -73,7 +91,13 @@ def test_a_loop_is_that_of_python_control(name, discrete):
 
 def test_a_step_of_the_reference_is_the_closed_loop_of_forced_response():
     K = CONTROLLERS["integrator"]
-    fields = {"x0": 0.0, "duration": 4.0, "control_period": H, "u_max": np.inf, "reference": smc.Constant(0.2)}
+    fields = {
+        "x0": 0.0,
+        "duration": 4.0,
+        "control_period": H,
+        "u_max": np.inf,
+        "reference": smc.Constant(0.2),
+    }
     trace = smc.run(smc.Scenario(plant=LINEAR, law=smc.exchange.law_from_control(K), **fields))
     G = control.sample_system(smc.design.state_space(LINEAR), H, "zoh")
     loop = control.feedback(G * sampled(K))
@@ -86,7 +110,9 @@ def test_many_inputs_are_read_by_name():
     K = control.ss([], [], [], [[5.0, -30.0, -6.0, 2.0]])
     law = smc.exchange.law_from_control(K, ["r", "x", "v", "ddr"])
     assert "w3 = y.ddr" in text(law)
-    trace = smc.run(smc.Scenario(plant=LINEAR, law=law, duration=0.1, reference=smc.Constant(0.5), u_max=np.inf))
+    trace = smc.run(
+        smc.Scenario(plant=LINEAR, law=law, duration=0.1, reference=smc.Constant(0.5), u_max=np.inf)
+    )
     assert np.allclose(trace.u[:, 0], 2.5 - 30.0 * trace.x[:, 0] - 6.0 * trace.v[:, 0], rtol=1e-12)
 
 
@@ -95,10 +121,9 @@ def test_its_c_gives_the_same_bits(tmp_path):
     law: Any = smc.exchange.law_from_control(CONTROLLERS["two resonances"])
     (tmp_path / "law.c").write_text(smc.exchange.law_to_c(law))
     in_c = smc.exchange.law_from_c(tmp_path / "law.c")
-    runs = [
-        smc.Scenario(plant="duffing", law=one, duration=1.0, u_max=np.inf)
-        for one in (law, in_c(), law.template(scale=0.5))
-    ]
+    runs = []
+    for one in (law, in_c(), law.template(scale=0.5)):
+        runs.append(smc.Scenario(plant="duffing", law=one, duration=1.0, u_max=np.inf))
     first, second, half = smc.run(runs)
     assert np.array_equal(first.u, second.u)
     assert half.u[0, 0] == first.u[0, 0] / 2
@@ -108,27 +133,38 @@ def test_it_is_tuned_pickled_and_told_apart():
     law: Any = smc.exchange.law_from_control(LEAD)
     assert pickle.loads(pickle.dumps(law)) == law != smc.exchange.law_from_control(2 * LEAD)
     assert text(pickle.loads(pickle.dumps(law))) == text(law)
-    assert 0.01 <= smc.tune("duffing", law.template(scale=0.02), budget=4, searches=1).gains["scale"] <= 100.0
+    assert (
+        0.01
+        <= smc.tune("duffing", law.template(scale=0.02), budget=4, searches=1).gains["scale"]
+        <= 100.0
+    )
 
 
 def test_systems_of_scipy_and_matrices_are_taken():
-    texts = {
-        text(smc.exchange.law_from_control(K))
-        for K in (
-            tf([1.0, 2.0], [1.0, 3.0]), scipy.signal.TransferFunction([1.0, 2.0], [1.0, 3.0]),
-            (-3.0, 1.0, -1.0, 1.0), ([[-3.0]], [1.0], [-1.0], 1.0, None),
-        )
-    }  # fmt: skip
+    texts = set()
+    for K in (
+        tf([1.0, 2.0], [1.0, 3.0]),
+        scipy.signal.TransferFunction([1.0, 2.0], [1.0, 3.0]),
+        (-3.0, 1.0, -1.0, 1.0),
+        ([[-3.0]], [1.0], [-1.0], 1.0, None),
+    ):
+        texts.add(text(smc.exchange.law_from_control(K)))
     assert len(texts) == 1
 
 
 def test_what_cannot_be_a_law_is_one_sentence(refused):
     wrong = {
-        "improper": tf([1, 0], [1]), "two outputs": control.rss(2, 2, 1), "three inputs": control.rss(2, 1, 3),
-        "51 states": control.rss(51, 1, 1), "not square": ([[1.0, 2.0]], 1, 1, 0),
-        "not finite": (float("nan"), 1, 1, 0), "not real": (1j, 1, 1, 0), "negative period": (1, 1, 1, 0, -0.1),
-        "a name": "pid", "three matrices": (1, 1, 1),
-    }  # fmt: skip
+        "improper": tf([1, 0], [1]),
+        "two outputs": control.rss(2, 2, 1),
+        "three inputs": control.rss(2, 1, 3),
+        "51 states": control.rss(51, 1, 1),
+        "not square": ([[1.0, 2.0]], 1, 1, 0),
+        "not finite": (float("nan"), 1, 1, 0),
+        "not real": (1j, 1, 1, 0),
+        "negative period": (1, 1, 1, 0, -0.1),
+        "a name": "pid",
+        "three matrices": (1, 1, 1),
+    }
     for K in wrong.values():
         refused(lambda K=K: smc.exchange.law_from_control(K))
     refused(lambda: smc.exchange.law_from_control(LEAD, ["y"]))
@@ -137,7 +173,9 @@ def test_what_cannot_be_a_law_is_one_sentence(refused):
 
 def test_a_discrete_one_runs_at_its_own_period_only():
     law = smc.exchange.law_from_control(sampled(LEAD))
-    with pytest.raises(smc.ScenarioError, match=r"is discretised for 0.01 s, and control_period is 0.001 s: give"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"is discretised for 0.01 s, and control_period is 0.001 s: give"
+    ):
         smc.Scenario(plant="duffing", law=law)
     every = sampled(LEAD)
     every.dt = True
@@ -186,6 +224,11 @@ def test_a_body_that_hovers_leans_to_move_and_its_rotors_turn_it():
 
 def test_it_is_linearised_where_a_command_holds_it():
     G = smc.design.state_space("inverted_pendulum", 0.5)
-    assert G.A[1, 0] == pytest.approx(smc.design.state_space("inverted_pendulum").A[1, 0] * np.cos(0.5), rel=1e-6)
-    with pytest.raises(smc.ScenarioError, match=r"no command holds cart_pole at rest at x = 0\.5, 0\.5: give another"):
+    assert G.A[1, 0] == pytest.approx(
+        smc.design.state_space("inverted_pendulum").A[1, 0] * np.cos(0.5), rel=1e-6
+    )
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"no command holds cart_pole at rest at x = 0\.5, 0\.5: give another",
+    ):
         smc.design.state_space("cart_pole", 0.5)

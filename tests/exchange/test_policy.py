@@ -1,4 +1,5 @@
-"""Policies as laws: what they see and give, and what they are asked for; of torch and onnxruntime, stand-ins.
+"""Policies as laws: what they see and give, and what they are asked for; of torch and onnxruntime,
+stand-ins.
 
 The libraries themselves are no dependency: where they are installed, the last tests here ask them.
 """
@@ -21,7 +22,10 @@ from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange import policy
 from smc_mujoco.studies import run_key
 
-pytestmark = [pytest.mark.quick, pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")]
+pytestmark = [
+    pytest.mark.quick,
+    pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning"),
+]
 
 
 def proportional(observation):
@@ -30,7 +34,9 @@ def proportional(observation):
 
 def briefly(law, **fields):
     """A run of three samples, and the start of it in parts of u_max, at x = 0.5, v = 0."""
-    return smc.run(smc.Scenario(plant="duffing", law=law, duration=0.002, x0=0.5, u_max=6.0, **fields))
+    return smc.run(
+        smc.Scenario(plant="duffing", law=law, duration=0.002, x0=0.5, u_max=6.0, **fields)
+    )
 
 
 # callables
@@ -44,7 +50,9 @@ def test_a_policy_as_a_law_gives_the_episode_that_it_has_as_an_agent():
 
 
 def test_a_policy_of_a_joint_and_one_that_moves_with_it_sees_both():
-    environment = dm_control_suite().load("cart_pole", "track", changes={"duration": 0.1, "x0": [0.1, 0.2]})
+    environment = dm_control_suite().load(
+        "cart_pole", "track", changes={"duration": 0.1, "x0": [0.1, 0.2]}
+    )
 
     def act(observation):
         return np.array([observation @ np.arange(0.1, 0.8, 0.1)])
@@ -57,7 +65,20 @@ def test_a_policy_of_a_joint_and_one_that_moves_with_it_sees_both():
 def test_a_joint_that_nothing_couples_where_it_is_stays_in_the_observation():
     seen = []
     law = smc.policy(lambda o: seen.append(o) or [0.0])
-    alone = Measurement(t=0.0, dt=0.001, x=0.1, v=0.2, e=0.1, de=0.2, r=0.0, dr=0.0, ddr=0.0, f=0.0, g=1.0, limit=6.0)
+    alone = Measurement(
+        t=0.0,
+        dt=0.001,
+        x=0.1,
+        v=0.2,
+        e=0.1,
+        de=0.2,
+        r=0.0,
+        dr=0.0,
+        ddr=0.0,
+        f=0.0,
+        g=1.0,
+        limit=6.0,
+    )
     for y in (alone, alone._replace(q=1.5, fq=2.0, gq=1.0), alone._replace(q=1.6, fq=2.0, gq=0.0)):
         assert law.function
         law.function(y, None, np.zeros(1))
@@ -68,14 +89,23 @@ def test_the_warning_of_a_policy_names_its_cost_and_no_compiler():
     with pytest.warns(smc.errors.PlainLoopWarning) as caught:
         briefly(smc.policy(proportional))
     sentence = str(caught[0].message)
-    assert sentence.startswith("law 'proportional' is a policy, which is Python: several times slower")
+    assert sentence.startswith(
+        "law 'proportional' is a policy, which is Python: several times slower"
+    )
     assert "compile:" not in sentence
     assert "umba" not in sentence
 
 
 def test_policies_of_one_callable_are_one_law_that_can_be_sent_away():
-    assert smc.policy(proportional) == smc.policy(proportional) != smc.policy(proportional, reference=True)
-    assert pickle.loads(pickle.dumps(smc.policy(proportional).function)) == smc.policy(proportional).function
+    assert (
+        smc.policy(proportional)
+        == smc.policy(proportional)
+        != smc.policy(proportional, reference=True)
+    )
+    assert (
+        pickle.loads(pickle.dumps(smc.policy(proportional).function))
+        == smc.policy(proportional).function
+    )
 
 
 class Adaptive:
@@ -99,14 +129,22 @@ class Predicting:
         return self.adaptive(observation), None
 
 
-@pytest.mark.parametrize("given", [Adaptive(), Adaptive().__call__, Predicting()], ids=["called", "method", "predict"])
+@pytest.mark.parametrize(
+    "given", [Adaptive(), Adaptive().__call__, Predicting()], ids=["called", "method", "predict"]
+)
 def test_every_channel_of_every_run_starts_from_the_object_as_it_was_given(given):
     scenario = smc.Scenario(
-        plant="pendulum_network", law=smc.policy(given), duration=0.002, x0=[0.1, 0.2, 0.1, 0.1, 0.1], u_max=6.0
+        plant="pendulum_network",
+        law=smc.policy(given),
+        duration=0.002,
+        x0=[0.1, 0.2, 0.1, 0.1, 0.1],
+        u_max=6.0,
     )
     first, second = (smc.run(scenario) for _ in range(2))
     np.testing.assert_array_equal(first.u, second.u)
-    np.testing.assert_allclose(first.u[0], -0.6 * np.array(first.scenario.x0))  # the first call of each channel
+    np.testing.assert_allclose(
+        first.u[0], -0.6 * np.array(first.scenario.x0)
+    )  # the first call of each channel
 
 
 class Locked(Adaptive):
@@ -117,7 +155,10 @@ class Locked(Adaptive):
 
 
 def test_an_object_that_cannot_be_copied_is_shared_and_says_so():
-    with pytest.warns(UserWarning, match=r"policy 'Locked' cannot be copied \(it holds a lock\), .*: give an object"):
+    with pytest.warns(
+        UserWarning,
+        match=r"policy 'Locked' cannot be copied \(it holds a lock\), .*: give an object",
+    ):
         briefly(smc.policy(Locked()))
 
 
@@ -128,7 +169,9 @@ def test_an_action_beyond_its_bounds_saturates():
 
 
 def test_a_policy_may_look_ahead_in_environments_of_its_own():
-    gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'")
+    gymnasium = pytest.importorskip(
+        "gymnasium", reason="gymnasium is not installed: pip install 'smc-mujoco[rl]'"
+    )
 
     def act(observation):
         many = gymnasium.make_vec("smc_mujoco:Duffing-v0", num_envs=2)
@@ -147,7 +190,9 @@ def test_a_policy_may_look_ahead_in_environments_of_its_own():
 @pytest.fixture(autouse=True)
 def here(monkeypatch):
     """Files are tried in this process, where the stand-ins are."""
-    monkeypatch.setattr(policy, "tried", lambda module, order, timeout: policy.load_network(policy.File(**order)))
+    monkeypatch.setattr(
+        policy, "tried", lambda module, order, timeout: policy.load_network(policy.File(**order))
+    )
 
 
 @pytest.mark.slow
@@ -159,7 +204,10 @@ def test_a_library_that_a_file_crashes_is_one_sentence(tmp_path, monkeypatch):
     with pytest.raises(smc.ScenarioError, match=r"^policy 'net\.onnx': reading it died of SIGABRT"):
         smc.policy(tmp_path / "net.onnx")
     (tmp_path / "onnxruntime.py").write_text("raise ImportError('no library')\n")
-    with pytest.raises(smc.ScenarioError, match=r"^policy 'net\.onnx' needs onnxruntime \(no library\): pip install"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"^policy 'net\.onnx' needs onnxruntime \(no library\): pip install",
+    ):
         smc.policy(tmp_path / "net.onnx")
 
 
@@ -198,8 +246,12 @@ def onnx(monkeypatch, kind="tensor(float)", shape=("batch", 2), more=()):
     return seen
 
 
-@pytest.mark.parametrize(("kind", "dtype"), [("float", np.float32), ("double", np.float64), ("float16", np.float16)])
-def test_a_file_of_onnx_is_asked_for_a_batch_of_one_in_its_own_type(kind, dtype, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("kind", "dtype"), [("float", np.float32), ("double", np.float64), ("float16", np.float16)]
+)
+def test_a_file_of_onnx_is_asked_for_a_batch_of_one_in_its_own_type(
+    kind, dtype, tmp_path, monkeypatch
+):
     seen = onnx(monkeypatch, f"tensor({kind})")
     (tmp_path / f"{kind}.onnx").write_bytes(kind.encode())
     trace = briefly(smc.policy(tmp_path / f"{kind}.onnx"))
@@ -211,7 +263,9 @@ def test_a_file_that_changed_is_another_law_to_a_study(tmp_path, monkeypatch):
     onnx(monkeypatch)
     file = tmp_path / "net.onnx"
     file.write_bytes(b"x")
-    first, again = (run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file))) for _ in range(2))
+    first, again = (
+        run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file))) for _ in range(2)
+    )
     file.write_bytes(b"y")
     assert first == again != run_key.key(smc.Scenario(plant="duffing", law=smc.policy(file)))
 
@@ -235,10 +289,14 @@ def test_a_file_that_changed_before_its_run_is_not_taken_for_what_it_was(tmp_pat
     ],
     ids=str,
 )
-def test_a_network_that_takes_more_or_less_than_an_observation_is_refused_before_the_run(taken, tmp_path, monkeypatch):
+def test_a_network_that_takes_more_or_less_than_an_observation_is_refused_before_the_run(
+    taken, tmp_path, monkeypatch
+):
     onnx(monkeypatch, **taken)
     (tmp_path / "net.onnx").write_bytes(str(taken).encode())
-    with pytest.raises(smc.ScenarioError, match=r"'net.onnx' takes obs tensor.*export it for one input of floats"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"'net.onnx' takes obs tensor.*export it for one input of floats"
+    ):
         smc.policy(tmp_path / "net.onnx")
 
 
@@ -261,7 +319,9 @@ class Module:
 
     def __call__(self, batch):
         assert (batch.shape, batch.dtype) == ((1, 2), self.dtype)
-        return np.inf * batch if self.training else self.gain * batch[:, :1]
+        if self.training:
+            return np.inf * batch
+        return self.gain * batch[:, :1]
 
 
 class Tensor(np.ndarray):
@@ -296,7 +356,9 @@ def test_a_torch_module_is_asked_in_evaluation_and_in_its_own_type(dtype, torch)
 
 
 class Predicts:
-    """A stand-in for a model that gives its action, and what it remembers, when asked for the deterministic one."""
+    """A stand-in for a model that gives its action, and what it remembers, when asked for the
+    deterministic one.
+    """
 
     def predict(self, observation, state=None, episode_start=None, deterministic=False):
         assert observation.shape == (2,)
@@ -335,7 +397,9 @@ class Head(Module):
 
 
 def test_the_policy_of_a_model_is_taken_as_it_is_now(torch):
-    model = types.SimpleNamespace(predict=lambda *_, **__: pytest.fail("the model is trained on"), policy=Head())
+    model = types.SimpleNamespace(
+        predict=lambda *_, **__: pytest.fail("the model is trained on"), policy=Head()
+    )
     law = smc.policy(model)
     model.policy.gain = 7.0
     assert briefly(law).u[0, 0] == pytest.approx(-1.5, rel=1e-6)
@@ -360,9 +424,16 @@ class Pair(Module):
 def test_what_is_no_action_ends_the_run_with_a_sentence(torch):
     wrong = {"two": lambda o: [1.0, 2.0], "none": lambda o: [np.nan], "pair": Pair(np.float64)}
     ends = {name: briefly(smc.policy(act)).failure for name, act in wrong.items()}
-    free = smc.Scenario(plant="duffing", law=smc.policy(lambda o: o[:1]), duration=0.002, u_max=math.inf)
+    free = smc.Scenario(
+        plant="duffing", law=smc.policy(lambda o: o[:1]), duration=0.002, u_max=math.inf
+    )
     ends["no bound"] = smc.run(free).failure
-    for name, said in {"two": "2 numbers", "none": "nan", "pair": "Pair", "no bound": "u_max is inf"}.items():
+    for name, said in {
+        "two": "2 numbers",
+        "none": "nan",
+        "pair": "Pair",
+        "no bound": "u_max is inf",
+    }.items():
         assert said in str(ends[name])
         assert "t = 0 s" in str(ends[name])
 
@@ -370,7 +441,9 @@ def test_what_is_no_action_ends_the_run_with_a_sentence(torch):
 def test_a_file_that_is_no_network_is_one_sentence(tmp_path, monkeypatch):
     onnx(monkeypatch)
     (tmp_path / "bad.onnx").write_bytes(b"bad")
-    with pytest.raises(smc.ScenarioError, match=r"'bad.onnx' cannot be read \(protobuf parsing failed\): give what"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"'bad.onnx' cannot be read \(protobuf parsing failed\): give what"
+    ):
         smc.policy(tmp_path / "bad.onnx")
 
 

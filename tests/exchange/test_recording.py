@@ -1,4 +1,6 @@
-"""An .mcap file, read by its own library, has the trace's numbers, and the machine where MuJoCo puts it."""
+"""An .mcap file, read by its own library, has the trace's numbers, and the machine where MuJoCo
+puts it.
+"""
 
 import collections
 import json
@@ -65,10 +67,15 @@ def test_bodies_are_where_mujoco_puts_them(run):
         mujoco.mj_forward(model, data)
         assert [each.child_frame_id for each in message.transforms] == ["upper", "body 2"]
         for each, body in zip(message.transforms, (1, 2), strict=True):
-            assert (each.parent_frame_id, each.timestamp.ToNanoseconds()) == ("world", round(1e9 * time))
+            assert (each.parent_frame_id, each.timestamp.ToNanoseconds()) == (
+                "world",
+                round(1e9 * time),
+            )
             place, turn = each.translation, each.rotation
             np.testing.assert_allclose([place.x, place.y, place.z], data.xpos[body], atol=1e-12)
-            np.testing.assert_allclose([turn.w, turn.x, turn.y, turn.z], data.xquat[body], atol=1e-12)
+            np.testing.assert_allclose(
+                [turn.w, turn.x, turn.y, turn.z], data.xquat[body], atol=1e-12
+            )
 
 
 def test_shapes_are_those_that_mujoco_draws_and_move_with_their_bodies(run):
@@ -80,7 +87,12 @@ def test_shapes_are_those_that_mujoco_draws_and_move_with_their_bodies(run):
         ("upper", True),
         ("body 2", True),
     ]
-    assert [len(world.cubes), len(world.spheres), len(upper.cylinders), len(upper.spheres)] == [1, 0, 1, 2]
+    assert [len(world.cubes), len(world.spheres), len(upper.cylinders), len(upper.spheres)] == [
+        1,
+        0,
+        1,
+        2,
+    ]
     (ball,) = lower.spheres  # the others are hidden
     assert (ball.size.x, ball.size.z, ball.pose.position.z) == pytest.approx((0.06, 0.6, -0.2))
     ends = sorted((each.pose.position.x, each.pose.position.z) for each in upper.spheres)
@@ -88,18 +100,26 @@ def test_shapes_are_those_that_mujoco_draws_and_move_with_their_bodies(run):
     assert upper.cylinders[0].size.z == pytest.approx(2.0 * model.geom_size[2, 1])
     cylinder = upper.cylinders[0]
     assert [getattr(cylinder.color, of) for of in "rgba"] == pytest.approx([0.5, 0.5, 0.5, 1.0])
-    assert [getattr(cylinder.pose.orientation, of) for of in "wxyz"] == pytest.approx(model.geom_quat[2])
+    assert [getattr(cylinder.pose.orientation, of) for of in "wxyz"] == pytest.approx(
+        model.geom_quat[2]
+    )
     assert [getattr(cylinder.pose.position, of) for of in "xyz"] == pytest.approx(model.geom_pos[2])
     assert [getattr(cylinder.size, of) for of in "xy"] == pytest.approx([0.06, 0.06])
     assert [getattr(world.cubes[0].size, of) for of in "xyz"] == pytest.approx([0.2, 0.2, 1.0])
 
 
 def test_the_scenario_is_in_the_metadata_and_a_failed_run_ends_where_it_failed(tmp_path):
-    lost = smc.run(smc.Scenario(plant=arms.arm(), law="none", duration=0.3, disturbance=smc.Sine(1e9, 1.0)))
+    lost = smc.run(
+        smc.Scenario(plant=arms.arm(), law="none", duration=0.3, disturbance=smc.Sine(1e9, 1.0))
+    )
     assert lost.diverged_at is not None
     path = lost.export(tmp_path / "lost.mcap")
     with path.open("rb") as stream:
-        (about,) = [each for each in make_reader(stream).iter_metadata() if each.name == "trace of smc_mujoco"]
+        (about,) = [
+            each
+            for each in make_reader(stream).iter_metadata()
+            if each.name == "trace of smc_mujoco"
+        ]
     assert json.loads(about.metadata["scenario"])["law"]["name"] == "none"
     assert about.metadata["failure"] == lost.failure
     found = read(path)
@@ -126,6 +146,8 @@ def test_every_name_that_a_joint_can_have_becomes_a_field(joints, named):
     message = recording.message_of(joints)
     assert list(message.DESCRIPTOR.fields_by_name) == named
     sent = message(**dict(zip(named, [1.5, -2.0, 3.0], strict=False)))
-    assert [getattr(message.FromString(sent.SerializeToString()), name) for name in named] == [1.5, -2.0, 3.0][
-        : len(named)
-    ]
+    assert [getattr(message.FromString(sent.SerializeToString()), name) for name in named] == [
+        1.5,
+        -2.0,
+        3.0,
+    ][: len(named)]

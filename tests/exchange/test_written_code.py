@@ -1,4 +1,7 @@
-"""A law in C is written as recorded: users read and compile it. Other tests run it, in C, in FMUs and in JavaScript."""
+"""A law in C is written as recorded: users read and compile it.
+
+Other tests run it, in C, in FMUs and in JavaScript.
+"""
 
 import re
 
@@ -8,8 +11,15 @@ from smc_mujoco.exchange.c import export as c_export
 
 
 def test_a_law_in_c_is_as_recorded(snapshot, monkeypatch):
-    """Without its docstring, the header, the version, and its code's size, which depends on the compiler."""
+    """Without its docstring, the header, the version, and its code's size, which depends on the
+    compiler.
+    """
     monkeypatch.setattr(c_export, "_measured", lambda code: "not measured")
     text = smc.exchange.law_to_c("super_twisting", "float")
-    text = text.replace(smc.__version__, "VERSION").replace(build.HEADER.read_text(encoding="utf-8").strip(), "HEADER")
-    assert re.sub(r"( \*\n \* [^\n]*\n).*?(?= \* gains )", r"\1", text, count=1, flags=re.DOTALL) == snapshot
+    text = text.replace(smc.__version__, "VERSION").replace(
+        build.HEADER.read_text(encoding="utf-8").strip(), "HEADER"
+    )
+    assert (
+        re.sub(r"( \*\n \* [^\n]*\n).*?(?= \* gains )", r"\1", text, count=1, flags=re.DOTALL)
+        == snapshot
+    )

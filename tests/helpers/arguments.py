@@ -16,9 +16,13 @@ from smc_mujoco.studies.scene import Scene
 
 
 def told(value: Any) -> str:
-    """Return an argument as text: of what the package makes, its name and what differs from the default."""
+    """Return an argument as text: of what the package makes, its name and what differs from the
+    default.
+    """
     text = next((text for kind, text in TEXTS.items() if isinstance(value, kind)), None)
-    return text(value) if text else " ".join(filter(None, ["a", type(value).__name__, getattr(value, "name", "")]))
+    if text:
+        return text(value)
+    return " ".join(filter(None, ["a", type(value).__name__, getattr(value, "name", "")]))
 
 
 def told_items(values: list | tuple) -> str:
@@ -37,11 +41,17 @@ def told_scenario(scenario: Scenario) -> str:
 
 TEXTS: dict[Any, Callable[[Any], str]] = {
     Scenario: told_scenario,
-    Scene: lambda scene: f"Scene({scene.title}, camera={scene.camera}, seeds={ {s.seed for _, _, s in scene.runs()} })",
+    Scene: lambda scene: (
+        f"Scene({scene.title}, camera={scene.camera}, seeds={ {s.seed for _, _, s in scene.runs()} })"
+    ),
     Plant: lambda plant: f"plant {plant.name}",
-    Component: lambda one: f"{one.kind} {one.name if one.source.search else one}, gains of kind {one.source.kind}",
+    Component: lambda one: (
+        f"{one.kind} {one.name if one.source.search else one}, gains of kind {one.source.kind}"
+    ),
     Path: lambda path: f"Path({path.as_posix()})",
-    Mapping: lambda values: "{" + ", ".join(f"{key}: {told(one)}" for key, one in values.items()) + "}",
+    Mapping: lambda values: (
+        "{" + ", ".join(f"{key}: {told(one)}" for key, one in values.items()) + "}"
+    ),
     (list, tuple): told_items,
     (bool, int, float, str, range, NoneType, Condition, Starts, Uncertainty): repr,
 }

@@ -6,7 +6,8 @@ import smc_mujoco as smc
 from smc_mujoco.control.joint_law import catalogue
 from smc_mujoco.control.law import FREE_BODY
 
-# laws that an arm can have; those of a free body take parts of arrays, which have no translation into C
+# laws that an arm can have; those of a free body take parts of arrays, which have no translation
+# into C
 LAWS = {name: law for name, law in catalogue().items() if FREE_BODY not in law.plants}
 
 ARM = """
@@ -37,5 +38,7 @@ ARM = """
 
 @functools.cache
 def arm() -> smc.Plant:
-    """Three joints of two units, driven in another order than the model's, beside a tree without a channel."""
+    """Three joints of two units, driven in another order than the model's, beside a tree without a
+    channel.
+    """
     return smc.plant_from(ARM, channels=["reach", "turn", "lift"], name="arm", tip="tip")

@@ -12,7 +12,11 @@ LEVELS = {
 def part(theorem, margins, **data):
     """Return a theorem's data; `margins`: condition -> margin."""
     conditions = [{"name": name, "margin": margin} for name, margin in margins.items()]
-    return {"theorem": theorem, "holds": min(margins.values()) >= 0.0, "conditions": conditions} | data
+    return {
+        "theorem": theorem,
+        "holds": min(margins.values()) >= 0.0,
+        "conditions": conditions,
+    } | data
 
 
 PARTS = [
@@ -25,9 +29,20 @@ def certificate(plant="duffing", law="observer_free", gains=None, parts=PARTS, *
     """Return a certificate of a plant's equation and a law."""
     its = smc.plant(plant)
     plain = {
-        "format": "x", "u_max": 6.0, "unit": its.unit, "disturbance": 2.0, "slope": None,
-        "plant": {"name": plant, "n": its.n, "parameters": dict(its.parameters), "mechanism": "equation"},
+        "format": "x",
+        "u_max": 6.0,
+        "unit": its.unit,
+        "disturbance": 2.0,
+        "slope": None,
+        "plant": {
+            "name": plant,
+            "n": its.n,
+            "parameters": dict(its.parameters),
+            "mechanism": "equation",
+        },
         "law": {"name": law, "gains": gains or {"lam": 6.0, "k1": 3.0}},
-        "leaves_out": {"delay": {"input_delay": {"time": 0.004}}, "noise": {}}, "parts": parts, "seal": "y",
-    }  # fmt: skip
+        "leaves_out": {"delay": {"input_delay": {"time": 0.004}}, "noise": {}},
+        "parts": parts,
+        "seal": "y",
+    }
     return Certificate(data=plain | changes)

@@ -14,10 +14,14 @@ EVERY = [(plant, task) for plant in smc.plants() for task in tasks.tasks(plant)]
 
 
 def one_of_each(turn: int) -> list[tuple[str, str]]:
-    """Half of the plants, the other half with the next turn, with one task each, another one with each turn."""
+    """Half of the plants, the other half with the next turn, with one task each, another one with
+    each turn.
+    """
     tasked = {plant: tasks.tasks(plant) for plant in JOINTED}
     return [
-        (plant, known[(i + turn) % len(known)]) for i, (plant, known) in enumerate(tasked.items()) if i % 2 == turn % 2
+        (plant, known[(i + turn) % len(known)])
+        for i, (plant, known) in enumerate(tasked.items())
+        if i % 2 == turn % 2
     ]
 
 
@@ -31,7 +35,9 @@ def start(plant, task):
 
 
 def dm_control_suite() -> ModuleType:
-    """The module dm_control_env; where dm_control is missing, or does not fit this MuJoCo, what asks is skipped."""
+    """The module dm_control_env; where dm_control is missing, or does not fit this MuJoCo, what
+    asks is skipped.
+    """
     try:
         from smc_mujoco.envs import dm_control_env
 
@@ -47,7 +53,9 @@ def driven_by_dm(environment, act):
     timestep, states = environment.reset(), []
     while True:
         u = act(timestep)
-        states.append([*timestep.observation["position"], *timestep.observation["velocity"], *(u * limit)])
+        states.append(
+            [*timestep.observation["position"], *timestep.observation["velocity"], *(u * limit)]
+        )
         if timestep.last():
             return np.array(states)
         timestep = environment.step(u)
@@ -60,7 +68,9 @@ def driven_by_gym(environment, act):
     states, over = [], False
     while True:
         u = act(observation)
-        assert environment.action_space.contains(u.astype(np.float32))  # a float64 that `step` does not round
+        assert environment.action_space.contains(
+            u.astype(np.float32)
+        )  # a float64 that `step` does not round
         assert environment.observation_space.contains(observation)
         states.append([*observation[: 2 * n], *(u * limit)])
         if over:

@@ -1,7 +1,9 @@
-"""Limit cycles of sampled laws on linear plants behind linear drives, integrated exactly, without the suite's code.
+"""Limit cycles of sampled laws on linear plants behind linear drives, integrated exactly, without
+the suite's code.
 
-A plant M x'' = -alpha x - delta x' + f is behind lags, or behind a motor whose current has back-EMF, under a command
-that is sampled, delayed and held. From one sample to the next its state moves by matrix exponentials.
+A plant M x'' = -alpha x - delta x' + f is behind lags, or behind a motor whose current has
+back-EMF, under a command that is sampled, delayed and held. From one sample to the next its state
+moves by matrix exponentials.
 """
 
 import dataclasses
@@ -84,23 +86,40 @@ class ExactLoop:
         start[0] = self.x0
         samples = round(duration / self.period)
         Phi, Gamma = np.ascontiguousarray(moved[:n, :n]), np.ascontiguousarray(moved[:n, n])
-        s = _run(self.kind, np.array(self.gains), samples, self.period, self.periods_late, Phi, Gamma, start)
+        s = _run(
+            self.kind,
+            np.array(self.gains),
+            samples,
+            self.period,
+            self.periods_late,
+            Phi,
+            Gamma,
+            start,
+        )
         return self.period * np.arange(samples), s
 
     def cycle(self, duration: float = 12.0) -> tuple[float, float]:
-        """Return amplitude of s and frequency, Hz, of the limit cycle about rest; NaN, NaN where none is steady."""
+        """Return amplitude of s and frequency, Hz, of the limit cycle about rest; NaN, NaN where
+        none is steady.
+        """
         t, s = self.run(duration)
         first = int(len(t) * (1.0 - LATE))
         middle = (first + len(t)) // 2
-        parts = [measured(t[part], s[part]) for part in (slice(first, None), slice(first, middle), slice(middle, None))]
+        parts = []
+        for part in (slice(first, None), slice(first, middle), slice(middle, None)):
+            parts.append(measured(t[part], s[part]))
         whole, early, late = parts
         steady = all(abs(b / a - 1.0) < STEADY for a, b in zip(early, late, strict=True))
         centred = abs(s[first:].max() + s[first:].min()) < 2.0 * CENTRED * whole[0]
-        return whole if steady and centred else (math.nan, math.nan)
+        if steady and centred:
+            return whole
+        return (math.nan, math.nan)
 
 
 def measured(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
-    """Return half the median range of s between its upward crossings of the mean, and their frequency, Hz."""
+    """Return half the median range of s between its upward crossings of the mean, and their
+    frequency, Hz.
+    """
     z = s - s.mean()
     up = np.flatnonzero((z[:-1] < 0.0) & (z[1:] >= 0.0))
     if len(up) < 5 or not np.isfinite(s).all():
@@ -111,7 +130,9 @@ def measured(t: np.ndarray, s: np.ndarray) -> tuple[float, float]:
 
 
 def random_loop(rng: np.random.Generator) -> ExactLoop:
-    """Return a random loop: one of six laws, five periods, one or two lags, a motor or a delay, and a plant."""
+    """Return a random loop: one of six laws, five periods, one or two lags, a motor or a delay, and
+    a plant.
+    """
     kind = int(rng.integers(len(NAMES)))
     scaled = [gain * 2.0 ** rng.uniform(-1.0, 1.0) for gain in USUAL[kind]]
     if kind == 5:
@@ -120,23 +141,41 @@ def random_loop(rng: np.random.Generator) -> ExactLoop:
         scaled[1] = scaled[0] * rng.uniform(0.2, 0.8)
     period = float(rng.choice(PERIODS))
     drive = rng.choice(["lag", "two lags", "motor", "delay", "lag and delay"])
-    late = int(rng.integers(2, 31)) if "delay" in drive else 0
-    lags = tuple(float(10.0 ** rng.uniform(-3.0, -1.5)) for _ in range({"two lags": 2}.get(drive, int("lag" in drive))))
+    if "delay" in drive:
+        late = int(rng.integers(2, 31))
+    else:
+        late = 0
+    lags = tuple(
+        float(10.0 ** rng.uniform(-3.0, -1.5))
+        for _ in range({"two lags": 2}.get(drive, int("lag" in drive)))
+    )
     motor = None
     if drive == "motor":
         resistance = float(10.0 ** rng.uniform(-1.0, 1.0))
-        lag, constant = float(10.0 ** rng.uniform(-3.0, -1.5)), float(10.0 ** rng.uniform(-1.5, 0.0))
+        lag, constant = (
+            float(10.0 ** rng.uniform(-3.0, -1.5)),
+            float(10.0 ** rng.uniform(-1.5, 0.0)),
+        )
         motor = Motor(resistance, lag * resistance, constant, 0.0)
     return ExactLoop(
-        kind=kind, gains=tuple(scaled), period=period, lags=lags, periods_late=late, motor=motor,
-        M=2.0 ** rng.uniform(-1.0, 2.0), alpha=float(rng.choice([0.0, 1.0])) * rng.uniform(0.0, 20.0),
-        delta=float(rng.choice([0.0, 1.0])) * rng.uniform(0.0, 2.0), x0=float(10.0 ** rng.uniform(-3.0, -1.0)),
-    )  # fmt: skip
+        kind=kind,
+        gains=tuple(scaled),
+        period=period,
+        lags=lags,
+        periods_late=late,
+        motor=motor,
+        M=2.0 ** rng.uniform(-1.0, 2.0),
+        alpha=float(rng.choice([0.0, 1.0])) * rng.uniform(0.0, 20.0),
+        delta=float(rng.choice([0.0, 1.0])) * rng.uniform(0.0, 2.0),
+        x0=float(10.0 ** rng.uniform(-3.0, -1.0)),
+    )
 
 
 @njit(cache=True)
 def _sign(a):
-    return 1.0 if a > 0.0 else (-1.0 if a < 0.0 else 0.0)
+    if a > 0.0:
+        return 1.0
+    return -1.0 if a < 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -153,7 +192,9 @@ def _law(kind, g, m, h, x, v):
         return u, s
     if kind == 3:
         wanted = g[1] * math.sqrt(abs(x))
-        return (-g[0] * (v + wanted * _sign(x)) / (abs(v) + wanted) if abs(v) + wanted > 0.0 else 0.0), x
+        return (
+            -g[0] * (v + wanted * _sign(x)) / (abs(v) + wanted) if abs(v) + wanted > 0.0 else 0.0
+        ), x
     if kind == 4:
         if v * m[1] < 0.0 or v == 0.0:
             m[0] = x if abs(x) > abs(m[2]) or v == 0.0 else m[2]

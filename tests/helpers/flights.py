@@ -24,17 +24,28 @@ int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, s
 """
 ARRAY_SHAPES = {name: (6, 6) if name == "M" else (6,) for name in ARRAYS}
 MEASUREMENT = np.dtype(
-    [("head", "f8", (3,)), *((name, "f8", shape) for name, shape in ARRAY_SHAPES.items()), ("functions", "i8", (3,))]
+    [
+        ("head", "f8", (3,)),
+        *((name, "f8", shape) for name, shape in ARRAY_SHAPES.items()),
+        ("functions", "i8", (3,)),
+    ]
 )  # as in smc_law.h
 
 
 def scenarios(law) -> list[smc.Scenario]:
-    """Of the library's quadrotor, along a path in turbulence, and of a drone of one's own, which starts turned."""
+    """Of the library's quadrotor, along a path in turbulence, and of a drone of one's own, which
+    starts turned.
+    """
     drone = smc.plant_from("examples/quadrotor.xml", channels=["body"], keyframe="hover")
     common = {"law": law, "noise": smc.Noise(1e-3, 1e-2), "duration": 0.4}
     return [
         smc.Scenario(plant="quadrotor", disturbance=WIND, reference=smc.Sine(0.2, 3.0), **common),
-        smc.Scenario(plant=drone, x0=(0.3, 0.2, 1.0, 0.1, 0.2, 2.5), v0=(0.0, 0.0, 0.0, 3.0, 0.0, 2.0), **common),
+        smc.Scenario(
+            plant=drone,
+            x0=(0.3, 0.2, 1.0, 0.1, 0.2, 2.5),
+            v0=(0.0, 0.0, 0.0, 3.0, 0.0, 2.0),
+            **common,
+        ),
     ]
 
 

@@ -15,10 +15,18 @@ HERE = Path(__file__).parent
 
 
 class Importer:
-    """One instance of an FMU of FMI 3.0, past its initialization mode unless that is left to the test."""
+    """One instance of an FMU of FMI 3.0, past its initialization mode unless that is left to the
+    test.
+    """
 
     def __init__(
-        self, path: Path, folder: Path, events: bool = False, early: bool = False, begin: bool = True, **first
+        self,
+        path: Path,
+        folder: Path,
+        events: bool = False,
+        early: bool = False,
+        begin: bool = True,
+        **first,
     ):
         if not folder.exists():
             fmpy.extract(str(path), str(folder))
@@ -26,9 +34,13 @@ class Importer:
         self.at = {variable.name: variable.valueReference for variable in about.modelVariables}
         self.said: list[str] = []
         self.fmu: Any = instantiate_fmu(
-            str(folder), about, "CoSimulation", event_mode_used=events, early_return_allowed=early,
+            str(folder),
+            about,
+            "CoSimulation",
+            event_mode_used=events,
+            early_return_allowed=early,
             logger=lambda *words: self.said.append(words[-1].decode()),
-        )  # fmt: skip
+        )
         if begin:
             self.begin(**first)
 
@@ -58,13 +70,19 @@ def fmi2(folder: Path, about: str = (HERE / "fmi2.xml").read_text()) -> Path:
 
 
 def fmi3(folder: Path) -> Path:
-    """An FMU of FMI 3.0, from fmi3.c, which has inputs that are not real numbers, and steps every 5 ms."""
+    """An FMU of FMI 3.0, from fmi3.c, which has inputs that are not real numbers, and steps every 5
+    ms.
+    """
     header = (Path(fmpy.__file__).parent / "c-code" / "fmi3Functions.h").read_text(encoding="utf-8")
     own = (HERE / "fmi3.c").read_text(encoding="utf-8")
     missing = {*re.findall(r"\bfmi3\w+(?=TYPE\b)", header)} - {*re.findall(r"fmi3\w+", own)}
-    (folder / "missing.c").write_text("".join(f"int {name}(void) {{ return 3; }}\n" for name in sorted(missing)))
+    (folder / "missing.c").write_text(
+        "".join(f"int {name}(void) {{ return 3; }}\n" for name in sorted(missing))
+    )
     about = (HERE / "fmi3.xml").read_text()
-    return archived(folder, [HERE / "fmi3.c", folder / "missing.c"], "servo", fmpy.platform_tuple, about)
+    return archived(
+        folder, [HERE / "fmi3.c", folder / "missing.c"], "servo", fmpy.platform_tuple, about
+    )
 
 
 def archived(folder: Path, sources: list[Path], name: str, system: str, about: str) -> Path:
@@ -72,8 +90,14 @@ def archived(folder: Path, sources: list[Path], name: str, system: str, about: s
     headers, library = Path(fmpy.__file__).parent / "c-code", folder / f"{name}.so"
     if not library.exists():
         command = [
-            *build.compiler(), *build.LIBRARY_FLAGS, f"-I{headers}", *map(str, sources), "-o", str(library), "-lm",
-        ]  # fmt: skip
+            *build.compiler(),
+            *build.LIBRARY_FLAGS,
+            f"-I{headers}",
+            *map(str, sources),
+            "-o",
+            str(library),
+            "-lm",
+        ]
         subprocess.run(command, check=True)
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", about)

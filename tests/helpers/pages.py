@@ -12,12 +12,16 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 def blocks(text: str, language: str) -> list[str]:
     """The fenced blocks of one language."""
-    return re.findall(rf"^```{language}(?: title=\"[^\"]+\")?\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return re.findall(
+        rf"^```{language}(?: title=\"[^\"]+\")?\n(.*?)^```$", text, re.MULTILINE | re.DOTALL
+    )
 
 
 def titled(page: Path) -> dict[str, str]:
     """The files that a page has its reader write: name -> text."""
-    found = re.findall(r"^```\w+ title=\"([^\"]+)\"\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
+    found = re.findall(
+        r"^```\w+ title=\"([^\"]+)\"\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL
+    )
     return dict(found)
 
 

@@ -1,13 +1,15 @@
 """Integrator chains on which laws are held to their theorems, sampled without error.
 
-Plant A is s' = f + g u + d, plant B is x1' = x2, x2' = f + g u + d, plant C has one integrator more; f and g are
-constant, u is held between samples, and the integrals of d are given in closed form, so a run is exact to rounding.
+Plant A is s' = f + g u + d, plant B is x1' = x2, x2' = f + g u + d, plant C has one integrator
+more; f and g are constant, u is held between samples, and the integrals of d are given in closed
+form, so a run is exact to rounding.
 
     plant_a(smc.law("classical", k=2.0), wave).residual()
-    plant_b(smc.law("twisting"), sine(0.5, 2.0) + constant(0.1), x=(1.0, 0.0), f=-9.81, g=2.0, model=1.0)
+    plant_b(smc.law("twisting"), sine(0.5, 2.0) + constant(0.1), x=(1.0, 0.0), f=-9.81, g=2.0,
+    model=1.0)
 
-A law of degree 1 sees plant A's s as what a surface gives, with eq = 0; a law of higher degree has no use for it. On
-plant B laws see e = x1, de = x2, on plant C also a = x3. The reference is 0.
+A law of degree 1 sees plant A's s as what a surface gives, with eq = 0; a law of higher degree has
+no use for it. On plant B laws see e = x1, de = x2, on plant C also a = x3. The reference is 0.
 """
 
 import dataclasses
@@ -26,7 +28,9 @@ from smc_mujoco.simulation import cfunctions, python_controller
 
 @dataclasses.dataclass(frozen=True)
 class Force:
-    """A disturbance d(t): integral(n, t) is its n-th repeated integral, n = 0 .. 3, with any constants."""
+    """A disturbance d(t): integral(n, t) is its n-th repeated integral, n = 0 .. 3, with any
+    constants.
+    """
 
     integral: Callable[[int, Any], Any]  # t and the result are numbers or arrays
 
@@ -49,14 +53,18 @@ def sine(size: float, omega: float = 1.0) -> Force:
     return Force(lambda n, t: size * omega**-n * np.sin(omega * t - n * math.pi / 2))
 
 
-T, X, V, E, DE, A, HAS_SURFACE, S = map(Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s"))
+T, X, V, E, DE, A, HAS_SURFACE, S = map(
+    Measurement._fields.index, ("t", "x", "v", "e", "de", "a", "has_surface", "s")
+)
 
 rest = constant(0.0)
 wave = sine(1.0) + constant(0.5)  # |d| <= 1.5, |d'| <= 1
 
 
 def measured(e=0.0, de=0.0, dt=1e-3, **more):
-    """What a law sees with the reference at 0, f = 0, g = 1 and no surface, but for the fields in `more`."""
+    """What a law sees with the reference at 0, f = 0, g = 1 and no surface, but for the fields in
+    `more`.
+    """
     zero = dict.fromkeys(("t", "r", "dr", "ddr", "f"), 0.0)
     return Measurement(**(zero | {"dt": dt, "x": e, "v": de, "e": e, "de": de, "g": 1.0} | more))
 
@@ -78,8 +86,9 @@ def one(law: Law, **y):
 
 
 class Sampled(NamedTuple):
-    """A run: t (K,), the chain's states x (K, n), commanded u and the law's own s (K,) and its memory (K, m), before
-    each sample."""
+    """A run: t (K,), the chain's states x (K, n), commanded u and the law's own s (K,) and its
+    memory (K, m), before each sample.
+    """
 
     t: np.ndarray
     x: np.ndarray
@@ -101,7 +110,9 @@ class Sampled(NamedTuple):
         outside = np.flatnonzero(np.abs(self.s) > band)
         if not outside.size:
             return 0.0
-        return float(self.t[outside[-1] + 1]) if outside[-1] + 1 < self.t.size else math.inf
+        if outside[-1] + 1 < self.t.size:
+            return float(self.t[outside[-1] + 1])
+        return math.inf
 
     def variation(self) -> float:
         """Total variation of u in the last 20 % of the run."""
@@ -148,19 +159,57 @@ def chain(
         shift[n - 1, :n] = rates
     step, x = expm(h * shift)[:n].copy(), np.array(x, dtype=float)
     kicks, errors = kicked(d, n, h, count), np.zeros((count, n))
-    errors += 0.0 if noise is None else np.reshape(noise, (count, -1))
-    states, log, memories = np.empty((count, n)), np.empty((count, 2)), np.empty((count, law.memory))
+    if noise is None:
+        errors += 0.0
+    else:
+        errors += np.reshape(noise, (count, -1))
+    states, log, memories = (
+        np.empty((count, n)),
+        np.empty((count, 2)),
+        np.empty((count, law.memory)),
+    )
     arrays = [y, gains, cells, out, x, step, kicks, errors, states, log, memories]
     numbers = h, f, sign * g, limit
-    raised = _chain(function.address, *(a.ctypes.data for a in arrays), count, n, law.memory, *numbers)
+    raised = _chain(
+        function.address, *(a.ctypes.data for a in arrays), count, n, law.memory, *numbers
+    )
     assert not raised, f"{law.name} raised"
     return Sampled(np.arange(count) * h, states, *log.T.copy(), memories)
 
 
 @njit
-def _chain(law, y, gains, cells, out, x, step, kicks, errors, states, log, memories, count, n, size, h, f, g, limit):
-    """Fill states, log (u, s) and memories of a chain, all by address, sample by sample. Return 1 if the law raised."""
-    at, memory, answer, state, moved = pointer(y), pointer(cells), pointer(out), pointer(x), pointer(step)
+def _chain(
+    law,
+    y,
+    gains,
+    cells,
+    out,
+    x,
+    step,
+    kicks,
+    errors,
+    states,
+    log,
+    memories,
+    count,
+    n,
+    size,
+    h,
+    f,
+    g,
+    limit,
+):
+    """Fill states, log (u, s) and memories of a chain, all by address, sample by sample.
+
+    Return 1 if the law raised.
+    """
+    at, memory, answer, state, moved = (
+        pointer(y),
+        pointer(cells),
+        pointer(out),
+        pointer(x),
+        pointer(step),
+    )
     kick, noise, kept = pointer(kicks), pointer(errors), pointer(states)
     logged, remembered = pointer(log), pointer(memories)
     for k in range(count):
@@ -189,12 +238,17 @@ def _chain(law, y, gains, cells, out, x, step, kicks, errors, states, log, memor
 
 
 def kicked(d, n, h, count):
-    """What d adds to each state over each period, (K, n): Taylor's remainder of its repeated integrals."""
+    """What d adds to each state over each period, (K, n):
+
+    Taylor's remainder of its repeated integrals.
+    """
     whole = [d.integral(m, np.arange(count + 1) * h) for m in range(1, n + 1)]  # integral m + 1
     kicks = np.empty((count, n))
     for i in range(n):
         m = n - i
-        kicks[:, i] = whole[m - 1][1:] - sum(h**j / math.factorial(j) * whole[m - j - 1][:-1] for j in range(m))
+        kicks[:, i] = whole[m - 1][1:] - sum(
+            h**j / math.factorial(j) * whole[m - j - 1][:-1] for j in range(m)
+        )
     return kicks
 
 
@@ -215,5 +269,7 @@ def plant_c(law, d=rest, x=(1.0, 0.0, 0.0), h=1e-3, duration=10.0, **options):
 
 def orders(law, d=wave, steps=(1e-2, 1e-3, 1e-4), plant=plant_a, duration=10.0, **options):
     """Order of the residual in the control period between each two steps, and the residuals."""
-    residuals = np.array([plant(law, d, h=h, duration=duration, **options).residual() for h in steps])
+    residuals = np.array(
+        [plant(law, d, h=h, duration=duration, **options).residual() for h in steps]
+    )
     return np.diff(np.log(residuals)) / np.diff(np.log(steps)), residuals

@@ -1,7 +1,8 @@
 """The reference loop: mj_step, controlled by the `Controller` in Python.
 
-It runs what does not compile. The tests compare the compiled callback with it: the same Scenario must give the same
-Trace. It is written to be read, with numpy's Philox and none of the callback's code. A step takes tens of microseconds.
+It runs what does not compile. The tests compare the compiled callback with it: the same Scenario
+must give the same Trace. It is written to be read, with numpy's Philox and none of the callback's
+code. A step takes tens of microseconds.
 """
 
 import contextlib
@@ -40,7 +41,9 @@ PLANT_DIVERGED = f"{trace.PLANT_DIVERGED} (|x| or |v| above {MAX_STATE:g}, or Na
 
 
 def interrupted(name: str) -> str:
-    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the control callback."""
+    """Return why a run failed during which other code set one of MuJoCo's callbacks; "" is the
+    control callback.
+    """
     name = name or "control"
     so = ", so that its law was not called" * (name == "control")
     return (
@@ -50,11 +53,17 @@ def interrupted(name: str) -> str:
 
 
 def run(scenario: Scenario, mechanism: models.Mechanism | None = None) -> Trace:
-    """Return the trace of a scenario, run in the reference loop. `mechanism`: the scenario's, if it is made already."""
+    """Return the trace of a scenario, run in the reference loop.
+
+    `mechanism`: the scenario's, if it is made already.
+    """
     mechanism = mechanism or models.mechanism(scenario)
     with installed():
         loop = Loop(scenario, mechanism)
-    with installed(loop.control), np.errstate(all="ignore"):  # the loop itself checks for NaN and inf
+    with (
+        installed(loop.control),
+        np.errstate(all="ignore"),
+    ):  # the loop itself checks for NaN and inf
         for step in range(loop.total + 1):
             loop.step(step)
             if loop.failure:
@@ -70,7 +79,9 @@ class Motor:
         self.queue = [0.0] * (2 * part.queued)
 
     def step(self, u: float | None, step: int, h: float) -> None:
-        """Turn the field through a physics step of h s; u is a command that arrives at its start, or None."""
+        """Turn the field through a physics step of h s; u is a command that arrives at its start,
+        or None.
+        """
         start, end = step * h, (step + 1) * h
         if u is not None:
             stepper.command(self.state, self.numbers, u, start)
@@ -78,8 +89,12 @@ class Motor:
         stepper.field(self.state, self.numbers, self.queue, start, end)
 
     def torque(self, x: float, sign: int) -> float:
-        """Return the torque on a joint at x; sign is -1 and 1 in the first and last stage of RK4, else 0."""
-        return stepper.torque(self.state, self.numbers, x, self.state.middle + sign * self.state.rise)
+        """Return the torque on a joint at x; sign is -1 and 1 in the first and last stage of RK4,
+        else 0.
+        """
+        return stepper.torque(
+            self.state, self.numbers, x, self.state.middle + sign * self.state.rise
+        )
 
 
 class Loop:
@@ -91,54 +106,89 @@ class Loop:
         self.model = models.with_values(self.base, scenario)
         self.data = mujoco.MjData(self.model)
         self.channels = {name: table[name].copy() for name in table.dtype.names or ()}
-        self.driven, self.hinged = self.channels["ctrl"] >= 0, self.channels["hinge_body"] >= 0  # (n,) bool
-        self.has_friction, self.has_drive = self.channels["friction_force"] >= 0, self.channels["force"] >= 0
+        self.driven, self.hinged = (
+            self.channels["ctrl"] >= 0,
+            self.channels["hinge_body"] >= 0,
+        )  # (n,) bool
+        self.has_friction, self.has_drive = (
+            self.channels["friction_force"] >= 0,
+            self.channels["force"] >= 0,
+        )
         models.put_initial_state(self.model, self.data, scenario)
         self.total = scenario.samples * scenario.steps  # physics steps
         self.loops = self.with_pauses()
         self.calls = 0
         self.controller = Controller(scenario)
-        self.signal_memory = [[np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance]
+        self.signal_memory = [
+            [np.zeros(max(d.memory, 1)) for _ in range(n)] for d in scenario.disturbance
+        ]
         self.streams = [scenario.noise_stream(j) for j in range(len(scenario.disturbance))]
         self.commands: list[np.ndarray] = []
         self.d = np.zeros(n)  # disturbances at the last stage
-        self.forces = np.zeros((2, n))  # sums over a control period: of the drives, of friction and contacts
+        self.forces = np.zeros(
+            (2, n)
+        )  # sums over a control period: of the drives, of friction and contacts
         self.drive_step = scenario.drive_step
         if self.drive_step:  # both states of the drives
             self.first, self.second = self.drive_step.start(self.data.qvel[self.channels["shaft"]])
-        self.middle, self.rise = np.zeros((2, n))  # the mean force in a step of RK4, and its rise to the last stage
+        self.middle, self.rise = np.zeros(
+            (2, n)
+        )  # the mean force in a step of RK4, and its rise to the last stage
         inertia, formula = self.model.dof_M0[self.channels["qvel"]], self.scenario.formula_friction
-        self.bristles = [] if formula is None else [formula.bristle(i, inertia[i]) for i in range(n)]
-        self.numbers = [] if formula is None else [friction_numbers(formula, i) for i in range(n)]
-        self.stuck_at, self.speed = [math.nan] * n, [0.0] * n  # positions of joints that stick, or NaN; last speeds
-        self.rubbing, self.held = np.zeros((n, 4)), np.zeros(n)  # of Coulomb friction, see `apply_exact_friction`
-        self.motors = (
-            []
-            if scenario.stepper is None
-            else [Motor(scenario.stepper, values) for values in motors_at_start(self.scenario)]
-        )
+        if formula is None:
+            self.bristles = []
+        else:
+            self.bristles = [formula.bristle(i, inertia[i]) for i in range(n)]
+        if formula is None:
+            self.numbers = []
+        else:
+            self.numbers = [friction_numbers(formula, i) for i in range(n)]
+        self.stuck_at, self.speed = (
+            [math.nan] * n,
+            [0.0] * n,
+        )  # positions of joints that stick, or NaN; last speeds
+        self.rubbing, self.held = (
+            np.zeros((n, 4)),
+            np.zeros(n),
+        )  # of Coulomb friction, see `apply_exact_friction`
+        if scenario.stepper is None:
+            self.motors = []
+        else:
+            self.motors = [
+                Motor(scenario.stepper, values) for values in motors_at_start(self.scenario)
+            ]
         self.delayed = np.zeros(n)  # the commands whose delay has passed
         self.log = np.full((scenario.samples + 1, n), np.nan, LOG)
         self.failure: str | None = None
         self.failed_step = 0  # physics step
 
     def step(self, step: int) -> None:
-        """Do physics step 0, 1, ..., with `control` installed. The step after the last one only completes the log."""
+        """Do physics step 0, 1, ..., with `control` installed.
+
+        The step after the last one only completes the log.
+        """
         if step == self.scenario.jump_step:
             models.put_values(self.model, self.base, self.scenario, step)
             mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
-        with contextlib.suppress(mujoco.UnexpectedError):  # MuJoCo's, where our Python callback is taken away
+        with contextlib.suppress(
+            mujoco.UnexpectedError
+        ):  # MuJoCo's, where our Python callback is taken away
             if step < self.total:
                 mujoco.mj_step(self.model, self.data)
             else:
                 mujoco.mj_forward(self.model, self.data)
         expected_calls = min(step + 1, self.total) * self.scenario.stages + (step == self.total)
-        other = mjcb.replaced() if step % CALLBACK_STEPS == 0 or step == self.total else ""
+        if step % CALLBACK_STEPS == 0 or step == self.total:
+            other = mjcb.replaced()
+        else:
+            other = ""
         if (other or self.calls != expected_calls) and self.failure is None:
             self.failure, self.failed_step = interrupted(other), step
 
     def control(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Control callback: run the law at the first stage of a sample, and apply the disturbances at every stage."""
+        """Control callback: run the law at the first stage of a sample, and apply the disturbances
+        at every stage.
+        """
         if self.failure or data._address != self.data._address:
             return  # a law or another thread may step another model
         step, stage = divmod(self.calls, self.scenario.stages)
@@ -157,14 +207,24 @@ class Loop:
             if stage == 0 and within == 0:
                 x, v = data.qpos[self.channels["qpos"]], data.qvel[self.channels["qvel"]]
                 held = self.drive_step or self.motors
-                delayed = self.delayed if held else data.ctrl[self.channels["ctrl"]] / self.controller.scale
+                if held:
+                    delayed = self.delayed
+                else:
+                    delayed = data.ctrl[self.channels["ctrl"]] / self.controller.scale
                 applied, limits = np.zeros(len(x)), self.controller.limits
                 # the quotient may round to just beyond the limit
                 applied[self.driven] = np.clip(delayed[self.driven], -limits, limits)
                 sample = (
-                    x, v, self.commands[-1], applied, self.controller.s, d, self.controller.r,
-                    *self.forces / self.scenario.steps, self.held,
-                )  # fmt: skip
+                    x,
+                    v,
+                    self.commands[-1],
+                    applied,
+                    self.controller.s,
+                    d,
+                    self.controller.r,
+                    *self.forces / self.scenario.steps,
+                    self.held,
+                )
                 for name, values in zip(LOG.names or (), sample, strict=True):
                     self.log[name][k] = values
                 self.forces[:] = self.held[:] = 0.0
@@ -175,7 +235,9 @@ class Loop:
             self.failure, self.failed_step = " ".join(str(failure).split()), step
 
     def begin_step(self, data: mujoco.MjData, step: int) -> None:
-        """Begin a physics step: run the law if it is a sample, and apply the command whose delay has passed."""
+        """Begin a physics step: run the law if it is a sample, and apply the command whose delay
+        has passed.
+        """
         self.sum_forces(data)
         if not ((np.abs(data.qpos) < MAX_STATE).all() and (np.abs(data.qvel) < MAX_STATE).all()):
             raise Failure(PLANT_DIVERGED)
@@ -187,14 +249,19 @@ class Loop:
             at = self.channels
             if self.scenario.model == "true":
                 self.controller.told = self.d + self.forces[1] / self.scenario.steps
-            self.commands[k], s = self.controller(k, t, *(data.sensordata[at[one]] for one in ("x_sensor", "v_sensor")))
+            self.commands[k], s = self.controller(
+                k, t, *(data.sensordata[at[one]] for one in ("x_sensor", "v_sensor"))
+            )
             for name, values in (("u", self.commands[k]), ("s", s), ("r", self.controller.r)):
                 self.log[name][k] = values
         past = step - self.scenario.delay_steps
         if past >= 0 and past % self.scenario.steps >= self.late(past // self.scenario.steps):
             self.delayed = self.commands[past // self.scenario.steps]
         if self.motors:
-            sampled = past // self.scenario.steps if past >= 0 else 0
+            if past >= 0:
+                sampled = past // self.scenario.steps
+            else:
+                sampled = 0
             arrives = past >= 0 and past % self.scenario.steps == self.late(sampled)
             for motor, u in zip(self.motors, self.delayed, strict=False):
                 motor.step(float(u) if arrives else None, step, self.scenario.physics_step)
@@ -214,23 +281,35 @@ class Loop:
         """Give every stepper motor its torque at a stage."""
         rk4 = self.scenario.stages > 1
         for i, motor in enumerate(self.motors):
-            force = motor.torque(float(data.qpos[self.channels["shaft_qpos"][i]]), (-1, 0, 0, 1)[stage] if rk4 else 0)
+            force = motor.torque(
+                float(data.qpos[self.channels["shaft_qpos"][i]]), (-1, 0, 0, 1)[stage] if rk4 else 0
+            )
             data.ctrl[self.channels["ctrl"][i]] = force
             self.forces[0, i] += force / ((6.0, 3.0, 3.0, 6.0)[stage] if rk4 else 1.0)
 
     def give_moment(self, data: mujoco.MjData, stage: int) -> None:
-        """Give the later stages of an RK4 step the force that has its mean and first moment, see `DriveStep`."""
-        force = self.middle + self.rise if stage == 3 else self.middle
+        """Give the later stages of an RK4 step the force that has its mean and first moment, see
+        `DriveStep`.
+        """
+        if stage == 3:
+            force = self.middle + self.rise
+        else:
+            force = self.middle
         data.ctrl[self.channels["ctrl"][self.driven]] = force[self.driven]
         if stage == 3:  # what the actuators did in the stage before, with the mean force
-            self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
+            self.forces[0] += np.where(
+                self.has_drive, data.actuator_force[self.channels["force"]], 0.0
+            )
 
     def late(self, k: int) -> int:
         """Return by how many physics steps sample k is late; -1 if it does not run."""
         clock, seed = self.scenario.clock, self.scenario.seed
         if k in (0, self.scenario.samples):
             return 0
-        if clock.missed and philox.random_words(seed, 0, philox.MISSED, k)[0] * 2.0**-53 < clock.missed:
+        if (
+            clock.missed
+            and philox.random_words(seed, 0, philox.MISSED, k)[0] * 2.0**-53 < clock.missed
+        ):
             return -1
         if self.loops is not None:
             return self.loops.get(k, -1)
@@ -239,7 +318,9 @@ class Loop:
         return int(philox.random_words(seed, 0, philox.JITTER, k)[0] * 2.0**-53 * (steps + 1))
 
     def with_pauses(self) -> dict[int, int] | None:
-        """Return the samples of a loop with pauses, and by how many physics steps each is late; None without pauses."""
+        """Return the samples of a loop with pauses, and by how many physics steps each is late;
+        None without pauses.
+        """
         s, late, step = self.scenario, {}, 0
         length, samples = s.clock.pauses(s.control_period, s.physics_step)
         if not length:
@@ -254,27 +335,40 @@ class Loop:
         return late
 
     def apply_disturbances(self, data: mujoco.MjData, t: float) -> np.ndarray:
-        """Apply the disturbances at time t, s, to the bodies. Return their generalised forces, (n,)."""
+        """Apply the disturbances at time t, s, to the bodies.
+
+        Return their generalised forces, (n,).
+        """
         xfrc, at = data.xfrc_applied.ravel(), self.channels
         xfrc[at["xfrc"]] = xfrc[at["horizontal"]] = 0.0
         self.apply_pushes(data, t)
         joints = np.zeros(len(self.driven))  # forces on the joints themselves, in a user's model
-        for signal, memory, stream in zip(self.scenario.disturbance, self.signal_memory, self.streams, strict=True):
+        for signal, memory, stream in zip(
+            self.scenario.disturbance, self.signal_memory, self.streams, strict=True
+        ):
             if isinstance(signal, Push):
                 continue
             if signal.random:
                 seed = self.scenario.seed
-                d = [evaluate(signal, t, state, seed, i, stream)[0] for i, state in enumerate(memory)]
+                d = []
+                for i, state in enumerate(memory):
+                    d.append(evaluate(signal, t, state, seed, i, stream)[0])
             elif signal.sees:
                 d = self.feedback_force(signal, data, t, memory[0])
             else:
                 d = evaluate(signal, t)[0]  # the same in all channels
             matched = at["sign"] * d * self.driven  # only on joints with an actuator
             joints += matched
-            xfrc[at["horizontal" if signal.cartesian else "xfrc"]] += d if signal.cartesian else matched
+            if signal.cartesian:
+                xfrc[at["horizontal" if signal.cartesian else "xfrc"]] += d
+            else:
+                xfrc[at["horizontal" if signal.cartesian else "xfrc"]] += matched
         if self.scenario.plant.direct:
             xfrc[at["xfrc"]], data.qfrc_applied[at["qfrc"]] = 0.0, joints
-        d = joints if self.scenario.plant.direct else at["sign"] * xfrc[at["xfrc"]]
+        if self.scenario.plant.direct:
+            d = joints
+        else:
+            d = at["sign"] * xfrc[at["xfrc"]]
         if self.hinged.any():
             anchor, axis = data.xanchor[at["anchor"] // 3], data.xaxis[at["anchor"] // 3]
             arm = data.xipos[at["hinge_body"] // 3] - anchor
@@ -285,12 +379,19 @@ class Loop:
             raise Failure(DISTURBANCE_NOT_FINITE)
         return d
 
-    def feedback_force(self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray) -> float:
-        """Return the force of a disturbance that sees the loop: a new one at each sample, constant until the next."""
+    def feedback_force(
+        self, signal: Signal, data: mujoco.MjData, t: float, memory: np.ndarray
+    ) -> float:
+        """Return the force of a disturbance that sees the loop: a new one at each sample, constant
+        until the next.
+        """
         k, rest = divmod(self.calls - 1, self.scenario.stages * self.scenario.steps)
         if rest == 0:
             r, s = float(self.controller.r[0]), float(self.controller.s[0])
-            dr = (r - self.log["r"][k - 1, 0]) / self.scenario.control_period if k else 0.0
+            if k:
+                dr = (r - self.log["r"][k - 1, 0]) / self.scenario.control_period
+            else:
+                dr = 0.0
             x, v = data.qpos[self.channels["qpos"][0]], data.qvel[self.channels["qvel"][0]]
             evaluate(signal, t, memory, float(x - r), float(v - dr), s)
         return memory[0]
@@ -304,11 +405,16 @@ class Loop:
             data.xfrc_applied[body, :3] += evaluate(push, t)[0] * np.array([push.x, push.y, push.z])
 
     def apply_friction(self, data: mujoco.MjData, d: np.ndarray, formula: Sliding) -> None:
-        """Give the joints their friction by a formula for a physics step; d are the disturbances, (n,)."""
+        """Give the joints their friction by a formula for a physics step; d are the disturbances,
+        (n,).
+        """
         at = self.channels
         for i, dof in enumerate(at["qvel"]):
             x, v = float(data.qpos[at["qpos"][i]]), float(data.qvel[dof])
-            motor = float(data.actuator_force[at["force"][i]]) if self.has_drive[i] else 0.0
+            if self.has_drive[i]:
+                motor = float(data.actuator_force[at["force"][i]])
+            else:
+                motor = 0.0
             load = float(data.qfrc_spring[dof] - data.qfrc_bias[dof])
             load += float(data.qfrc_constraint[dof] + d[i])
             friction, low, high = sliding_friction(formula, self.numbers[i], v, motor, load)
@@ -326,15 +432,27 @@ class Loop:
             self.speed[i], data.ctrl[at["friction_ctrl"][i]] = v, -friction
 
     def apply_exact_friction(self, data: mujoco.MjData, d: np.ndarray, stage: int) -> None:
-        """Give the joints the moments of their Coulomb friction at a stage of RK4; d are the disturbances, (n,)."""
+        """Give the joints the moments of their Coulomb friction at a stage of RK4; d are the
+        disturbances, (n,).
+        """
         at, h = self.channels, self.scenario.physics_step
         for i, dof in enumerate(at["qvel"]):
-            drive = float(data.ctrl[at["ctrl"][i]]) if self.driven[i] else 0.0
+            if self.driven[i]:
+                drive = float(data.ctrl[at["ctrl"][i]])
+            else:
+                drive = 0.0
             level = float(self.model.dof_frictionloss[dof])
             others = float(data.qfrc_passive[dof] - data.qfrc_bias[dof] + d[i])
             if stage == 0:
-                middle = self.middle[i] if self.drive_step and self.drive_step.rise_first else drive
-                smooth, v, mobility = others + middle, float(data.qvel[dof]), float(data.qLDiagInv[dof])
+                if self.drive_step and self.drive_step.rise_first:
+                    middle = self.middle[i]
+                else:
+                    middle = drive
+                smooth, v, mobility = (
+                    others + middle,
+                    float(data.qvel[dof]),
+                    float(data.qLDiagInv[dof]),
+                )
                 mean, rise, held = coulomb_step(v, smooth, level, mobility, h)
                 sliding = 1.0 - held / h
                 self.rubbing[i] = mean, rise, smooth, 1.0 - sliding * sliding if held > 0.0 else 0.0
@@ -346,12 +464,18 @@ class Loop:
             self.forces[1, i] += force / (6.0, 3.0, 3.0, 6.0)[stage]
 
     def sum_forces(self, data: mujoco.MjData) -> None:
-        """Add the forces of the last physics step on the joints: of the drives, and of friction and contacts."""
+        """Add the forces of the last physics step on the joints: of the drives, and of friction and
+        contacts.
+        """
         if not (self.motors or (self.drive_step and self.drive_step.rise_first)):
-            self.forces[0] += np.where(self.has_drive, data.actuator_force[self.channels["force"]], 0.0)
+            self.forces[0] += np.where(
+                self.has_drive, data.actuator_force[self.channels["force"]], 0.0
+            )
         self.forces[1] += data.qfrc_constraint[self.channels["qvel"]]
         if self.has_friction.any():
-            self.forces[1, self.has_friction] += data.actuator_force[self.channels["friction_force"][self.has_friction]]
+            self.forces[1, self.has_friction] += data.actuator_force[
+                self.channels["friction_force"][self.has_friction]
+            ]
 
 
 def friction_numbers(formula: Sliding, i: int) -> tuple:
@@ -359,8 +483,12 @@ def friction_numbers(formula: Sliding, i: int) -> tuple:
     return jit.named(formula.names)(*(formula.parameters(i) or [0.0]))
 
 
-def sliding_friction(formula: Sliding, numbers: tuple, v: float, motor: float, load: float) -> list[float]:
-    """Return the sliding friction by a formula with the `friction_numbers` of a channel, and its bounds at rest."""
+def sliding_friction(
+    formula: Sliding, numbers: tuple, v: float, motor: float, load: float
+) -> list[float]:
+    """Return the sliding friction by a formula with the `friction_numbers` of a channel, and its
+    bounds at rest.
+    """
     name = f"friction {type(formula).__name__}"
     try:
         out = type(formula).value(v, motor, load, numbers)

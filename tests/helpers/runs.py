@@ -8,7 +8,9 @@ import numpy as np
 import smc_mujoco as smc
 from helpers import reference
 
-JOINTED = [name for name in smc.plants() if not smc.plant(name).pose]  # the plants that are no free body
+JOINTED = [
+    name for name in smc.plants() if not smc.plant(name).pose
+]  # the plants that are no free body
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 
 
@@ -31,24 +33,32 @@ def plainly(*args, **kwargs):
 
 def same(a, b) -> bool:
     """Whether two traces are equal to the last bit."""
-    return all(np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ARRAYS)
+    return all(
+        np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True) for name in ARRAYS
+    )
 
 
 def assert_same(a, b):
     """Fail unless two traces hold the same bits and ended the same way."""
     assert (a.failure, a.diverged_at) == (b.failure, b.diverged_at)
     for name in ARRAYS:
-        np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}")
+        np.testing.assert_array_equal(
+            getattr(a, name), getattr(b, name), err_msg=f"{name} of {a!r}"
+        )
 
 
 def assert_loops_agree(scenarios, rounding=0.0):
-    """Fail unless runs of the callback are those of the reference loop, to the bit or to a rounding, and go well."""
+    """Fail unless runs of the callback are those of the reference loop, to the bit or to a
+    rounding, and go well.
+    """
     for one, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert trace.failure is None
         other = reference.run(one)
         for name in ARRAYS:
             a, b = getattr(trace, name), getattr(other, name)
-            np.testing.assert_allclose(a, b, rtol=rounding, atol=rounding, err_msg=f"{name} of {trace!r}")
+            np.testing.assert_allclose(
+                a, b, rtol=rounding, atol=rounding, err_msg=f"{name} of {trace!r}"
+            )
 
 
 @smc.law_function(gains={"k": 1.0, "when": 0.02})

@@ -23,13 +23,18 @@ def numbers(values: Iterable) -> str:
 
 
 def made(scenario: smc.Scenario) -> smc.Trace:
-    """Return a trace of a scenario that was not run: decaying waves, other ones for each array and channel."""
+    """Return a trace of a scenario that was not run: decaying waves, other ones for each array and
+    channel.
+    """
     t = np.arange(scenario.samples + 1) * scenario.control_period
     n = scenario.plant.n
-    waves = {
-        name: 0.7**k * np.exp(-2.0 * t)[:, None] * np.cos((4.0 + k) * t[:, None] + 0.3 + 0.7 * np.arange(n))
-        for k, name in enumerate(ARRAYS[1:])
-    }
+    waves = {}
+    for k, name in enumerate(ARRAYS[1:]):
+        waves[name] = (
+            0.7**k
+            * np.exp(-2.0 * t)[:, None]
+            * np.cos((4.0 + k) * t[:, None] + 0.3 + 0.7 * np.arange(n))
+        )
     return smc.Trace(t=t, **waves, scenario=scenario)
 
 
@@ -58,7 +63,10 @@ def _noted(name: str) -> Callable:
         if first:
             named = [f"{key}={_plain(value)}" for key, value in options.items()]
             many = name == "polygon" or (name == "line" and len(given[0]) > 4)
-            shape = [_outline(given[0]), *given[1:]] if many else given
+            if many:
+                shape = [_outline(given[0]), *given[1:]]
+            else:
+                shape = given
             Pen.notes.append(" ".join([name, *map(_plain, shape), *named]))
         try:
             return draw(self, *given, **options)
@@ -69,9 +77,13 @@ def _noted(name: str) -> Callable:
 
 
 def _outline(points: Sequence) -> np.ndarray:
-    """Return the number of the points of an outline, the first, the middle one, their means and spreads."""
+    """Return the number of the points of an outline, the first, the middle one, their means and
+    spreads.
+    """
     line = np.array(points, float)
-    return np.array([len(line), *line[0], *line[len(line) // 2], *line.mean(axis=0), *line.std(axis=0)])
+    return np.array(
+        [len(line), *line[0], *line[len(line) // 2], *line.mean(axis=0), *line.std(axis=0)]
+    )
 
 
 def _plain(part: object) -> str:

@@ -13,7 +13,8 @@ SPACE = re.compile(r"[ \t─━-]{2,}")  # widths of columns depend on numbers
 
 
 def recorded(file: str, names: Iterable[str]) -> list[str]:
-    """Return those names that a test file's snapshots have as cases or at the start of a line; all while recording.
+    """Return those names that a test file's snapshots have as cases or at the start of a line; all
+    while recording.
 
     So what is new needs no recording at once.
     """
@@ -21,10 +22,16 @@ def recorded(file: str, names: Iterable[str]) -> list[str]:
     if "--snapshot-update" in sys.argv or not record.exists():
         return list(names)
     text = record.read_text(encoding="utf-8")
-    return [name for name in names if re.search(rf"(^  |\[|^ +'){re.escape(name)}(\(|\]$|':)", text, re.MULTILINE)]
+    return [
+        name
+        for name in names
+        if re.search(rf"(^  |\[|^ +'){re.escape(name)}(\(|\]$|':)", text, re.MULTILINE)
+    ]
 
 
 def words(text: str) -> str:
-    """Return a text with # for its numbers, and one space for a run of spaces or of lines that rule a table."""
+    """Return a text with # for its numbers, and one space for a run of spaces or of lines that rule
+    a table.
+    """
     lines = (SPACE.sub(" ", NUMBER.sub("#", line)).strip() for line in text.splitlines())
     return "\n".join(line for line in lines if line)

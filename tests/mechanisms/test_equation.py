@@ -1,7 +1,8 @@
-"""Each ideal plant is its differential equation, held against scipy's DOPRI5 on the equations of the study.
+"""Each ideal plant is its differential equation, held against scipy's DOPRI5 on the equations of
+the study.
 
-Nothing of the plants' own `nominal` is used: the right-hand sides, the laws and the sample-and-hold with its delay are
-written again here.
+Nothing of the plants' own `nominal` is used: the right-hand sides, the laws and the sample-and-hold
+with its delay are written again here.
 """
 
 import dataclasses
@@ -62,9 +63,11 @@ def sine(signal, t):
 
 
 def oracle(scenarios, factor=1.0):
-    """x and v (K+1, m, n) of closed loops: smooth laws on the oracle's own state, held, delayed and integrated.
+    """x and v (K+1, m, n) of closed loops: smooth laws on the oracle's own state, held, delayed and
+    integrated.
 
-    The m scenarios differ in their laws alone, so that one integration is enough. `factor` multiplies the true mass.
+    The m scenarios differ in their laws alone, so that one integration is enough. `factor`
+    multiplies the true mass.
     """
     s = scenarios[0].resolved
     assert all(dataclasses.replace(other, law=s.law) == scenarios[0] for other in scenarios)
@@ -72,16 +75,24 @@ def oracle(scenarios, factor=1.0):
     delay, jump = round(s.input_delay / h), math.inf if s.jump is None else round(s.jump.time / h)
     y, commands, states = np.array([[s.x0, s.v0]] * len(scenarios)).swapaxes(0, 1), [], []
     before = s.plant.values({**s.mismatch, "mass": factor * s.mismatch.get("mass", 1.0)})
-    after = s.plant.values(s.factors(jump)) if s.jump else before
+    if s.jump:
+        after = s.plant.values(s.factors(jump))
+    else:
+        after = before
     for step in range(s.samples * s.steps + 1):
         if step % s.steps == 0:
             r = sine(s.reference, step * h)
             dr = s.reference.amplitude * s.reference.omega * math.cos(s.reference.omega * step * h)
-            u = [SMOOTH[o.law.name](o.law.gains, x - r, v - dr) for o, x, v in zip(scenarios, *y, strict=True)]
+            u = []
+            for o, x, v in zip(scenarios, *y, strict=True):
+                u.append(SMOOTH[o.law.name](o.law.gains, x - r, v - dr))
             commands.append(np.clip(u, -s.u_max, s.u_max))
             states.append(y)
         p = after if step >= jump else before
-        u = commands[(step - delay) // s.steps] if step >= delay else 0.0
+        if step >= delay:
+            u = commands[(step - delay) // s.steps]
+        else:
+            u = 0.0
         slopes = np.empty_like(y)
 
         def slope(t, y, p=p, u=u, slopes=slopes):
@@ -119,7 +130,9 @@ def everything(plant, law):
 
 
 def test_every_plant_of_the_study_has_its_equation_here():
-    assert set(smc.paper.GAINS) == set(EQUATION)  # the others: test_underactuated.py and test_rig_plants.py
+    assert set(smc.paper.GAINS) == set(
+        EQUATION
+    )  # the others: test_underactuated.py and test_rig_plants.py
 
 
 @pytest.mark.slow
@@ -138,7 +151,11 @@ def test_seconds_of_the_closed_loop_follow_the_equation(plant, law):
 @PLANTS
 def test_a_delay_that_is_no_multiple_of_the_control_period_is_exact(plant):
     scenario = dataclasses.replace(
-        everything(plant, "observer_free"), control_period=5e-3, physics_step=1e-3, duration=0.5, jump=None
+        everything(plant, "observer_free"),
+        control_period=5e-3,
+        physics_step=1e-3,
+        duration=0.5,
+        jump=None,
     )
     x, v = error(smc.run(scenario), *oracle([scenario]))
     assert x < 1e-10
@@ -167,14 +184,19 @@ def coarse(plant):
 @pytest.mark.parametrize(
     ("plant", "integrator", "order"),
     [
-        *((plant, "RK4", 4) for plant in sorted(EQUATION)), ("duffing", "Euler", 1),
-        ("inverted_pendulum", "implicitfast", 1), ("inverted_pendulum_network", "implicit", 1),
-        ("pendulum_network", "Euler", 1), ("van_der_pol", "implicitfast", 1),
+        *((plant, "RK4", 4) for plant in sorted(EQUATION)),
+        ("duffing", "Euler", 1),
+        ("inverted_pendulum", "implicitfast", 1),
+        ("inverted_pendulum_network", "implicit", 1),
+        ("pendulum_network", "Euler", 1),
+        ("van_der_pol", "implicitfast", 1),
     ],
-)  # fmt: skip
+)
 def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, order):
     (scenario, states), steps = coarse(plant), (8e-3, 4e-3, 2e-3)
-    traces = smc.run([dataclasses.replace(scenario, physics_step=h, integrator=integrator) for h in steps])
+    traces = smc.run(
+        [dataclasses.replace(scenario, physics_step=h, integrator=integrator) for h in steps]
+    )
     errors = [error(trace, states)[0] for trace in traces]
     slopes = np.diff(np.log(errors)) / np.diff(np.log(steps))
     assert np.all(np.abs(slopes - order) < (0.3 if order == 4 else 0.1)), slopes
@@ -183,18 +205,24 @@ def test_the_error_falls_with_the_order_of_the_integrator(plant, integrator, ord
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]  # laws
 HALF = 0.25  # s
 CONDITIONS = {
-    "nominal": {}, "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
+    "nominal": {},
+    "noise": {"noise": smc.Noise(position=0.01, velocity=0.05)},
     "sines": {"disturbance": (SINE, smc.Sine(amplitude=1.0, omega=30.0))},
     "step": {"disturbance": smc.Step(0.2, time=HALF)},
     "pulse": {"disturbance": smc.signals.Pulse(2.0, time=HALF, width=0.1)},
     "process_noise": {"disturbance": smc.signals.OrnsteinUhlenbeck(sigma=0.2, tau=0.1)},
-    "delay": {"input_delay": 0.02}, "light": {"mismatch": {"mass": 0.7}},
-    "differenced": {"velocity": "filtered_difference"}, "jump": {},
-}  # fmt: skip
+    "delay": {"input_delay": 0.02},
+    "light": {"mismatch": {"mass": 0.7}},
+    "differenced": {"velocity": "filtered_difference"},
+    "jump": {},
+}
 
 
 def disturbance(trace, since):
-    """d at each t_k + since, (K, n). What is neither a sine nor process noise is constant within a step here."""
+    """d at each t_k + since, (K, n).
+
+    What is neither a sine nor process noise is constant within a step here.
+    """
     step = trace.scenario.resolved.physics_step
     rise = np.diff(trace.d, axis=0) * since / step  # knots at the steps, linear between them
     d = np.zeros_like(rise)
@@ -210,14 +238,26 @@ def disturbance(trace, since):
 
 @pytest.mark.parametrize(
     ("plant", "condition"),
-    [(p, c) for i, p in enumerate(sorted(EQUATION)) for j, c in enumerate(CONDITIONS) if (i + j) % 5 in (0, 2)],
+    [
+        (p, c)
+        for i, p in enumerate(sorted(EQUATION))
+        for j, c in enumerate(CONDITIONS)
+        if (i + j) % 5 in (0, 2)
+    ],
 )
 def test_every_step_of_every_law_obeys_the_equation(plant, condition):
     """From each logged state, one step with the logged control ends in the next logged state."""
     fields = CONDITIONS[condition]
     if condition == "jump":
-        fields = {"jump": smc.Jump(time=HALF, factors=smc.plant(plant).jumps["mild"]), "disturbance": SINE}
-    scenarios = [dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields) for law in STUDIED]
+        fields = {
+            "jump": smc.Jump(time=HALF, factors=smc.plant(plant).jumps["mild"]),
+            "disturbance": SINE,
+        }
+    scenarios = []
+    for law in STUDIED:
+        scenarios.append(
+            dataclasses.replace(smc.paper.scenario(plant, law), duration=2 * HALF, **fields)
+        )
     for trace in smc.run(scenarios):
         s = trace.scenario
         states = np.stack([trace.x, trace.v])
@@ -230,12 +270,20 @@ def test_every_step_of_every_law_obeys_the_equation(plant, condition):
                 return np.stack([y[1], EQUATION[plant](p, y[0], y[1], force)])
 
             end = integrated(slope, states[:, part], 0.0, s.resolved.physics_step)
-            np.testing.assert_allclose(end, states[:, first + 1 : last + 1], rtol=0, atol=1e-10, err_msg=str(s.law))
+            np.testing.assert_allclose(
+                end, states[:, first + 1 : last + 1], rtol=0, atol=1e-10, err_msg=str(s.law)
+            )
 
 
 def test_a_cart_that_becomes_heavier_on_its_way_accelerates_less():
     cart = smc.plant("servo_axis", M=2.0, b=0.0, cf=0.0, offset=0.0)
-    parts = {"disturbance": smc.Constant(1.0), "jump": smc.Jump(0.1, {"mass": 4.0}), "duration": 0.3}
+    parts = {
+        "disturbance": smc.Constant(1.0),
+        "jump": smc.Jump(0.1, {"mass": 4.0}),
+        "duration": 0.3,
+    }
     trace = smc.run(smc.Scenario(plant=cart, law="none", x0=0.0, **parts))
     after = np.maximum(trace.t - 0.1, 0.0)
-    np.testing.assert_allclose(trace.v[:, 0], np.minimum(trace.t, 0.1) / 2.0 + after / 8.0, atol=1e-12)
+    np.testing.assert_allclose(
+        trace.v[:, 0], np.minimum(trace.t, 0.1) / 2.0 + after / 8.0, atol=1e-12
+    )

@@ -1,4 +1,6 @@
-"""Mechanisms built by other means agree with their equations where they must, and depart as far as they say."""
+"""Mechanisms built by other means agree with their equations where they must, and depart as far as
+they say.
+"""
 
 import mujoco
 import numpy as np
@@ -124,7 +126,12 @@ def test_in_a_row_the_equation_is_the_same(name):
         np.testing.assert_allclose(pull(row, mujoco.MjData(row), x, v), expected, rtol=1e-9)
 
 
-DEVIATIONS = {"duffing": 0.189, "van_der_pol": 0.231, "pendulum_network": 0.164, "inverted_pendulum_network": 0.312}
+DEVIATIONS = {
+    "duffing": 0.189,
+    "van_der_pol": 0.231,
+    "pendulum_network": 0.164,
+    "inverted_pendulum_network": 0.312,
+}
 
 
 def test_every_other_mechanism_has_its_deviation_here():
@@ -136,7 +143,9 @@ def test_a_mechanism_departs_from_its_equation_as_far_as_it_says(name, other):
     assert deviation(catalogue()[name], other) == pytest.approx(DEVIATIONS[name], abs=0.001)
 
 
-@pytest.mark.parametrize("name", sorted(set(DEVIATIONS) - {"duffing"}))  # whose hill is in the middle
+@pytest.mark.parametrize(
+    "name", sorted(set(DEVIATIONS) - {"duffing"})
+)  # whose hill is in the middle
 def test_a_smaller_reach_has_a_smaller_deviation(name):
     assert deviation(catalogue()[name], "springs", 0.1) < 0.5 * DEVIATIONS[name]
 
@@ -147,7 +156,10 @@ def test_everything_is_named_and_the_channels_stay_where_they_were(name, other):
     model, _ = built(p, other)
     assert unnamed(model) == []
     assert model.nv == p.n
-    driven = [model.actuator(i).name for i in range(model.nu) if not model.actuator(i).name.startswith("passive:")]
+    driven = []
+    for i in range(model.nu):
+        if not model.actuator(i).name.startswith("passive:"):
+            driven.append(model.actuator(i).name)
     assert driven == [model.actuator(i).name for i in range(p.n)]
     assert np.count_nonzero(model.body_mass) == p.n
 
@@ -160,17 +172,27 @@ def test_springs_that_cannot_be_are_refused():
 
 
 def test_an_unknown_mechanism_is_refused():
-    with pytest.raises(ScenarioError, match="unknown mechanism of duffing 'spring': did you mean 'springs'"):
+    with pytest.raises(
+        ScenarioError, match="unknown mechanism of duffing 'spring': did you mean 'springs'"
+    ):
         deviation(plant("duffing"), "spring")
 
 
 def test_a_coil_winds_as_often_as_it_says_at_its_radius_about_its_line():
     spec, fixed = mujoco.MjSpec(), ("world", (0.0, 0.0, 0.0))
     coil.draw(
-        spec, "coil", (*fixed, (0.1, 0.0, 0.3)), (*fixed, (0.5, 0.0, 0.3)),
-        radius=0.02, turns=3, wire=1e-3, material="",
-    )  # fmt: skip
-    x, y, z = np.reshape(spec.skins[0].vert, (-1, coil.SIDES, 3)).mean(axis=1).T  # of the middle of the wire
+        spec,
+        "coil",
+        (*fixed, (0.1, 0.0, 0.3)),
+        (*fixed, (0.5, 0.0, 0.3)),
+        radius=0.02,
+        turns=3,
+        wire=1e-3,
+        material="",
+    )
+    x, y, z = (
+        np.reshape(spec.skins[0].vert, (-1, coil.SIDES, 3)).mean(axis=1).T
+    )  # of the middle of the wire
     angle = np.unwrap(np.arctan2(y, z - 0.3))
     assert abs(angle[-1] - angle[0]) == pytest.approx(3 * 2 * np.pi)
     np.testing.assert_allclose(np.hypot(y, z - 0.3), 0.02, rtol=1e-5)

@@ -1,8 +1,9 @@
-"""Every plant says of itself what is recorded, and its machine looks so, with each contact and other mechanism.
+"""Every plant says of itself what is recorded, and its machine looks so, with each contact and
+other mechanism.
 
-Tests of the equation do not see what is only drawn, nor names, scales of jumps, limits and places in a film. Of a
-contact or another mechanism the record has what it changes. What is added to the catalogue is tested once it is
-recorded.
+Tests of the equation do not see what is only drawn, nor names, scales of jumps, limits and places
+in a film. Of a contact or another mechanism the record has what it changes. What is added to the
+catalogue is tested once it is recorded.
 """
 
 import dataclasses
@@ -16,15 +17,27 @@ from smc_mujoco.common.mjcb import compiled
 from smc_mujoco.common.rebuild import rebuild
 from smc_mujoco.mechanisms.plant import catalogue, plant, write
 
-PLANTS = {name: one if one.n == one.sizes[0] else plant(name, n=12) for name, one in catalogue().items()}
+PLANTS = {
+    name: one if one.n == one.sizes[0] else plant(name, n=12) for name, one in catalogue().items()
+}
 NOT_READ = {"reach", "friction", "n", "contacts", "mechanisms"}
 PHYSICS = {  # what blows and springs are made of
-    "body": ("pos", "quat", "mass", "inertia"), "geom": ("pos", "quat", "size", "type", "contype"),
-    "pair": ("friction", "solref", "solimp", "dim"), "tendon": ("stiffness", "damping", "lengthspring"),
-    "jnt": ("stiffness", "range"), "dof": ("damping", "armature", "frictionloss"), "site": ("pos",), "key": ("qpos",),
+    "body": ("pos", "quat", "mass", "inertia"),
+    "geom": ("pos", "quat", "size", "type", "contype"),
+    "pair": ("friction", "solref", "solimp", "dim"),
+    "tendon": ("stiffness", "damping", "lengthspring"),
+    "jnt": ("stiffness", "range"),
+    "dof": ("damping", "armature", "frictionloss"),
+    "site": ("pos",),
+    "key": ("qpos",),
     "actuator": ("biasprm", "ctrlrange"),
-}  # fmt: skip
-SEEN = {"geom": ("rgba", "matid", "group"), "skin": ("vert", "matid"), "site": ("group",), "cam": ("pos", "quat")}
+}
+SEEN = {
+    "geom": ("rgba", "matid", "group"),
+    "skin": ("vert", "matid"),
+    "site": ("group",),
+    "cam": ("pos", "quat"),
+}
 
 
 def moved(value):
@@ -34,8 +47,13 @@ def moved(value):
 def said(one):
     """What the rest of the package reads of a plant, except its functions."""
     fields = {field.name: getattr(one, field.name) for field in dataclasses.fields(one)}
-    plain = {name: value for name, value in fields.items() if not callable(value) and name not in NOT_READ}
-    return ", ".join(f"{name} {value}" for name, value in plain.items() if value not in ((), {}, "", False))
+    plain = {}
+    for name, value in fields.items():
+        if not callable(value) and name not in NOT_READ:
+            plain[name] = value
+    return ", ".join(
+        f"{name} {value}" for name, value in plain.items() if value not in ((), {}, "", False)
+    )
 
 
 def parameters(one):
@@ -45,7 +63,10 @@ def parameters(one):
 
 def equation(one):
     """A weighted sum of f and g of all channels in one state."""
-    nominal, (x, v) = rebuild(one.nominal, lambda plain: plain), np.random.default_rng(3).uniform(-1.0, 1.0, (2, one.n))
+    nominal, (x, v) = (
+        rebuild(one.nominal, lambda plain: plain),
+        np.random.default_rng(3).uniform(-1.0, 1.0, (2, one.n)),
+    )
     return f"f and g {weighed([nominal(x, v, i, parameters(one)) for i in range(one.n)])}"
 
 
@@ -57,24 +78,46 @@ def machine(one, how):
     if how in one.mechanisms:
         one.mechanisms[how].edit(spec)
         fields = one.mechanisms[how].fields
-    kinds = spec.bodies, spec.geoms, spec.joints, spec.sites, spec.tendons, spec.skins, spec.actuators, spec.sensors
-    names = [each.name for kind in kinds for each in kind if each.name]
+    kinds = (
+        spec.bodies,
+        spec.geoms,
+        spec.joints,
+        spec.sites,
+        spec.tendons,
+        spec.skins,
+        spec.actuators,
+        spec.sensors,
+    )
+    names = []
+    for kind in kinds:
+        for each in kind:
+            if each.name:
+                names.append(each.name)
     model = compiled(spec)
     write(model, fields(model, values))
     return names, model
 
 
 def sizes(model):
-    """What moves a machine, and what is only seen of it, in a number each: to see that one has changed, not which."""
+    """What moves a machine, and what is only seen of it, in a number each: to see that one has
+    changed, not which.
+    """
     parts = [[[*model.opt.gravity]], [[*model.stat.center, model.stat.extent]]]
     for found, arrays in zip(parts, (PHYSICS, SEEN), strict=True):
-        found += [getattr(model, f"{kind}_{array}") for kind, names in arrays.items() for array in names]
-    return [weighed(np.concatenate([np.ravel(np.asarray(array, float)) for array in found])) for found in parts]
+        found += [
+            getattr(model, f"{kind}_{array}") for kind, names in arrays.items() for array in names
+        ]
+    return [
+        weighed(np.concatenate([np.ravel(np.asarray(array, float)) for array in found]))
+        for found in parts
+    ]
 
 
 def weighed(array):
     values = np.asarray(array, float).ravel()
-    return f"{values @ np.random.default_rng(values.size).uniform(0.5, 1.5, values.size) + 0.0:.10g}"
+    return (
+        f"{values @ np.random.default_rng(values.size).uniform(0.5, 1.5, values.size) + 0.0:.10g}"
+    )
 
 
 @pytest.mark.parametrize("name", recorded(__file__, PLANTS))

@@ -1,4 +1,6 @@
-"""Each model is its equation and nothing else: held against `nominal` at random states, for every plant."""
+"""Each model is its equation and nothing else: held against `nominal` at random states, for every
+plant.
+"""
 
 import importlib
 from types import SimpleNamespace
@@ -31,23 +33,36 @@ def sized(name, n, **parameters):
 
 def changed(name, n, rng):
     """The plant with every parameter moved by up to 40%."""
-    wet = {key: value for key, value in sized(name, n).parameters.items() if key not in catalogue()[name].dry}
-    return sized(name, n, **{key: (value or 0.1) * rng.uniform(0.6, 1.4) for key, value in wet.items()})
+    wet = {}
+    for key, value in sized(name, n).parameters.items():
+        if key not in catalogue()[name].dry:
+            wet[key] = value
+    return sized(
+        name, n, **{key: (value or 0.1) * rng.uniform(0.6, 1.4) for key, value in wet.items()}
+    )
 
 
 def expected(p, x, v, u):
     """x'' by the plant's nominal equation, (n,), and the size of its largest term."""
     parameters = SimpleNamespace(**p.parameters)
-    others = (u,) if isinstance(p.nominal, NominalModel) else ()
+    if isinstance(p.nominal, NominalModel):
+        others = (u,)
+    else:
+        others = ()
     terms = [p.nominal(x, v, i, parameters, *others) for i in range(p.n)]
-    forces = [u[i if i < p.driven else i - p.driven] for i in range(p.n)]  # that of the joint it moves with
+    # that of the joint it moves with
+    forces = []
+    for i in range(p.n):
+        forces.append(u[i if i < p.driven else i - p.driven])
     acc = np.array([f + g * force for (f, g), force in zip(terms, forces, strict=True)])
     size = max(max(abs(f), abs(g * force)) for (f, g), force in zip(terms, forces, strict=True))
     return acc, size
 
 
 def within(p, x):
-    """x from -2 .. 2, scaled to the ranges of the joints that have limits: the equation knows of none."""
+    """x from -2 .. 2, scaled to the ranges of the joints that have limits: the equation knows of
+    none.
+    """
     if not p.ranges:
         return x
     low, high = np.array([each[1:] for each in p.ranges]).T
@@ -66,7 +81,11 @@ def worst_error(p, model, rng, trials=20):
     data = mujoco.MjData(model)
     worst = 0.0
     for _ in range(trials):
-        x, v, u = within(p, rng.uniform(-2, 2, p.n)), rng.uniform(-3, 3, p.n), rng.uniform(-6, 6, p.n)
+        x, v, u = (
+            within(p, rng.uniform(-2, 2, p.n)),
+            rng.uniform(-3, 3, p.n),
+            rng.uniform(-6, 6, p.n),
+        )
         acc, size = expected(p, x, v, u)
         worst = max(worst, np.abs(acceleration(model, data, x, v, u) - acc).max() / size)
     return worst
@@ -98,7 +117,11 @@ def test_every_parameter_is_felt_by_the_model(name, n):
     size = {"n": n} if n > 1 else {}
     p = catalogue()[name]
     values = {key: value or 0.01 * min((1.0, *p.limits)) for key, value in p.parameters.items()}
-    x, v, u = within(p, rng.uniform(1.1, 2, n)), rng.uniform(1, 3, n), rng.uniform(1, 6, n) * min((1.0, *p.limits))
+    x, v, u = (
+        within(p, rng.uniform(1.1, 2, n)),
+        rng.uniform(1, 3, n),
+        rng.uniform(1, 6, n) * min((1.0, *p.limits)),
+    )
     before = plant(name, **size, **values).load()
     for key, value in values.items():
         after = plant(name, **size, **values | {key: 1.25 * value}).load()
@@ -111,7 +134,10 @@ def test_default_fields_change_nothing_of_the_compiled_file(name):
     p = catalogue()[name]
     model = p.spec().compile()
     for field, index, value, _ in p.fields(model, p.values({})):
-        owner = model.opt if field.startswith("opt.") else model
+        if field.startswith("opt."):
+            owner = model.opt
+        else:
+            owner = model
         compiled = getattr(owner, field.removeprefix("opt."))
         assert np.all(compiled[index] == np.asarray(value)), field
 
@@ -146,7 +172,12 @@ def test_everything_the_contract_names_is_there(name, n):
     model = p.load()
     for kind in ("body", "machine"), ("camera", "look"), ("material", "accent"), ("geom", "floor"):
         assert getattr(model, kind[0])(kind[1]).id >= 0
-    counts = {"geom": model.ngeom, "body": model.nbody, "site": model.nsite, "tendon": model.ntendon}
+    counts = {
+        "geom": model.ngeom,
+        "body": model.nbody,
+        "site": model.nsite,
+        "tendon": model.ntendon,
+    }
     for kind, count in counts.items():
         assert all(getattr(model, kind)(i).name for i in range(count)), kind
     np.testing.assert_array_equal(model.key("home").qpos[joint_ids(model)], p.x0)
@@ -165,7 +196,10 @@ def test_machines_attach_side_by_side_with_their_own_accent(name):
     model = scene.compile()
     data = mujoco.MjData(model)
     assert model.nq == 3 * p.load().nq
-    data.qpos[:] = model.qpos0 if p.pose else np.tile(p.x0, 3)
+    if p.pose:
+        data.qpos[:] = model.qpos0
+    else:
+        data.qpos[:] = np.tile(p.x0, 3)
     mujoco.mj_forward(model, data)
     used = {model.mat(i).name for i in model.geom_matid if i >= 0}
     assert {"a/accent", "b/accent", "c/accent"} <= used
@@ -228,5 +262,7 @@ def test_springs_are_drawn_for_fifty_pendulums_and_no_more():
 
 @pytest.mark.parametrize("name", ["cart_pole", "pendulum_network", "overhead_crane"])
 def test_a_true_parameter_beyond_what_a_plant_takes_is_refused(name):
-    with pytest.raises(smc.ScenarioError, match=rf"{name}'s true l becomes \S+: give other factors"):
+    with pytest.raises(
+        smc.ScenarioError, match=rf"{name}'s true l becomes \S+: give other factors"
+    ):
         smc.run(smc.Scenario(plant=name, law="none", duration=0.01, mismatch={"l": 1e277}))

@@ -1,6 +1,8 @@
-"""The Panda: its model against Newton and Euler's equations on the maker's frames, its payload, limits and contacts.
+"""The Panda: its model against Newton and Euler's equations on the maker's frames, its payload,
+limits and contacts.
 
-The equations and the published numbers are written again here; nothing of the plant's own file is used for them.
+The equations and the published numbers are written again here; nothing of the plant's own file is
+used for them.
 """
 
 import dataclasses
@@ -15,20 +17,54 @@ import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.contact import Contact
 
 GRAV, STATES = 9.81, 1000
-# a, m, and alpha, rad, of the link before; d, m: Franka Emika, modified Denavit-Hartenberg parameters
+# a, m, and alpha, rad, of the link before; d, m: Franka Emika, modified Denavit-Hartenberg
+# parameters
 FRAMES = (
-    (0, 0, 0.333), (0, -math.pi / 2, 0), (0, math.pi / 2, 0.316), (0.0825, math.pi / 2, 0),
-    (-0.0825, -math.pi / 2, 0.384), (0, math.pi / 2, 0), (0.088, math.pi / 2, 0),
-)  # fmt: skip
+    (0, 0, 0.333),
+    (0, -math.pi / 2, 0),
+    (0, math.pi / 2, 0.316),
+    (0.0825, math.pi / 2, 0),
+    (-0.0825, -math.pi / 2, 0.384),
+    (0, math.pi / 2, 0),
+    (0.088, math.pi / 2, 0),
+)
 # kg, m, kg m^2 about the centre (xx yy zz xy xz yz): Gaz et al. 2019
 LINKS = (
-    (4.970684, (0.003875, 0.002081, -0.04762), (0.70337, 0.70661, 0.0091170, -0.00013900, 0.0067720, 0.019169)),
-    (0.646926, (-0.003141, -0.02872, 0.003495), (0.0079620, 2.8110e-2, 2.5995e-2, -3.925e-3, 1.0254e-2, 7.04e-4)),
-    (3.228604, (2.7518e-2, 3.9252e-2, -6.6502e-2), (3.7242e-2, 3.6155e-2, 1.083e-2, -4.761e-3, -1.1396e-2, -1.2805e-2)),
-    (3.587895, (-5.317e-2, 1.04419e-1, 2.7454e-2), (2.5853e-2, 1.9552e-2, 2.8323e-2, 7.796e-3, -1.332e-3, 8.641e-3)),
-    (1.225946, (-1.1953e-2, 4.1065e-2, -3.8437e-2), (3.5549e-2, 2.9474e-2, 8.627e-3, -2.117e-3, -4.037e-3, 2.29e-4)),
-    (1.666555, (6.0149e-2, -1.4117e-2, -1.0517e-2), (1.964e-3, 4.354e-3, 5.433e-3, 1.09e-4, -1.158e-3, 3.41e-4)),
-    (0.735522, (1.0517e-2, -4.252e-3, 6.1597e-2), (1.2516e-2, 1.0027e-2, 4.815e-3, -4.28e-4, -1.196e-3, -7.41e-4)),
+    (
+        4.970684,
+        (0.003875, 0.002081, -0.04762),
+        (0.70337, 0.70661, 0.0091170, -0.00013900, 0.0067720, 0.019169),
+    ),
+    (
+        0.646926,
+        (-0.003141, -0.02872, 0.003495),
+        (0.0079620, 2.8110e-2, 2.5995e-2, -3.925e-3, 1.0254e-2, 7.04e-4),
+    ),
+    (
+        3.228604,
+        (2.7518e-2, 3.9252e-2, -6.6502e-2),
+        (3.7242e-2, 3.6155e-2, 1.083e-2, -4.761e-3, -1.1396e-2, -1.2805e-2),
+    ),
+    (
+        3.587895,
+        (-5.317e-2, 1.04419e-1, 2.7454e-2),
+        (2.5853e-2, 1.9552e-2, 2.8323e-2, 7.796e-3, -1.332e-3, 8.641e-3),
+    ),
+    (
+        1.225946,
+        (-1.1953e-2, 4.1065e-2, -3.8437e-2),
+        (3.5549e-2, 2.9474e-2, 8.627e-3, -2.117e-3, -4.037e-3, 2.29e-4),
+    ),
+    (
+        1.666555,
+        (6.0149e-2, -1.4117e-2, -1.0517e-2),
+        (1.964e-3, 4.354e-3, 5.433e-3, 1.09e-4, -1.158e-3, 3.41e-4),
+    ),
+    (
+        0.735522,
+        (1.0517e-2, -4.252e-3, 6.1597e-2),
+        (1.2516e-2, 1.0027e-2, 4.815e-3, -4.28e-4, -1.196e-3, -7.41e-4),
+    ),
 )
 DELTA = (  # the second set, Tables VIII and IX of their supplement, in the same order
     (2.0643e-5, (5.2e-8, 5.2e-8, -0.1750), (0.6, 0.6, 2e-6, 0, 0, 0)),
@@ -52,13 +88,20 @@ def rotation(alpha, theta):
 
 def cross(a, b):
     """Their vector product: np.cross takes ten times as long."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
 
 
 def torques(q, v, a, payload=0.0, lp=0.04, links=LINKS):
-    """The torques of the joints by Newton and Euler's recursion, (7,); J. J. Craig, Introduction to Robotics, 6.5."""
+    """The torques of the joints by Newton and Euler's recursion, (7,); J.
+
+    J. Craig, Introduction to Robotics, 6.5.
+    """
     z, steel = np.array([0.0, 0.0, 1.0]), 7850.0
-    bodies = [[(m, np.array(c), np.array([[A, D, E], [D, B, F], [E, F, C]]))] for m, c, (A, B, C, D, E, F) in links]
+    bodies = []
+    for m, c, (A, B, C, D, E, F) in links:
+        bodies.append([(m, np.array(c), np.array([[A, D, E], [D, B, F], [E, F, C]]))])
     radius = (3 * payload / (4 * math.pi * steel)) ** (1 / 3)
     bodies[6].append((payload, np.array([0, 0, 0.107 + lp]), 0.4 * payload * radius**2 * np.eye(3)))
     turns = [rotation(alpha, angle) for (_, alpha, _), angle in zip(FRAMES, q, strict=True)]
@@ -91,7 +134,11 @@ def test_a_thousand_states_obey_newton_and_euler(payload):
     model = plant.load()
     data, worst = mujoco.MjData(model), 0.0
     for _ in range(STATES if payload else 100):
-        q, v, u = rng.uniform(LOW, HIGH), rng.uniform(-2.5, 2.5, 7), rng.uniform(-1, 1, 7) * plant.limits
+        q, v, u = (
+            rng.uniform(LOW, HIGH),
+            rng.uniform(-2.5, 2.5, 7),
+            rng.uniform(-1, 1, 7) * plant.limits,
+        )
         data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
         mujoco.mj_forward(model, data)
         expected = torques(q, v, data.qacc, payload)
@@ -114,7 +161,11 @@ def test_the_second_set_obeys_newton_and_euler():
     model = plant.load()
     data = mujoco.MjData(model)
     for _ in range(100):
-        q, v, u = rng.uniform(LOW, HIGH), rng.uniform(-2.5, 2.5, 7), rng.uniform(-1, 1, 7) * plant.limits
+        q, v, u = (
+            rng.uniform(LOW, HIGH),
+            rng.uniform(-2.5, 2.5, 7),
+            rng.uniform(-1, 1, 7) * plant.limits,
+        )
         data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
         mujoco.mj_forward(model, data)
         expected = torques(q, v, data.qacc, links=DELTA)
@@ -124,8 +175,16 @@ def test_the_second_set_obeys_newton_and_euler():
 @pytest.mark.parametrize(
     ("delta", "inertia", "gravity"),
     [
-        (0.0, (1.173, 2.408, 1.136, 0.785, 0.0271, 0.0326, 0.0049), (0, -25.22, 0, 18.53, 0.74, 1.65, 0)),
-        (1.0, (1.056, 2.109, 1.013, 0.650, 0.0044, 0.0135, 0.0002), (0, -26.11, 0, 18.47, 0.74, 1.60, 0)),
+        (
+            0.0,
+            (1.173, 2.408, 1.136, 0.785, 0.0271, 0.0326, 0.0049),
+            (0, -25.22, 0, 18.53, 0.74, 1.65, 0),
+        ),
+        (
+            1.0,
+            (1.056, 2.109, 1.013, 0.650, 0.0044, 0.0135, 0.0002),
+            (0, -26.11, 0, 18.47, 0.74, 1.60, 0),
+        ),
     ],
 )
 def test_inertia_and_gravity_at_home_of_both_sets(delta, inertia, gravity):
@@ -139,7 +198,9 @@ def test_inertia_and_gravity_at_home_of_both_sets(delta, inertia, gravity):
 
 
 def identified(delta):
-    """Coefficients of Table III of Gaz et al. from the compiled links: 3 of inertia and 9 of gravity, kg m^2, kg m."""
+    """Coefficients of Table III of Gaz et al. from the compiled links: 3 of inertia and 9 of
+    gravity, kg m^2, kg m.
+    """
     model = smc.plant("panda", delta=delta).load()
     ids = [model.body(f"link{i}").id for i in range(1, 8)]
     m = dict(enumerate(model.body_mass[ids], 1))
@@ -153,19 +214,54 @@ def identified(delta):
         J[i] = J[i] + m[i] * (c[i] @ c[i] * np.eye(3) - np.outer(c[i], c[i]))
     s3, s4, s5 = (sum(m[i] for i in range(first, 8)) for first in (3, 4, 5))
     return [
-        J[2][1, 1] + J[1][2, 2], J[3][1, 1] + J[2][2, 2] + 0.099856 * m[3] + 0.632 * c[3][2] * m[3] + 0.10666225 * s4,
-        J[5][1, 1] + J[4][2, 2] + 0.15426225 * s5 + 0.768 * c[5][2] * m[5], c[2][0] * m[2],
-        c[2][1] * m[2] - 0.316 * s3 - c[3][2] * m[3], 0.0825 * s4 + c[3][0] * m[3], c[4][0] * m[4] - 0.0825 * s5,
-        0.384 * s5 + c[4][1] * m[4] + c[5][2] * m[5], 0.088 * m[7] + c[6][0] * m[6], c[6][1] * m[6] - c[7][2] * m[7],
-        c[7][0] * m[7], c[5][1] * m[5] - c[6][2] * m[6],
-    ]  # fmt: skip
+        J[2][1, 1] + J[1][2, 2],
+        J[3][1, 1] + J[2][2, 2] + 0.099856 * m[3] + 0.632 * c[3][2] * m[3] + 0.10666225 * s4,
+        J[5][1, 1] + J[4][2, 2] + 0.15426225 * s5 + 0.768 * c[5][2] * m[5],
+        c[2][0] * m[2],
+        c[2][1] * m[2] - 0.316 * s3 - c[3][2] * m[3],
+        0.0825 * s4 + c[3][0] * m[3],
+        c[4][0] * m[4] - 0.0825 * s5,
+        0.384 * s5 + c[4][1] * m[4] + c[5][2] * m[5],
+        0.088 * m[7] + c[6][0] * m[6],
+        c[6][1] * m[6] - c[7][2] * m[7],
+        c[7][0] * m[7],
+        c[5][1] * m[5] - c[6][2] * m[6],
+    ]
 
 
 def test_both_sets_give_the_coefficients_of_the_published_table():
-    """The table prints those of the first set, but for the last: it prints 0.0824, and the set's c6z gives 0.0679."""
-    printed = [0.0373, 1.036, 0.6325, -0.002, -3.104, 0.6842, -0.4901, 1.721, 0.165, -0.0688, 0.0077, 0.0679]
+    """The table prints those of the first set, but for the last: it prints 0.0824, and the set's
+    c6z gives 0.0679.
+    """
+    printed = [
+        0.0373,
+        1.036,
+        0.6325,
+        -0.002,
+        -3.104,
+        0.6842,
+        -0.4901,
+        1.721,
+        0.165,
+        -0.0688,
+        0.0077,
+        0.0679,
+    ]
     np.testing.assert_allclose(identified(0.0), printed, atol=6e-4)
-    of_delta = [0.04269, 0.9004, 0.5202, 0.0138, -3.1664, 0.7654, -0.4497, 1.7197, 0.1659, -0.05852, -0.0056, 0.0804]
+    of_delta = [
+        0.04269,
+        0.9004,
+        0.5202,
+        0.0138,
+        -3.1664,
+        0.7654,
+        -0.4497,
+        1.7197,
+        0.1659,
+        -0.05852,
+        -0.0056,
+        0.0804,
+    ]
     np.testing.assert_allclose(identified(1.0), of_delta, atol=6e-5)
 
 
@@ -184,11 +280,17 @@ def test_a_mismatch_makes_the_arm_that_of_the_second_set():
     common = {"law": "none", "x0": HOME, "v0": (0.5,) * 7, "duration": 0.1}
     unknown = smc.Scenario(plant="panda", mismatch={"delta": 1.0}, **common)
     traces = smc.run(
-        [smc.Scenario(plant="panda", **common), unknown, smc.Scenario(plant=smc.plant("panda", delta=1), **common)]
+        [
+            smc.Scenario(plant="panda", **common),
+            unknown,
+            smc.Scenario(plant=smc.plant("panda", delta=1), **common),
+        ]
     )
     np.testing.assert_array_equal(traces[1].x, traces[2].x)
     assert np.abs(traces[0].x[-1] - traces[1].x[-1]).max() > 1e-3
-    with pytest.raises(smc.ScenarioError, match=r"panda's delta is 1\.5: give the share of the second set, 0 to 1"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"panda's delta is 1\.5: give the share of the second set, 0 to 1"
+    ):
         smc.run(dataclasses.replace(unknown, mismatch={"delta": 1.5}))
 
 
@@ -238,13 +340,18 @@ def test_a_reference_that_is_left_out_follows_the_plant():
     assert (other.reference, other.references) == (None, (smc.Constant(0.0),) * 2)
     given = dataclasses.replace(scenario, reference=scenario.references)
     assert given == scenario
-    with pytest.raises(smc.ScenarioError, match="reference has 7 values for the 2 driven channels of double_pendulum"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match="reference has 7 values for the 2 driven channels of double_pendulum",
+    ):
         dataclasses.replace(given, plant="double_pendulum")
 
 
 def test_a_mismatch_and_a_jump_add_kilograms_to_the_payload():
     known = {"law": "computed_torque_sliding", "duration": 0.1, "control_period": 2e-3}
-    unknown = smc.Scenario(plant="panda", mismatch={"payload": 0.5}, jump=smc.Jump(0.05, {"payload": 1.5}), **known)
+    unknown = smc.Scenario(
+        plant="panda", mismatch={"payload": 0.5}, jump=smc.Jump(0.05, {"payload": 1.5}), **known
+    )
     assert unknown.factors(0) == {"payload": 0.5}
     late = unknown.factors(unknown.jump_step)
     assert unknown.plant.values(late).payload == 2.0
@@ -275,7 +382,9 @@ def test_a_payload_below_nothing_is_refused(make, says):
 
 @pytest.mark.parametrize("kind", ["table", "wall"])
 def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
-    """The probe swings down onto the table, or forward against the wall; the arm's stops are met, too."""
+    """The probe swings down onto the table, or forward against the wall; the arm's stops are met,
+    too.
+    """
     plant, lowest = smc.plant("panda"), 0.0
     spec = plant.spec()
     Contact(kind).edit_on(plant, spec)
@@ -284,7 +393,9 @@ def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    data.qvel[{"table": 1, "wall": 3}[kind]] = {"table": 1.0, "wall": 5.0}[kind]  # of the shoulder, of the elbow
+    data.qvel[{"table": 1, "wall": 3}[kind]] = {"table": 1.0, "wall": 5.0}[
+        kind
+    ]  # of the shoulder, of the elbow
     mujoco.mj_forward(model, data)
     start, touched = data.energy.sum(), False
     while data.time < 1.0:
@@ -296,15 +407,23 @@ def test_a_fall_onto_an_obstacle_gains_no_energy(kind):
 
 
 def test_the_friction_of_a_surface_is_that_of_its_scenario():
-    common = {"plant": "panda", "law": "none", "v0": (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0), "duration": 0.6}
-    scenarios = [smc.Scenario(**common, contact=smc.Contact("table", friction=mu)) for mu in (0.1, 0.5)]
+    common = {
+        "plant": "panda",
+        "law": "none",
+        "v0": (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "duration": 0.6,
+    }
+    scenarios = []
+    for mu in (0.1, 0.5):
+        scenarios.append(smc.Scenario(**common, contact=smc.Contact("table", friction=mu)))
     together = smc.run(scenarios)
     for scenario, trace in zip(scenarios, together, strict=True):
         assert_same(trace, smc.run(scenario))
     assert np.abs(together[0].x[-1] - together[1].x[-1]).max() > 1e-3
 
 
-# a point behind each surface to which the tip is sent from home, the surface's axis, its place and the way into it
+# a point behind each surface to which the tip is sent from home, the surface's axis, its place and
+# the way into it
 BEHIND = {"table": ((0.5545, 0.0, 0.195), 2, 0.2, -1.0), "wall": ((0.66, 0.0, 0.5), 0, 0.65, 1.0)}
 
 
@@ -313,7 +432,12 @@ def test_the_probe_presses_on_a_surface_and_does_not_pass_through(kind):
     point, axis, place, way = BEHIND[kind]
     home = (0.5545, 0.0, 0.5245)
     path = smc.signals.cartesian_path("panda", [0.0, 1.0], [home, point], site="tip")
-    common = {"plant": "panda", "law": "computed_torque_sliding", "reference": path, "duration": 1.2}
+    common = {
+        "plant": "panda",
+        "law": "computed_torque_sliding",
+        "reference": path,
+        "duration": 1.2,
+    }
     depths = {}
     for trace in smc.run([smc.Scenario(**common, contact=each) for each in (kind, "none")]):
         assert trace.failure is None

@@ -1,4 +1,6 @@
-"""The quadrotor: its rotors, drag and wind against integrations and closed forms that share no code with it."""
+"""The quadrotor: its rotors, drag and wind against integrations and closed forms that share no code
+with it.
+"""
 
 import dataclasses
 import math
@@ -40,16 +42,23 @@ def rotor_rate(W, c, p):
 
 
 def newton_euler(duration, period, p, wind):
-    """Return the state at the end of `flip`, by DOP853 between samples: no MuJoCo. The wind blows from the start."""
+    """Return the state at the end of `flip`, by DOP853 between samples: no MuJoCo.
+
+    The wind blows from the start.
+    """
     drag, J = np.diag([p["Dx"], p["Dy"], p["Dz"]]), np.diag([p["Jx"], p["Jy"], p["Jz"]])
     places = p["a"] * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
     spins = np.array([1.0, -1.0, 1.0, -1.0])
-    state = np.concatenate([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6), np.full(4, speed(p, p["m"] * G / 4))])
+    state = np.concatenate(
+        [[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6), np.full(4, speed(p, p["m"] * G / 4))]
+    )
     for k in range(round(duration / period)):
         t = k * period
         F = 0.3 + 0.05 * math.sin(9.0 * t)
         M = 6e-4 * math.sin(5.0 * t), 3e-4 * math.cos(7.0 * t), 2e-4 * math.sin(3.0 * t + 1.0)
-        signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])  # as in the firmware's power distribution
+        signs = np.array(
+            [(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)]
+        )  # as in the firmware's power distribution
         asked = F / 4 + signs @ np.array([M[0] / p["a"], M[1] / p["a"], M[2] / p["c"]]) / 4
         asked = np.clip(asked - max(0.0, asked.max() - p["fmax"]), 0.0, p["fmax"])
         told = np.array([speed(p, f) for f in asked])
@@ -65,10 +74,17 @@ def newton_euler(duration, period, p, wind):
             torque -= np.cross(w, J @ w + h * spin) + dh * spin
             force = turn.apply([0.0, 0.0, f.sum()]) - turn.apply(drag @ turn.inv().apply(v - wind))
             dq = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
-            return np.concatenate([v, dq, force / p["m"] - [0.0, 0.0, G], np.linalg.solve(J, torque), dW])
+            return np.concatenate(
+                [v, dq, force / p["m"] - [0.0, 0.0, G], np.linalg.solve(J, torque), dW]
+            )
 
         state = solve_ivp(rates, (0.0, period), state, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-    return state[:3], Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(), state[7:10], state[10:13]
+    return (
+        state[:3],
+        Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(),
+        state[7:10],
+        state[10:13],
+    )
 
 
 @pytest.mark.parametrize("name", ["crazyflie", "crazyflow"])
@@ -79,10 +95,15 @@ def test_two_seconds_of_a_flip_in_wind_are_those_of_an_integration_without_mujoc
     for step in (2e-3, 1e-3):
         trace = smc.run(
             smc.Scenario(
-                plant=plant, law=flip, control_period=4e-3, physics_step=step, duration=2.0,
-                x0=QUADROTOR.rest, disturbance=smc.signals.Wind(1.0, -2.0, 0.5),
+                plant=plant,
+                law=flip,
+                control_period=4e-3,
+                physics_step=step,
+                duration=2.0,
+                x0=QUADROTOR.rest,
+                disturbance=smc.signals.Wind(1.0, -2.0, 0.5),
             )
-        )  # fmt: skip
+        )
         attitude = Rotation.from_rotvec(trace.x[-1, 3:].copy()).as_matrix()
         off = trace.x[-1, :3] - place, attitude - turn, trace.v[-1] - [*v, *w]
         misses.append([np.abs(values).max() for values in off])
@@ -93,7 +114,9 @@ def test_two_seconds_of_a_flip_in_wind_are_those_of_an_integration_without_mujoc
 
 @dataclasses.dataclass(frozen=True)
 class AllTurnAlike:
-    """The quadrotor's fields, with rotors that all turn counter-clockwise, so that their angular momentum is not 0."""
+    """The quadrotor's fields, with rotors that all turn counter-clockwise, so that their angular
+    momentum is not 0.
+    """
 
     def __call__(self, model, p):
         yield from QUADROTOR.fields(model, p)
@@ -103,19 +126,38 @@ class AllTurnAlike:
 @pytest.mark.parametrize("fall", [0.0, 3.0], ids=["steady", "slowing down"])
 def test_a_tumbling_body_with_spinning_rotors_keeps_its_angular_momentum(fall):
     """Without lever and torque per thrust nothing turns the body but its rotors."""
-    plant = smc.plant("quadrotor", a=1e-11, c=1e-11, Jr=1e-8, Jy=20e-6, Dx=0.0, Dy=0.0, Dz=0.0, rise=0.0, fall=fall)
+    plant = smc.plant(
+        "quadrotor",
+        a=1e-11,
+        c=1e-11,
+        Jr=1e-8,
+        Jy=20e-6,
+        Dx=0.0,
+        Dy=0.0,
+        Dz=0.0,
+        rise=0.0,
+        fall=fall,
+    )
     plant = dataclasses.replace(plant, fields=AllTurnAlike())
     J, start, idle = np.diag([16.8e-6, 20e-6, 29.8e-6]), speed(P, P["m"] * G / 4), speed(P, 0.0)
     misses = []
     for step in (2e-3, 1e-3):
         trace = smc.run(
             smc.Scenario(
-                plant=plant, law="none", x0=(0.0, 0.0, 3.0, 0.3, -0.2, 0.1), v0=(1.0, -2.0, 3.0, 5.0, 20.0, 3.0),
-                duration=5.0, control_period=5.0, integrator="RK4", physics_step=step,
+                plant=plant,
+                law="none",
+                x0=(0.0, 0.0, 3.0, 0.3, -0.2, 0.1),
+                v0=(1.0, -2.0, 3.0, 5.0, 20.0, 3.0),
+                duration=5.0,
+                control_period=5.0,
+                integrator="RK4",
+                physics_step=step,
             )
-        )  # fmt: skip
+        )
         w, h = trace.v[:, 3:], 4 * 1e-8 * (idle + (start - idle) * np.exp(-fall * trace.t))
-        momentum = Rotation.from_rotvec(trace.x[:, 3:].copy()).apply(w @ J + np.outer(h, [0.0, 0.0, 1.0]))
+        momentum = Rotation.from_rotvec(trace.x[:, 3:].copy()).apply(
+            w @ J + np.outer(h, [0.0, 0.0, 1.0])
+        )
         size, energy = np.linalg.norm(momentum, axis=1), np.einsum("ki,ij,kj->k", w, J, w)
         misses.append(np.abs(momentum[1] - momentum[0]).max() / size[0])
         if fall == 0.0 and step == 1e-3:
@@ -130,7 +172,9 @@ def speed(p, thrust):
     return (math.sqrt(p["k1"] ** 2 + 4 * p["k2"] * thrust) - p["k1"]) / (2 * p["k2"])
 
 
-@pytest.mark.parametrize("numbers", [(7.0, 0.0, 5.0, 2e-3), (4.0, 1e-3, 0.0, 3e-3), (0.0, 2e-3, 9.0, 0.0)], ids=str)
+@pytest.mark.parametrize(
+    "numbers", [(7.0, 0.0, 5.0, 2e-3), (4.0, 1e-3, 0.0, 3e-3), (0.0, 2e-3, 9.0, 0.0)], ids=str
+)
 @pytest.mark.parametrize(("first", "told"), [(500.0, 2000.0), (2000.0, 300.0), (900.0, 900.0)])
 def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
     rise, rise2, fall, fall2 = numbers
@@ -138,7 +182,10 @@ def test_a_rotor_follows_its_equation_for_whatever_step(numbers, first, told):
     rotor.rise, rotor.rise2, rotor.fall, rotor.fall2 = numbers
 
     def rate(t, W):
-        a, b = (rise, rise2) if told >= W[0] else (fall, fall2)
+        if told >= W[0]:
+            a, b = (rise, rise2)
+        else:
+            a, b = (fall, fall2)
         return [a * (told - W[0]) + b * (told**2 - W[0] ** 2)]
 
     found, slope = spun.py_func(rotor, first, told, 0.3)
@@ -153,7 +200,9 @@ def falling(**fields):
     """Return a run of a body that falls with its rotors at rest."""
     plant = fields.pop("plant", smc.plant("quadrotor", lift=0.0, Dx=0.02, Dy=0.01, Dz=0.03))
     start = {"x0": (0.0, 0.0, 50.0, 0.0, 0.0, 0.0), "v0": (3.0, -2.0, 4.0, 0.0, 0.0, 0.0)}
-    return smc.run(smc.Scenario(**(start | {"plant": plant, "law": "none", "duration": 2.0} | fields)))
+    return smc.run(
+        smc.Scenario(**(start | {"plant": plant, "law": "none", "duration": 2.0} | fields))
+    )
 
 
 def test_a_body_thrown_without_thrust_loses_its_speed_to_drag_exponentially():
@@ -166,27 +215,49 @@ def test_a_body_thrown_without_thrust_loses_its_speed_to_drag_exponentially():
 def test_in_wind_a_body_moves_as_in_still_air_seen_from_the_air():
     wind = np.array([2.0, -1.0, 0.5])
     still = falling()
-    blown = falling(v0=(*(still.v[0, :3] + wind), 0.0, 0.0, 0.0), disturbance=smc.signals.Wind(*wind))
+    blown = falling(
+        v0=(*(still.v[0, :3] + wind), 0.0, 0.0, 0.0), disturbance=smc.signals.Wind(*wind)
+    )
     np.testing.assert_allclose(blown.v[:, :3] - wind, still.v[:, :3], atol=1e-10)
     turned = falling(x0=(0.0, 0.0, 50.0, 0.3, -0.5, 0.8), disturbance=smc.signals.Wind(*wind))
     R = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
-    np.testing.assert_allclose(turned.d[0, :3], R @ np.diag([0.02, 0.01, 0.03]) @ R.T @ wind, atol=1e-15)
+    np.testing.assert_allclose(
+        turned.d[0, :3], R @ np.diag([0.02, 0.01, 0.03]) @ R.T @ wind, atol=1e-15
+    )
     assert np.all(turned.d[:, 3:] == 0.0)
 
 
 def test_a_gust_of_wind_is_a_raised_cosine():
     trace = falling(disturbance=smc.signals.Wind(x=3.0, time=0.5, width=1.0))
-    shape = np.where(np.abs(trace.t - 1.0) < 0.5, 0.5 - 0.5 * np.cos(2 * np.pi * (trace.t - 0.5)), 0.0)
+    shape = np.where(
+        np.abs(trace.t - 1.0) < 0.5, 0.5 - 0.5 * np.cos(2 * np.pi * (trace.t - 0.5)), 0.0
+    )
     np.testing.assert_allclose(trace.d[:, 0], 0.02 * 3.0 * shape, atol=1e-12)
 
 
 @pytest.mark.parametrize("step", [5e-3, 1e-3])
 def test_turbulence_has_its_rms_and_its_correlation_whatever_the_step(step):
-    """MIL-F-8785C's lengths and sizes at 3.05 m; 60 runs of 20 s, 8 correlation times each along x and y."""
+    """MIL-F-8785C's lengths and sizes at 3.05 m; 60 runs of 20 s, 8 correlation times each along x
+    and y.
+    """
     wind = smc.signals.Dryden(w20=7.7, height=3.048, speed=5.0)
-    base = {"plant": smc.plant("quadrotor", lift=0.0, Dx=1.0, Dy=1.0, Dz=1.0), "law": "none", "duration": 20.0}
-    base |= {"physics_step": step, "control_period": 0.05, "x0": QUADROTOR.rest, "disturbance": wind}
-    d = np.array([trace.d[:, :3] for trace in smc.run([smc.Scenario(**base, seed=seed) for seed in range(60)])])
+    base = {
+        "plant": smc.plant("quadrotor", lift=0.0, Dx=1.0, Dy=1.0, Dz=1.0),
+        "law": "none",
+        "duration": 20.0,
+    }
+    base |= {
+        "physics_step": step,
+        "control_period": 0.05,
+        "x0": QUADROTOR.rest,
+        "disturbance": wind,
+    }
+    d = np.array(
+        [
+            trace.d[:, :3]
+            for trace in smc.run([smc.Scenario(**base, seed=seed) for seed in range(60)])
+        ]
+    )
     b = 0.177 + 0.000823 * 10
     sigma = 0.77 / np.array([b**0.4, b**0.4, 1.0])
     times = 3.048 / np.array([b**1.2, b**1.2, 1.0]) / 5.0
@@ -207,7 +278,9 @@ def hovering(**parameters):
         return np.array([0.0, 0.0, 0.0319 * 9.81, 0.0, 0.0, 0.0]), np.zeros(6)
 
     plant = smc.plant("quadrotor", Jx=1e3, Jy=1e3, Jz=1e3, **parameters)
-    return smc.run(smc.Scenario(plant=plant, law=weight, duration=2.0, x0=QUADROTOR.rest)).force[-1, 2]
+    return smc.run(smc.Scenario(plant=plant, law=weight, duration=2.0, x0=QUADROTOR.rest)).force[
+        -1, 2
+    ]
 
 
 def test_a_weak_battery_and_a_fading_rotor_lose_their_share_of_the_thrust():
@@ -221,8 +294,13 @@ def test_a_weak_battery_and_a_fading_rotor_lose_their_share_of_the_thrust():
 
 
 def test_the_rotor_that_fades_is_the_front_right_one():
-    """Its side sinks, and the drag that it lacks leaves the body to turn counter-clockwise, as it turns itself."""
-    plant, u = smc.plant("quadrotor", fade=0.4, Jr=0.0), np.array([0.0, 0.0, P["m"] * G, 0.0, 0.0, 0.0])
+    """Its side sinks, and the drag that it lacks leaves the body to turn counter-clockwise, as it
+    turns itself.
+    """
+    plant, u = (
+        smc.plant("quadrotor", fade=0.4, Jr=0.0),
+        np.array([0.0, 0.0, P["m"] * G, 0.0, 0.0, 0.0]),
+    )
     law = smc.law_function(**FREE_BODY)(lambda y, gains, memory: (u.copy(), np.zeros(6)))
     trace = smc.run(smc.Scenario(plant=plant, law=law, duration=0.01, x0=QUADROTOR.rest))
     lost = 0.4 * P["m"] * G / 4 * 0.01
@@ -244,9 +322,18 @@ def test_a_payload_that_is_dropped_is_weight_until_then():
 
 
 LIFTS = {  # set -> thrust over weight, as its source or what was derived of it says
-    "crazyflie": 1.53, "crazyflow": 1.53, "gym": 2.25, "rotorpy": 1.95, "crazys": 2.41, "hummingbird": 10.2,
-}  # fmt: skip
-HOVERS = {"crazyflow": 18_968, "gym": 14_480, "rotorpy": 17_079}  # rpm at which a set hovers, of the same sources
+    "crazyflie": 1.53,
+    "crazyflow": 1.53,
+    "gym": 2.25,
+    "rotorpy": 1.95,
+    "crazys": 2.41,
+    "hummingbird": 10.2,
+}
+HOVERS = {
+    "crazyflow": 18_968,
+    "gym": 14_480,
+    "rotorpy": 17_079,
+}  # rpm at which a set hovers, of the same sources
 
 
 @pytest.mark.parametrize("name", list(QUADROTOR.sets))
@@ -256,7 +343,9 @@ def test_every_set_of_numbers_hovers_where_its_rotors_carry_it(name):
     assert 4 * p["fmax"] / (p["m"] * G) == pytest.approx(LIFTS[name], rel=0.01)
     if name in HOVERS:
         assert speed(p, p["m"] * G / 4) * 30 / math.pi == pytest.approx(HOVERS[name], rel=2e-3)
-    trace = smc.run(smc.Scenario(plant=plant, law="geometric", model="nominal", x0=plant.rest, duration=1.0))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law="geometric", model="nominal", x0=plant.rest, duration=1.0)
+    )
     assert trace.failure is None
     assert np.abs(trace.e).max() < 1e-9
     assert plant.limits[3] == pytest.approx(4 * p["fmax"] * p["a"])
@@ -266,9 +355,15 @@ def test_motion_is_the_same_turned_about_the_vertical_and_in_a_mirror():
     """The mirror y -> -y swaps the rotors of left and right, which turn the other way."""
     common = {"plant": QUADROTOR, "law": "geometric", "model": "nominal", "duration": 1.0}
     heading = {"reference": [smc.Constant(v) for v in QUADROTOR.rest]}
-    trace = smc.run(smc.Scenario(**common, **heading, x0=(0.3, 0.1, 1.2, 0.2, -0.1, 0.3), v0=(1, 2, 0, 1, -2, 3)))
+    trace = smc.run(
+        smc.Scenario(
+            **common, **heading, x0=(0.3, 0.1, 1.2, 0.2, -0.1, 0.3), v0=(1, 2, 0, 1, -2, 3)
+        )
+    )
     mirrored = smc.run(
-        smc.Scenario(**common, **heading, x0=(0.3, -0.1, 1.2, -0.2, -0.1, -0.3), v0=(1, -2, 0, -1, -2, -3))
+        smc.Scenario(
+            **common, **heading, x0=(0.3, -0.1, 1.2, -0.2, -0.1, -0.3), v0=(1, -2, 0, -1, -2, -3)
+        )
     )
     np.testing.assert_allclose(mirrored.e, trace.e * [1, -1, 1, -1, 1, -1], atol=1e-9)
     np.testing.assert_allclose(mirrored.applied[:, :4], trace.applied[:, [3, 2, 1, 0]], atol=1e-9)
@@ -278,10 +373,12 @@ def test_motion_is_the_same_turned_about_the_vertical_and_in_a_mirror():
     goal = [*turn.apply(QUADROTOR.rest[:3]), *axis]
     turned = smc.run(
         smc.Scenario(
-            **common, reference=[smc.Constant(value) for value in goal],
-            x0=(*place, *(turn * start).as_rotvec()), v0=(*v, 1, -2, 3),
+            **common,
+            reference=[smc.Constant(value) for value in goal],
+            x0=(*place, *(turn * start).as_rotvec()),
+            v0=(*v, 1, -2, 3),
         )
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(turned.e[:, :3], turn.apply(trace.e[:, :3]), atol=1e-9)
     np.testing.assert_allclose(turned.e[:, 3:], trace.e[:, 3:], atol=1e-9)
 
@@ -290,7 +387,11 @@ def test_laws_know_neither_drag_nor_what_has_gone_wrong():
     """The mixer and M are those of the nominal numbers, whatever the truth is."""
     fields = {"plant": QUADROTOR, "law": "geometric", "model": "nominal", "duration": 0.002}
     plain = smc.run(smc.Scenario(**fields))
-    wrong = smc.run(smc.Scenario(**fields, mismatch={"a": 1.2, "fade": 0.2, "payload": 0.004, "Dx": 3.0, "m": 1.1}))
+    wrong = smc.run(
+        smc.Scenario(
+            **fields, mismatch={"a": 1.2, "fade": 0.2, "payload": 0.004, "Dx": 3.0, "m": 1.1}
+        )
+    )
     np.testing.assert_array_equal(plain.applied[0], wrong.applied[0])
     other = smc.run(smc.Scenario(**(fields | {"plant": smc.plant("quadrotor", a=0.05)})))
     assert np.abs(other.applied[0] - plain.applied[0]).max() > 1e-3
@@ -298,7 +399,9 @@ def test_laws_know_neither_drag_nor_what_has_gone_wrong():
 
 @pytest.mark.parametrize("wind", [smc.signals.Wind(1e300), smc.signals.Wind(y=1e300)])
 def test_a_wind_beyond_all_numbers_ends_its_own_run_alone(wind):
-    runs = [smc.Scenario(plant=QUADROTOR, law="geometric", duration=0.01, disturbance=d) for d in (wind, ())]
+    runs = []
+    for d in (wind, ()):
+        runs.append(smc.Scenario(plant=QUADROTOR, law="geometric", duration=0.01, disturbance=d))
     failed, other = smc.run(runs)
     assert failed.failure == "the disturbance became NaN or inf, at t = 0 s"
     assert other.failure is None
@@ -308,10 +411,22 @@ def refusals():
     yield lambda: smc.plant("quadrotor", set="parrot"), "unknown set of quadrotor 'parrot'"
     yield lambda: smc.plant("panda", set="gym"), "unknown set of panda"
     yield lambda: smc.plant("quadrotor", Jx=0.0), "Jx"
-    yield lambda: smc.run(smc.Scenario(plant=QUADROTOR, law="none", mismatch={"fade": 1.5})), "fade is 1.5"
-    yield lambda: smc.run(smc.Scenario(plant=smc.plant("quadrotor", Dz=-1.0), law="none")), "Dz is -1: give 0 or more"
-    yield lambda: smc.Scenario(plant="duffing", law="pid", disturbance=smc.signals.Wind(1.0)), "has no drag"
-    yield lambda: smc.Scenario(plant=QUADROTOR, law="geometric", reference=smc.signals.Wind(1.0)), "is a wind"
+    yield (
+        lambda: smc.run(smc.Scenario(plant=QUADROTOR, law="none", mismatch={"fade": 1.5})),
+        "fade is 1.5",
+    )
+    yield (
+        lambda: smc.run(smc.Scenario(plant=smc.plant("quadrotor", Dz=-1.0), law="none")),
+        "Dz is -1: give 0 or more",
+    )
+    yield (
+        lambda: smc.Scenario(plant="duffing", law="pid", disturbance=smc.signals.Wind(1.0)),
+        "has no drag",
+    )
+    yield (
+        lambda: smc.Scenario(plant=QUADROTOR, law="geometric", reference=smc.signals.Wind(1.0)),
+        "is a wind",
+    )
     yield lambda: smc.signals.Dryden(w20=5.0, height=1.0), "height"
     yield lambda: smc.Scenario(plant=QUADROTOR, law="pid"), "of one channel"
 

@@ -1,6 +1,9 @@
-"""The plants of real rigs: Furuta pendulum, double pendulum with its two ways to drive it, servo axis.
+"""The plants of real rigs:
 
-The equations are written again here, as mass matrix and forces; nothing of the plants' own `nominal` is used for them.
+Furuta pendulum, double pendulum with its two ways to drive it, servo axis.
+
+The equations are written again here, as mass matrix and forces; nothing of the plants' own
+`nominal` is used for them.
 """
 
 import functools
@@ -10,20 +13,23 @@ from types import SimpleNamespace
 import mujoco
 import numpy as np
 import pytest
+from helpers import reference
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.part import joint_ids
 from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_0
-from helpers import reference
 
 GRAV = 9.81
 STATES = 1000
 # plant -> parameters that have friction and rotors of every kind
 ROUGH = {
     "furuta": {"b": 3e-4, "bq": 1e-5, "cf": 2e-3, "cfq": 1e-5, "k": 4e-3, "tx": 0.1, "ty": -0.2},
-    "double_pendulum": MODEL_1_0, "pendubot": MODEL_1_0, "acrobot": MODEL_1_0, "servo_axis": {},
-}  # fmt: skip
+    "double_pendulum": MODEL_1_0,
+    "pendubot": MODEL_1_0,
+    "acrobot": MODEL_1_0,
+    "servo_axis": {},
+}
 PLANTS = pytest.mark.parametrize("name", ROUGH)
 # Channels of a plant -> its joints in the order of the equation below.
 ORDER = {"acrobot": [1, 0]}
@@ -33,13 +39,24 @@ def furuta(p, q, v, u):
     """(x'', q'') by Lagrange's equations of the arm and of the pendulum as a rod without thickness."""
     Jp = p.Jc + p.m * p.l**2
     s, c = math.sin(q[1]), math.cos(q[1])
-    mass = np.array([[p.J + p.m * p.L**2 + Jp * s * s, p.m * p.L * p.l * c], [p.m * p.L * p.l * c, Jp]])
-    gyration = np.array([2 * Jp * s * c * v[0] * v[1] - p.m * p.L * p.l * s * v[1] ** 2, -Jp * s * c * v[0] ** 2])
+    mass = np.array(
+        [[p.J + p.m * p.L**2 + Jp * s * s, p.m * p.L * p.l * c], [p.m * p.L * p.l * c, Jp]]
+    )
+    gyration = np.array(
+        [2 * Jp * s * c * v[0] * v[1] - p.m * p.L * p.l * s * v[1] ** 2, -Jp * s * c * v[0] ** 2]
+    )
     friction = np.array([p.b, p.bq]) * v + np.array([p.cf, p.cfq]) * np.sign(v)
-    arm, ahead = np.array([math.sin(q[0]), -math.cos(q[0]), 0.0]), np.array([math.cos(q[0]), math.sin(q[0]), 0.0])
-    jacobian = np.array([p.L * ahead - p.l * s * arm, p.l * (c * ahead - s * np.array([0.0, 0.0, 1.0]))])
+    arm, ahead = (
+        np.array([math.sin(q[0]), -math.cos(q[0]), 0.0]),
+        np.array([math.cos(q[0]), math.sin(q[0]), 0.0]),
+    )
+    jacobian = np.array(
+        [p.L * ahead - p.l * s * arm, p.l * (c * ahead - s * np.array([0.0, 0.0, 1.0]))]
+    )
     down = GRAV * np.array([p.tx, p.ty, -math.sqrt(1.0 - p.tx**2 - p.ty**2)])
-    return np.linalg.solve(mass, [u[0] - p.k * q[0], 0.0] - gyration - friction + p.m * jacobian @ down)
+    return np.linalg.solve(
+        mass, [u[0] - p.k * q[0], 0.0] - gyration - friction + p.m * jacobian @ down
+    )
 
 
 def double_pendulum(p, q, v, u):
@@ -47,14 +64,27 @@ def double_pendulum(p, q, v, u):
     mass, force = np.zeros((2, 2)), np.array(u, float)
     one, two = q[0], q[0] + q[1]
     turns = (np.array([1.0, 0.0]), np.array([1.0, 1.0]))  # of each link, by the joints
-    for m, I, r, arm, turn in ((p.m1, p.I1, p.r1, (), turns[0]), (p.m2, p.I2, p.r2, (p.l1,), turns[1])):
-        parts = [(length, one, turns[0]) for length in arm] + [(r, one if turn is turns[0] else two, turn)]
+    for m, I, r, arm, turn in (
+        (p.m1, p.I1, p.r1, (), turns[0]),
+        (p.m2, p.I2, p.r2, (p.l1,), turns[1]),
+    ):
+        parts = [(length, one, turns[0]) for length in arm] + [
+            (r, one if turn is turns[0] else two, turn)
+        ]
         jacobian = sum(length * np.outer([math.cos(a), math.sin(a)], by) for length, a, by in parts)
-        drift = np.sum([length * (by @ v) ** 2 * np.array([-math.sin(a), math.cos(a)]) for length, a, by in parts], 0)
+        drift = np.sum(
+            [
+                length * (by @ v) ** 2 * np.array([-math.sin(a), math.cos(a)])
+                for length, a, by in parts
+            ],
+            0,
+        )
         mass += m * jacobian.T @ jacobian + (I - m * r**2) * np.outer(turn, turn)
         force -= m * jacobian.T @ (drift + np.array([0.0, p.grav]))
     mass += p.Ir * (p.gear**2 * np.outer([1, 0], [1, 0]) + np.outer([1, -p.gear], [1, -p.gear]))
-    return np.linalg.solve(mass, force - np.array([p.b1, p.b2]) * v - np.array([p.cf1, p.cf2]) * np.sign(v))
+    return np.linalg.solve(
+        mass, force - np.array([p.b1, p.b2]) * v - np.array([p.cf1, p.cf2]) * np.sign(v)
+    )
 
 
 def servo_axis(p, q, v, u):
@@ -62,7 +92,9 @@ def servo_axis(p, q, v, u):
 
 
 def acceleration(name, p, x, v, u):
-    """x'' of the channels, (n,), from their x and v, (n,) each, and the commands of the driven ones."""
+    """x'' of the channels, (n,), from their x and v, (n,) each, and the commands of the driven
+    ones.
+    """
     order = ORDER.get(name, [0, 1])[: len(x)]
     equation = {"furuta": furuta, "servo_axis": servo_axis}.get(name, double_pendulum)
     force = np.zeros(len(x))
@@ -71,11 +103,17 @@ def acceleration(name, p, x, v, u):
 
 
 def states(name, plant, rng):
-    """Random states and commands, each joint fast enough that dry friction cannot stop it within a step."""
+    """Random states and commands, each joint fast enough that dry friction cannot stop it within a
+    step.
+    """
     for _ in range(STATES):
         v = rng.uniform(1, 5, plant.n) * rng.choice([-1, 1], plant.n)
         scale = 0.01 if name == "furuta" else 1.0
-        yield rng.uniform(-3, 3, plant.n), v, scale * rng.uniform(-1, 1, plant.driven) * plant.limits[0]
+        yield (
+            rng.uniform(-3, 3, plant.n),
+            v,
+            scale * rng.uniform(-1, 1, plant.driven) * plant.limits[0],
+        )
 
 
 @pytest.mark.slow
@@ -92,7 +130,9 @@ def test_a_thousand_accelerations_are_those_of_the_equation(name, rough):
         data.qpos[joints], data.qvel[joints], data.ctrl[:] = x, v, u
         mujoco.mj_forward(model, data)
         expected = acceleration(name, p, x, v, u)
-        worst = max(worst, np.abs(data.qacc[joints] - expected).max() / max(1.0, np.abs(expected).max()))
+        worst = max(
+            worst, np.abs(data.qacc[joints] - expected).max() / max(1.0, np.abs(expected).max())
+        )
     assert worst < 1e-9
 
 
@@ -109,7 +149,11 @@ def test_nominal_is_the_equation_without_dry_friction(name):
             assert f + g * u[i % plant.driven] == pytest.approx(expected[i], rel=1e-10, abs=1e-10)
 
 
-START = {"furuta": (0.0, 2.6), "servo_axis": 0.1, "acrobot": (0.5, 1.0)}  # the Furuta pendulum about hanging
+START = {
+    "furuta": (0.0, 2.6),
+    "servo_axis": 0.1,
+    "acrobot": (0.5, 1.0),
+}  # the Furuta pendulum about hanging
 
 
 @pytest.mark.slow
@@ -118,7 +162,9 @@ def test_two_seconds_of_free_motion_at_2_ms_follow_an_eighth_order_integration(n
     plant = smc.plant(name, **dict.fromkeys(smc.plant(name).dry, 0.0))
     v0 = 1.0 if name == "servo_axis" else 0.0
     common = {"control_period": 2e-3, "physics_step": 2e-3, "duration": 2.0}
-    trace = smc.run(smc.Scenario(plant=plant, law="none", x0=START.get(name, (1.0, 0.5)), v0=v0, **common))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law="none", x0=START.get(name, (1.0, 0.5)), v0=v0, **common)
+    )
     assert trace.scenario.resolved.integrator == "RK4"
     p, n = SimpleNamespace(**plant.parameters), plant.n
 
@@ -173,16 +219,23 @@ def test_model_1_1_equals_an_independent_rk4(name, driven):
             duration=1.0,
         )
     )
-    column, order = (0, [0, 1]) if name == "pendubot" else (1, [1, 0])
+    if name == "pendubot":
+        column, order = (0, [0, 1])
+    else:
+        column, order = (1, [1, 0])
     torque = np.zeros((500, 2))
     torque[:, column] = profile
-    expected = runge_kutta(SimpleNamespace(**smc.plant(name).parameters), np.take((0.8, -0.3), order), torque)
+    expected = runge_kutta(
+        SimpleNamespace(**smc.plant(name).parameters), np.take((0.8, -0.3), order), torque
+    )
     assert np.abs(trace.x[:, order] - expected).max() < 1e-6
     assert np.abs(trace.u[:-1, 0] - profile).max() == 0.0
 
 
 def test_the_published_mass_matrix_has_rotors_as_here():
-    """M of the published design: gear^2 Ir + Ir at the shoulder, gear^2 Ir at the elbow, -gear Ir between them."""
+    """M of the published design: gear^2 Ir + Ir at the shoulder, gear^2 Ir at the elbow, -gear Ir
+    between them.
+    """
     plant = smc.plant("double_pendulum", **MODEL_1_0)
     p, model = SimpleNamespace(**plant.parameters), plant.load()
     data, full = mujoco.MjData(model), np.zeros((2, 2))
@@ -192,7 +245,9 @@ def test_the_published_mass_matrix_has_rotors_as_here():
     a = p.m2 * p.l1 * p.r2 * math.cos(0.7)
     rotor = p.gear**2 * p.Ir
     first = p.I1 + p.I2 + p.m2 * p.l1**2 + 2 * a + rotor + p.Ir
-    np.testing.assert_allclose(full, [[first, p.I2 + a - p.gear * p.Ir], [p.I2 + a - p.gear * p.Ir, p.I2 + rotor]])
+    np.testing.assert_allclose(
+        full, [[first, p.I2 + a - p.gear * p.Ir], [p.I2 + a - p.gear * p.Ir, p.I2 + rotor]]
+    )
 
 
 def test_the_weight_is_drawn_at_the_end_of_the_lower_link():
@@ -206,11 +261,21 @@ def test_the_weight_is_drawn_at_the_end_of_the_lower_link():
 
 def test_dry_friction_holds_the_axis_and_lets_go_at_its_level():
     cf, offset = (smc.plant("servo_axis").parameters[name] for name in ("cf", "offset"))
-    pushes = [sign * cf * part + offset for sign in (-1, 1) for part in (0.95, 1.05)]
-    runs = [
-        smc.Scenario(plant="servo_axis", law="none", x0=0.0, disturbance=smc.Constant(push), duration=0.5)
-        for push in pushes
-    ]
+    pushes = []
+    for sign in (-1, 1):
+        for part in (0.95, 1.05):
+            pushes.append(sign * cf * part + offset)
+    runs = []
+    for push in pushes:
+        runs.append(
+            smc.Scenario(
+                plant="servo_axis",
+                law="none",
+                x0=0.0,
+                disturbance=smc.Constant(push),
+                duration=0.5,
+            )
+        )
     moved = [abs(trace.x[-1, 0]) for trace in smc.run(runs)]
     assert max(moved[0], moved[2]) < 1e-6
     assert min(moved[1], moved[3]) > 1e-4
@@ -222,7 +287,10 @@ def test_friction_of_a_part_is_added_to_that_of_the_plant():
     common = {"law": "none", "v0": 1.0, "duration": 0.4}
     both = smc.plant("servo_axis", cf=base["cf"] + 5.0)
     beside, inside = smc.run(
-        [smc.Scenario(plant="servo_axis", friction=smc.Coulomb(5.0), **common), smc.Scenario(plant=both, **common)]
+        [
+            smc.Scenario(plant="servo_axis", friction=smc.Coulomb(5.0), **common),
+            smc.Scenario(plant=both, **common),
+        ]
     )
     np.testing.assert_allclose(beside.x, inside.x, atol=1e-12)
 
@@ -237,11 +305,17 @@ def test_a_plant_is_smooth_without_any_dry_friction(name):
 @PLANTS
 def test_the_motor_limits_the_command(name):
     limit = {"furuta": 0.05, "servo_axis": 351.507}.get(name, 6.0)
-    assert smc.Scenario(plant=name, law="none").limits == (pytest.approx(limit),) * smc.plant(name).driven
+    assert (
+        smc.Scenario(plant=name, law="none").limits
+        == (pytest.approx(limit),) * smc.plant(name).driven
+    )
 
 
 def test_a_gust_on_the_pole_of_a_turned_arm_is_logged_as_its_torque_about_the_hinge():
-    """Against the force times dp/dq of the pole's centre p, by the formula of its place: F l cos(q) cos(x)."""
+    """Against the force times dp/dq of the pole's centre p, by the formula of its place:
+
+    F l cos(q) cos(x).
+    """
     gust = smc.signals.Gust(0.02, time=-1.0, width=3.0)
     fields = {"law": "none", "x0": (0.8, 0.5), "v0": (3.0, 0.0), "disturbance": gust}
     trace = smc.run(smc.Scenario(plant="furuta", duration=0.3, **fields))

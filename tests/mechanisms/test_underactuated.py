@@ -1,6 +1,7 @@
 """Plants with a joint that no actuator drives, and the law that is for them.
 
-The equations are written again here, as mass matrix and forces; nothing of the plants' own `nominal` is used for them.
+The equations are written again here, as mass matrix and forces; nothing of the plants' own
+`nominal` is used for them.
 """
 
 import dataclasses
@@ -13,6 +14,7 @@ import mujoco
 import numba
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
@@ -20,7 +22,6 @@ from smc_mujoco.control.component import GainWarning
 from smc_mujoco.control.laws.hierarchical import hierarchical
 from smc_mujoco.control.surface import surface as surface_of
 from smc_mujoco.mechanisms.hardware.part import joint_ids
-from helpers import reference
 
 NAMES = ("cart_pole", "overhead_crane")
 PLANTS = pytest.mark.parametrize("name", NAMES)
@@ -30,8 +31,13 @@ LAW = SimpleNamespace(**smc.law("hierarchical").gains)
 
 
 def acceleration(name, p, x, v, u):
-    """(x'', q'') from the Lagrangian: the body's middle lies at x + l sin q, up cos q or down; I about it."""
-    up, inertia = (1.0, p.m * p.l**2 / 3) if name == "cart_pole" else (-1.0, 0.0)
+    """(x'', q'') from the Lagrangian: the body's middle lies at x + l sin q, up cos q or down; I
+    about it.
+    """
+    if name == "cart_pole":
+        up, inertia = (1.0, p.m * p.l**2 / 3)
+    else:
+        up, inertia = (-1.0, 0.0)
     lever = up * p.m * p.l * math.cos(x[1])
     mass = np.array([[p.M + p.m, lever], [lever, p.m * p.l**2 + inertia]])
     swing = up * p.m * p.l * math.sin(x[1])
@@ -41,7 +47,9 @@ def acceleration(name, p, x, v, u):
 
 def changed(name, rng):
     """The plant with every parameter moved by up to 40 %, and with friction."""
-    values = {key: (value or 0.3) * rng.uniform(0.6, 1.4) for key, value in smc.plant(name).parameters.items()}
+    values = {}
+    for key, value in smc.plant(name).parameters.items():
+        values[key] = (value or 0.3) * rng.uniform(0.6, 1.4)
     return smc.plant(name, **values)
 
 
@@ -50,7 +58,9 @@ def scenario(name, law="hierarchical", **fields):
 
 
 def bound(trace):
-    """The largest error of the last fifth, of the cart in m or of what it carries in rad, over the largest x0."""
+    """The largest error of the last fifth, of the cart in m or of what it carries in rad, over the
+    largest x0.
+    """
     assert trace.failure is None
     start = max(map(abs, trace.scenario.resolved.x0))
     return max(each["ultimate_bound"] for each in smc.scores(trace).values()) / start
@@ -72,7 +82,11 @@ def test_the_model_is_its_equation(name):
         model, values = p.load(), SimpleNamespace(**p.parameters)
         data = mujoco.MjData(model)
         for _ in range(20):
-            data.qpos[:], data.qvel[:], data.ctrl[:] = rng.uniform(-2, 2, 2), rng.uniform(-3, 3, 2), rng.uniform(-6, 6)
+            data.qpos[:], data.qvel[:], data.ctrl[:] = (
+                rng.uniform(-2, 2, 2),
+                rng.uniform(-3, 3, 2),
+                rng.uniform(-6, 6),
+            )
             mujoco.mj_forward(model, data)
             expected = acceleration(name, values, data.qpos, data.qvel, data.ctrl[0])
             assert np.abs(data.qacc - expected).max() < 1e-9 * max(1.0, np.abs(expected).max())
@@ -99,7 +113,10 @@ def test_fields_alone_carry_a_parameter_change(name):
     p = changed(name, rng)
     jumped, made = smc.plant(name).load(), p.load()
     for field, at, value, _ in p.fields(jumped, p.values({})):
-        owner = jumped.opt if field.startswith("opt.") else jumped
+        if field.startswith("opt."):
+            owner = jumped.opt
+        else:
+            owner = jumped
         getattr(owner, field.removeprefix("opt."))[at] = value
     for model in (jumped, made):
         data = mujoco.MjData(model)
@@ -125,12 +142,19 @@ def test_the_file_holds_the_default_parameters(name):
     p = smc.plant(name)
     model = p.spec().compile()
     for field, at, value, _ in p.fields(model, p.values({})):
-        owner = model.opt if field.startswith("opt.") else model
+        if field.startswith("opt."):
+            owner = model.opt
+        else:
+            owner = model
         assert np.all(getattr(owner, field.removeprefix("opt."))[at] == np.asarray(value)), field
     np.testing.assert_array_equal(model.key("home").qpos, p.x0)
     assert (model.nv, model.nu, model.nsensor) == (2, 1, 4)
     kinds = {mujoco.mjtJoint.mjJNT_SLIDE: "m", mujoco.mjtJoint.mjJNT_HINGE: "rad"}
-    assert p.units == tuple(kinds[mujoco.mjtJoint(model.jnt_type[joint])] for joint in joint_ids(model)) == ("m", "rad")
+    assert (
+        p.units
+        == tuple(kinds[mujoco.mjtJoint(model.jnt_type[joint])] for joint in joint_ids(model))
+        == ("m", "rad")
+    )
     assert model.body_mass.sum() == pytest.approx(p.parameters["M"] + p.parameters["m"], rel=1e-15)
     assert not model.jnt_limited.any()
     assert not model.dof_armature.any()
@@ -168,7 +192,9 @@ def test_only_the_cart_is_driven_and_disturbed(name):
     for array in (trace.u, trace.applied, trace.s, trace.d):
         assert array[:, 0].any()
         assert not array[:, 1].any()
-    gust = smc.run(scenario(name, disturbance=smc.signals.Gust(0.5, time=0.1, width=0.2), duration=0.5))
+    gust = smc.run(
+        scenario(name, disturbance=smc.signals.Gust(0.5, time=0.1, width=0.2), duration=0.5)
+    )
     assert gust.d[:, 1].any()  # the wind meets the pole, too
 
 
@@ -186,18 +212,27 @@ def test_the_stops_end_the_rail(name):
 
 
 PARTS = {
-    "ideal": {}, "viscous": {"friction": smc.Viscous(0.05)}, "coulomb": {"friction": smc.Coulomb(0.001)},
+    "ideal": {},
+    "viscous": {"friction": smc.Viscous(0.05)},
+    "coulomb": {"friction": smc.Coulomb(0.001)},
     "lugre": {"friction": smc.hardware.LuGre(coulomb=0.001, static=0.0012, stribeck=0.05)},
-    "lag": {"actuator": smc.Lag(0.01)}, "motor": {"actuator": smc.DCMotor()},
+    "lag": {"actuator": smc.Lag(0.01)},
+    "motor": {"actuator": smc.DCMotor()},
     "rate": {"actuator": smc.hardware.RateLimit(200.0)},
-    "backlash": {"actuator": (smc.Lag(0.005), smc.Backlash(0.002))}, "encoder": {"sensor": smc.Encoder(counts=20_000)},
-    "late": {"sensor": smc.Encoder(counts=20_000, bias=1e-3, dropout=0.05, period=2e-3, delay=2e-3)},
+    "backlash": {"actuator": (smc.Lag(0.005), smc.Backlash(0.002))},
+    "encoder": {"sensor": smc.Encoder(counts=20_000)},
+    "late": {
+        "sensor": smc.Encoder(counts=20_000, bias=1e-3, dropout=0.05, period=2e-3, delay=2e-3)
+    },
     "stops": {"contact": "stops"},
-    "noise": {"noise": smc.Noise(1e-3, 1e-2), "disturbance": smc.signals.OrnsteinUhlenbeck(0.1, tau=0.1)},
+    "noise": {
+        "noise": smc.Noise(1e-3, 1e-2),
+        "disturbance": smc.signals.OrnsteinUhlenbeck(0.1, tau=0.1),
+    },
     "gust": {"disturbance": smc.signals.Gust(0.3, time=0.1, width=0.2)},
     "jump": {"jump": smc.Jump(time=0.1, factors={"M": 1.2, "m": 0.8, "l": 1.1, "grav": 1.01})},
     "delay": {"input_delay": 5e-3},
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow
@@ -214,7 +249,10 @@ def test_the_law_settles_both_joints_also_on_the_realistic_mechanism(name):
 
 @pytest.mark.slow
 def test_dry_friction_at_the_hinge_is_not_matched_and_leaves_a_limit_cycle_in_proportion():
-    """Where the pole sticks, by up to level / (m grav l), the cart walks; no gain k on S helps: S is 0 the while."""
+    """Where the pole sticks, by up to level / (m grav l), the cart walks; no gain k on S helps:
+
+    S is 0 the while.
+    """
     levels = np.array([0.001, 0.002, 0.004])
     runs = [scenario("cart_pole", friction=smc.Coulomb(level), duration=20.0) for level in levels]
     traces = smc.run(runs)
@@ -238,7 +276,11 @@ def test_s_is_zero_in_the_time_of_its_reaching_law_and_stays(name):
 
 @PLANTS
 def test_s_chatters_in_proportion_to_the_control_period(name):
-    runs = [scenario(name, u_max=math.inf, control_period=h, physics_step=2e-4, duration=4.0) for h in (8e-3, 2e-3)]
+    runs = []
+    for h in (8e-3, 2e-3):
+        runs.append(
+            scenario(name, u_max=math.inf, control_period=h, physics_step=2e-4, duration=4.0)
+        )
     coarse, fine = (np.abs(surface(trace)[trace.t > 3.0]).max() for trace in smc.run(runs))
     assert coarse / fine == pytest.approx(4.0, rel=0.2)
 
@@ -255,7 +297,9 @@ def test_both_joints_come_to_rest_within_6_newton(name):
 def test_the_load_is_kept_from_swinging_on_the_way_and_at_the_end():
     """In comparison with a law that only brings the trolley to 0, with the same c1."""
     ours = smc.run(scenario("overhead_crane"))
-    trolley = smc.run(scenario("overhead_crane", smc.law("classical", c=LAW.c1, k=1.0), model="none"))
+    trolley = smc.run(
+        scenario("overhead_crane", smc.law("classical", c=LAW.c1, k=1.0), model="none")
+    )
     swing = [np.abs(trace.x[trace.t > 5.0, 1]).max() for trace in (ours, trolley)]
     assert np.abs(ours.x[:, 1]).max() < 0.07
     assert swing[0] < 0.01
@@ -286,7 +330,9 @@ def test_the_wrong_sign_fails(name):
 
 @pytest.mark.slow
 @PLANTS
-@pytest.mark.parametrize("factors", [{"M": 0.8}, {"M": 1.2}, {"m": 0.8}, {"m": 1.2}, {"M": 1.2, "m": 1.2, "l": 1.1}])
+@pytest.mark.parametrize(
+    "factors", [{"M": 0.8}, {"M": 1.2}, {"m": 0.8}, {"m": 1.2}, {"M": 1.2, "m": 1.2, "l": 1.1}]
+)
 def test_masses_off_by_a_fifth_are_borne(name, factors):
     trace = smc.run(scenario(name, mismatch=factors))
     assert bound(trace) <= 0.05
@@ -300,7 +346,9 @@ def test_a_matched_force_is_tolerated_up_to_k_and_beyond_it_s_is_the_rest_over_r
     (_, g), (_, gq) = (p.nominal(np.zeros(2), np.zeros(2), i, values) for i in (0, 1))
     b = abs(LAW.a * g + gq)
     small, large = 0.8 * LAW.k / b, 1.5 * LAW.k / b
-    held, left = smc.run([scenario(name, disturbance=smc.Constant(d), duration=15.0) for d in (small, large)])
+    held, left = smc.run(
+        [scenario(name, disturbance=smc.Constant(d), duration=15.0) for d in (small, large)]
+    )
     assert bound(held) <= 0.05
     assert np.abs(surface(held)[-1000:]).max() <= 3e-3 * LAW.k
     np.testing.assert_allclose(np.abs(surface(left)[-1000:]), 0.5 * LAW.k / LAW.rate, rtol=0.02)
@@ -315,7 +363,9 @@ ROUTH = [  # a L, c1, c2
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "gains"), list(zip(itertools.cycle(NAMES), ROUTH)))
 def test_the_motion_on_the_surface_is_stable_exactly_where_its_roots_say(name, gains):
-    """S -> 0 does not suffice: with gains beyond the condition S stays at 0 while both joints run away."""
+    """S -> 0 does not suffice: with gains beyond the condition S stays at 0 while both joints run
+    away.
+    """
     aL, c1, c2 = gains
     L = LENGTH[name]
     a = aL / abs(L)
@@ -345,7 +395,9 @@ def test_without_the_model_it_brings_the_crane_in_and_drops_the_pole():
 def test_a_law_that_drops_the_pole_settles_nothing_in_a_study(tmp_path):
     """It may hold the cart meanwhile, where hierarchical moves it to catch the pole."""
     laws = "hierarchical", "super_twisting"
-    table = smc.study([smc.Scenario(plant="cart_pole", law=law, duration=8.0) for law in laws], tmp_path)
+    table = smc.study(
+        [smc.Scenario(plant="cart_pole", law=law, duration=8.0) for law in laws], tmp_path
+    )
     assert smc.scores(table.trace(1))["driven"]["settling_time"] < 8.0
     assert table.column("settling_time")[0] < 8.0
     assert table.column("settling_time")[1] == math.inf
@@ -368,7 +420,9 @@ def test_a_reference_moves_the_cart_and_the_joint_that_goes_with_it_stays():
 @PLANTS
 def test_the_cart_s_surface_may_be_the_scenario_s(name):
     """The linear one with the same c gives the same run, to the last bit."""
-    own, given = smc.run([scenario(name, surface=s) for s in (None, surface_of("linear", c=LAW.c1))])
+    own, given = smc.run(
+        [scenario(name, surface=s) for s in (None, surface_of("linear", c=LAW.c1))]
+    )
     np.testing.assert_array_equal(own.x, given.x)
     other = smc.run(scenario(name, surface=surface_of("linear", c=0.9 * LAW.c1)))
     assert bound(other) <= 0.05
@@ -392,7 +446,9 @@ def test_friction_of_the_parameters_is_that_of_the_part():
 def test_runs_of_one_batch_may_differ_in_every_parameter():
     for name in NAMES:
         base = smc.plant(name)
-        plants = [smc.plant(name, **{key: 1.3 * value or 0.2}) for key, value in base.parameters.items()]
+        plants = []
+        for key, value in base.parameters.items():
+            plants.append(smc.plant(name, **{key: 1.3 * value or 0.2}))
         runs = [scenario(p, duration=0.1) for p in plants]
         for run, trace in zip(runs, smc.run(runs), strict=True):
             other = reference.run(run)
@@ -403,4 +459,9 @@ def test_runs_of_one_batch_may_differ_in_every_parameter():
 
 def test_obstacles_on_the_rail_do_not_ask_for_a_length_of_the_pole():
     plant = smc.plant("cart_pole", l=0.6)
-    assert smc.run(smc.Scenario(plant=plant, law="hierarchical", contact="stops", duration=0.05)).failure is None
+    assert (
+        smc.run(
+            smc.Scenario(plant=plant, law="hierarchical", contact="stops", duration=0.05)
+        ).failure
+        is None
+    )

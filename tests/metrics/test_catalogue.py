@@ -59,8 +59,12 @@ def run(t, x=0.0, *, r=0.0, u=0.0, s=0.0, v=0.0, reaction=0.0, units=(), free=Fa
     x, r, u, s, v, reaction = (np.broadcast_to(a, (t.size, n)) for a in columns)
     zero = np.zeros((t.size, n))
     units = units or ("m",) * n
-    mixed = dataclasses.replace(plant("cart_pole"), name="duffing", unit=units[0], mixed=units, n=n, underactuated=free)
-    scenario = SimpleNamespace(plant=mixed, efforts=mixed.efforts, law=SimpleNamespace(name="classical"))
+    mixed = dataclasses.replace(
+        plant("cart_pole"), name="duffing", unit=units[0], mixed=units, n=n, underactuated=free
+    )
+    scenario = SimpleNamespace(
+        plant=mixed, efforts=mixed.efforts, law=SimpleNamespace(name="classical")
+    )
     more = {"force": u, "reaction": reaction, "scenario": scenario} | fields
     return Run(t=t, x=x, v=v, u=u, applied=u, s=s, d=zero, r=r, **more)
 
@@ -85,7 +89,8 @@ STOPS = np.array([1, 0, 1, 0, 0, 1, 0, 0])  # a speed: at rest from sample 3 to 
 BOTH = np.column_stack([STOPS, np.ones(8)])
 LONG = clock(10, 1e-2)
 STOPPED = np.where(LONG < 2, 1.0, 1e-3)
-BY_HAND = [  # metric, its value, of a run with these signals, at t = 0, 1, 2, ... s if t is not given
+# metric, its value, of a run with these signals, at t = 0, 1, 2, ... s if t is not given
+BY_HAND = [
     (m.settling_time, 4.0, {"x": [1, 0, 0, 0.5, 0, 0]}, "the last exit counts, not the first entry"),
     (m.settling_time, 4.0, {"t": np.arange(7, 13), "x": [1, 0, 0, 0.5, 0, 0]}, "time counts from the first sample"),
     (m.settling_time, 1.0, {"x": [100, 2, -2]}, "the band is closed"),
@@ -142,10 +147,14 @@ BY_HAND = [  # metric, its value, of a run with these signals, at t = 0, 1, 2, .
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("metric", "value", "signals", "words"), BY_HAND, ids=[row[-1] for row in BY_HAND])
+@pytest.mark.parametrize(
+    ("metric", "value", "signals", "words"), BY_HAND, ids=[row[-1] for row in BY_HAND]
+)
 def test_a_few_samples_have_the_value_that_a_hand_finds(metric, value, signals, words):
     samples = max(np.shape(signal)[0] for signal in signals.values() if np.shape(signal))
-    assert metric(run(**{"t": np.arange(samples)} | signals)) == pytest.approx(value, rel=1e-12), words
+    assert metric(run(**{"t": np.arange(samples)} | signals)) == pytest.approx(value, rel=1e-12), (
+        words
+    )
 
 
 # Settling, rise, overshoot
@@ -154,7 +163,10 @@ def test_a_few_samples_have_the_value_that_a_hand_finds(metric, value, signals, 
 def test_a_slowly_moving_reference_is_one_approach():
     t = clock(10, 1e-3)
     r = np.sin(t)
-    tracking, regulating = run(t, r + np.exp(-t) * np.cos(3 * t), r=r), run(t, np.exp(-t) * np.cos(3 * t))
+    tracking, regulating = (
+        run(t, r + np.exp(-t) * np.cos(3 * t), r=r),
+        run(t, np.exp(-t) * np.cos(3 * t)),
+    )
     assert scale(tracking) == pytest.approx(2.0, rel=1e-6)  # the range of r exceeds |e(0)| = 1
     assert 2.0 * m.overshoot(tracking) == pytest.approx(m.overshoot(regulating), rel=1e-6)
 
@@ -214,15 +226,45 @@ def alternating(t):
 
 SECOND, ODD, SLOWLY = clock(1, 1e-3), np.arange(1002) / 1001, clock(10, 0.01)
 HF_SHARES = [  # share of the power, u over t, and why
-    (0.1, SECOND, lambda t: 7.0 + tone(t, 20, 3.0) + tone(t, 120), "two sines have their shares, whatever the mean"),
+    (
+        0.1,
+        SECOND,
+        lambda t: 7.0 + tone(t, 20, 3.0) + tone(t, 120),
+        "two sines have their shares, whatever the mean",
+    ),
     (0.1, ODD, lambda t: 7.0 + tone(t, 20, 3.0) + tone(t, 120), "also of an odd number of samples"),
     (1.0, SECOND, lambda t: tone(t, 51), "all is above 50 Hz"),
     (0.0, SECOND, lambda t: tone(t, 50), "50 Hz itself is not"),
-    (0.0, 1000.1 + clock(0.3, 1e-3), lambda t: tone(t, 50), "where 15 periods over the time are 50 + 6e-12 Hz"),
-    (2 / 3, SECOND, lambda t: alternating(t) + tone(t, 10), "power 1 at half the sampling rate counts once"),
-    (1 / 2, ODD, lambda t: tone(t, 500) + tone(t, 10), "the highest frequency of an odd number of samples counts"),
-    (0.1, SECOND, lambda t: np.column_stack([tone(t, 10, 3.0), tone(t, 100)]), "channels are pooled"),
-    (0.0, SECOND, lambda t: np.column_stack([tone(t, 10, 3.0), 1e-17 * alternating(t)]), "with one at rest"),
+    (
+        0.0,
+        1000.1 + clock(0.3, 1e-3),
+        lambda t: tone(t, 50),
+        "where 15 periods over the time are 50 + 6e-12 Hz",
+    ),
+    (
+        2 / 3,
+        SECOND,
+        lambda t: alternating(t) + tone(t, 10),
+        "power 1 at half the sampling rate counts once",
+    ),
+    (
+        1 / 2,
+        ODD,
+        lambda t: tone(t, 500) + tone(t, 10),
+        "the highest frequency of an odd number of samples counts",
+    ),
+    (
+        0.1,
+        SECOND,
+        lambda t: np.column_stack([tone(t, 10, 3.0), tone(t, 100)]),
+        "channels are pooled",
+    ),
+    (
+        0.0,
+        SECOND,
+        lambda t: np.column_stack([tone(t, 10, 3.0), 1e-17 * alternating(t)]),
+        "with one at rest",
+    ),
     (0.0, SECOND, lambda t: np.full(t.size, 0.1), "a constant has none"),
     (0.0, SECOND, lambda t: 3.0 + tone(t, 100, 1.2e-12), "nor has rounding, of a range of 0.8e-12"),
     (1.0, SECOND, lambda t: 3.0 + tone(t, 100, 1.8e-12), "a range of 1.2e-12 is more"),
@@ -230,9 +272,13 @@ HF_SHARES = [  # share of the power, u over t, and why
 ]
 
 
-@pytest.mark.parametrize(("share", "t", "u", "words"), HF_SHARES, ids=[row[-1] for row in HF_SHARES])
+@pytest.mark.parametrize(
+    ("share", "t", "u", "words"), HF_SHARES, ids=[row[-1] for row in HF_SHARES]
+)
 def test_hf_share(share, t, u, words):
-    assert m.hf_share(run(t, u=u(t))) == pytest.approx(share, abs=0.01 if "1.2e-12" in words else 1e-9)
+    assert m.hf_share(run(t, u=u(t))) == pytest.approx(
+        share, abs=0.01 if "1.2e-12" in words else 1e-9
+    )
 
 
 # The sliding variable and the network
@@ -296,7 +342,9 @@ def test_what_creeps_or_decays_does_not_hunt():
     t = clock(10, 1e-3)
     for x in (np.exp(-t), 0.45e-6 * np.sin(20 * t) + (t < 1), 0.2 + 0.01 * t, np.ones(t.size)):
         assert m.reversal_rate(run(t, x)) == 0.0
-    assert m.reversal_rate(run(t, 0.55e-6 * np.sin(20 * t) + (t < 1))) > 5.0  # its ripple is above 1e-6 of the scale
+    assert (
+        m.reversal_rate(run(t, 0.55e-6 * np.sin(20 * t) + (t < 1))) > 5.0
+    )  # its ripple is above 1e-6 of the scale
 
 
 def test_reversals_are_those_of_the_channel_that_hunts_fastest():
@@ -308,7 +356,9 @@ def test_reversals_are_those_of_the_channel_that_hunts_fastest():
 # Against python-control
 
 
-@pytest.mark.parametrize(("zeta", "omega"), [(0.1, 5.0), (0.3, 1.0), (0.7, 5.0), (0.9, 5.0), (1.0, 5.0), (1.5, 5.0)])
+@pytest.mark.parametrize(
+    ("zeta", "omega"), [(0.1, 5.0), (0.3, 1.0), (0.7, 5.0), (0.9, 5.0), (1.0, 5.0), (1.5, 5.0)]
+)
 def test_step_response_agrees_with_python_control(zeta, omega):
     h = 1e-3
     t = clock(60 / omega, h)
@@ -328,7 +378,9 @@ def test_score_has_every_metric_and_the_sync_metrics_for_networks_only():
     t = clock(1, 1e-2)
     names = [metric.name for metric in m.metrics()]
     assert list(m.score(run(t, np.cos(t)))) == [name for name in names if name not in SYNC]
-    network = run(t, np.column_stack([np.cos(t), np.sin(t)]), u=np.column_stack([np.sin(90 * t), t]), s=0.5)
+    network = run(
+        t, np.column_stack([np.cos(t), np.sin(t)]), u=np.column_stack([np.sin(90 * t), t]), s=0.5
+    )
     assert list(m.score(network)) == names
     assert m.score(network) == {name: getattr(m, name)(network) for name in names}
     assert all(type(value) is float for value in m.score(network).values())
@@ -339,19 +391,33 @@ def cart_and_pole():
     x = np.array([[1.0, 0.5, 0.0, 0.0, 0.0], [0.1, -0.05, 0.01, 0.0015, 0.001]]).T
     u = np.array([[3.0, -1.0, 0.0, 0.0, 0.0], [0.0] * 5]).T
     t = np.arange(5) / 10
-    return run(t, x, u=u, v=np.gradient(x, t, axis=0), reaction=[[0.5, 0.2]] * 5, units=("m", "rad"), free=True)
+    return run(
+        t,
+        x,
+        u=u,
+        v=np.gradient(x, t, axis=0),
+        reaction=[[0.5, 0.2]] * 5,
+        units=("m", "rad"),
+        free=True,
+    )
 
 
 def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
     trace, alone = cart_and_pole(), []
     for i in (0, 1):
-        columns = {name: getattr(trace, name)[:, [i]] for name in ("x", "v", "u", "s", "r", "reaction")}
-        alone.append(m.score(run(trace.t, columns.pop("x"), units=("m", "rad")[i : i + 1], **columns)))
+        columns = {}
+        for name in ("x", "v", "u", "s", "r", "reaction"):
+            columns[name] = getattr(trace, name)[:, [i]]
+        alone.append(
+            m.score(run(trace.t, columns.pop("x"), units=("m", "rad")[i : i + 1], **columns))
+        )
     found = m.scores(trace)
     assert list(found) == ["driven", "free"]
     assert found["driven"] == alone[0]
     commanded = [metric.name for metric in m.metrics() if metric.command]
-    assert found["free"] == {name: value for name, value in alone[1].items() if name not in commanded}
+    assert found["free"] == {
+        name: value for name, value in alone[1].items() if name not in commanded
+    }
     assert (found["driven"]["settling_time"], found["free"]["settling_time"]) == (0.2, 0.3)
     assert (found["driven"]["overshoot"], found["free"]["overshoot"]) == (0.0, pytest.approx(50.0))
 
@@ -359,7 +425,9 @@ def test_driven_channels_and_free_joints_are_scored_as_if_each_were_alone():
 def test_what_u_or_s_changes_is_of_the_command():
     t = clock(1, 1e-3)
     still = {"t": t, "x": np.cos(t), "force": np.zeros((t.size, 1))}
-    scores = m.score(run(**still, u=np.sin(600 * t) * (2 - t), s=np.exp(-9 * t) + 0.01 * np.sin(60 * t)))
+    scores = m.score(
+        run(**still, u=np.sin(600 * t) * (2 - t), s=np.exp(-9 * t) + 0.01 * np.sin(60 * t))
+    )
     changed = {name for name, value in m.score(run(**still)).items() if value != scores[name]}
     assert changed == {metric.name for metric in m.metrics() if metric.command}
 
@@ -368,9 +436,15 @@ def test_scores_are_the_worst_of_cart_and_pole_and_those_with_a_unit_the_carts()
     trace = cart_and_pole()
     found, ours = m.scores(trace), m.score(trace)
     of_both = {"settling_time", "rise_time", "overshoot", "stick_time", "reversal_rate"}
-    assert {name for name in ours if ours[name] != found["driven"][name]} - CYCLE == {"settling_time", "overshoot"}
+    assert {name for name in ours if ours[name] != found["driven"][name]} - CYCLE == {
+        "settling_time",
+        "overshoot",
+    }
     for name, value in ours.items():
-        whose = max(found[group][name] for group in found) if name in of_both else found["driven"][name]
+        if name in of_both:
+            whose = max(found[group][name] for group in found)
+        else:
+            whose = found["driven"][name]
         assert value is getattr(m, name)(trace) or value == getattr(m, name)(trace) == whose, name
 
 
@@ -386,29 +460,47 @@ def test_a_cart_with_its_pole_is_no_network():
     assert not SYNC & set(m.score(trace))
     assert not SYNC & set(m.scores(trace)["free"])
     for name in SYNC:
-        with pytest.raises(ScenarioError, match=f"{name} compares channels and duffing has one of a kind"):
+        with pytest.raises(
+            ScenarioError, match=f"{name} compares channels and duffing has one of a kind"
+        ):
             getattr(m, name)(trace)
 
 
 def test_carts_with_poles_side_by_side_are_compared_each_with_its_kind():
-    trace = run(np.arange(2.0), np.array([[0.0, 1.0, 0.2, 0.5]] * 2), units=("m", "m", "rad", "rad"), free=True)
+    trace = run(
+        np.arange(2.0),
+        np.array([[0.0, 1.0, 0.2, 0.5]] * 2),
+        units=("m", "m", "rad", "rad"),
+        free=True,
+    )
     assert m.spread_bound(trace) == 1.0
     assert m.scores(trace)["free"]["spread_bound"] == pytest.approx(0.3)
 
 
 def test_driven_channels_in_two_units_have_the_worst_time_and_no_number_in_either_unit():
     t = np.arange(5.0)
-    arm = run(t, np.array([[10, 1, 0, 0, 0], [0.1, 0.1, 0.1, 0, 0], [0.05, 0, 0, 0, 0]]).T, units=("m", "rad", "rad"))
+    arm = run(
+        t,
+        np.array([[10, 1, 0, 0, 0], [0.1, 0.1, 0.1, 0, 0], [0.05, 0, 0, 0, 0]]).T,
+        units=("m", "rad", "rad"),
+    )
     found, ours = m.score(arm), m.scores(arm)
     assert list(ours) == ["driven m", "driven rad"]
-    assert found["settling_time"] == ours["driven rad"]["settling_time"] == 3.0 > ours["driven m"]["settling_time"]
+    assert (
+        found["settling_time"]
+        == ours["driven rad"]["settling_time"]
+        == 3.0
+        > ours["driven m"]["settling_time"]
+    )
     assert "ultimate_bound" not in found
     assert (ours["driven m"]["peak"], ours["driven rad"]["peak"]) == (10.0, 0.1)
     assert not SYNC & {*ours["driven m"]}
     assert {*ours["driven rad"]} > SYNC  # a slide and two hinges, which can be compared
     assert found["mean_settling_time"] == ours["driven rad"]["mean_settling_time"]
     for name in ("peak", "itae", "tv", "spread_bound"):
-        with pytest.raises(ScenarioError, match=rf"{name} has no one value .* in m and rad, .*: use smc.scores"):
+        with pytest.raises(
+            ScenarioError, match=rf"{name} has no one value .* in m and rad, .*: use smc.scores"
+        ):
             getattr(m, name)(arm)
 
 
@@ -519,7 +611,11 @@ def test_the_limit_cycle_of_the_worst_channel_is_scored_and_its_absence_is_nan()
 def test_scoring_keeps_no_trace_and_looks_once_in_each_group(monkeypatch):
     t, asked = np.arange(2001) / 100, []
     both = run(t, np.zeros((len(t), 2)), s=np.sin(60 * t)[:, None] * np.ones(2), units=("m", "rad"))
-    monkeypatch.setattr(limit_cycle, "channel_cycle", lambda trace, channel: asked.append(trace.s.shape) or (0.1, 10.0))
+    monkeypatch.setattr(
+        limit_cycle,
+        "channel_cycle",
+        lambda trace, channel: asked.append(trace.s.shape) or (0.1, 10.0),
+    )
     m.scores(both)
     m.score(both)
     assert len(asked) == 4  # two groups, scored twice
@@ -538,7 +634,9 @@ WHOLE = st.integers(-1000, 1000)
 def random_runs(draw):
     """Whole-number signals, so that scaling by a power of two and adding an offset are exact."""
     n, samples = draw(st.integers(1, 4)), draw(st.integers(2, 30))
-    block = st.lists(st.lists(WHOLE, min_size=n, max_size=n), min_size=samples, max_size=samples).map(np.array)
+    block = st.lists(
+        st.lists(WHOLE, min_size=n, max_size=n), min_size=samples, max_size=samples
+    ).map(np.array)
     x, u, s = draw(block), draw(block), draw(block)
     r = np.where(np.arange(samples)[:, None] < draw(st.integers(0, samples)), 0, draw(WHOLE))
     if draw(st.booleans()):
@@ -556,7 +654,9 @@ def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentage
     before = m.score(trace)
     after = m.score(dataclasses.replace(trace, x=c * trace.x, r=c * trace.r, u=k * trace.u))
     for metric in m.metrics():
-        power, of_u = (2 if f"({one})^2" in metric.unit else int(one in metric.unit) for one in ("{x}", "{u}"))
+        power, of_u = (
+            2 if f"({one})^2" in metric.unit else int(one in metric.unit) for one in ("{x}", "{u}")
+        )
         if metric.name in before:
             factor = abs(c) ** power * abs(k) ** of_u
             value = pytest.approx(factor * before[metric.name], rel=1e-12, abs=1e-12, nan_ok=True)
@@ -569,8 +669,12 @@ def test_scaling_x_or_u_scales_what_has_its_unit_and_leaves_times_and_percentage
 def test_permuting_channels_changes_nothing(trace, random):
     order = list(range(trace.x.shape[1]))
     random.shuffle(order)
-    shuffled = {name: getattr(trace, name)[:, order] for name in ("x", "v", "u", "applied", "s", "d", "r", "reaction")}
-    assert m.score(dataclasses.replace(trace, **shuffled)) == pytest.approx(m.score(trace), rel=1e-12, nan_ok=True)
+    shuffled = {}
+    for name in ("x", "v", "u", "applied", "s", "d", "r", "reaction"):
+        shuffled[name] = getattr(trace, name)[:, order]
+    assert m.score(dataclasses.replace(trace, **shuffled)) == pytest.approx(
+        m.score(trace), rel=1e-12, nan_ok=True
+    )
 
 
 @pytest.mark.slow

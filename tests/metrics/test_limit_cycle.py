@@ -18,7 +18,10 @@ def wave(frequency, amplitude=0.3, phase=0.3):
 
 
 def test_what_is_kept_for_a_trace_is_known_by_the_function_that_computes_it():
-    assert (largest_cycle.__name__, largest_cycle.__module__) == ("largest_cycle", limit_cycle.__module__)
+    assert (largest_cycle.__name__, largest_cycle.__module__) == (
+        "largest_cycle",
+        limit_cycle.__module__,
+    )
     assert largest_cycle.__wrapped__.__code__.co_name == "largest_cycle"
 
 
@@ -36,7 +39,9 @@ def test_a_wave_of_two_samples_is_found():
 def test_a_cycle_of_two_samples_on_a_decay_is_found_without_a_warning():
     t = T[:679]
     with np.errstate(all="raise"):
-        assert limit_cycle(t, np.exp(-100.0 * t) + 1e-5 * (-1.0) ** np.arange(len(t))) == pytest.approx((1e-5, 500.0))
+        assert limit_cycle(
+            t, np.exp(-100.0 * t) + 1e-5 * (-1.0) ** np.arange(len(t))
+        ) == pytest.approx((1e-5, 500.0))
 
 
 SHAPES = {
@@ -50,9 +55,17 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_the_first_harmonic_counts_where_a_higher_one_is_larger_in_the_rate(shape):
-    for frequency, noise in ((3.1, 0.01), (7.25, 0.0), (7.25, 0.01), (19.37, 0.01), (81.4, 0.01)):  # 7.25: between bins
+    for frequency, noise in (
+        (3.1, 0.01),
+        (7.25, 0.0),
+        (7.25, 0.01),
+        (19.37, 0.01),
+        (81.4, 0.01),
+    ):  # 7.25: between bins
         wave = SHAPES[shape](math.tau * frequency * T + 0.3)
-        amplitude, found = limit_cycle(T, wave + noise * np.random.default_rng(0).normal(size=len(T)))
+        amplitude, found = limit_cycle(
+            T, wave + noise * np.random.default_rng(0).normal(size=len(T))
+        )
         assert found == pytest.approx(frequency, rel=1e-3)
         assert amplitude == pytest.approx(1.0, rel=0.1)
 
@@ -84,13 +97,32 @@ def test_slow_waves_and_drifts_do_not_count():
 @pytest.mark.parametrize(
     "s",
     [
-        np.zeros(len(T)), np.exp(-3.0 * T), np.exp(-3.0 * T) * np.sin(60.0 * T), np.exp(3.0 * T) * np.sin(60.0 * T),
-        0.5 * np.sin(6.0 * T), (2.0 / math.pi) * np.arcsin(np.sin(math.tau * 2.0 * T)),
-        np.random.default_rng(0).normal(size=len(T)), 1.0 + 1e-12 * wave(30.0),
-        np.where(T < 1.0, wave(30.0), math.nan), wave(30.0)[:10], 1e160 * wave(30.0),
+        np.zeros(len(T)),
+        np.exp(-3.0 * T),
+        np.exp(-3.0 * T) * np.sin(60.0 * T),
+        np.exp(3.0 * T) * np.sin(60.0 * T),
+        0.5 * np.sin(6.0 * T),
+        (2.0 / math.pi) * np.arcsin(np.sin(math.tau * 2.0 * T)),
+        np.random.default_rng(0).normal(size=len(T)),
+        1.0 + 1e-12 * wave(30.0),
+        np.where(T < 1.0, wave(30.0), math.nan),
+        wave(30.0)[:10],
+        1e160 * wave(30.0),
     ],
-    ids=["zero", "decay", "dying", "growing", "slow", "slow triangle", "noise", "rounding", "broken", "short", "huge"],
-)  # fmt: skip
+    ids=[
+        "zero",
+        "decay",
+        "dying",
+        "growing",
+        "slow",
+        "slow triangle",
+        "noise",
+        "rounding",
+        "broken",
+        "short",
+        "huge",
+    ],
+)
 def test_what_does_not_oscillate_steadily_has_no_limit_cycle(s):
     amplitude, frequency = limit_cycle(T[: len(s)], s)
     assert math.isnan(amplitude)
@@ -108,7 +140,12 @@ def test_a_group_without_a_limit_cycle_hides_no_other_and_units_do_not_mix(laws,
     motors = {name: smc.Channel(motor=True) for name in "AB"}
     plant = smc.plant_from(str(tmp_path / "two.xml"), motors)
     scenario = smc.Scenario(
-        plant=plant, law=[smc.law(law) for law in laws], x0=0.3, u_max=6.0, duration=6.0, input_delay=0.005
+        plant=plant,
+        law=[smc.law(law) for law in laws],
+        x0=0.3,
+        u_max=6.0,
+        duration=6.0,
+        input_delay=0.005,
     )
     trace = smc.run(scenario)
     of_group, whole = smc.scores(trace), smc.score(trace)

@@ -16,7 +16,9 @@ from smc_mujoco.metrics import tip
 @pytest.fixture(scope="module")
 def trace():
     law = smc.law("computed_torque_sliding", c=8.0)
-    return smc.run(smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, duration=0.5))
+    return smc.run(
+        smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, duration=0.5)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +27,9 @@ def pressed():
     law, path = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2), tasks.wall_path()
     start = tuple(signal.values[0] for signal in path)
     wall = smc.Contact("wall", friction=0.0)
-    return smc.run(smc.Scenario(plant="panda", law=law, reference=path, x0=start, contact=wall, duration=0.9))
+    return smc.run(
+        smc.Scenario(plant="panda", law=law, reference=path, x0=start, contact=wall, duration=0.9)
+    )
 
 
 def test_tip_scores_are_of_the_distance_in_space(trace):
@@ -42,20 +46,30 @@ def test_tip_scores_are_of_the_distance_in_space(trace):
 
     away = np.linalg.norm(places(trace.x) - places(trace.r), axis=1)
     found = smc.metrics.tip_scores(trace)
-    expected = {"max_error": away.max(), "rms_error": np.sqrt(np.mean(away**2)), "last_error": away[-1]}
+    expected = {
+        "max_error": away.max(),
+        "rms_error": np.sqrt(np.mean(away**2)),
+        "last_error": away[-1],
+    }
     assert found == pytest.approx(expected, rel=1e-12)
     assert away.max() > 0.05
 
 
 def test_the_actual_tip_is_that_of_the_true_plant(trace):
-    """An arm whose last link's length is a parameter: a jump of it moves the actual tip, not the wanted one."""
+    """An arm whose last link's length is a parameter: a jump of it moves the actual tip, not the
+    wanted one.
+    """
 
     def fields(model, p):
         yield from trace.scenario.plant.fields(model, p)
-        yield Field("site_pos", model.site("tip").id, model.site_pos[model.site("tip").id] * p.share)
+        yield Field(
+            "site_pos", model.site("tip").id, model.site_pos[model.site("tip").id] * p.share
+        )
 
     plant = dataclasses.replace(
-        trace.scenario.plant, fields=fields, parameters=dict(trace.scenario.plant.parameters) | {"share": 1.0}
+        trace.scenario.plant,
+        fields=fields,
+        parameters=dict(trace.scenario.plant.parameters) | {"share": 1.0},
     )
     longer = dataclasses.replace(trace.scenario, plant=plant, jump=smc.Jump(0.25, {"share": 1.1}))
     actual, wanted = tip.tip_paths(dataclasses.replace(trace, scenario=longer))
@@ -71,20 +85,29 @@ def test_joint_scores_are_each_joints_own(trace):
     for i, scores in enumerate(found.values()):
         power = np.abs(trace.force[:, i] * trace.v[:, i])
         assert scores["max_u"] == np.abs(trace.u[:, i]).max()
-        assert scores["ultimate_bound"] <= smc.scores(trace)["driven m" if i == 0 else "driven rad"]["ultimate_bound"]
+        assert (
+            scores["ultimate_bound"]
+            <= smc.scores(trace)["driven m" if i == 0 else "driven rad"]["ultimate_bound"]
+        )
         assert scores["peak_power"] == power.max()
-        assert scores["work"] == pytest.approx(np.sum((power[1:] + power[:-1]) / 2 * np.diff(trace.t)))
+        assert scores["work"] == pytest.approx(
+            np.sum((power[1:] + power[:-1]) / 2 * np.diff(trace.t))
+        )
 
 
 def test_contact_forces_are_those_that_the_joints_feel(pressed):
-    """Without friction the reactions of the joints are -A' f, with A the tip's Jacobian along the wall's normal."""
+    """Without friction the reactions of the joints are -A' f, with A the tip's Jacobian along the
+    wall's normal.
+    """
     found, plant = tip.contacts(pressed), pressed.scenario.plant
     for k in (400, 600, 900):
         A = plant.nominal.jacobian(pressed.x[k], plant.values({}), plant.tip)[0]
         felt = -(A @ pressed.reaction[k]) / (A @ A)
         np.testing.assert_allclose(pressed.reaction[k], -A * felt, atol=0.05)
         assert found.force[k] == pytest.approx(felt, rel=5e-3)
-        np.testing.assert_allclose(found.push[k], [-found.force[k], 0.0, 0.0], atol=1e-6)  # away from the wall
+        np.testing.assert_allclose(
+            found.push[k], [-found.force[k], 0.0, 0.0], atol=1e-6
+        )  # away from the wall
 
 
 def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
@@ -92,7 +115,9 @@ def test_contact_forces_are_those_under_the_runs_disturbance_and_motor():
     push = smc.Push("cart", x=4.0, time=1.0, width=2.0)  # largest at 2 s; it is in d
     pushed = {"feedforward": smc.Constant(4.0), "disturbance": (smc.Constant(4.0), push)}
     motor = smc.DCMotor(inductance=0.0)
-    cart = smc.Scenario(plant="duffing", law="none", contact="stops", x0=0.5, duration=2.0, actuator=motor, **pushed)
+    cart = smc.Scenario(
+        plant="duffing", law="none", contact="stops", x0=0.5, duration=2.0, actuator=motor, **pushed
+    )
     trace = smc.run(cart)
     assert tip.contacts(trace).force[-1] == pytest.approx(-trace.reaction[-1, 0], rel=0.01)
     assert trace.reaction[-1, 0] < -1.0
@@ -138,7 +163,11 @@ def test_contact_forces_end_with_a_failure(pressed, tmp_path, monkeypatch):
 def test_contact_forces_are_unknown_behind_parts_with_a_state(pressed, refused):
     for part in (smc.Lag(0.01), smc.Backlash(0.01)):
         refused(lambda part=part: tip.contacts(changed(pressed, actuator=part)))
-        assert set(smc.metrics.tip_scores(changed(pressed, actuator=part))) == {"max_error", "rms_error", "last_error"}
+        assert set(smc.metrics.tip_scores(changed(pressed, actuator=part))) == {
+            "max_error",
+            "rms_error",
+            "last_error",
+        }
 
 
 LIFTED = """
@@ -156,8 +185,12 @@ def test_joints_without_a_channel_are_where_they_start():
     """A lift holds the arm 0.7 m higher than the model's qpos0, also for inverse kinematics."""
     plant = smc.plant_from(LIFTED, channels=["turn"], keyframe="up", name="lifted", tip="tip")
     np.testing.assert_allclose(tip.tip_path(plant, np.zeros((1, 1))), [[0.5, 0.0, 1.0]])
-    (turn,) = smc.signals.cartesian_path(plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5])
-    np.testing.assert_allclose(tip.tip_path(plant, np.array([[turn.values[-1]]])), [[0.4, 0.0, 1.3]], atol=1e-6)
+    (turn,) = smc.signals.cartesian_path(
+        plant, (0, 1), [(0.4, 0.0, 1.3)] * 2, site="tip", x0=[-0.5]
+    )
+    np.testing.assert_allclose(
+        tip.tip_path(plant, np.array([[turn.values[-1]]])), [[0.4, 0.0, 1.3]], atol=1e-6
+    )
 
 
 def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
@@ -170,14 +203,23 @@ def test_hybrid_law_presses_with_its_force_while_the_tip_slides(pressed):
     assert 0.0 < scores["depth"] < 1e-3
     assert scores["max_error"] < 2e-3
     assert np.ptp(tip.tip_path(pressed.scenario.plant, pressed.x)[:, 1]) > 0.02
-    assert smc.metrics.tip_scores(pressed, force=10.0)["force_error"] == pytest.approx(100.0, abs=2.0)
+    assert smc.metrics.tip_scores(pressed, force=10.0)["force_error"] == pytest.approx(
+        100.0, abs=2.0
+    )
 
 
 def test_rubbing_on_the_wall_does_not_change_the_force():
-    """Its torque is in the directions of sliding, where the sliding mode answers it, and presses no more for it."""
+    """Its torque is in the directions of sliding, where the sliding mode answers it, and presses no
+    more for it.
+    """
     path = tasks.wall_path()
-    law, start = smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2), tuple(one.values[0] for one in path)
-    rough = smc.Scenario(plant="panda", law=law, reference=path, x0=start, contact="wall", duration=1.4)
+    law, start = (
+        smc.law("hybrid_sliding", force=20.0, c=15.0, k=40.0, width=0.2),
+        tuple(one.values[0] for one in path),
+    )
+    rough = smc.Scenario(
+        plant="panda", law=law, reference=path, x0=start, contact="wall", duration=1.4
+    )
     late = tip.contacts(smc.run(rough)).force[-400:]
     assert late.mean() == pytest.approx(20.0, rel=0.02)
 

@@ -1,14 +1,16 @@
-"""Levant's orders of accuracy, measured in runs: under noise of size eps, and in the sampling period h.
+"""Levant's orders of accuracy, measured in runs: under noise of size eps, and in the sampling
+period h.
 
-An r-sliding law with Levant's differentiator keeps |s^(i)| = O(eps^((r-i)/r)) and O(h^(r-i)), i = 0 .. r-1 (A. Levant,
-Int. J. Control 76:924, 2003, whose abstract, "up to the rth order of sliding precision with respect to the sampling
-interval", could be read; 1993, Int. J. Control 58:1247, for r = 2: "proportional to the square of the switching time
-delay"). A differentiator of order n errs in the i-th derivative by O(eps^((n+1-i)/(n+1))) (Automatica 34:379, 1998;
-2003).
+An r-sliding law with Levant's differentiator keeps |s^(i)| = O(eps^((r-i)/r)) and O(h^(r-i)), i = 0
+.. r-1 (A. Levant, Int. J. Control 76:924, 2003, whose abstract, "up to the rth order of sliding
+precision with respect to the sampling interval", could be read; 1993, Int. J. Control 58:1247, for
+r = 2: "proportional to the square of the switching time delay"). A differentiator of order n errs
+in the i-th derivative by O(eps^((n+1-i)/(n+1))) (Automatica 34:379, 1998; 2003).
 
-The bounds are for the worst noise. White noise sampled at one fixed period is not the worst for every eps, since more
-samples of it average out where the loop is slower. Here the period is in proportion to eps^(1/r), so that the noise is
-the same for every eps, relative to the speed of the loop.
+The bounds are for the worst noise. White noise sampled at one fixed period is not the worst for
+every eps, since more samples of it average out where the loop is slower. Here the period is in
+proportion to eps^(1/r), so that the noise is the same for every eps, relative to the speed of the
+loop.
 """
 
 import functools
@@ -26,8 +28,11 @@ from smc_mujoco.control.estimators.levant import levant
 WITHIN, TOLD = 0.1, 0.02  # of the theorem's exponent, and of that on the page
 NOISE, PERIOD = 2, 4  # columns of the page
 PERIODS = (2e-3, 1e-3, 5e-4, 2.5e-4)  # s
-SEEDS = 24  # with 4 the exponent of e under noise comes out between .95 and 1.11; without noise 4 are enough
-LATE = 3000  # samples in which errors are measured: as many for every period, as their maximum grows with the number
+# with 4 the exponent of e under noise comes out between .95 and 1.11; without noise 4 are enough
+SEEDS = 24
+# samples in which errors are measured: as many for every period, as their maximum grows with the
+# number
+LATE = 3000
 
 
 def mass():
@@ -44,8 +49,12 @@ def exponents(sizes, errors):
 def check(found, theorem, row, column):
     """Exponents are those of the theorem, and those that docs/published.md tells."""
     np.testing.assert_allclose(found, theorem, rtol=0, atol=WITHIN)
-    (line,) = re.findall(rf"^\| `{row}.*", (ROOT / "docs" / "published.md").read_text(), re.MULTILINE)
-    np.testing.assert_allclose(found, [float(one) for one in line.split("|")[column].split(",")], rtol=0, atol=TOLD)
+    (line,) = re.findall(
+        rf"^\| `{row}.*", (ROOT / "docs" / "published.md").read_text(), re.MULTILINE
+    )
+    np.testing.assert_allclose(
+        found, [float(one) for one in line.split("|")[column].split(",")], rtol=0, atol=TOLD
+    )
 
 
 def late(*signals):
@@ -75,25 +84,28 @@ LAWS = {r: [law.name for law in fields["law"]] for r, fields in ((2, SECOND), (3
 
 @functools.cache
 def sliding(r, noise):
-    """Errors of e .. e^(r-1) with the periods, (laws, periods, runs, r); noise is (period / 30 ms)^r, or 0."""
+    """Errors of e .. e^(r-1) with the periods, (laws, periods, runs, r); noise is (period / 30
+    ms)^r, or 0.
+    """
     fields = dict(SECOND if r == 2 else THIRD)
     laws, settled = fields.pop("law"), fields.pop("settled")
-    scenarios = [
-        smc.Scenario(
-            plant=mass(),
-            law=law,
-            x0=0.02 + 0.01 * seed,
-            duration=settled + LATE * h,
-            control_period=h,
-            physics_step=h,
-            noise=smc.Noise(position=noise * (h / 0.03) ** r),
-            seed=seed,
-            **({"u_max": 20.0} | fields),
-        )
-        for law in laws
-        for h in PERIODS
-        for seed in range(SEEDS if noise else 4)
-    ]
+    scenarios = []
+    for law in laws:
+        for h in PERIODS:
+            for seed in range(SEEDS if noise else 4):
+                scenarios.append(
+                    smc.Scenario(
+                        plant=mass(),
+                        law=law,
+                        x0=0.02 + 0.01 * seed,
+                        duration=settled + LATE * h,
+                        control_period=h,
+                        physics_step=h,
+                        noise=smc.Noise(position=noise * (h / 0.03) ** r),
+                        seed=seed,
+                        **({"u_max": 20.0} | fields),
+                    )
+                )
     errors = [late(t.x, t.v, t.force + t.d)[:r] for t in smc.run(scenarios)]
     return np.reshape(errors, (len(laws), len(PERIODS), -1, r))
 
@@ -115,7 +127,9 @@ def test_errors_in_the_sampling_period_have_levant_s_exponents(r):
 
 @pytest.mark.slow
 def test_noise_is_what_the_errors_under_noise_are_made_of():
-    """Ten times the errors that sampling alone leaves, so that the exponents are those of the noise."""
+    """Ten times the errors that sampling alone leaves, so that the exponents are those of the
+    noise.
+    """
     for r in (2, 3):
         alone = sliding(r, 0.0)[..., 0]
         assert np.all(sliding(r, 1.0)[:, :, : alone.shape[2], 0] > 10.0 * alone)
@@ -129,7 +143,9 @@ estimate = njit(levant.function)
 
 @smc.estimator_function(gains={"L": 1.0, "order": 1.0}, memory=5)
 def position(y, gains, memory):
-    """The differentiator's z0, which a law does not get: its estimate of the position at the sample."""
+    """The differentiator's z0, which a law does not get: its estimate of the position at the
+    sample.
+    """
     z0 = memory[1]
     estimate(y, gains, memory)
     return z0, 0.0
@@ -146,31 +162,34 @@ def shows_acceleration(y, gains, memory):
 
 
 def differentiation(n, noise):
-    """Errors of z0 .. zn on x = sin t, (periods, runs, n + 1); noise is (period / 30 ms)^(n + 1), or 0."""
+    """Errors of z0 .. zn on x = sin t, (periods, runs, n + 1); noise is (period / 30 ms)^(n + 1),
+    or 0.
+    """
     shows = [
         (shows_velocity(), position(L=1.0, order=n)),
         (shows_velocity(), smc.estimator("levant", L=1.0, order=n)),
         (shows_acceleration(), smc.estimator("levant", L=1.0, order=n)),
     ]
     periods = 8.0 * np.array(PERIODS)
-    scenarios = [
-        smc.Scenario(
-            plant=mass(),
-            law=law,
-            velocity=velocity,
-            x0=math.sin(seed),
-            v0=math.cos(seed),
-            disturbance=smc.Sine(-1.0, 1.0, seed),
-            control_period=h,
-            physics_step=h,
-            duration=12.0 + LATE * h,
-            noise=smc.Noise(position=noise * (h / 0.03) ** (n + 1)),
-            seed=seed,
-        )
-        for h in periods
-        for seed in range(3 if noise else 1)
-        for law, velocity in shows[: n + 1]
-    ]
+    scenarios = []
+    for h in periods:
+        for seed in range(3 if noise else 1):
+            for law, velocity in shows[: n + 1]:
+                scenarios.append(
+                    smc.Scenario(
+                        plant=mass(),
+                        law=law,
+                        velocity=velocity,
+                        x0=math.sin(seed),
+                        v0=math.cos(seed),
+                        disturbance=smc.Sine(-1.0, 1.0, seed),
+                        control_period=h,
+                        physics_step=h,
+                        duration=12.0 + LATE * h,
+                        noise=smc.Noise(position=noise * (h / 0.03) ** (n + 1)),
+                        seed=seed,
+                    )
+                )
     errors = []
     for k, trace in enumerate(smc.run(scenarios)):
         true = np.sin(trace.t + trace.scenario.seed + k % (n + 1) * math.pi / 2)
@@ -183,7 +202,9 @@ def differentiation(n, noise):
 def test_differentiators_err_under_noise_with_levant_s_exponents(n):
     periods, errors = differentiation(n, 1.0)
     eps = (periods / 0.03) ** (n + 1)
-    check(exponents(eps, errors), (n + 1 - np.arange(n + 1)) / (n + 1), f"levant`, order {n}", NOISE)
+    check(
+        exponents(eps, errors), (n + 1 - np.arange(n + 1)) / (n + 1), f"levant`, order {n}", NOISE
+    )
 
 
 @pytest.mark.slow

@@ -1,11 +1,13 @@
-"""Implicit sliding modes against the trajectories of Siconos, an implementation that shares no line with this one.
+"""Implicit sliding modes against the trajectories of Siconos, an implementation that shares no line
+with this one.
 
-The files are those of siconos-tutorials (Apache-2.0), `examples/control/SMC/SMCExampleImplicit.ref` and its siblings,
-as arrays in ../shared/published. Without them the figures below remain, a few rows of each file.
+The files are those of siconos-tutorials (Apache-2.0), `examples/control/SMC/SMCExampleImplicit.ref`
+and its siblings, as arrays in ../shared/published. Without them the figures below remain, a few
+rows of each file.
 
-Both examples run on a free mass here. In the first, x1' = b, x2' = -b + 2 u with b = sin 50 t, the two states do not
-meet: each is the velocity of a separate mass. Siconos holds b over a step at its value at the step's end, which is
-MuJoCo's Euler step with b advanced by one step.
+Both examples run on a free mass here. In the first, x1' = b, x2' = -b + 2 u with b = sin 50 t, the
+two states do not meet: each is the velocity of a separate mass. Siconos holds b over a step at its
+value at the step's end, which is MuJoCo's Euler step with b advanced by one step.
 """
 
 import functools
@@ -20,7 +22,9 @@ import smc_mujoco as smc
 pytestmark = pytest.mark.quick
 
 PUBLISHED = Path(__file__).parents[2] / ".." / "shared" / "published"
-files = pytest.mark.skipif(not PUBLISHED.is_dir(), reason="needs the published trajectories in ../shared/published")
+files = pytest.mark.skipif(
+    not PUBLISHED.is_dir(), reason="needs the published trajectories in ../shared/published"
+)
 STEP, PERIOD = 1e-4, 1e-2  # s, of the first example
 EXACT = 1e-9
 
@@ -53,19 +57,38 @@ def published(name):
 @functools.cache
 def first_example():
     """Traces: x2 under the implicit law and under the explicit one, and x1."""
-    common = {"control_period": PERIOD, "physics_step": STEP, "integrator": "Euler", "x0": 0.0, "duration": 1.0}
+    common = {
+        "control_period": PERIOD,
+        "physics_step": STEP,
+        "integrator": "Euler",
+        "x0": 0.0,
+        "duration": 1.0,
+    }
     lead = 50.0 * STEP
-    x2 = [
-        smc.Scenario(
-            plant=mass(0.5), law=law, model="nominal", v0=-1.0, disturbance=smc.Sine(-0.5, 50.0, lead), **common
+    x2 = []
+    for law in (
+        smc.law("implicit_first_order", k=2.0, c=0.0),
+        smc.law("classical", k=2.0, c=0.0),
+    ):
+        x2.append(
+            smc.Scenario(
+                plant=mass(0.5),
+                law=law,
+                model="nominal",
+                v0=-1.0,
+                disturbance=smc.Sine(-0.5, 50.0, lead),
+                **common,
+            )
         )
-        for law in (smc.law("implicit_first_order", k=2.0, c=0.0), smc.law("classical", k=2.0, c=0.0))
-    ]
-    x1 = smc.Scenario(plant=mass(), law="none", v0=1.0, disturbance=smc.Sine(1.0, 50.0, lead), **common)
+    x1 = smc.Scenario(
+        plant=mass(), law="none", v0=1.0, disturbance=smc.Sine(1.0, 50.0, lead), **common
+    )
     return smc.run([*x2, x1])
 
 
-@pytest.mark.parametrize(("which", "rows"), [(0, IMPLICIT), (1, EXPLICIT)], ids=["implicit", "explicit"])
+@pytest.mark.parametrize(
+    ("which", "rows"), [(0, IMPLICIT), (1, EXPLICIT)], ids=["implicit", "explicit"]
+)
 def test_rows_of_siconos_are_reproduced(which, rows):
     trace = first_example()[which]
     for t, row in rows.items():
@@ -80,7 +103,9 @@ def test_trajectories_of_siconos_are_reproduced(which, name):
     at = np.arange(101) * round(PERIOD / STEP)
     np.testing.assert_allclose(trace.v[:, 0], data["x2"][at], rtol=0, atol=EXACT)
     np.testing.assert_allclose(x1.v[:, 0], data["x1"][at], rtol=0, atol=EXACT)
-    np.testing.assert_allclose(trace.u[:-1, 0], data["u"][at[:-1] + 1], rtol=0, atol=EXACT)  # of the step that follows
+    np.testing.assert_allclose(
+        trace.u[:-1, 0], data["u"][at[:-1] + 1], rtol=0, atol=EXACT
+    )  # of the step that follows
 
 
 def test_only_the_explicit_law_chatters_as_in_siconos():
@@ -96,11 +121,13 @@ def test_only_the_explicit_law_chatters_as_in_siconos():
 
 @smc.law_function(gains={"G": 10.0, "beta": 0.3}, memory=1, relative_degree=2)
 def implicit_twisting(y, gains, memory):
-    """Twisting with both signs at the end of the period: u = -a S1 - b S2, a = G (1 + beta dt/2), b = G beta.
+    """Twisting with both signs at the end of the period: u = -a S1 - b S2, a = G (1 + beta dt/2), b
+    = G beta.
 
-    S1 is in sgn(x1+ + dt/2 x2+) and S2 in sgn(x2+), with x2+ = x2 + dt u and x1+ = x1 + dt (x2 + x2+)/2: the
-    normal-cone problem of Siconos' example Twisting.cpp. u + a S1 + b S2 grows with u and jumps at two places. Its zero
-    is at one of them, or at one of the three values that u has between them.
+    S1 is in sgn(x1+ + dt/2 x2+) and S2 in sgn(x2+), with x2+ = x2 + dt u and x1+ = x1 + dt (x2 +
+    x2+)/2: the normal-cone problem of Siconos' example Twisting.cpp. u + a S1 + b S2 grows with u
+    and jumps at two places. Its zero is at one of them, or at one of the three values that u has
+    between them.
     """
     a, b = gains.G * (1.0 + gains.beta * y.dt / 2.0), gains.G * gains.beta
     first, second = -(y.e + 1.5 * y.dt * y.de) / y.dt**2, -y.de / y.dt
@@ -112,7 +139,14 @@ def implicit_twisting(y, gains, memory):
 @functools.cache
 def twisting_runs():
     """Traces of Siconos' implicit twisting and of the library's explicit twisting, from (10, 10)."""
-    common = {"plant": mass(), "x0": 10.0, "v0": 10.0, "control_period": 0.1, "duration": 19.9, "u_max": math.inf}
+    common = {
+        "plant": mass(),
+        "x0": 10.0,
+        "v0": 10.0,
+        "control_period": 0.1,
+        "duration": 19.9,
+        "u_max": math.inf,
+    }
     laws = (implicit_twisting(), smc.law("twisting", r1=10.0, r2=3.0))
     return smc.run([smc.Scenario(law=law, **common) for law in laws])
 
@@ -126,7 +160,9 @@ def test_rows_of_siconos_implicit_twisting_are_reproduced():
 
 @files
 def test_trajectory_of_siconos_implicit_twisting_is_reproduced():
-    """u is compared as the force G (u1 + beta u2): at rest the two multipliers are not unique, their sum is."""
+    """u is compared as the force G (u1 + beta u2): at rest the two multipliers are not unique,
+    their sum is.
+    """
     data, trace = published("twisting-implicit"), twisting_runs()[0]
     np.testing.assert_allclose(trace.x[:, 0], data["x1"], rtol=0, atol=EXACT)
     np.testing.assert_allclose(trace.v[:, 0], data["x2"], rtol=0, atol=EXACT)

@@ -1,7 +1,7 @@
 """Inequalities and closed forms of published theorems, in runs of a free mass: s = x', s' = u + d.
 
-What could be read of each source is said at its test. The conditions of conditioned super-twisting are those that the
-law's docstring cites; only the paper's abstract could be read.
+What could be read of each source is said at its test. The conditions of conditioned super-twisting
+are those that the law's docstring cites; only the paper's abstract could be read.
 """
 
 import math
@@ -38,13 +38,17 @@ def conditioned(k2, k1=None, name="conditioned_super_twisting"):
 def test_conditioned_super_twisting_reaches_by_its_authors_inequalities():
     """From s = 5 with |u| <= U and |d| = 1.5 < U, |d'| = L, with k2 just above L and far above."""
     d = smc.Sine(1.5, L / 1.5, 0.3)
-    for trace in run([conditioned(1.05 * L), conditioned(4.0 * L)], v0=5.0, u_max=BOUND, disturbance=d):
+    for trace in run(
+        [conditioned(1.05 * L), conditioned(4.0 * L)], v0=5.0, u_max=BOUND, disturbance=d
+    ):
         assert residual(trace) < 30.0 * 1e-3**2
         assert np.abs(trace.u + trace.d)[-3000:].max() < 0.05
 
 
 def test_conditioned_super_twisting_does_not_wind_up_as_the_plain_law_does():
-    laws = [smc.law(name, k1=1.5, k2=1.1, c=0.0) for name in ("conditioned_super_twisting", "super_twisting")]
+    laws = []
+    for name in ("conditioned_super_twisting", "super_twisting"):
+        laws.append(smc.law(name, k1=1.5, k2=1.1, c=0.0))
     ours, plain = run(laws, v0=10.0, u_max=BOUND, integrator="Euler")
     assert 0.0 < -ours.v.min() < min(BOUND**2 / (2.0 * 1.1), (BOUND / 1.5) ** 2) < -plain.v.min()
     assert np.abs(ours.u).max() == BOUND
@@ -53,7 +57,10 @@ def test_conditioned_super_twisting_does_not_wind_up_as_the_plain_law_does():
 
 @pytest.mark.parametrize(("slope", "kept"), [(0.95, True), (1.05, False)])
 def test_conditioned_super_twisting_follows_slopes_up_to_k2_and_no_steeper_ones(slope, kept):
-    """d = -U/2 + slope t: the theorem asks for L < k2 = 1. Beyond it w falls behind, and s goes as the difference."""
+    """d = -U/2 + slope t: the theorem asks for L < k2 = 1.
+
+    Beyond it w falls behind, and s goes as the difference.
+    """
     ramp = [smc.Constant(-BOUND), smc.signals.Ramp(slope)]
     (trace,) = run([conditioned(1.0, k1=3.0)], u_max=2.0 * BOUND, disturbance=ramp, duration=5.0)
     late = np.abs(trace.v[-500:]).max()
@@ -63,11 +70,14 @@ def test_conditioned_super_twisting_follows_slopes_up_to_k2_and_no_steeper_ones(
 
 @pytest.mark.parametrize(("force", "kept"), [(0.95 * BOUND, True), (1.05 * BOUND, False)])
 def test_conditioned_super_twisting_tolerates_disturbances_up_to_its_bound(force, kept):
-    (trace,) = run([conditioned(1.05)], u_max=BOUND, disturbance=smc.Constant(force), v0=0.1, duration=40.0)
+    (trace,) = run(
+        [conditioned(1.05)], u_max=BOUND, disturbance=smc.Constant(force), v0=0.1, duration=40.0
+    )
     assert (residual(trace) < 1e-5) == kept
 
 
-# proper implicit super-twisting: R. Seeber & B. Andritsch, Automatica 173:112027, 2025; abstract read
+# proper implicit super-twisting: R. Seeber & B. Andritsch, Automatica 173:112027, 2025; abstract
+# read
 
 
 @pytest.mark.parametrize("name", ["proper_super_twisting", "proper_conditioned_super_twisting"])
@@ -75,7 +85,10 @@ def test_conditioned_super_twisting_tolerates_disturbances_up_to_its_bound(force
 def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, name):
     """L h^2: what d can do to s, from a period that ends at s = 0, before the law can know of it."""
     d = smc.Sine(1.0, L)
-    bound = BOUND if name == "proper_conditioned_super_twisting" else math.inf
+    if name == "proper_conditioned_super_twisting":
+        bound = BOUND
+    else:
+        bound = math.inf
     law = smc.law(name, k1=1.5, k2=1.1, c=0.0)
     (trace,) = run([law], disturbance=d, control_period=period, u_max=bound, v0=5.0)
     assert residual(trace) == pytest.approx(L * period**2, rel=0.01)
@@ -83,10 +96,12 @@ def test_proper_super_twisting_has_the_best_worst_case_of_a_sampled_law(period, 
 
 @pytest.mark.slow
 def test_proper_conditioned_super_twisting_is_the_proper_law_until_u_is_saturated_and_then_does_not_wind_up():
-    """Of the inner branch too, where |s| <= dt^2 k2; and from s = 20 with |u| <= U, it overshoots by a fraction."""
-    laws = [
-        smc.law(name, k1=3.0, k2=4.4, c=0.0) for name in ("proper_conditioned_super_twisting", "proper_super_twisting")
-    ]
+    """Of the inner branch too, where |s| <= dt^2 k2; and from s = 20 with |u| <= U, it overshoots
+    by a fraction.
+    """
+    laws = []
+    for name in ("proper_conditioned_super_twisting", "proper_super_twisting"):
+        laws.append(smc.law(name, k1=3.0, k2=4.4, c=0.0))
     d = smc.Sine(1.5, 0.6)
     ours, plain = run(laws, v0=0.1, disturbance=d, duration=2.0)
     np.testing.assert_allclose(ours.v, plain.v, atol=1e-12)
@@ -96,16 +111,22 @@ def test_proper_conditioned_super_twisting_is_the_proper_law_until_u_is_saturate
     assert residual(ours) <= 0.9 * 1e-3**2 * (1 + 1e-4)
 
 
-# fixed-time reaching: R. Aldana-Lopez et al., Int. J. Robust Nonlinear Control, 2019, arXiv 1809.07012; abstract read
+# fixed-time reaching: R. Aldana-Lopez et al., Int. J. Robust Nonlinear Control, 2019, arXiv
+# 1809.07012; abstract read
 
 
 def test_fixed_time_reaching_is_bounded_by_the_least_bound_and_not_by_polyakov_s():
     """s' = -2 [s]^(1/2) - 2 [s]^(3/2) takes arctan(sqrt|s0|) < pi/2; Polyakov's bound of 2012 is 2.
 
-    The paper's abstract: it shows "the conservatism of the classical upper estimate of the settling time" and gives
-    "the smallest constant that uniformly upper bounds the settling time". With s = z^2 the integral is elementary.
+    The paper's abstract: it shows "the conservatism of the classical upper estimate of the settling
+    time" and gives "the smallest constant that uniformly upper bounds the settling time". With s =
+    z^2 the integral is elementary.
     """
-    law, least, classical = smc.law("fixed_time", k1=2.0, k2=2.0, a=0.5, b=1.5, k=0.0, c=0.0), math.pi / 2, 2.0
+    law, least, classical = (
+        smc.law("fixed_time", k1=2.0, k2=2.0, a=0.5, b=1.5, k=0.0, c=0.0),
+        math.pi / 2,
+        2.0,
+    )
     times = []
     for start in (1.0, 100.0, 1e4):
         (trace,) = run([law], v0=start, control_period=2.5e-4, duration=2.0, integrator="Euler")

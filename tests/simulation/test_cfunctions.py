@@ -1,4 +1,6 @@
-"""Compiled components on disk: what was compiled once is loaded, what differs in anything that it reaches is not."""
+"""Compiled components on disk: what was compiled once is loaded, what differs in anything that it
+reaches is not.
+"""
 
 import ctypes
 import os
@@ -40,7 +42,12 @@ def hits(function, **options) -> int:
 
 def force(function) -> float:
     """The u of a compiled law at 0, with a gain of 3."""
-    inputs, gains, memory, out = np.zeros(len(Measurement._fields)), np.array([3.0]), np.zeros(1), np.zeros(2)
+    inputs, gains, memory, out = (
+        np.zeros(len(Measurement._fields)),
+        np.array([3.0]),
+        np.zeros(1),
+        np.zeros(2),
+    )
     done = compiled(function)
     assert done._cfunc.ctypes(*(a.ctypes.data for a in (inputs, gains, memory, out))) == 0
     return out[0]
@@ -101,13 +108,19 @@ def test_a_law_that_has_changed_is_not_taken_for_the_one_before():
         exec(helper.format(number), space)
         return mine("helper(gains.k)", helper=space["helper"])
 
-    assert [force(mine("gains.k")), force(mine("2.0 * gains.k")), force(mine("gains.k"))] == [3.0, 6.0, 3.0]
+    assert [force(mine("gains.k")), force(mine("2.0 * gains.k")), force(mine("gains.k"))] == [
+        3.0,
+        6.0,
+        3.0,
+    ]
     assert [force(mine(scaled, factor=f)) for f in (4.0, 5.0)] == [12.0, 15.0]
     assert [force(helped(number)) for number in (6.0, 7.0)] == [18.0, 21.0]
 
 
 def test_a_global_that_changes_between_hash_and_compilation_is_not_kept_under_the_old_hash(cache):
-    """A study hashes a law before it compiles it; another process with the old value must not load the new one."""
+    """A study hashes a law before it compiles it; another process with the old value must not load
+    the new one.
+    """
     late = mine("factor * gains.k", factor=2.0)
     fingerprint.of(late)
     late.__globals__["factor"] = 5.0
@@ -128,7 +141,9 @@ def test_what_numba_compiles_in_place_of_a_function_tells_laws_apart():
 
 
 def test_laws_of_one_name_are_all_kept_and_of_very_many_the_last(monkeypatch):
-    """Laws that are written from numbers have one name, such as linear controllers, and so have the laws of scripts."""
+    """Laws that are written from numbers have one name, such as linear controllers, and so have the
+    laws of scripts.
+    """
     laws = [mine(f"{factor} * gains.k") for factor in (1.0, 2.0, 3.0)]
     assert [hits(law) for law in laws + laws] == [0, 0, 0, 1, 1, 1]
     monkeypatch.setattr(jit, "MAX_FILES_OF_A_NAME", 2)
@@ -185,7 +200,8 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 def test_code_of_two_processes_is_not_mixed_up(cache, tmp_path, monkeypatch):
-    """Numba numbers functions of one name, such as those around a law, and each of the processes counts from the start.
+    """Numba numbers functions of one name, such as those around a law, and each of the processes
+    counts from the start.
 
     A process that loads both would run the code that it loads first in both laws.
     """
@@ -251,12 +267,19 @@ def test_code_that_holds_an_address_or_a_number_of_this_process_is_not_kept(cach
 
 
 def test_own_functions_divide_as_numpy_does_and_those_of_laws_as_python_does():
-    """An exception cannot leave the callback, so a division by zero gives inf there. In a law it ends the run."""
+    """An exception cannot leave the callback, so a division by zero gives inf there.
+
+    In a law it ends the run.
+    """
     from smc_mujoco.control import law
     from smc_mujoco.simulation import controller, philox, signals, time_series
 
     def models(*modules):
-        found = [(module, one) for module in modules for one in vars(module).values() if hasattr(one, "targetoptions")]
+        found = []
+        for module in modules:
+            for one in vars(module).values():
+                if hasattr(one, "targetoptions"):
+                    found.append((module, one))
         own = [one for module, one in found if one.py_func.__module__ == module.__name__]
         return [one.targetoptions.get("error_model", "python") for one in own]
 

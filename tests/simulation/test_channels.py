@@ -1,15 +1,16 @@
-"""A separate law, gains, bound and reference for each channel: both loops, files, keys, and bad input."""
+"""A separate law, gains, bound and reference for each channel: both loops, files, keys, and bad
+input.
+"""
 
 import dataclasses
 import pickle
 
 import numpy as np
 import pytest
-from helpers import arms
+from helpers import arms, reference
 from helpers.runs import ARRAYS, assert_same
 
 import smc_mujoco as smc
-from helpers import reference
 from smc_mujoco.simulation.signals import PerChannel
 from smc_mujoco.studies import run_key
 
@@ -33,15 +34,26 @@ def remembers(y, gains, memory):
 def cases():
     """Scenarios in which channels differ in one respect or in all."""
     mixed = {"shoulder": smc.law("super_twisting", k1=5.0), "elbow": remembers(k=3.0)}
-    yield smc.Scenario(law=mixed, u_max={"elbow": 2.0, "shoulder": 5.0}, reference=[SINE, MOVE], **BOTH)
+    yield smc.Scenario(
+        law=mixed, u_max={"elbow": 2.0, "shoulder": 5.0}, reference=[SINE, MOVE], **BOTH
+    )
     yield smc.Scenario(law=["twisting", "super_twisting"], model="nominal", **BOTH)
     yield smc.Scenario(law=smc.law("classical", k=[1.0, 5.0]), surface="pid", **BOTH)
     yield smc.Scenario(law=remembers(k=[1.0, 5.0]), **BOTH)  # each channel its own memory
-    yield smc.Scenario(law=remembers, reference={"shoulder": MOVE, "elbow": SINE}, feedforward=SINE, **BOTH)
     yield smc.Scenario(
-        plant=arms.arm(), law="passivity_based", reference=[SINE, MOVE, SINE], u_max=[5.0, 50.0, 20.0], **COMMON
+        law=remembers, reference={"shoulder": MOVE, "elbow": SINE}, feedforward=SINE, **BOTH
     )
-    cart = {"plant": smc.plant("pendulum_network", n=3), "law": ["classical", remembers, "twisting"]}
+    yield smc.Scenario(
+        plant=arms.arm(),
+        law="passivity_based",
+        reference=[SINE, MOVE, SINE],
+        u_max=[5.0, 50.0, 20.0],
+        **COMMON,
+    )
+    cart = {
+        "plant": smc.plant("pendulum_network", n=3),
+        "law": ["classical", remembers, "twisting"],
+    }
     yield smc.Scenario(reference=[SINE, SINE, MOVE], input_delay=3e-3, **cart, **COMMON)
 
 
@@ -70,13 +82,19 @@ def test_files_and_keys_hold_what_each_channel_has(traces, tmp_path):
 
 
 def test_each_channel_runs_as_it_would_under_its_law_alone():
-    """On uncoupled pendulums a channel's run is that of a scenario in which all have its law, gains and reference."""
+    """On uncoupled pendulums a channel's run is that of a scenario in which all have its law, gains
+    and reference.
+    """
     plant = smc.plant("pendulum_network", n=3, kc=0.0)
     laws = [smc.law("classical", k=2.0), smc.law("twisting"), smc.law("super_twisting", k2=3.0)]
     signals, bounds = [SINE, MOVE, smc.Constant(0.1)], [1.0, 2.0, 3.0]
-    together = smc.run(smc.Scenario(plant=plant, law=laws, reference=signals, u_max=bounds, duration=0.2))
+    together = smc.run(
+        smc.Scenario(plant=plant, law=laws, reference=signals, u_max=bounds, duration=0.2)
+    )
     for i, (law, signal, bound) in enumerate(zip(laws, signals, bounds, strict=True)):
-        alone = smc.run(smc.Scenario(plant=plant, law=law, reference=signal, u_max=bound, duration=0.2))
+        alone = smc.run(
+            smc.Scenario(plant=plant, law=law, reference=signal, u_max=bound, duration=0.2)
+        )
         for name in set(ARRAYS) - {"t"}:
             one, other = getattr(together, name)[:, i], getattr(alone, name)[:, i]
             np.testing.assert_allclose(
@@ -87,7 +105,9 @@ def test_each_channel_runs_as_it_would_under_its_law_alone():
 
 def test_what_is_the_same_for_all_channels_is_one():
     one = smc.Scenario(law=smc.law("classical"), reference=SINE, u_max=3.0, **BOTH)
-    same = smc.Scenario(law=["classical", "classical"], reference=[SINE, SINE], u_max=[3, 3.0], **BOTH)
+    same = smc.Scenario(
+        law=["classical", "classical"], reference=[SINE, SINE], u_max=[3, 3.0], **BOTH
+    )
     assert one == same
     assert same.law.uniform
     gains = smc.Scenario(law=[smc.law("classical", k=1.0), smc.law("classical", k=2.0)], **BOTH).law
@@ -100,42 +120,61 @@ def test_what_is_the_same_for_all_channels_is_one():
 
 def test_a_plants_channels_suggest_what_a_scenario_leaves_out():
     channels = {
-        "shoulder": smc.Channel(motor=True, law=smc.law("classical", k=5.0), u_max=8.0, reference=SINE),
+        "shoulder": smc.Channel(
+            motor=True, law=smc.law("classical", k=5.0), u_max=8.0, reference=SINE
+        ),
         "elbow": {"motor": True, "law": "twisting", "reference": None},
     }
     plant = smc.plant_from(PENDULUM, channels=channels, name="suggesting")
     suggested = smc.Scenario(plant=plant, **COMMON)
-    same = {"law": [smc.law("classical", k=5.0), "twisting"], "u_max": [8.0, 6.0], "reference": [SINE, REST]}
+    same = {
+        "law": [smc.law("classical", k=5.0), "twisting"],
+        "u_max": [8.0, 6.0],
+        "reference": [SINE, REST],
+    }
     assert suggested == smc.Scenario(plant=plant, **same, **COMMON)
     assert suggested.limits == (8.0, 6.0)
     assert_same(smc.run(suggested), reference.run(suggested))
     others = {"law": smc.law("classical", k=1.0), "u_max": 2.0, "reference": MOVE}
     given = smc.Scenario(plant=plant, **others, **COMMON)
     assert (given.law, given.u_max, given.reference) == tuple(others.values())
-    plain = smc.plant_from(PENDULUM, channels={j: smc.Channel(motor=True) for j in channels}, name="suggesting")
+    plain = smc.plant_from(
+        PENDULUM, channels={j: smc.Channel(motor=True) for j in channels}, name="suggesting"
+    )
     assert plant == plain  # the same mechanism
     assert smc.Scenario(plant=plain, **others, **COMMON) == given
     assert pickle.loads(pickle.dumps(suggested)) == suggested
     assert suggested.reference is None
     assert suggested.references == (SINE, REST)
-    assert dataclasses.replace(suggested, plant=plain).references == (REST, REST)  # a default follows the plant
+    assert dataclasses.replace(suggested, plant=plain).references == (
+        REST,
+        REST,
+    )  # a default follows the plant
 
 
 REFUSED = {
     "no law": lambda: smc.Scenario(**BOTH),
     "law of one channel alone": lambda: smc.plant_from(
-        PENDULUM, channels={"shoulder": smc.Channel(motor=True, law="classical"), "elbow": {"motor": True}}
+        PENDULUM,
+        channels={"shoulder": smc.Channel(motor=True, law="classical"), "elbow": {"motor": True}},
     ),
-    "channel's bound": lambda: smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, u_max=-1.0)}),
+    "channel's bound": lambda: smc.plant_from(
+        PENDULUM, channels={"elbow": smc.Channel(motor=True, u_max=-1.0)}
+    ),
     "channel's reference": lambda: smc.Scenario(
-        plant=smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, reference=0.3)}), law="classical"
+        plant=smc.plant_from(PENDULUM, channels={"elbow": smc.Channel(motor=True, reference=0.3)}),
+        law="classical",
     ),
-    "unknown joint": lambda: smc.Scenario(law={"shoulder": "classical", "elbo": "classical"}, **BOTH),
+    "unknown joint": lambda: smc.Scenario(
+        law={"shoulder": "classical", "elbo": "classical"}, **BOTH
+    ),
     "missing joint": lambda: smc.Scenario(law="classical", reference={"shoulder": SINE}, **BOTH),
     "too many": lambda: smc.Scenario(law=["classical"] * 3, **BOTH),
     "bad bound": lambda: smc.Scenario(law="classical", u_max=[1.0, -2.0], **BOTH),
     "joint law in one channel": lambda: smc.Scenario(law=["classical", "unit_vector"], **BOTH),
-    "gains by channel in one channel": lambda: smc.Scenario(law=["classical", smc.law("twisting", r1=[4, 3])], **BOTH),
+    "gains by channel in one channel": lambda: smc.Scenario(
+        law=["classical", smc.law("twisting", r1=[4, 3])], **BOTH
+    ),
     "noise as reference": lambda: smc.Scenario(
         law="classical", reference=[SINE, smc.signals.OrnsteinUhlenbeck(0.1, 1.0)], **BOTH
     ),

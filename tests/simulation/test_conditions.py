@@ -1,4 +1,6 @@
-"""Conditions and starts: named, combined, read from text without being evaluated, and used on any plant."""
+"""Conditions and starts: named, combined, read from text without being evaluated, and used on any
+plant.
+"""
 
 import dataclasses
 import math
@@ -36,7 +38,10 @@ ARM = """<mujoco model="arm">
   <actuator><motor name="shoulder" joint="shoulder" ctrllimited="true" ctrlrange="-20 20"/></actuator>
 </mujoco>"""
 WORN = smc.condition(
-    "worn gear", friction=smc.Coulomb(0.05), actuator=smc.Backlash(0.02), sensor=smc.Encoder(counts=4096)
+    "worn gear",
+    friction=smc.Coulomb(0.05),
+    actuator=smc.Backlash(0.02),
+    sensor=smc.Encoder(counts=4096),
 )
 
 
@@ -60,7 +65,12 @@ def test_text_says_a_condition_whole():
         WORN,
         smc.condition("a", mismatch={"mass": 1.1}, input_delay=0.003),
         smc.condition("b", velocity=smc.estimator("levant", L=30.0), noise=smc.Noise(0.01)),
-        smc.condition("c", disturbance=(smc.Sine(0.2, 5.0), smc.Constant(-0.1)), contact="stops", u_max=math.inf),
+        smc.condition(
+            "c",
+            disturbance=(smc.Sine(0.2, 5.0), smc.Constant(-0.1)),
+            contact="stops",
+            u_max=math.inf,
+        ),
         smc.condition("d", jump=smc.Jump(0.5, {"mass": 2.0}), x0=[0.3], reference=smc.Step(0.1)),
     ):
         assert parse(str(condition)) == condition
@@ -71,7 +81,10 @@ def test_the_brief_text_of_a_condition_has_all_its_fields_and_no_default(name):
     plant = smc.plant("inverted_pendulum")
     text = NAMED[name].brief(plant, 4.0)
     assert parse(f"copy: {text}").fields == NAMED[name].on(plant, 4.0)
-    assert smc.condition("all defaults", actuator=smc.DCMotor()).brief(plant, 4.0) == "actuator=DCMotor()"
+    assert (
+        smc.condition("all defaults", actuator=smc.DCMotor()).brief(plant, 4.0)
+        == "actuator=DCMotor()"
+    )
 
 
 def test_a_class_of_the_users_with_a_name_of_ours_changes_no_text():
@@ -95,7 +108,10 @@ def test_the_suites_conditions_go_by_their_names():
 def test_conditions_add_up(refused):
     duffing = smc.plant("duffing")
     both = find_condition("sine + coulomb + constant").on(duffing, 4.0)
-    assert both == {"disturbance": (smc.Sine(0.2, 5.0), smc.Constant(0.2)), "friction": smc.Coulomb(0.1)}
+    assert both == {
+        "disturbance": (smc.Sine(0.2, 5.0), smc.Constant(0.2)),
+        "friction": smc.Coulomb(0.1),
+    }
     assert find_condition("noise + noise").on(duffing, 4.0) == {"noise": smc.Noise(0.01, 0.05)}
     refused(lambda: find_condition("light + heavy").on(duffing, 4.0))
     awkward = smc.condition("awkward", input_delay=wild.Awkward())
@@ -175,21 +191,40 @@ def test_conditions_suit_a_plant_that_they_have_numbers_for(arm):
 
 
 def test_a_condition_that_starts_at_0_is_nothing_to_tune_for(refused):
-    refused(lambda: smc.tune("duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)]))
+    refused(
+        lambda: smc.tune(
+            "duffing", "classical", 2, conditions=["nominal", smc.condition("rest", x0=0.0)]
+        )
+    )
 
 
 def test_a_grid_has_conditions_of_ones_own_under_their_names():
-    made = smc.grid("duffing", "classical", ["nominal", WORN, "noise + coulomb"], 2, gains="default", duration=1.0)
+    made = smc.grid(
+        "duffing",
+        "classical",
+        ["nominal", WORN, "noise + coulomb"],
+        2,
+        gains="default",
+        duration=1.0,
+    )
     assert [told(s) for s in made] == ["nominal"] * 2 + ["worn gear"] * 2 + ["noise + coulomb"] * 2
     assert made[2].friction == (smc.Coulomb(0.05),)
-    assert dataclasses.replace(made[2], friction=None).condition is None  # the name goes with the fields
+    assert (
+        dataclasses.replace(made[2], friction=None).condition is None
+    )  # the name goes with the fields
 
 
 def test_a_name_of_the_suite_changes_no_runs_key_and_ones_own_does():
     (ours,) = smc.grid("duffing", "classical", "noise", 1, gains="default")
     by_hand = paper.scenario("duffing", "classical", "noise", gains="default")
     assert (ours, key(ours)) == (by_hand, key(by_hand))
-    (one,) = smc.grid("duffing", "classical", smc.condition("one", noise=smc.Noise(0.01, 0.05)), 1, gains="default")
+    (one,) = smc.grid(
+        "duffing",
+        "classical",
+        smc.condition("one", noise=smc.Noise(0.01, 0.05)),
+        1,
+        gains="default",
+    )
     assert one == ours
     assert key(one) != key(ours)
 
@@ -220,7 +255,9 @@ def test_no_grid_has_the_starts_and_the_noise_of_tuning(refused):
 
 def test_a_model_of_ones_own_is_compared_like_any_other(arm, tmp_path):
     law = smc.law("boundary_layer", k=10.0, c=4.0, phi=0.5)
-    scenarios = smc.grid([arm, "duffing"], law, ["nominal", WORN], 2, duration=0.5, starts=smc.starts(x0=0.4))
+    scenarios = smc.grid(
+        [arm, "duffing"], law, ["nominal", WORN], 2, duration=0.5, starts=smc.starts(x0=0.4)
+    )
     table = smc.study(scenarios, tmp_path / "study")
     assert sorted(set(table.column("plant"))) == ["arm", "duffing"]
     assert sorted(set(table.column("condition"))) == ["nominal", "worn gear"]
@@ -243,9 +280,17 @@ def test_grid_refuses_two_things_of_one_name(refused):
         {"conditions": [WORN, smc.condition("worn gear", u_max=3.0)]},
         {"laws": [pid(k=2.0)]},
     ]:
-        refused(lambda given={"plants": "duffing", "laws": "classical"} | changed: smc.grid(**given))
-    assert len(smc.grid(["duffing"] * 2, [SLOW, smc.law("classical", k=2.0), pid().named("my pid")])) == 6
-    assert len(smc.grid("duffing", "classical", [WORN, WORN, "noise + coulomb", "noise + coulomb"])) == 4
+        refused(
+            lambda given={"plants": "duffing", "laws": "classical"} | changed: smc.grid(**given)
+        )
+    assert (
+        len(smc.grid(["duffing"] * 2, [SLOW, smc.law("classical", k=2.0), pid().named("my pid")]))
+        == 6
+    )
+    assert (
+        len(smc.grid("duffing", "classical", [WORN, WORN, "noise + coulomb", "noise + coulomb"]))
+        == 4
+    )
 
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
@@ -276,10 +321,23 @@ def test_grid_warns_of_gains_for_other_parameters():
 def test_start_is_set_by_condition_or_starts(refused):
     for search in (smc.grid, smc.margins, smc.tune, smc.basin):
         far = smc.condition("far", x0=1.0)
-        fields = {"conditions": far} if search in (smc.grid, smc.tune) else {"condition": far}
-        more = {} if search is smc.basin else {"starts": smc.starts(x0=0.5)}
-        refused(lambda search=search, fields=fields, more=more: search("duffing", "classical", **fields, **more))
-        assert [s.resolved.x0 for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))] == [(1.0,)]
+        if search in (smc.grid, smc.tune):
+            fields = {"conditions": far}
+        else:
+            fields = {"condition": far}
+        if search is smc.basin:
+            more = {}
+        else:
+            more = {"starts": smc.starts(x0=0.5)}
+        refused(
+            lambda search=search, fields=fields, more=more: search(
+                "duffing", "classical", **fields, **more
+            )
+        )
+        assert [
+            s.resolved.x0
+            for s in smc.grid("duffing", "classical", far, starts=smc.starts(spread=0.1))
+        ] == [(1.0,)]
 
 
 def test_starts_that_are_a_number_are_one_sentence(refused, tmp_path):
@@ -296,7 +354,9 @@ def test_grid_asks_where_a_model_at_rest_starts(arm, refused):
     moved = smc.condition("a", reference=smc.Step(0.1)), smc.condition("b", v0=0.1)
     moved += (smc.condition("c", feedforward=smc.Step(0.1)),)
     assert len(smc.grid(arm, law, [*moved, "noise", "sine", "encoder"], 2)) == 12
-    assert len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2  # seed 0 alone starts at 0
+    assert (
+        len(smc.grid(arm, law, "nominal", 2, starts=smc.starts(by=0.1))) == 2
+    )  # seed 0 alone starts at 0
     held = ARM.replace('fromto="0 0 0 0 0 -0.4"', 'fromto="0 0 0 0.4 0 0"')
     assert smc.grid(smc.plant_from(held, ["shoulder"]), law, "nominal")  # gravity moves it
 
@@ -318,7 +378,15 @@ def test_a_region_of_a_model_is_asked_for_its_reach(arm):
 def test_a_model_is_tuned_in_conditions_of_ones_own(arm, refused):
     refused(lambda: smc.tune(arm, "observer_free", budget=4, conditions="nominal"))
     goal = Objective(conditions=("nominal",), duration=0.5)
-    found = smc.tune(arm, "observer_free", 4, objective=goal, conditions=[WORN], starts=smc.starts(x0=0.4), searches=1)
+    found = smc.tune(
+        arm,
+        "observer_free",
+        4,
+        objective=goal,
+        conditions=[WORN],
+        starts=smc.starts(x0=0.4),
+        searches=1,
+    )
     assert [one.name for one in found.definition.conditions] == ["worn gear"]
     assert found.scales["X"] == 0.4
 
@@ -331,7 +399,12 @@ def test_tune_has_the_bound_of_a_grid(arm):
     (run,) = smc.grid(arm, found.law, starts=starts)
     assert found.definition.u_max == run.resolved.u_max == 20.0
     assert "|u| <= 20" in str(found.definition)
-    assert smc.tune(arm, "pid", 2, objective=Objective(u_max=5.0), starts=starts, searches=1).definition.u_max == 5.0
+    assert (
+        smc.tune(
+            arm, "pid", 2, objective=Objective(u_max=5.0), starts=starts, searches=1
+        ).definition.u_max
+        == 5.0
+    )
 
 
 @pytest.mark.filterwarnings("ignore:no set of gains")
@@ -348,7 +421,18 @@ def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     own = "worn gear: friction=Coulomb(0.05), sensor=Encoder(counts=4096)"
     plants = f"duffing,{file}:shoulder"
-    arguments = ["--law", "observer_free", "--gains", "default", "--seeds", "1", "--duration", "0.5", "--x0", "0.4"]
+    arguments = [
+        "--law",
+        "observer_free",
+        "--gains",
+        "default",
+        "--seeds",
+        "1",
+        "--duration",
+        "0.5",
+        "--x0",
+        "0.4",
+    ]
     done = CliRunner().invoke(app, ["compare", plants, "--condition", own, *arguments])
     assert done.exit_code == 0, done.output
     table = smc.Table.read(tmp_path / "compared" / "results.parquet")
@@ -358,9 +442,22 @@ def test_commands_take_conditions_as_text_and_models_as_files(file, tmp_path, mo
     }
 
 
-def test_compare_has_conditions_for_a_model_of_ones_own_without_being_told_any(file, tmp_path, monkeypatch):
+def test_compare_has_conditions_for_a_model_of_ones_own_without_being_told_any(
+    file, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    arguments = ["--law", "pid", "--gains", "default", "--seeds", "1", "--duration", "0.05", "--x0", "0.4"]
+    arguments = [
+        "--law",
+        "pid",
+        "--gains",
+        "default",
+        "--seeds",
+        "1",
+        "--duration",
+        "0.05",
+        "--x0",
+        "0.4",
+    ]
     done = CliRunner().invoke(app, ["compare", "--quick", f"{file}:shoulder", *arguments])
     assert done.exit_code == 0, done.output
     done = CliRunner().invoke(app, ["compare", f"{file}:shoulder", *arguments])
@@ -380,9 +477,18 @@ TWO = """<mujoco model="two"><worldbody><body>
             ("margins", "arm.xml:shoulder", "--x0", "0.4"),
             "smc-mujoco tune arm.xml:shoulder observer_free --out FILE.json",
         ),
-        (("basin", "cart_pole", "--law", "hierarchical"), "hierarchical(a=...), or take the defaults"),
-        (("tune", "two.xml:shoulder", "pid", "--x0", "0.4"), "two: it has no nominal model, which tuning takes"),
-        (("compare", "--law", "pid(kp=x)"), "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)"),
+        (
+            ("basin", "cart_pole", "--law", "hierarchical"),
+            "hierarchical(a=...), or take the defaults",
+        ),
+        (
+            ("tune", "two.xml:shoulder", "pid", "--x0", "0.4"),
+            "two: it has no nominal model, which tuning takes",
+        ),
+        (
+            ("compare", "--law", "pid(kp=x)"),
+            "law 'pid(kp=x)' cannot be read: write it as pid(kp=50, ki=1)",
+        ),
         (("compare", "--condition", "worn: friction=Colomb(0.05)"), "did you mean 'Coulomb'"),
         (("margins", "duffing", "--condition", "noisy"), "did you mean 'noise'"),
         (("compare", "arm.xml"), "names no joints"),
@@ -403,11 +509,24 @@ def test_commands_refuse_in_one_sentence(arguments, words, tmp_path, monkeypatch
 
 def test_commands_take_laws_with_gains_of_their_own(file, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    runner, common = CliRunner(), ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"]
+    runner, common = (
+        CliRunner(),
+        ["--x0", "0.4", "--condition", "pushed: disturbance=Constant(0.1)"],
+    )
     tuned = ["tune", "arm.xml:shoulder", "pid", "--budget", "2", "--out", "arm_pid.json"]
     assert runner.invoke(app, [*tuned, *common]).exit_code == 0
     laws = "arm_pid.json,classical(k=5, c=2e0),quick: classical(k=9)"
-    words = ["compare", "arm.xml:shoulder", "--law", laws, "--seeds", "1", "--duration", "0.1", *common]
+    words = [
+        "compare",
+        "arm.xml:shoulder",
+        "--law",
+        laws,
+        "--seeds",
+        "1",
+        "--duration",
+        "0.1",
+        *common,
+    ]
     done = runner.invoke(app, words)
     assert done.exit_code == 0, done.output
     assert "Gains: classical and quick yours, pid tuned here (" in " ".join(done.output.split())

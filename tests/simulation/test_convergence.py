@@ -1,14 +1,15 @@
-"""The physics step of realistic runs is fine enough: halving it changes no score of a smooth law by 3 %.
+"""The physics step of realistic runs is fine enough: halving it changes no score of a smooth law by
+3 %.
 
     python tests/simulation/test_convergence.py    # the study as a table: every plant and part, 10 s
 
-Scores are settling_time, ultimate_bound and tv_rate. A score that is nothing but rounding or creep is compared as if
-it were at its floor: 1e-4 of the run's scale for the bound, 1e-4 of u_max per second for tv_rate. Laws and gains are
-the paper study's, the control period is 1 ms.
+Scores are settling_time, ultimate_bound and tv_rate. A score that is nothing but rounding or creep
+is compared as if it were at its floor: 1e-4 of the run's scale for the bound, 1e-4 of u_max per
+second for tv_rate. Laws and gains are the paper study's, the control period is 1 ms.
 
-With an encoder or a backlash the loop hunts: it ends in a limit cycle of a count or two, or within the play, and which
-one is chance - a start 0.2 % off gives another. There the mean over several starts is compared, and may differ by three
-of its standard errors more.
+With an encoder or a backlash the loop hunts: it ends in a limit cycle of a count or two, or within
+the play, and which one is chance - a start 0.2 % off gives another. There the mean over several
+starts is compared, and may differ by three of its standard errors more.
 """
 
 import dataclasses
@@ -25,7 +26,11 @@ LAWS = ("observer_free", "boundary_layer")
 SCORES = ("settling_time", "ultimate_bound", "tv_rate")
 FLOOR = 1e-4  # of the run's scale, and of u_max per second
 MOST = 0.03
-BRIEF, SLOW, LONG = 3.0, 4.0, 5.0  # s: of most runs here, of Van der Pol's, of what hunts or creeps. The study's: 10 s
+BRIEF, SLOW, LONG = (
+    3.0,
+    4.0,
+    5.0,
+)  # s: of most runs here, of Van der Pol's, of what hunts or creeps. The study's: 10 s
 HUNTING, CREEPING = ("backlash", "encoder"), ("lugre",)
 
 PARTS = {
@@ -59,7 +64,10 @@ def cases(n=None):
     """(plant, name) -> the fields of a scenario that make it realistic."""
     found = {}
     for name in smc.paper.GAINS:
-        plant = smc.plant(name) if n is None or smc.plant(name).n == 1 else smc.plant(name, n=n)
+        if n is None or smc.plant(name).n == 1:
+            plant = smc.plant(name)
+        else:
+            plant = smc.plant(name, n=n)
         for part, fields in PARTS.items():
             found[name, part] = {"plant": plant} | fields
         for mechanism in plant.mechanisms:
@@ -76,16 +84,21 @@ def scenarios(key, law, duration, n, starts):
     first = smc.Scenario(**cases(n)[key], law=made, duration=duration)
     if key[1] not in HUNTING:
         return [first]
-    return [dataclasses.replace(first, x0=[x * (1 - 0.002 * i) for x in first.resolved.x0]) for i in range(starts)]
+    return [
+        dataclasses.replace(first, x0=[x * (1 - 0.002 * i) for x in first.resolved.x0])
+        for i in range(starts)
+    ]
 
 
 def brief():
-    """(plant, part, law) -> scenarios that the tests have time for: networks of two, where they do not hunt.
+    """(plant, part, law) -> scenarios that the tests have time for: networks of two, where they do
+    not hunt.
 
     A part is on every second plant, under one law on the first and under the other one on the next.
     """
     brief = {
-        key: LONG if key[1] in HUNTING + CREEPING else SLOW if key[0] == "van_der_pol" else BRIEF for key in cases()
+        key: LONG if key[1] in HUNTING + CREEPING else SLOW if key[0] == "van_der_pol" else BRIEF
+        for key in cases()
     }
     found = {}
     for i, plant in enumerate(smc.paper.GAINS):
@@ -105,7 +118,10 @@ def scores(trace):
     """The three scores, none below its floor."""
     assert trace.failure is None
     found = smc.score(trace)
-    floors = {"ultimate_bound": FLOOR * scale(trace), "tv_rate": FLOOR * trace.scenario.resolved.u_max}
+    floors = {
+        "ultimate_bound": FLOOR * scale(trace),
+        "tv_rate": FLOOR * trace.scenario.resolved.u_max,
+    }
     return [max(found[name], floors.get(name, 0.0)) for name in SCORES]
 
 
@@ -114,7 +130,9 @@ def halved(scenario):
 
 
 def study(chosen):
-    """(plant, part, law) -> score -> its means with a step and with half of it, and the error of their difference."""
+    """(plant, part, law) -> score -> its means with a step and with half of it, and the error of
+    their difference.
+    """
     every = [s for group in chosen.values() for s in (*group, *map(halved, group))]
     traces = iter(smc.run(every))
     result = {}
@@ -132,17 +150,24 @@ def change(coarse, fine):
     """By how much of the finer one's score the other differs."""
     if coarse == fine:  # also where both are inf: neither settles
         return 0.0
-    return abs(coarse - fine) / fine if math.isfinite(fine) and fine else math.inf
+    if math.isfinite(fine) and fine:
+        return abs(coarse - fine) / fine
+    return math.inf
 
 
 def converged(coarse, fine, spread):
-    return change(coarse, fine) < MOST + 3 * spread / fine if spread else change(coarse, fine) < MOST
+    if spread:
+        return change(coarse, fine) < MOST + 3 * spread / fine
+    return change(coarse, fine) < MOST
 
 
 @pytest.mark.slow
 def test_halving_the_physics_step_changes_no_score():
     chosen = brief()
-    assert {key[1] for key in chosen} >= {*PARTS, *(contact for contacts in HITS.values() for contact in contacts)}
+    assert {key[1] for key in chosen} >= {
+        *PARTS,
+        *(contact for contacts in HITS.values() for contact in contacts),
+    }
     changed = {
         (*key, name): values
         for key, scores in study(chosen).items()
@@ -154,15 +179,26 @@ def test_halving_the_physics_step_changes_no_score():
 
 @pytest.mark.slow
 def test_the_obstacles_of_the_study_are_hit():
-    keys = [(name, contact) for name, contacts in HITS.items() for contact in contacts]
-    touching = [made for key in keys for law in LAWS for made in scenarios(key, law, 1.0, 2, 1)]
+    keys = []
+    for name, contacts in HITS.items():
+        for contact in contacts:
+            keys.append((name, contact))
+    touching = []
+    for key in keys:
+        for law in LAWS:
+            for made in scenarios(key, law, 1.0, 2, 1):
+                touching.append(made)
     for trace in smc.run(touching):
         assert np.abs(trace.reaction).max() > 0.5, trace.scenario
 
 
 def test_realistic_mechanisms_take_the_step_of_the_study_by_default():
-    steps = {group[0].resolved.physics_step for key, group in brief().items() if key[1] != "encoder"}
-    # MAX_STEP under RK4, behind a lag or a motor without inductance; PLAY_STEP for stops that do not bounce
+    steps = set()
+    for key, group in brief().items():
+        if key[1] != "encoder":
+            steps.add(group[0].resolved.physics_step)
+    # MAX_STEP under RK4, behind a lag or a motor without inductance; PLAY_STEP for stops that do
+    # not bounce
     assert steps == {REALISTIC_STEP, MAX_STEP, PLAY_STEP}
 
 
@@ -170,14 +206,22 @@ def table(chosen):
     """The study as a rich table."""
     from rich.table import Table
 
-    shown = Table(title="scores with the default physics step, and by how much they differ with half of it")
+    shown = Table(
+        title="scores with the default physics step, and by how much they differ with half of it"
+    )
     for head in ("plant", "part", "law", *SCORES):
         shown.add_column(head)
     for key, values in study(chosen).items():
         cells = []
         for coarse, fine, spread in values.values():
-            chance = f" +- {100 * spread / fine:.1f}" if spread else ""
-            colour = "" if converged(coarse, fine, spread) else "[red]"
+            if spread:
+                chance = f" +- {100 * spread / fine:.1f}"
+            else:
+                chance = ""
+            if converged(coarse, fine, spread):
+                colour = ""
+            else:
+                colour = "[red]"
             cells.append(f"{coarse:.4g}  {colour}{100 * change(coarse, fine):.2f}{chance} %")
         shown.add_row(*key, *cells)
     return shown

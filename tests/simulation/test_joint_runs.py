@@ -6,16 +6,23 @@ import pickle
 import mujoco
 import numpy as np
 import pytest
-from helpers import arms
+from helpers import arms, reference
 from helpers.runs import assert_loops_agree, assert_same, plainly
 from numba import njit
 
 import smc_mujoco as smc
-from smc_mujoco.control.joint_law import catalogue, coriolis, jacobian, norm, product, saturate, torque
+from smc_mujoco.control.joint_law import (
+    catalogue,
+    coriolis,
+    jacobian,
+    norm,
+    product,
+    saturate,
+    torque,
+)
 from smc_mujoco.control.law import FREE_BODY
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel
 from smc_mujoco.mechanisms.plant import Values
-from helpers import reference
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +32,9 @@ def arm():
 
 @smc.law_function(joint=True, gains={"k": 20.0, "c": 5.0}, memory=3, requires_model=True)
 def curious(y, gains, memory):
-    """Reads everything that a law of many joints may read, remembers, and writes over its reference."""
+    """Reads everything that a law of many joints may read, remembers, and writes over its
+    reference.
+    """
     s = y.de + gains.c * y.e
     memory[:, 0] += y.dt * saturate(s)
     memory[0, 1] = y.t
@@ -51,7 +60,12 @@ def held(y, gains, memory):
 def cases(arm):
     """Scenarios that differ in all that the law's road touches, most in one Batch."""
     common = {"duration": 0.05, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2)}
-    loaded = {"velocity": "levant", "input_delay": 2e-3, "mismatch": {"m": 1.4}, "feedforward": smc.Constant(0.3)}
+    loaded = {
+        "velocity": "levant",
+        "input_delay": 2e-3,
+        "mismatch": {"m": 1.4},
+        "feedforward": smc.Constant(0.3),
+    }
     for name in (name for name, law in catalogue().items() if FREE_BODY not in law.plants):
         yield smc.Scenario(plant=arm, law=name, x0=(0.1, -0.3, 0.2), **common)
         if name != "hybrid_sliding":  # which needs a tip
@@ -95,7 +109,9 @@ SERVO = '<position tendon="t" kp="4" kv="0.5"/>'
     ids=["bodies", "tendon", "another actuator", "gravity compensated by the actuator"],
 )
 def test_all_forces_of_the_model_are_in_h_also_after_runs_of_other_laws(parts):
-    """Also those that MuJoCo computes elsewhere, and with data that a law of one channel has used before."""
+    """Also those that MuJoCo computes elsewhere, and with data that a law of one channel has used
+    before.
+    """
     text = TENDON.format(**{"tendon": "", "actuator": "", "own": "false"} | parts)
     channels = {name: smc.Channel(x0=0.3) for name in "ab"}
     plant = smc.plant_from(text, channels=channels, name="pulled")
@@ -118,8 +134,12 @@ def test_nominal_dynamics_are_those_of_inverse_dynamics(arm):
         mujoco.mj_inverse(model, data)
         values = Values(**arm.parameters)
         found = arm.nominal.dynamics(x, v, values)
-        np.testing.assert_allclose(found.M @ a + found.h, data.qfrc_inverse[dofs], rtol=1e-10, atol=1e-10)
-        np.testing.assert_allclose(found.g, arm.nominal.dynamics(x, 0 * v, values).h, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            found.M @ a + found.h, data.qfrc_inverse[dofs], rtol=1e-10, atol=1e-10
+        )
+        np.testing.assert_allclose(
+            found.g, arm.nominal.dynamics(x, 0 * v, values).h, rtol=1e-12, atol=1e-12
+        )
 
 
 def test_the_jacobian_is_the_tips_velocity(arm):
@@ -133,12 +153,16 @@ def test_the_jacobian_is_the_tips_velocity(arm):
         return data.site("tip").xpos.copy()
 
     found = arm.nominal.jacobian(x, Values(**arm.parameters), "tip")
-    expected = np.column_stack([(place(x + h * unit) - place(x - h * unit)) / (2 * h) for unit in np.eye(3)])
+    expected = np.column_stack(
+        [(place(x + h * unit) - place(x - h * unit)) / (2 * h) for unit in np.eye(3)]
+    )
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_coriolis_is_christoffels(arm):
-    """C v is the part of h that is quadratic in v, and M' - 2 C is skew-symmetric: w' M' w = 2 w' C w."""
+    """C v is the part of h that is quadratic in v, and M' - 2 C is skew-symmetric: w' M' w = 2 w' C
+    w.
+    """
     rng = np.random.default_rng(2)
     values, h = Values(**arm.parameters), 1e-5
     nominal = arm.nominal
@@ -148,7 +172,9 @@ def test_coriolis_is_christoffels(arm):
         x, v, w = rng.normal(size=(3, 3))
         found = nominal.dynamics(x, v, values)
         quadratic = found.h - found.g - damping * v
-        np.testing.assert_allclose(nominal.coriolis(x, v, v, values), quadratic, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            nominal.coriolis(x, v, v, values), quadratic, rtol=1e-9, atol=1e-9
+        )
         after, before = (nominal.dynamics(x + sign * h * v, v, values).M for sign in (1, -1))
         rate = w @ (after - before) @ w / (2 * h)
         assert rate == pytest.approx(2 * w @ nominal.coriolis(x, v, w, values), abs=1e-7)
@@ -192,7 +218,9 @@ def beyond(y, gains, memory):
 
 
 def test_a_push_gives_its_impulse_to_its_body(refused):
-    """A sphere that swings freely, without gravity: l F dt of angular momentum, F dt = 2 width peak / pi."""
+    """A sphere that swings freely, without gravity: l F dt of angular momentum, F dt = 2 width peak
+    / pi.
+    """
     text = """<mujoco><option gravity="0 0 0"/><worldbody><body name="bob"><joint name="a" axis="0 1 0"/>
       <geom type="sphere" size="0.01" pos="0 0 -1" mass="2"/></body></worldbody></mujoco>"""
     plant = smc.plant_from(text, channels={"a": {"motor": True}}, name="bob")
@@ -208,7 +236,10 @@ def test_a_failing_law_ends_its_own_run_with_the_reason():
         (short, "instead of two vectors u, s of 2 numbers each, at t = 0 s"),
         (late, "law 'late' returned u = nan, s = 0.5"),
         (beyond, "law 'beyond' raised IndexError"),
-        (tipped, "law 'tipped' raised ValueError (there is no tip, or the law has no model: give the plant a tip"),
+        (
+            tipped,
+            "law 'tipped' raised ValueError (there is no tip, or the law has no model: give the plant a tip",
+        ),
     ]
     common = {"plant": "double_pendulum", "duration": 0.03}
     laws = [law for law, _ in reasons]
@@ -240,17 +271,25 @@ WELDED = """
 """
 TORQUE = "computed_torque_sliding"
 REFUSED = {
-    "gain of another length": lambda: smc.Scenario(plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])),
+    "gain of another length": lambda: smc.Scenario(
+        plant="double_pendulum", law=smc.law(TORQUE, k=[1.0, 2.0, 3.0])
+    ),
     "no gain": lambda: smc.law(TORQUE, k=[]),
     "bad gain": lambda: smc.law(TORQUE, k=[1.0, -1.0]),
     "free joint": lambda: smc.Scenario(plant="cart_pole", law=TORQUE),
     "one joint": lambda: smc.Scenario(plant="duffing", law=TORQUE),
     "surface": lambda: smc.Scenario(plant="double_pendulum", law=TORQUE, surface="terminal"),
     "singular": lambda: smc.Scenario(
-        plant=smc.plant_from(TWICE, channels={n: smc.Channel(motor=True) for n in "ab"}, name="twice"), law=TORQUE
+        plant=smc.plant_from(
+            TWICE, channels={n: smc.Channel(motor=True) for n in "ab"}, name="twice"
+        ),
+        law=TORQUE,
     ),
     "welded": lambda: smc.Scenario(
-        plant=smc.plant_from(WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"), law=TORQUE
+        plant=smc.plant_from(
+            WELDED, channels={n: smc.Channel(motor=True) for n in "ab"}, name="welded"
+        ),
+        law=TORQUE,
     ),
     "in C": lambda: smc.exchange.law_to_c(TORQUE),
     "chattering": lambda: smc.chattering(TORQUE, plant="double_pendulum"),

@@ -1,7 +1,9 @@
-"""The compiled callback and the reference loop give the same numbers, to the last bit, whatever else runs.
+"""The compiled callback and the reference loop give the same numbers, to the last bit, whatever
+else runs.
 
-The reference loop uses numpy's own generator and calls the laws as the Python functions they are: agreement holds the
-callback's clock, noise, delay, estimators, signals, saturation and logging against a second telling of them.
+The reference loop uses numpy's own generator and calls the laws as the Python functions they are:
+agreement holds the callback's clock, noise, delay, estimators, signals, saturation and logging
+against a second telling of them.
 """
 
 import dataclasses
@@ -17,12 +19,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.commands import python
 from helpers.pages import ROOT
 from helpers.runs import ARRAYS, JOINTED, assert_loops_agree, assert_same
 
 import smc_mujoco as smc
-from helpers import reference
 
 PLANTS = pytest.mark.parametrize("plant", JOINTED)
 STUDIED = [*smc.paper.GAINS["duffing"], "none"]
@@ -33,7 +35,9 @@ def shortened(s, duration):
     """The scenario with its run, and every time in it, shrunk to a duration."""
     shrink = duration / s.duration
     signals = tuple(
-        dataclasses.replace(d, **{k: v * shrink for k, v in d.parameters().items() if k in ("time", "width")})
+        dataclasses.replace(
+            d, **{k: v * shrink for k, v in d.parameters().items() if k in ("time", "width")}
+        )
         for d in s.disturbance
     )
     jump = s.jump and smc.Jump(time=s.jump.time * shrink, factors=s.jump.factors)
@@ -43,11 +47,10 @@ def shortened(s, duration):
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", smc.paper.GAINS)
 def test_callback_equals_plain_loop_under_every_law_of_the_study_in_every_condition(plant):
-    scenarios = [
-        shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.05)
-        for law in STUDIED
-        for condition in smc.paper.CONDITIONS
-    ]
+    scenarios = []
+    for law in STUDIED:
+        for condition in smc.paper.CONDITIONS:
+            scenarios.append(shortened(smc.paper.scenario(plant, law, condition, seed=7), 0.05))
     assert_loops_agree(scenarios)
 
 
@@ -79,7 +82,11 @@ def noisy(plant, law, model, velocity):
 @pytest.mark.parametrize("surface", smc.laws(kind="surface"))
 def test_callback_equals_plain_loop_on_every_surface(surface):
     scenario = smc.Scenario(
-        plant="inverted_pendulum", law="boundary_layer", surface=surface, model="nominal", duration=0.2
+        plant="inverted_pendulum",
+        law="boundary_layer",
+        surface=surface,
+        model="nominal",
+        duration=0.2,
     )
     assert_loops_agree([scenario], 1e-12)
 
@@ -87,7 +94,12 @@ def test_callback_equals_plain_loop_on_every_surface(surface):
 @pytest.mark.parametrize("velocity", smc.laws(kind="estimator"))
 def test_callback_equals_plain_loop_with_every_estimator(velocity):
     scenario = smc.Scenario(
-        plant="duffing", law="classical", velocity=velocity, noise=smc.Noise(0.01), duration=0.3, seed=4
+        plant="duffing",
+        law="classical",
+        velocity=velocity,
+        noise=smc.Noise(0.01),
+        duration=0.3,
+        seed=4,
     )
     assert_loops_agree([scenario], 1e-9)
 
@@ -98,27 +110,42 @@ def curious(y, gains, memory):
     memory[0] += y.dt * y.e
     memory[1] = 0.9 * memory[1] + y.de
     model = (y.ddr - y.f) / y.g
-    u = model - gains.a * y.x - gains.b * y.v - memory[0] - 0.1 * memory[1] + 1e-3 * y.t + y.r - y.dr
+    u = (
+        model
+        - gains.a * y.x
+        - gains.b * y.v
+        - memory[0]
+        - 0.1 * memory[1]
+        + 1e-3 * y.t
+        + y.r
+        - y.dr
+    )
     return u, memory[0]
 
 
 def within(plant):
     """Least and largest positions of a plant's channels."""
-    return np.array([ends for _, *ends in plant.ranges]).T if plant.ranges else (-math.inf, math.inf)
+    if plant.ranges:
+        return np.array([ends for _, *ends in plant.ranges]).T
+    return (-math.inf, math.inf)
 
 
 def scattered(number):
     """A random valid scenario."""
     rng = np.random.default_rng(number)
     plant = smc.plant(str(rng.choice(JOINTED)))
-    period, step = [(1e-3, 1e-3), (2e-3, 1e-3), (5e-3, 1e-3), (20e-3, 1e-3), (4e-3, 5e-4)][rng.integers(5)]
+    period, step = [(1e-3, 1e-3), (2e-3, 1e-3), (5e-3, 1e-3), (20e-3, 1e-3), (4e-3, 5e-4)][
+        rng.integers(5)
+    ]
     key = str(rng.choice([*plant.parameters, "mass"]))
     signals = [
         smc.Constant(rng.normal()),
         smc.Sine(rng.normal(), omega=rng.uniform(1, 50), phase=rng.uniform(0, 6)),
         smc.Step(rng.normal(), time=rng.uniform(0, 0.2)),
         smc.signals.Pulse(rng.normal(), time=rng.uniform(0, 0.2), width=rng.uniform(0.001, 0.1)),
-        smc.signals.OrnsteinUhlenbeck(rng.uniform(0.1, 1), tau=rng.uniform(0.01, 1), dt=rng.uniform(1e-4, 1e-2)),
+        smc.signals.OrnsteinUhlenbeck(
+            rng.uniform(0.1, 1), tau=rng.uniform(0.01, 1), dt=rng.uniform(1e-4, 1e-2)
+        ),
     ]
     return smc.Scenario(
         plant=plant,
@@ -148,27 +175,46 @@ def test_callback_equals_plain_loop_in_scattered_scenarios():
 
 @pytest.mark.slow
 def test_a_users_law_sees_the_same_measurement_in_both_loops():
-    """To rounding only: numba multiplies x**3 of the nominal Duffing spring out, Python takes a power."""
-    scenarios = [dataclasses.replace(scattered(number), law=curious(a=3.0)) for number in range(80, 92)]
+    """To rounding only: numba multiplies x**3 of the nominal Duffing spring out, Python takes a
+    power.
+    """
+    scenarios = []
+    for number in range(80, 92):
+        scenarios.append(dataclasses.replace(scattered(number), law=curious(a=3.0)))
     assert_loops_agree(scenarios, 1e-12)
 
 
 @PLANTS
 def test_every_parameter_of_a_plant_may_differ_and_jump_within_one_batch(plant):
     keys = list(smc.plant(plant).parameters)
-    common = {"plant": plant, "law": "super_twisting", "duration": 0.03, "disturbance": smc.Sine(0.2, omega=5.0)}
+    common = {
+        "plant": plant,
+        "law": "super_twisting",
+        "duration": 0.03,
+        "disturbance": smc.Sine(0.2, omega=5.0),
+    }
     scenarios = []
     for time, off in ((0.0, 0.1), (0.013, -0.1)):
         factors = {key: 1.0 + off * (1 + i % 3) / 3 for i, key in enumerate(keys)}
-        factors |= {"delta": 0.3} if "delta" in keys else {}  # a share, 0 to 1, to which this is added
-        scenarios.append(smc.Scenario(mismatch=factors, jump=smc.Jump(time, dict(reversed(factors.items()))), **common))
+        # a share, 0 to 1, to which this is added
+        if "delta" in keys:
+            factors |= {"delta": 0.3}
+        else:
+            factors |= {}
+        scenarios.append(
+            smc.Scenario(
+                mismatch=factors, jump=smc.Jump(time, dict(reversed(factors.items()))), **common
+            )
+        )
     assert_loops_agree(scenarios)
 
 
 def test_a_jump_at_the_last_step_is_in_the_last_sample():
     """The jump makes the lever of the gust longer."""
     gust, jump = smc.signals.Gust(2.0, 0.0, 0.02), smc.Jump(0.00999, {"l": 1.5})
-    longer = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, disturbance=gust, jump=jump)
+    longer = smc.Scenario(
+        plant="inverted_pendulum", law="none", duration=0.01, disturbance=gust, jump=jump
+    )
     assert longer.jump_step == longer.samples * longer.steps
     trace = smc.run(longer)
     assert_same(trace, reference.run(longer))
@@ -177,7 +223,9 @@ def test_a_jump_at_the_last_step_is_in_the_last_sample():
 
 @pytest.mark.parametrize(("period", "steps"), [(0.0225, 23), (0.0305, 31), (0.05, 19)])
 def test_the_law_and_the_trace_share_one_clock(period, steps):
-    """period / steps * steps is below the period in floating point: a step reference at a sample must not come late."""
+    """period / steps * steps is below the period in floating point: a step reference at a sample
+    must not come late.
+    """
     scenario = smc.Scenario(
         plant="duffing",
         law="classical",
@@ -195,7 +243,12 @@ def test_the_law_and_the_trace_share_one_clock(period, steps):
 def test_a_disturbance_that_begins_at_a_sample_is_in_that_sample(period, steps):
     step = smc.Step(1.0, time=2 * period)
     scenario = smc.Scenario(
-        plant="duffing", law="none", control_period=period, physics_step=period / steps, duration=0.5, disturbance=step
+        plant="duffing",
+        law="none",
+        control_period=period,
+        physics_step=period / steps,
+        duration=0.5,
+        disturbance=step,
     )
     assert smc.run(scenario).d[:4, 0].tolist() == [0.0, 0.0, 1.0, 1.0]
 
@@ -219,15 +272,26 @@ def both(y, gains, memory):
 
 
 def test_a_voltage_and_a_feedforward_are_the_same_in_both_loops():
-    """A law that computes with the model per volt, on the joint that the motor drives and the one that it moves."""
+    """A law that computes with the model per volt, on the joint that the motor drives and the one
+    that it moves.
+    """
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
     scenario = smc.Scenario(
-        plant=smc.plant("furuta", b=1e-4, bq=1e-5), law=both(), x0=(0.0, 0.05), actuator=motor,
-        feedforward=smc.Sine(0.5, 20.0), sensor=smc.Encoder(2048), control_period=2e-3, input_delay=1e-3, duration=0.3,
-    )  # fmt: skip
+        plant=smc.plant("furuta", b=1e-4, bq=1e-5),
+        law=both(),
+        x0=(0.0, 0.05),
+        actuator=motor,
+        feedforward=smc.Sine(0.5, 20.0),
+        sensor=smc.Encoder(2048),
+        control_period=2e-3,
+        input_delay=1e-3,
+        duration=0.3,
+    )
     trace, other = smc.run(scenario), reference.run(scenario)
     for name in ARRAYS:
-        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name
+        )
     plain = smc.run(dataclasses.replace(scenario, feedforward=None))
     np.testing.assert_allclose(trace.u[0, 0], plain.u[0, 0])
     assert np.abs(trace.u[1:50] - plain.u[1:50]).max() > 0.01
@@ -235,7 +299,11 @@ def test_a_voltage_and_a_feedforward_are_the_same_in_both_loops():
 
 def test_a_feedforward_is_added_before_the_bound_and_read_at_the_sample():
     scenario = smc.Scenario(
-        plant="duffing", law="none", feedforward=smc.Sine(8.0, 30.0), duration=0.2, control_period=5e-3
+        plant="duffing",
+        law="none",
+        feedforward=smc.Sine(8.0, 30.0),
+        duration=0.2,
+        control_period=5e-3,
     )
     trace = smc.run(scenario)
     expected = np.clip(8.0 * np.sin(30.0 * trace.t), -6.0, 6.0)
@@ -253,26 +321,45 @@ def test_a_feedforward_that_raises_says_so():
 def test_applied_is_the_command_of_the_delay_ago():
     delays = (0.0, 0.001, 0.004, 0.007, 0.01, 0.19)
     common = {
-        "plant": "duffing", "law": "observer_free", "duration": 0.2, "control_period": 0.005, "physics_step": 0.001,
-    }  # fmt: skip
-    scenarios = [smc.Scenario(**common, noise=smc.Noise(0.1, 0.1), input_delay=delay) for delay in delays]
+        "plant": "duffing",
+        "law": "observer_free",
+        "duration": 0.2,
+        "control_period": 0.005,
+        "physics_step": 0.001,
+    }
+    scenarios = []
+    for delay in delays:
+        scenarios.append(smc.Scenario(**common, noise=smc.Noise(0.1, 0.1), input_delay=delay))
     for trace in smc.run(scenarios):
-        samples = math.ceil(round(trace.scenario.input_delay / 0.001) / 5)  # a command acts from the next sample on
+        samples = math.ceil(
+            round(trace.scenario.input_delay / 0.001) / 5
+        )  # a command acts from the next sample on
         np.testing.assert_array_equal(trace.applied[:samples], 0.0)
         np.testing.assert_array_equal(trace.applied[samples:], trace.u[: len(trace.u) - samples])
         assert np.unique(trace.u).size > 1
 
 
 def batch():
-    """Two plants, each with half of the laws, mixed gains, signals, noise, seeds, delays, jumps and periods."""
+    """Two plants, each with half of the laws, mixed gains, signals, noise, seeds, delays, jumps and
+    periods.
+    """
     found = []
     for i, law in enumerate(STUDIED):
-        common = smc.paper.scenario(("duffing", "pendulum_network")[i % 2], law, "jump_mild", seed=i)
-        noisy = {"noise": smc.Noise(0.01, 0.05), "disturbance": smc.signals.OrnsteinUhlenbeck(0.2 + 0.1 * i, tau=0.1)}
+        common = smc.paper.scenario(
+            ("duffing", "pendulum_network")[i % 2], law, "jump_mild", seed=i
+        )
+        noisy = {
+            "noise": smc.Noise(0.01, 0.05),
+            "disturbance": smc.signals.OrnsteinUhlenbeck(0.2 + 0.1 * i, tau=0.1),
+        }
         found.append(shortened(common, 0.1))
         found.append(shortened(dataclasses.replace(common, **noisy, input_delay=i * 1e-3), 0.1))
-        found.append(shortened(dataclasses.replace(common, **noisy, velocity="filtered_difference"), 0.1))
-        found.append(dataclasses.replace(found[-1], jump=None, control_period=5e-3, u_max=0.1 * (i + 1)))
+        found.append(
+            shortened(dataclasses.replace(common, **noisy, velocity="filtered_difference"), 0.1)
+        )
+        found.append(
+            dataclasses.replace(found[-1], jump=None, control_period=5e-3, u_max=0.1 * (i + 1))
+        )
     return found
 
 
@@ -314,17 +401,21 @@ def test_batches_and_slices_change_no_bit(together, monkeypatch, batch_bytes, sl
     assert digest(smc.run(batch(), threads=2)) == digest(together)
 
 
-def test_another_process_gives_the_same_bits_and_a_python_law_may_simulate_a_model_of_its_own(together):
+def test_another_process_gives_the_same_bits_and_a_python_law_may_simulate_a_model_of_its_own(
+    together,
+):
     """A predictive law steps MuJoCo inside the callback: the worst case is an abort of the process."""
     here = Path(__file__).parent
     code = "import smc_mujoco as smc, test_lockstep as t; print(t.digest(smc.run(t.batch()))); t.predict()"
-    assert python("-c", code, path=f"{here.parent}{os.pathsep}{here}{os.pathsep}{ROOT}").stdout.strip() == digest(
-        together
-    )
+    assert python(
+        "-c", code, path=f"{here.parent}{os.pathsep}{here}{os.pathsep}{ROOT}"
+    ).stdout.strip() == digest(together)
 
 
 def test_another_seed_gives_other_bits(together):
-    assert digest(smc.run([dataclasses.replace(s, seed=s.seed + 1) for s in batch()])) != digest(together)
+    assert digest(smc.run([dataclasses.replace(s, seed=s.seed + 1) for s in batch()])) != digest(
+        together
+    )
 
 
 def test_runs_from_several_python_threads_give_the_same_bits(together):
@@ -343,7 +434,9 @@ def test_runs_from_several_python_threads_give_the_same_bits(together):
 
 @smc.law_function(gains={"at": 0.05, "how": 0.0}, memory=1)
 def doomed(y, gains, memory):
-    """Fails at a time: 0 returns NaN, 1 raises, 2 writes beyond its memory, 3 throws the plant out of the world."""
+    """Fails at a time: 0 returns NaN, 1 raises, 2 writes beyond its memory, 3 throws the plant out
+    of the world.
+    """
     if y.t >= gains.at:
         if gains.how == 0.0:
             return math.nan, y.e
@@ -369,7 +462,9 @@ def test_a_failure_leaves_its_neighbours_alone(together):
 @pytest.mark.parametrize(("plant", "how"), list(zip(JOINTED, itertools.cycle(range(4)))))
 def test_a_failure_is_timed_and_what_came_before_is_kept(plant, how):
     unbounded = dataclasses.replace(smc.plant(plant), limits=())
-    scenario = smc.Scenario(plant=unbounded, law=doomed(how=how), u_max=math.inf, duration=0.1, control_period=2e-3)
+    scenario = smc.Scenario(
+        plant=unbounded, law=doomed(how=how), u_max=math.inf, duration=0.1, control_period=2e-3
+    )
     trace = smc.run(scenario)
     assert_same(trace, reference.run(scenario))
     assert trace.diverged_at is not None
@@ -382,7 +477,9 @@ def test_a_failure_is_timed_and_what_came_before_is_kept(plant, how):
 
 
 def test_a_command_too_large_for_mujoco_is_not_dropped_in_silence():
-    """Beyond 1e10 MuJoCo sets every control to 0 and only counts a warning: the trace must not say that it acted."""
+    """Beyond 1e10 MuJoCo sets every control to 0 and only counts a warning: the trace must not say
+    that it acted.
+    """
 
     @smc.law_function()
     def huge(y, gains, memory):
@@ -408,7 +505,9 @@ def test_plants_of_one_name_and_two_mechanisms_are_not_mixed():
 
 
 def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
-    """An autoreset wipes userdata, and with it the row: without a word, the rest of the trace would be raw memory."""
+    """An autoreset wipes userdata, and with it the row: without a word, the rest of the trace would
+    be raw memory.
+    """
     duffing = smc.plant("duffing")
 
     def resetting(n):
@@ -417,7 +516,9 @@ def test_a_plant_that_lets_mujoco_reset_itself_still_says_that_it_diverged():
         return spec
 
     plant = dataclasses.replace(duffing, name="resetting", build=resetting)
-    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.01, disturbance=smc.Constant(1e12)))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law="none", duration=0.01, disturbance=smc.Constant(1e12))
+    )
     assert trace.diverged_at == 1e-3
     assert "the plant diverged" in str(trace.failure)
 

@@ -47,7 +47,14 @@ REFERRED = """
 def test_what_has_mass_or_touches_or_is_referred_to_or_pushed_is_no_scenery():
     spec = mujoco.MjSpec.from_string(REFERRED)
     without_scenery(spec, {"struck"})
-    assert [geom.name for geom in spec.geoms] == ["floor", "wall", "pulley", "seen", "bob", "buffer"]
+    assert [geom.name for geom in spec.geoms] == [
+        "floor",
+        "wall",
+        "pulley",
+        "seen",
+        "bob",
+        "buffer",
+    ]
     assert [body.name for body in spec.bodies] == ["world", "", "", "cart", "struck"]
     assert (len(spec.lights), len(spec.cameras)) == (0, 0)
     spec.compile()
@@ -55,7 +62,9 @@ def test_what_has_mass_or_touches_or_is_referred_to_or_pushed_is_no_scenery():
 
 @pytest.mark.parametrize(("contact", "geoms"), [("none", 0), ("stops", 8)])
 def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, monkeypatch):
-    scenario = smc.Scenario(plant="cart_pole", law="classical", contact=contact, x0=(1.2, 0.0), duration=0.5)
+    scenario = smc.Scenario(
+        plant="cart_pole", law="classical", contact=contact, x0=(1.2, 0.0), duration=0.5
+    )
     whole, bare = compile_model(scenario), compile_model(scenario, scenery=False)
     assert (bare.ngeom, bare.nlight, bare.ncam) == (geoms, 0, 0)
     assert (bare.npair, bare.nsensor) == (whole.npair, whole.nsensor)
@@ -67,7 +76,9 @@ def test_a_run_has_a_model_without_scenery_and_the_same_bits(contact, geoms, mon
 
 
 def test_a_body_that_is_pushed_stays_in_a_run():
-    pushed = smc.Scenario(plant="duffing", law="classical", disturbance=Push("scale", x=1.0), duration=0.01)
+    pushed = smc.Scenario(
+        plant="duffing", law="classical", disturbance=Push("scale", x=1.0), duration=0.01
+    )
     without = dataclasses.replace(pushed, disturbance=())
     assert [trace.failure for trace in smc.run([without, pushed])] == [None, None]
 
@@ -85,10 +96,20 @@ def test_the_scenery_of_a_users_model_stays():
 def test_runs_one_after_another_share_a_model_that_none_of_them_changes(monkeypatch):
     made, compiled = [], model.compile_model
     monkeypatch.setattr(model, "_mechanisms", weakref.WeakValueDictionary())
-    monkeypatch.setattr(model, "compile_model", lambda *args, **named: made.append(args) or compiled(*args, **named))
+    monkeypatch.setattr(
+        model, "compile_model", lambda *args, **named: made.append(args) or compiled(*args, **named)
+    )
     numbers = (2.0, 1.0, 1.5), (3.0, 2.0, 0.5), (2.0, 1.0, 1.5)
     first, _, again = (
-        smc.run(smc.Scenario(plant="duffing", law=smc.law("classical", k=k), mismatch={"M": M}, x0=x0, duration=0.01))
+        smc.run(
+            smc.Scenario(
+                plant="duffing",
+                law=smc.law("classical", k=k),
+                mismatch={"M": M},
+                x0=x0,
+                duration=0.01,
+            )
+        )
         for k, M, x0 in numbers
     )
     assert len(made) == 1

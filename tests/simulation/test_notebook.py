@@ -1,4 +1,6 @@
-"""Scenarios and traces in notebooks: what was given, what came of it, and as pandas and xarray with units."""
+"""Scenarios and traces in notebooks: what was given, what came of it, and as pandas and xarray with
+units.
+"""
 
 import json
 from xml.etree import ElementTree
@@ -28,23 +30,36 @@ def trace() -> smc.Trace:
 
 @pytest.fixture(scope="module")
 def cart() -> smc.Trace:
-    return smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=0.1))
+    return smc.run(
+        smc.Scenario(plant="cart_pole", law="hierarchical", model="nominal", duration=0.1)
+    )
 
 
 def cells(shown: object) -> dict[str, str]:
     """The fields of a table: name -> value. The HTML must be well-formed."""
     root = ElementTree.fromstring(f"<div>{shown._repr_html_()}</div>")
-    rows = [["".join(cell.itertext()) for cell in row if cell.tag == "td"] for row in root.iter("tr")]
+    rows = []
+    for row in root.iter("tr"):
+        rows.append(["".join(cell.itertext()) for cell in row if cell.tag == "td"])
     return {row[0]: row[-1] for row in rows if row}
 
 
 def test_a_scenario_shows_what_it_was_given():
     assert cells(GIVEN) == {
-        "plant": "inverted_pendulum (m = 0.5, l = 0.5, b = 0.02, grav = 9.81)", "law": "classical(k=2, c=3)",
-        "gains": "yours", "duration": "0.2", "x0": "(0.3,)", "noise": "Noise(position=0.01, velocity=0.05)",
+        "plant": "inverted_pendulum (m = 0.5, l = 0.5, b = 0.02, grav = 9.81)",
+        "law": "classical(k=2, c=3)",
+        "gains": "yours",
+        "duration": "0.2",
+        "x0": "(0.3,)",
+        "noise": "Noise(position=0.01, velocity=0.05)",
         "mismatch": "{'mass': 1.3}",
-    }  # fmt: skip
-    assert list(cells(smc.Scenario(plant="duffing", law="classical"))) == ["plant", "law", "gains", "duration"]
+    }
+    assert list(cells(smc.Scenario(plant="duffing", law="classical"))) == [
+        "plant",
+        "law",
+        "gains",
+        "duration",
+    ]
 
 
 def test_channels_in_two_units_have_each_its_own(cart):
@@ -75,7 +90,9 @@ def test_a_trace_that_failed_says_how():
 def test_a_voltage_is_in_volts():
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
     rig = smc.plant("furuta", b=1e-4, bq=1e-5)
-    volts = smc.Scenario(plant=rig, law="none", x0=(0.0, 0.05), actuator=motor, duration=0.01, u_max=9.0)
+    volts = smc.Scenario(
+        plant=rig, law="none", x0=(0.0, 0.05), actuator=motor, duration=0.01, u_max=9.0
+    )
     assert "u (V)" in cells(smc.run(volts))
 
 
@@ -85,7 +102,9 @@ def test_a_voltage_is_in_volts():
 @pytest.mark.parametrize(("method", "name"), [("to_pandas", "pandas"), ("to_xarray", "xarray")])
 def test_a_package_that_is_missing_is_named_with_its_cure(trace, monkeypatch, method, name):
     monkeypatch.setitem(__import__("sys").modules, name, None)
-    with pytest.raises(MissingPackageError, match=rf"Trace\.{method} needs {name} .*: pip install {name}$"):
+    with pytest.raises(
+        MissingPackageError, match=rf"Trace\.{method} needs {name} .*: pip install {name}$"
+    ):
         getattr(trace, method)()
 
 

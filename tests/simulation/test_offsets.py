@@ -1,4 +1,6 @@
-"""The only unsafe code: offsets are refused when wrong, and the callback touches nothing but its own records."""
+"""The only unsafe code: offsets are refused when wrong, and the callback touches nothing but its
+own records.
+"""
 
 import ctypes
 import dataclasses
@@ -14,13 +16,19 @@ from smc_mujoco.simulation import callback
 
 pytestmark = pytest.mark.quick
 
-STRUCTS = {name: "mjModel" if name in callback.OF_MODEL else "mjData" for name in callback.Offsets._fields[1:]}
+STRUCTS = {
+    name: "mjModel" if name in callback.OF_MODEL else "mjData"
+    for name in callback.Offsets._fields[1:]
+}
 SCENARIO = smc.Scenario(plant="duffing", law="classical", duration=0.05)
 
 
 @pytest.fixture(autouse=True)
 def nothing_left_behind():
-    before = mujoco.get_mjcb_control(), mujoco.get_mju_user_warning()  # dm_control has its own warning handler
+    before = (
+        mujoco.get_mjcb_control(),
+        mujoco.get_mju_user_warning(),
+    )  # dm_control has its own warning handler
     mujoco.set_mjcb_control(None)
     mujoco.set_mju_user_warning(None)
     yield
@@ -61,7 +69,10 @@ def test_offsets_are_where_the_live_arrays_are(live):
     assert ctypes.c_int64.from_address(model._address + offsets.nuserdata).value == 17
     for name, struct in STRUCTS.items():
         of = model if struct == "mjModel" else data
-        assert ctypes.c_void_p.from_address(of._address + getattr(offsets, name)).value == getattr(of, name).ctypes.data
+        assert (
+            ctypes.c_void_p.from_address(of._address + getattr(offsets, name)).value
+            == getattr(of, name).ctypes.data
+        )
 
 
 @pytest.mark.parametrize("name", STRUCTS)
@@ -74,7 +85,9 @@ def test_an_array_at_another_s_place_is_refused(monkeypatch, live, name):
         return fields
 
     doctored(monkeypatch, STRUCTS[name], swap)
-    with pytest.raises(callback.LayoutError, match=rf"does not have {STRUCTS[name]}\.{name} at byte"):
+    with pytest.raises(
+        callback.LayoutError, match=rf"does not have {STRUCTS[name]}\.{name} at byte"
+    ):
         callback.checked_offsets(*live)
 
 
@@ -100,15 +113,27 @@ def test_a_shifted_model_is_refused(monkeypatch, live):
 
 def test_an_unknown_type_is_refused(monkeypatch, live):
     def insert(fields):
-        return [dataclasses.replace(fields[0], name="extra", type=ast_nodes.ValueType(name="quaternion_t")), *fields]
+        return [
+            dataclasses.replace(
+                fields[0], name="extra", type=ast_nodes.ValueType(name="quaternion_t")
+            ),
+            *fields,
+        ]
 
     doctored(monkeypatch, "mjData", insert)
-    with pytest.raises(callback.LayoutError, match=r"^mujoco 3\.\S+ has .* C type .*quaternion_t.*: install mujoco 3"):
+    with pytest.raises(
+        callback.LayoutError,
+        match=r"^mujoco 3\.\S+ has .* C type .*quaternion_t.*: install mujoco 3",
+    ):
         callback.checked_offsets(*live)
 
 
 def test_nothing_is_installed_when_the_layout_is_wrong(monkeypatch):
-    doctored(monkeypatch, "mjModel", lambda fields: [dataclasses.replace(fields[0], name="extra"), *fields])
+    doctored(
+        monkeypatch,
+        "mjModel",
+        lambda fields: [dataclasses.replace(fields[0], name="extra"), *fields],
+    )
     callback.offsets.cache_clear()
     callback.callback.cache_clear()
     with pytest.raises(callback.LayoutError), callback.installed():
@@ -182,8 +207,13 @@ def test_a_second_thread_waits_for_the_first():
 
 @pytest.mark.parametrize("native", [True, False], ids=["native", "python"])
 def test_a_run_puts_a_users_own_callback_back(native):
-    """A Python callback makes MuJoCo's model compiler fail: no model may be built while it is installed."""
-    own = counting()[0] if native else lambda model, data: None
+    """A Python callback makes MuJoCo's model compiler fail: no model may be built while it is
+    installed.
+    """
+    if native:
+        own = counting()[0]
+    else:
+        own = lambda model, data: None
     alone = smc.run(SCENARIO)
     callback.offsets.cache_clear()  # as in a fresh process
     callback.callback.cache_clear()
@@ -200,24 +230,36 @@ def userdata(kind, size):
     """What a stranger may keep in userdata."""
     rng = np.random.default_rng(size)
     return {
-        "zeros": np.zeros(size), "ones": np.ones(size), "numbers": rng.normal(size=size) * 1e6,
-        "nan": np.full(size, np.nan), "nearly our magic number": np.full(size, callback.magic() + 1),
-    }[kind]  # fmt: skip
+        "zeros": np.zeros(size),
+        "ones": np.ones(size),
+        "numbers": rng.normal(size=size) * 1e6,
+        "nan": np.full(size, np.nan),
+        "nearly our magic number": np.full(size, callback.magic() + 1),
+    }[kind]
 
 
 @pytest.mark.parametrize(
     ("size", "kind"),
     [
-        (0, "zeros"), (1, "nearly our magic number"), (callback.USERDATA, "nearly our magic number"),
-        (callback.USERDATA, "ones"), (500, "numbers"), (500, "nan"),
+        (0, "zeros"),
+        (1, "nearly our magic number"),
+        (callback.USERDATA, "nearly our magic number"),
+        (callback.USERDATA, "ones"),
+        (500, "numbers"),
+        (500, "nan"),
     ],
-)  # fmt: skip
+)
 def test_strangers_are_not_touched(size, kind):
     model = smc.plant("pendulum_network").load(nuserdata=size)
     ends = []
     for inside in (False, True):
         data = mujoco.MjData(model)
-        data.qpos[:], data.userdata[:], data.ctrl[:], data.xfrc_applied[:] = 0.3, userdata(kind, size), 0.2, 0.01
+        data.qpos[:], data.userdata[:], data.ctrl[:], data.xfrc_applied[:] = (
+            0.3,
+            userdata(kind, size),
+            0.2,
+            0.01,
+        )
         if inside:
             with callback.installed():
                 mujoco.mj_step(model, data, 20)

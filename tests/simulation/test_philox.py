@@ -1,4 +1,6 @@
-"""Noise is numpy's Philox bit for bit, normal, independent where it must be, and a function of time and seed alone."""
+"""Noise is numpy's Philox bit for bit, normal, independent where it must be, and a function of time
+and seed alone.
+"""
 
 import dataclasses
 import itertools
@@ -16,7 +18,9 @@ LARGEST_SEED = 2**53 - 1
 
 
 def test_every_stream_of_a_seed_gives_the_numbers_it_always_gave(snapshot):
-    """They are whole numbers over a power of two, the same on all machines: a run is repeated years later."""
+    """They are whole numbers over a power of two, the same on all machines: a run is repeated years
+    later.
+    """
     streams = philox.MEASUREMENT, philox.PROCESS, philox.DROPOUT, philox.JITTER, philox.MISSED
     assert [[philox.uniform(5, 1, stream, k) for k in (0, 1, 7)] for stream in streams] == snapshot
 
@@ -31,7 +35,9 @@ def draws(seed, channel, stream, n):
 
 
 def numpys(seed, channel, stream, k):
-    """Block k from numpy's generator, which counts up before it draws; key and counter as little-endian words."""
+    """Block k from numpy's generator, which counts up before it draws; key and counter as
+    little-endian words.
+    """
     counter = (k + (stream << 64) - 1) % 2**256
     return np.random.Philox(key=seed | channel << 64, counter=counter).random_raw(4)
 
@@ -55,7 +61,9 @@ def test_normals_are_box_muller_of_the_top_53_bits():
         a, b, _, _ = (int(w) >> 11 for w in numpys(5, 2, philox.MEASUREMENT, k))
         radius, angle = math.sqrt(-2 * math.log((a + 1) / 2**53)), 2 * math.pi * b / 2**53
         expected = radius * math.cos(angle), radius * math.sin(angle)
-        np.testing.assert_allclose(philox.normals(5, 2, philox.MEASUREMENT, k), expected, rtol=1e-14, atol=1e-15)
+        np.testing.assert_allclose(
+            philox.normals(5, 2, philox.MEASUREMENT, k), expected, rtol=1e-14, atol=1e-15
+        )
 
 
 @pytest.mark.slow
@@ -71,7 +79,10 @@ def test_normals_are_standard_normal():
 
 @pytest.mark.slow
 def test_pairs_channels_streams_seeds_and_samples_are_independent():
-    n, keys = 20_000, itertools.product((0, 1, 2, LARGEST_SEED), (0, 1, 2), (philox.MEASUREMENT, philox.PROCESS))
+    n, keys = (
+        20_000,
+        itertools.product((0, 1, 2, LARGEST_SEED), (0, 1, 2), (philox.MEASUREMENT, philox.PROCESS)),
+    )
     series = np.concatenate([draws(*key, n).T for key in keys])
     later = np.roll(series, 1, axis=1)
     together = np.corrcoef(np.concatenate([series, later, series**2]))
@@ -91,14 +102,22 @@ def show_velocity(y, gains, memory):
 
 def at_rest(law, **fields):
     """A run at the origin: what the law shows as s is the noise alone, exactly."""
-    common = {"plant": "duffing", "x0": 0.0, "duration": 0.1, "noise": smc.Noise(position=0.5, velocity=3.0), "seed": 9}
+    common = {
+        "plant": "duffing",
+        "x0": 0.0,
+        "duration": 0.1,
+        "noise": smc.Noise(position=0.5, velocity=3.0),
+        "seed": 9,
+    }
     trace = smc.run(smc.Scenario(law=law(), **(common | fields)))
     assert not trace.x.any()
     return trace.s[:, 0]
 
 
 def test_sensors_show_the_truth_plus_the_normals_of_the_sample():
-    expected = np.array([python_controller.normals(9, 0, philox.MEASUREMENT, k) for k in range(101)])
+    expected = np.array(
+        [python_controller.normals(9, 0, philox.MEASUREMENT, k) for k in range(101)]
+    )
     np.testing.assert_allclose(at_rest(show_position), 0.5 * expected[:, 0], rtol=1e-15)
     np.testing.assert_allclose(at_rest(show_velocity), 3.0 * expected[:, 1], rtol=1e-15)
 
@@ -128,7 +147,9 @@ TAU, SIGMA = 0.05, 0.7
 def path(signal, times, seed=0, channel=0):
     """The signal's values at rising times."""
     memory = np.zeros(signal.memory)
-    return np.array([type(signal).value(t, signal, memory, seed, channel, philox.PROCESS)[0] for t in times])
+    return np.array(
+        [type(signal).value(t, signal, memory, seed, channel, philox.PROCESS)[0] for t in times]
+    )
 
 
 def test_process_noise_has_its_standard_deviation_and_correlation_time():
@@ -155,7 +176,9 @@ def test_process_noise_is_a_path_that_does_not_depend_on_where_it_is_read():
     fine = np.arange(4001) * 2.5e-4
     values = path(signal, fine)
     np.testing.assert_allclose(path(signal, fine[::3]), values[::3], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(path(signal, np.repeat(fine, 2)), np.repeat(values, 2), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        path(signal, np.repeat(fine, 2)), np.repeat(values, 2), rtol=0, atol=1e-12
+    )
 
 
 def test_process_noise_is_continuous_and_linear_between_knots():
@@ -177,10 +200,17 @@ def process(plant="duffing", **fields):
 def test_process_noise_does_not_depend_on_steps_or_integrator():
     d = process().d
     assert d.std() > 0.1 * SIGMA
-    for fields in ({"physics_step": 2.5e-4}, {"integrator": "Euler"}, {"law": "classical"}, {"noise": smc.Noise(1, 1)}):
+    for fields in (
+        {"physics_step": 2.5e-4},
+        {"integrator": "Euler"},
+        {"law": "classical"},
+        {"noise": smc.Noise(1, 1)},
+    ):
         np.testing.assert_allclose(process(**fields).d, d, rtol=0, atol=1e-12)
     for period in (2e-3, 20e-3):
-        np.testing.assert_allclose(process(control_period=period).d, d[:: round(period / 1e-3)], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            process(control_period=period).d, d[:: round(period / 1e-3)], rtol=0, atol=1e-12
+        )
 
 
 def test_process_noise_differs_between_channels_and_seeds():
@@ -188,7 +218,9 @@ def test_process_noise_differs_between_channels_and_seeds():
     other = process("pendulum_network", duration=2.0, seed=5).d
     pairs = np.corrcoef(np.concatenate([d, other], axis=1).T) - np.eye(10)
     assert np.abs(pairs).max() < 4 / math.sqrt(2.0 / (2 * TAU))
-    np.testing.assert_array_equal(d[:, 0], process(duration=2.0).d[:, 0])  # channel 0 is channel 0 in any plant
+    np.testing.assert_array_equal(
+        d[:, 0], process(duration=2.0).d[:, 0]
+    )  # channel 0 is channel 0 in any plant
 
 
 def test_two_process_noises_of_one_run_are_independent():
@@ -202,4 +234,7 @@ def test_two_process_noises_of_one_run_are_independent():
 def test_uniform_numbers_are_numpys_53_bits_of_a_block():
     for k in range(1, 50):
         word = int(numpys(7, 3, 5, k)[0])
-        assert philox.uniform(np.uint64(7), np.uint64(3), np.uint64(5), np.uint64(k)) == (word >> 11) * 2.0**-53
+        assert (
+            philox.uniform(np.uint64(7), np.uint64(3), np.uint64(5), np.uint64(k))
+            == (word >> 11) * 2.0**-53
+        )

@@ -1,4 +1,6 @@
-"""The controller in Python: measurement in, u and s out, as in the run, with nobody stepping a mechanism."""
+"""The controller in Python: measurement in, u and s out, as in the run, with nobody stepping a
+mechanism.
+"""
 
 import dataclasses
 
@@ -12,16 +14,28 @@ from smc_mujoco.simulation.python_controller import Controller, Failure
 NOISE = smc.Noise(position=0.001, velocity=0.01)
 SCENARIOS = {
     "a channel with noise, surface and feedforward": smc.Scenario(
-        plant="duffing", law="super_twisting", surface="integral", noise=NOISE, feedforward=smc.Sine(0.3, 4.0), seed=2
+        plant="duffing",
+        law="super_twisting",
+        surface="integral",
+        noise=NOISE,
+        feedforward=smc.Sine(0.3, 4.0),
+        seed=2,
     ),
     "a free joint, its model, an encoder that loses readings": smc.Scenario(
-        plant="furuta", law="observer_free", model="nominal", sensor=smc.Encoder(counts=4096, dropout=0.3)
+        plant="furuta",
+        law="observer_free",
+        model="nominal",
+        sensor=smc.Encoder(counts=4096, dropout=0.3),
     ),
     "a network with an estimator": smc.Scenario(
         plant=smc.plant("pendulum_network", n=3), law="observer_free", velocity="levant", u_max=2.0
     ),
     "a law of many joints": smc.Scenario(
-        plant=arms.arm(), law="computed_torque_sliding", model="nominal", reference=smc.Sine(0.2, 5.0), u_max=60.0
+        plant=arms.arm(),
+        law="computed_torque_sliding",
+        model="nominal",
+        reference=smc.Sine(0.2, 5.0),
+        u_max=60.0,
     ),
 }
 

@@ -1,4 +1,6 @@
-"""References and how laws follow them: derivatives are exact, and with the model r'' is fed forward."""
+"""References and how laws follow them: derivatives are exact, and with the model r'' is fed
+forward.
+"""
 
 import dataclasses
 import itertools
@@ -6,16 +8,24 @@ import math
 
 import numpy as np
 import pytest
+from helpers import reference
 
 import smc_mujoco as smc
 from smc_mujoco.control.law import catalogue
-from helpers import reference
 from smc_mujoco.simulation.signals import MinimumJerk, Ramp, Sine, Step
 
-REFERENCES = [Ramp(0.7, 0.3), Ramp(-2.0), MinimumJerk(1.5, 0.2, 0.9), MinimumJerk(-0.4, -0.1, 2.0), Sine(0.5, 3.0, 0.2)]
+REFERENCES = [
+    Ramp(0.7, 0.3),
+    Ramp(-2.0),
+    MinimumJerk(1.5, 0.2, 0.9),
+    MinimumJerk(-0.4, -0.1, 2.0),
+    Sine(0.5, 3.0, 0.2),
+]
 PLANTS = ("inverted_pendulum", "duffing", "van_der_pol")
 # Laws of e and its rate, on any plant, that act: their theory is the same for every reference.
-FOLLOWING = [n for n, t in catalogue().items() if t.relative_degree < 3 and not t.plants and n != "none"]
+FOLLOWING = [
+    n for n, t in catalogue().items() if t.relative_degree < 3 and not t.plants and n != "none"
+]
 
 
 def at(signal, t):
@@ -51,11 +61,15 @@ def test_minimum_jerk_moves_from_rest_to_rest_and_stays():
         assert at(move, t).tolist() == [0.0, 0.0, 0.0]
     for t in (1.1 + 1e-12, 5.0):
         assert at(move, t) == pytest.approx([1.5, 0.0, 0.0], abs=1e-12)
-    assert at(move, 0.65) == pytest.approx([0.75, 1.5 * 1.875 / 0.9, 0.0])  # halfway: 15/8 of the mean speed
+    assert at(move, 0.65) == pytest.approx(
+        [0.75, 1.5 * 1.875 / 0.9, 0.0]
+    )  # halfway: 15/8 of the mean speed
 
 
 def test_no_other_move_between_the_same_rests_has_less_jerk():
-    """The integral of the squared third derivative: 720 A^2/T^5, and more for the quintic plus any a^3 (1 - a)^3."""
+    """The integral of the squared third derivative: 720 A^2/T^5, and more for the quintic plus any
+    a^3 (1 - a)^3.
+    """
     move, h = MinimumJerk(1.0, 0.0, 1.0), 1e-3
     t = np.arange(0.0, 1.0 + h / 2, h)
     ddr = np.array([at(move, ti)[2] for ti in t])
@@ -77,7 +91,11 @@ def test_what_is_no_move_is_refused(refused):
 @pytest.mark.parametrize("signal", [Ramp(0.1, 0.05), MinimumJerk(0.4, 0.05, 0.3)], ids=repr)
 def test_a_reference_is_followed_alike_in_both_loops(signal):
     scenario = smc.Scenario(
-        plant="pendulum_network", law="computed_torque", model="nominal", reference=signal, duration=0.5
+        plant="pendulum_network",
+        law="computed_torque",
+        model="nominal",
+        reference=signal,
+        duration=0.5,
     )
     fast, slow = smc.run(scenario), reference.run(scenario)
     for name in ("x", "v", "u", "r"):
@@ -95,38 +113,57 @@ def test_the_reference_s_acceleration_is_fed_forward_with_the_model_and_only_wit
 
     At the top of a sine r is the same at every frequency, r' is 0 and r'' = -r omega^2.
     """
-    common = {"plant": smc.plant("duffing", M=0.625), "x0": 0.3, "v0": -0.2, "duration": 1e-3, "u_max": math.inf}
+    common = {
+        "plant": smc.plant("duffing", M=0.625),
+        "x0": 0.3,
+        "v0": -0.2,
+        "duration": 1e-3,
+        "u_max": math.inf,
+    }
     for model, expected in (("nominal", -0.2 * (5.0**2 - 1.0) * 0.625), ("none", 0.0)):
         slow, quick = (
-            smc.run([smc.Scenario(law=law, model=model, reference=Sine(0.2, omega, math.pi / 2), **common)
-                     for law in FOLLOWING])
+            smc.run(
+                [
+                    smc.Scenario(
+                        law=law, model=model, reference=Sine(0.2, omega, math.pi / 2), **common
+                    )
+                    for law in FOLLOWING
+                ]
+            )
             for omega in (1.0, 5.0)
-        )  # fmt: skip
-        changes = {name: b.u[0, 0] - a.u[0, 0] for name, a, b in zip(FOLLOWING, slow, quick, strict=True)}
+        )
+        changes = {}
+        for name, a, b in zip(FOLLOWING, slow, quick, strict=True):
+            changes[name] = b.u[0, 0] - a.u[0, 0]
         assert changes == pytest.approx(dict.fromkeys(FOLLOWING, expected), abs=1e-9)
 
 
 @pytest.fixture(scope="module")
 def followed():
-    """Every law, each on one of the plants, with the model, along a sine and along a smooth move from where it stands.
+    """Every law, each on one of the plants, with the model, along a sine and along a smooth move
+    from where it stands.
 
     It starts at a wrong speed of the sine.
     """
     sine, move = Sine(0.5, 2.0), MinimumJerk(0.5, 0.5, 1.5)
-    common = {"model": "nominal", "x0": 0.0, "integrator": "Euler"}  # a third of the time of Runge and Kutta's rule
-    scenarios = [
-        smc.Scenario(plant=plant, law=name, reference=r, duration=T, **common)
-        for name, plant in zip(FOLLOWING, itertools.cycle(PLANTS))
-        for r, T in ((sine, 6.0), (move, 2.5))
-    ]
+    common = {
+        "model": "nominal",
+        "x0": 0.0,
+        "integrator": "Euler",
+    }  # a third of the time of Runge and Kutta's rule
+    scenarios = []
+    for name, plant in zip(FOLLOWING, itertools.cycle(PLANTS)):
+        for r, T in ((sine, 6.0), (move, 2.5)):
+            scenarios.append(smc.Scenario(plant=plant, law=name, reference=r, duration=T, **common))
     traces = iter(smc.run(scenarios))
     return {name: (next(traces), next(traces)) for name in FOLLOWING}
 
 
 @pytest.mark.slow
 def test_a_law_with_the_model_follows_a_sine_and_a_smooth_path_without_leaving_it(followed):
-    """On a sine e ends within 2 % of the amplitude: what is left is the sampling, and an integrator's memory of the
-    start. Where it starts on the path, e is at no time more than 0.5 % of the way.
+    """On a sine e ends within 2 % of the amplitude: what is left is the sampling, and an
+    integrator's memory of the start. Where it starts on the path, e is at no time more than 0.5 %
+    of the way.
     """
     for name, (along_sine, along_move) in followed.items():
         assert along_sine.failure is along_move.failure is None, name
@@ -136,7 +173,9 @@ def test_a_law_with_the_model_follows_a_sine_and_a_smooth_path_without_leaving_i
 
 @pytest.mark.parametrize("name", ["computed_torque", "observer_free", "boundary_layer"])
 def test_without_the_model_a_continuous_law_lags_behind_a_sine(name, followed):
-    """What the model would have fed forward, (r'' - f)/g, takes an error to produce: ten times the error at least."""
+    """What the model would have fed forward, (r'' - f)/g, takes an error to produce: ten times the
+    error at least.
+    """
     seen = followed[name][0]
     blind = smc.run(dataclasses.replace(seen.scenario, model="none"))
     error, seeing = (np.abs(t.x - t.r)[t.t > 4.5].max() for t in (blind, seen))
@@ -145,7 +184,12 @@ def test_without_the_model_a_continuous_law_lags_behind_a_sine(name, followed):
 
 def test_a_step_is_taken_and_kept_by_the_model():
     scenario = smc.Scenario(
-        plant="inverted_pendulum", law="observer_free", model="nominal", reference=Step(0.3, 0.5), x0=0.0, duration=5.0
+        plant="inverted_pendulum",
+        law="observer_free",
+        model="nominal",
+        reference=Step(0.3, 0.5),
+        x0=0.0,
+        duration=5.0,
     )
     trace = smc.run(scenario)
     assert not trace.x[trace.t < 0.5].any()

@@ -42,10 +42,18 @@ NO_ROWS = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value
         ({"plant": "panda", "law": "none"}, True),
     ],
 )
-def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(fields, may, monkeypatch):
-    scenarios = [smc.Scenario(**{"law": "classical", "duration": 0.2} | fields, seed=seed) for seed in (0, 1)]
+def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(
+    fields, may, monkeypatch
+):
+    scenarios = []
+    for seed in (0, 1):
+        scenarios.append(smc.Scenario(**{"law": "classical", "duration": 0.2} | fields, seed=seed))
     flags, its = [], runs.ScenarioBatch.may_have_constraints
-    monkeypatch.setattr(runs.ScenarioBatch, "may_have_constraints", lambda batch: flags.append(its(batch)) or flags[-1])
+    monkeypatch.setattr(
+        runs.ScenarioBatch,
+        "may_have_constraints",
+        lambda batch: flags.append(its(batch)) or flags[-1],
+    )
     quick = smc.run(scenarios)
     assert flags == [may]
     monkeypatch.setattr(runs.ScenarioBatch, "may_have_constraints", lambda batch: True)
@@ -55,8 +63,15 @@ def test_models_that_can_have_no_constraint_look_for_none_and_no_bit_changes(fie
 
 
 def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
-    common = {"plant": "duffing", "law": "classical", "integrator": "implicitfast", "duration": 0.01}
-    none, some = (runs.prepare(smc.Scenario(**common, friction=smc.Coulomb(force))) for force in (0.0, 0.3))
+    common = {
+        "plant": "duffing",
+        "law": "classical",
+        "integrator": "implicitfast",
+        "duration": 0.01,
+    }
+    none, some = (
+        runs.prepare(smc.Scenario(**common, friction=smc.Coulomb(force))) for force in (0.0, 0.3)
+    )
     with callback.installed():
         for prepared, may in (([none, none], False), ([none, some], True), ([some, none], True)):
             batch = runs.ScenarioBatch(prepared, 1)
@@ -64,7 +79,9 @@ def test_dry_friction_of_any_run_of_a_batch_keeps_the_constraints():
 
 
 def failed(trace, at: float, *words: str):
-    """The trace failed at a time in s, said so in one sentence, and holds numbers before and NaN after."""
+    """The trace failed at a time in s, said so in one sentence, and holds numbers before and NaN
+    after.
+    """
     assert trace.diverged_at == pytest.approx(at, abs=1e-9)
     assert trace.failure.endswith(f"at t = {at:g} s")
     assert "\n" not in trace.failure
@@ -103,13 +120,24 @@ def test_no_scenarios_give_no_traces():
 
 def test_plants_sizes_and_durations_mix_in_one_call():
     many = [
-        scenario(plant="duffing"), scenario(plant=smc.plant("pendulum_network", n=2)),
-        scenario(plant=smc.plant("pendulum_network", n=3)), scenario(plant="duffing", duration=0.03),
-        scenario(plant="duffing", integrator="Euler"), scenario(plant="duffing", control_period=2e-3),
+        scenario(plant="duffing"),
+        scenario(plant=smc.plant("pendulum_network", n=2)),
+        scenario(plant=smc.plant("pendulum_network", n=3)),
+        scenario(plant="duffing", duration=0.03),
+        scenario(plant="duffing", integrator="Euler"),
+        scenario(plant="duffing", control_period=2e-3),
         scenario(plant="duffing", physics_step=5e-4),
-    ]  # fmt: skip
+    ]
     traces = smc.run(many)
-    assert [trace.x.shape for trace in traces] == [(21, 1), (21, 2), (21, 3), (31, 1), (21, 1), (11, 1), (21, 1)]
+    assert [trace.x.shape for trace in traces] == [
+        (21, 1),
+        (21, 2),
+        (21, 3),
+        (31, 1),
+        (21, 1),
+        (11, 1),
+        (21, 1),
+    ]
     assert all(same(trace, smc.run(one)) for trace, one in zip(traces, many, strict=True))
 
 
@@ -224,15 +252,23 @@ def test_a_law_that_its_author_compiled_cannot_write_beyond_its_memory_either():
 
 
 RETURNS = {
-    "nothing": lambda y, gains, memory: None, "text": lambda y, gains, memory: ("a", "b"),
-    "complex": lambda y, gains, memory: (1j, 0.0), "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
-    "memory": lambda y, gains, memory: memory, "huge": lambda y, gains, memory: (json.loads("1") * 10**400, 0.0),
-}  # fmt: skip
+    "nothing": lambda y, gains, memory: None,
+    "text": lambda y, gains, memory: ("a", "b"),
+    "complex": lambda y, gains, memory: (1j, 0.0),
+    "arrays": lambda y, gains, memory: (np.zeros(2), 0.0),
+    "memory": lambda y, gains, memory: memory,
+    "huge": lambda y, gains, memory: (json.loads("1") * 10**400, 0.0),
+}
 
 
 @pytest.mark.parametrize("name", RETURNS)
 def test_a_law_that_returns_the_wrong_thing_is_named(name, capfd):
-    failed(plainly(scenario(made(RETURNS[name]))), 0.0, "law '<lambda>'", "instead of the two numbers u, s")
+    failed(
+        plainly(scenario(made(RETURNS[name]))),
+        0.0,
+        "law '<lambda>'",
+        "instead of the two numbers u, s",
+    )
     assert capfd.readouterr().err == ""
 
 
@@ -250,7 +286,12 @@ def changes_its_measurement(y, gains, memory):
 
 @pytest.mark.parametrize("function", [changes_its_gains, changes_its_measurement])
 def test_a_law_cannot_change_what_it_is_given(function):
-    failed(plainly(scenario(made(function, {"k": 1.0}))), 0.0, f"law '{function.__name__}'", "AttributeError")
+    failed(
+        plainly(scenario(made(function, {"k": 1.0}))),
+        0.0,
+        f"law '{function.__name__}'",
+        "AttributeError",
+    )
 
 
 @pytest.mark.parametrize(
@@ -273,7 +314,9 @@ def test_endless_recursion_is_a_failure_like_any_other():
     failed(plainly(scenario(made(endless))), 0.0, "RecursionError")
 
 
-@pytest.mark.parametrize("value", ["x", None, (1.0, 2.0, 3.0), 10**400], ids=lambda v: type(v).__name__)
+@pytest.mark.parametrize(
+    "value", ["x", None, (1.0, 2.0, 3.0), 10**400], ids=lambda v: type(v).__name__
+)
 def test_an_estimator_that_returns_no_number_is_named(value):
     @smc.estimator_function()
     def odd(y, gains, memory):
@@ -338,7 +381,10 @@ class Written(smc.Signal):
 def test_a_signal_that_fails_fails_the_run_and_is_timed(signal, field):
     trace = smc.run(scenario(**{field: signal()}))
     failed(trace, trace.diverged_at)
-    assert trace.diverged_at in (pytest.approx(0.004), pytest.approx(0.005))  # some stage of a step, or the next
+    assert trace.diverged_at in (
+        pytest.approx(0.004),
+        pytest.approx(0.005),
+    )  # some stage of a step, or the next
 
 
 @pytest.mark.parametrize("field", ["reference", "disturbance"])
@@ -353,7 +399,9 @@ def test_a_signal_that_does_not_compile_takes_the_plain_loop():
 
 
 def test_extreme_sensor_noise_is_no_exception():
-    for trace in smc.run([scenario(plant=plant, noise=smc.Noise(1e100, 1e100)) for plant in JOINTED]):
+    for trace in smc.run(
+        [scenario(plant=plant, noise=smc.Noise(1e100, 1e100)) for plant in JOINTED]
+    ):
         assert trace.diverged_at is None or "law 'classical' returned" in trace.failure
 
 
@@ -396,16 +444,23 @@ def with_array(y, gains, memory):
 
 def test_a_law_that_does_not_compile_gives_the_trace_of_its_compilable_twin():
     rich = {
-        "duration": 0.1, "plant": smc.plant("pendulum_network", n=3), "control_period": 2e-3,
-        "noise": smc.Noise(0.01, 0.05), "disturbance": [smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.2, 0.1)],
-        "input_delay": 3e-3, "jump": smc.Jump(0.05, {"mass": 2.0}), "seed": 3,
-    }  # fmt: skip
+        "duration": 0.1,
+        "plant": smc.plant("pendulum_network", n=3),
+        "control_period": 2e-3,
+        "noise": smc.Noise(0.01, 0.05),
+        "disturbance": [smc.Sine(0.2, 5.0), smc.signals.OrnsteinUhlenbeck(0.2, 0.1)],
+        "input_delay": 3e-3,
+        "jump": smc.Jump(0.05, {"mass": 2.0}),
+        "seed": 3,
+    }
     twin = smc.run(scenario(made(native, {"k": 2.0}), **rich))
     for function in (with_json, WithClass(), Unhashable(), with_array):
         with pytest.warns(smc.errors.PlainLoopWarning, match="reference loop"):
             trace = smc.run(scenario(made(function, {"k": 2.0}), **rich))
         for name in ARRAYS:
-            np.testing.assert_allclose(getattr(trace, name), getattr(twin, name), rtol=0, atol=1e-12)
+            np.testing.assert_allclose(
+                getattr(trace, name), getattr(twin, name), rtol=0, atol=1e-12
+            )
 
 
 def test_the_warning_names_what_does_not_compile_and_why_and_points_at_the_caller():
@@ -499,11 +554,15 @@ def test_a_callback_that_was_installed_is_put_back():
     assert same(plain, plainly(scenario(made(with_json, {"k": 2.0}))))
 
 
-@pytest.mark.parametrize("law", ["classical", made(with_json, {"k": 2.0})], ids=["callback", "reference loop"])
+@pytest.mark.parametrize(
+    "law", ["classical", made(with_json, {"k": 2.0})], ids=["callback", "reference loop"]
+)
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers")
 def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     def interrupt(_, frame):
-        if frame.f_globals["__name__"] != "weakref":  # Python ignores exceptions there: the next alarm interrupts
+        if (
+            frame.f_globals["__name__"] != "weakref"
+        ):  # Python ignores exceptions there: the next alarm interrupts
             signal.setitimer(signal.ITIMER_REAL, 0.0)
             raise KeyboardInterrupt
 
@@ -514,11 +573,21 @@ def test_ctrl_c_in_mid_run_is_heard_and_leaves_the_callback_restored(law):
     begin = time.process_time()
     try:
         with pytest.raises(KeyboardInterrupt):
-            plainly(scenario(law, duration=10_000.0, control_period=0.1, physics_step=1e-3, integrator="Euler"))
+            plainly(
+                scenario(
+                    law,
+                    duration=10_000.0,
+                    control_period=0.1,
+                    physics_step=1e-3,
+                    integrator="Euler",
+                )
+            )
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    assert time.process_time() - begin < 10.0  # s of processor time; the run itself would take a minute
+    assert (
+        time.process_time() - begin < 10.0
+    )  # s of processor time; the run itself would take a minute
     assert mujoco.get_mjcb_control() is None
     assert mujoco.get_mju_user_warning() is handler
     assert smc.run(scenario()).diverged_at is None

@@ -43,7 +43,9 @@ from smc_mujoco.simulation.prepare import pack, prepare
 from smc_mujoco.studies import run_key
 
 PACKAGE = Path(smc.__file__).parent
-RUN = importlib.import_module("smc_mujoco.simulation.run")  # the module; the public name is the function
+RUN = importlib.import_module(
+    "smc_mujoco.simulation.run"
+)  # the module; the public name is the function
 ARRAYS = ("t", "x", "v", "u", "applied", "s", "d", "r")
 THREE = smc.plant("pendulum_network", n=3)
 
@@ -53,8 +55,14 @@ THREE = smc.plant("pendulum_network", n=3)
 
 ROOMS = ("common", "control", "simulation")
 SOURCES = {path.relative_to(PACKAGE) for room in ROOMS for path in (PACKAGE / room).glob("*.py")}
-IMPORTS = re.findall(r"^from smc_mujoco\.([\w.]+) import", Path(controller.__file__).read_text(encoding="utf-8"), re.M)
-SOURCES |= {path for name in IMPORTS if (PACKAGE / (path := Path(f"{name.replace('.', '/')}.py"))).exists()}
+IMPORTS = re.findall(
+    r"^from smc_mujoco\.([\w.]+) import",
+    Path(controller.__file__).read_text(encoding="utf-8"),
+    re.M,
+)
+SOURCES |= {
+    path for name in IMPORTS if (PACKAGE / (path := Path(f"{name.replace('.', '/')}.py"))).exists()
+}
 
 
 @pytest.fixture(scope="module")
@@ -164,12 +172,21 @@ def by_inner_function(y, gains, memory):
     return 0.0, memory[0]
 
 
-VANDALS = [by_global, by_global_compiled_before, by_another_helper, closed_over(), by_module, by_inner_function]
+VANDALS = [
+    by_global,
+    by_global_compiled_before,
+    by_another_helper,
+    closed_over(),
+    by_module,
+    by_inner_function,
+]
 
 
 @pytest.mark.parametrize("function", VANDALS, ids=lambda function: function.__name__)
 def test_a_helper_that_writes_beyond_the_memory_fails_the_run_and_touches_nothing_else(function):
-    good = [scenario(plant=THREE, seed=seed, noise=smc.Noise(0.1), law="adaptive") for seed in range(3)]
+    good = [
+        scenario(plant=THREE, seed=seed, noise=smc.Noise(0.1), law="adaptive") for seed in range(3)
+    ]
     bad = scenario(made(function), plant=THREE)
     first, trace, *others = plainly([good[0], bad, *good[1:]])
     assert trace.failure is not None
@@ -202,7 +219,9 @@ def factorial(n):
 
 
 def test_a_helper_that_calls_itself_compiles():
-    trace = smc.run(scenario(made(lambda y, gains, memory: (0.0, factorial(4)))))  # a warning would be an error
+    trace = smc.run(
+        scenario(made(lambda y, gains, memory: (0.0, factorial(4))))
+    )  # a warning would be an error
     assert (trace.s == 24.0).all()
 
 
@@ -239,10 +258,16 @@ def late_none(y, gains, memory):
 
 @pytest.mark.parametrize(("function", "at"), [(late_number, 0.0), (late_none, 0.005)])
 def test_a_law_that_may_return_none_is_not_compiled_and_is_named_when_it_does(function, at):
-    with pytest.warns(smc.errors.PlainLoopWarning, match=f"'{function.__name__}' does not compile.*instead of numbers"):
+    with pytest.warns(
+        smc.errors.PlainLoopWarning,
+        match=f"'{function.__name__}' does not compile.*instead of numbers",
+    ):
         trace = smc.run(scenario(made(function)))
     assert trace.diverged_at == pytest.approx(at)
-    assert f"law '{function.__name__}' returned (None, 0.0) instead of the two numbers u, s" in trace.failure
+    assert (
+        f"law '{function.__name__}' returned (None, 0.0) instead of the two numbers u, s"
+        in trace.failure
+    )
 
 
 # (d) signs
@@ -265,11 +290,16 @@ def test_a_law_is_zero_on_its_surface_and_opposes_s_off_it(name):
     rng = np.random.default_rng(0)
     for _ in range(200):
         gains = {gain: abs(rng.normal()) * 5.0 + 1e-3 for gain in template.defaults}
-        assert template.function(seen(0.0, 0.0), record(gains), np.zeros(template.memory)) == (0.0, 0.0)
+        assert template.function(seen(0.0, 0.0), record(gains), np.zeros(template.memory)) == (
+            0.0,
+            0.0,
+        )
         memory = np.zeros(template.memory)
         e, de = rng.normal(size=2)
         first = template.function(seen(e, de), record(gains), memory)
-        second = template.function(seen(e, de), record(gains), memory)  # what it remembers points the same way
+        second = template.function(
+            seen(e, de), record(gains), memory
+        )  # what it remembers points the same way
         for u, s in (first, second):
             assert u * s <= 0.0
         assert second[0] * second[1] < 0.0
@@ -277,9 +307,13 @@ def test_a_law_is_zero_on_its_surface_and_opposes_s_off_it(name):
 
 @pytest.mark.parametrize("name", ["classical", "adaptive", "adaptive_leak", "super_twisting"])
 def test_the_sign_of_zero_is_zero_whatever_came_before(name):
-    """On the surface, though not at the origin, and with a gain: a switching law does not choose a side."""
+    """On the surface, though not at the origin, and with a gain: a switching law does not choose a
+    side.
+    """
     template = catalogue()[name]
-    gains = dict(template.defaults) | {"c": 2.0} | ({"k0": 3.0} if "k0" in template.defaults else {})
+    gains = (
+        dict(template.defaults) | {"c": 2.0} | ({"k0": 3.0} if "k0" in template.defaults else {})
+    )
     memory = np.zeros(template.memory)
     assert template.function(seen(0.5, -1.0), record(gains), memory) == (0.0, 0.0)
     assert template.function(seen(-0.5, 1.0), record(gains), memory) == (0.0, 0.0)
@@ -288,7 +322,9 @@ def test_the_sign_of_zero_is_zero_whatever_came_before(name):
 @pytest.mark.parametrize(("leak_dt", "k0"), [(0.5, 0.0), (1.5, 2.0), (100.0, 2.0)])
 def test_the_gain_of_adaptive_leak_never_falls_below_0(leak_dt, k0):
     template, memory = catalogue()["adaptive_leak"], np.zeros(8)
-    gains = record(dict(template.defaults) | {"leak": leak_dt / 1e-2, "k0": k0, "gamma": 40.0, "c": 1.0})
+    gains = record(
+        dict(template.defaults) | {"leak": leak_dt / 1e-2, "k0": k0, "gamma": 40.0, "c": 1.0}
+    )
     lowest = math.inf
     for e, de in np.random.default_rng(1).normal(size=(500, 2)):
         u, s = template.function(seen(e, de, dt=1e-2), gains, memory)
@@ -342,8 +378,14 @@ def test_a_first_run_restores_the_callback_that_the_process_had(tmp_path):
 
 
 LARGE = [
-    scenario(made(lambda y, gains, memory: (0.0, 0.0), memory=10_000), plant=smc.plant("pendulum_network", n=50)),
-    scenario(disturbance=[smc.signals.OrnsteinUhlenbeck(0.1, 0.1)] * 40, plant=smc.plant("pendulum_network", n=50)),
+    scenario(
+        made(lambda y, gains, memory: (0.0, 0.0), memory=10_000),
+        plant=smc.plant("pendulum_network", n=50),
+    ),
+    scenario(
+        disturbance=[smc.signals.OrnsteinUhlenbeck(0.1, 0.1)] * 40,
+        plant=smc.plant("pendulum_network", n=50),
+    ),
     scenario(input_delay=0.9, duration=2.0, plant=smc.plant("pendulum_network", n=20)),
     scenario(velocity=smc.estimator_function(memory=5000)(lambda y, gains, memory: y.v)()),
     scenario(duration=10.0),
@@ -356,14 +398,22 @@ def test_the_estimated_memory_of_a_simulation_is_what_it_takes(large):
     log = np.empty((large.samples + 1, large.plant.n), state.LOG)
     _, packed = pack(prepared, log)
     struct = callback.offsets().userdata  # its arrays of statistics come first, and are most of it
-    takes = log.nbytes + packed.numbers.nbytes + state.SIMULATION.itemsize + struct + mujoco.MjData(model).nbuffer
+    takes = (
+        log.nbytes
+        + packed.numbers.nbytes
+        + state.SIMULATION.itemsize
+        + struct
+        + mujoco.MjData(model).nbuffer
+    )
     assert takes <= prepared.bytes <= 1.5 * takes
 
 
 def test_batches_of_laws_with_large_memory_stay_bounded(monkeypatch):
     monkeypatch.setattr(RUN, "BATCH_BYTES", RUN.BATCH_BYTES // 10)
     law = made(lambda y, gains, memory: (0.0, 0.0), memory=10_000)
-    many = [scenario(law, plant=smc.plant("pendulum_network", n=100), seed=seed) for seed in range(20)]
+    many = []
+    for seed in range(20):
+        many.append(scenario(law, plant=smc.plant("pendulum_network", n=100), seed=seed))
     batches = list(RUN._batches(list(enumerate(map(prepare, many))), 1))
     assert [index for batch in batches for index, _ in batch] == list(range(20))
     each = 8 * 10_000 * 100
@@ -446,13 +496,21 @@ def test_a_failing_run_says_the_same_alone_in_company_and_in_python(function):
     said = [trace.failure for trace in beside[1:-1]]
     assert said[0] == plainly(many[0]).failure
     assert said == [reference.run(one).failure for one in many]
-    said = [re.sub(r"expected a nonnegative input, got [-.\d]+", "math domain error", words) for words in said]  # 3.14
-    assert all(words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0]) for words in said)
+    said = [
+        re.sub(r"expected a nonnegative input, got [-.\d]+", "math domain error", words)
+        for words in said
+    ]  # 3.14
+    assert all(
+        words == SAYS[function].format(s=words.partition("s = ")[2].partition(" in ")[0])
+        for words in said
+    )
     assert [trace.failure for trace in (beside[0], beside[-1])] == [None, None]
 
 
 def test_a_singular_nominal_model_ends_a_run_of_python_instead_of_hanging_it():
-    """MuJoCo's warning about a singular inertia, given inside of a control callback of Python, never returns."""
+    """MuJoCo's warning about a singular inertia, given inside of a control callback of Python,
+    never returns.
+    """
     faulthandler.dump_traceback_later(60.0, exit=True)
     try:
         trace = reference.run(scenario("none", plant=smc.plant("double_pendulum", r1=1e9)))
@@ -495,11 +553,20 @@ class SourNoise(smc.Signal):
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"velocity": smc.estimator_function(sour_estimator)()}, "estimator 'sour_estimator' raised ValueError (sour)"),
-        ({"surface": smc.surface_function(sour_surface)()}, "surface 'sour_surface' raised ValueError (sour)"),
+        (
+            {"velocity": smc.estimator_function(sour_estimator)()},
+            "estimator 'sour_estimator' raised ValueError (sour)",
+        ),
+        (
+            {"surface": smc.surface_function(sour_surface)()},
+            "surface 'sour_surface' raised ValueError (sour)",
+        ),
         ({"reference": Sour()}, "Sour raised ValueError (sour)"),
         ({"feedforward": Sour()}, "Sour raised ValueError (sour)"),
-        ({"disturbance": [smc.signals.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]}, "SourNoise raised ValueError (sour)"),
+        (
+            {"disturbance": [smc.signals.OrnsteinUhlenbeck(0.1, 0.1), SourNoise()]},
+            "SourNoise raised ValueError (sour)",
+        ),
     ],
     ids=["estimator", "surface", "reference", "feedforward", "disturbance"],
 )
@@ -533,10 +600,18 @@ def test_a_motor_of_next_to_no_resistance_is_refused(refused):
 
 def test_process_noise_of_more_knots_than_minutes_of_computing_is_refused(refused):
     plant = smc.plant("pendulum_network", n=1000)
-    refused(lambda: scenario("none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10)))
+    refused(
+        lambda: scenario(
+            "none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1, dt=5e-10)
+        )
+    )
     scenario("none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1, dt=2e-7))
     scenario(
-        "none", plant=plant, disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1), duration=1000.0, control_period=0.1
+        "none",
+        plant=plant,
+        disturbance=smc.signals.OrnsteinUhlenbeck(0.1, 0.1),
+        duration=1000.0,
+        control_period=0.1,
     )
 
 
@@ -558,7 +633,9 @@ def test_the_arrays_of_a_failing_run_do_not_depend_on_its_company():
 def child_runs() -> int:
     """0 if a forked child finishes its own run, its exit status if not."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # forking with threads about is what is tested
+        warnings.simplefilter(
+            "ignore", DeprecationWarning
+        )  # forking with threads about is what is tested
         child = os.fork()
     if child == 0:
         signal.alarm(20)  # a child that hangs dies of it
@@ -606,7 +683,9 @@ def test_a_child_forked_by_a_law_in_the_plain_loop_can_run():
 def test_a_pulse_lasts_width_over_dt_samples_wherever_decimal_times_put_it(dt):
     wrong = []
     for start, width in itertools.product((*range(0, 60), 500, 4999), (1, 2, 3, 7, 10, 33, 100)):
-        pulse = smc.signals.Pulse(1.0, time=float(f"{start * dt:.6g}"), width=float(f"{width * dt:.6g}"))
+        pulse = smc.signals.Pulse(
+            1.0, time=float(f"{start * dt:.6g}"), width=float(f"{width * dt:.6g}")
+        )
         on = [k for k in range(start - 2, start + width + 3) if pulse.value(k * dt, pulse)[0]]
         if on != list(range(start, start + width)):
             wrong.append((pulse, on))
@@ -622,13 +701,17 @@ def test_a_pulse_of_a_run_lasts_as_long():
     pulses += [smc.signals.Pulse(1.0, round(0.001 * i, 3), 0.003) for i in range(1, 60)]
     traces = smc.run([scenario("none", duration=0.15, disturbance=pulse) for pulse in pulses])
     assert [int(trace.d.sum()) for trace in traces] == [100, 8, 30, *[3] * 59]
-    assert [trace.t[np.flatnonzero(trace.d)[0]] for trace in traces] == pytest.approx([p.time for p in pulses])
+    assert [trace.t[np.flatnonzero(trace.d)[0]] for trace in traces] == pytest.approx(
+        [p.time for p in pulses]
+    )
 
 
 NOISE = smc.signals.OrnsteinUhlenbeck(0.2, 0.1)
 
 
-@pytest.mark.parametrize("before", [[smc.Constant(0.0)], [smc.Step(0.0), smc.signals.Pulse(0.0, 0.1, 0.1)]])
+@pytest.mark.parametrize(
+    "before", [[smc.Constant(0.0)], [smc.Step(0.0), smc.signals.Pulse(0.0, 0.1, 0.1)]]
+)
 def test_the_path_of_process_noise_does_not_change_with_what_is_put_before_it(before):
     alone = smc.run(scenario("none", plant=THREE, disturbance=NOISE, seed=3))
     assert np.ptp(alone.d) > 0.0
@@ -650,7 +733,9 @@ def test_names_that_make_the_same_file_are_refused(refused):
         {"A": {"x": 1}, "a": {"x": 2}},
         {"a": {"b-c": 1}, "a-b": {"c": 2}},
     ]:
-        runs = {c: {label: scenario(seed=seed) for label, seed in labels.items()} for c, labels in conditions.items()}
+        runs = {}
+        for c, labels in conditions.items():
+            runs[c] = {label: scenario(seed=seed) for label, seed in labels.items()}
         refused(lambda runs=runs: smc.Scene(title="T", conditions=runs))
 
 
@@ -671,7 +756,9 @@ class Sine(smc.Signal):
         return p.amplitude, 0.0, 0.0
 
 
-def test_a_trace_of_a_signal_that_is_gone_is_refused_with_the_name_of_its_module(tmp_path, monkeypatch, refused):
+def test_a_trace_of_a_signal_that_is_gone_is_refused_with_the_name_of_its_module(
+    tmp_path, monkeypatch, refused
+):
     path = smc.run(scenario(disturbance=Sine(0.2, 5.0))).save(tmp_path / "a.npz")
     monkeypatch.setattr(Sine, "__module__", "a_module_that_is_gone")
     refused(lambda: smc.load(path), "'Sine' is unknown here: first import test_safety")
@@ -679,7 +766,9 @@ def test_a_trace_of_a_signal_that_is_gone_is_refused_with_the_name_of_its_module
 
 def test_signals_of_one_name_are_different_signals():
     assert Sine(0.2, 5.0) != smc.Sine(0.2, 5.0)
-    mine, theirs = smc.run([scenario(disturbance=Sine(0.2, 5.0)), scenario(disturbance=smc.Sine(0.2, 5.0))])
+    mine, theirs = smc.run(
+        [scenario(disturbance=Sine(0.2, 5.0)), scenario(disturbance=smc.Sine(0.2, 5.0))]
+    )
     assert (mine.d == 0.2).all()
     np.testing.assert_allclose(theirs.d[:, 0], 0.2 * np.sin(5.0 * theirs.t), atol=1e-15)
 
@@ -687,7 +776,9 @@ def test_signals_of_one_name_are_different_signals():
 # (m) checked mappings
 
 WHOLE = scenario(
-    smc.law("classical", k=2.0), mismatch={"M": 1.1, "alpha": 0.9}, jump=smc.Jump(0.01, {"M": 2.0, "alpha": 3.0})
+    smc.law("classical", k=2.0),
+    mismatch={"M": 1.1, "alpha": 0.9},
+    jump=smc.Jump(0.01, {"M": 2.0, "alpha": 3.0}),
 )
 MAPPINGS = {
     "gains": lambda s: s.law.gains,
@@ -697,7 +788,9 @@ MAPPINGS = {
 }
 
 
-@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))])
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))]
+)
 def test_a_scenario_hashes_and_comes_back_equal_and_unchangeable(copied):
     again = copied(WHOLE)
     assert again == WHOLE
@@ -732,10 +825,18 @@ def mechanism(drive: str, joint: str = "slide", axis: str = "1 0 0") -> mujoco.M
 
 @pytest.mark.parametrize(
     ("joint", "axis"),
-    [("hinge", "1 0 0"), ("hinge", "0 1 0"), ("hinge", "0 0 1"), ("hinge", "0 0 -1"), ("slide", "-1 0 0")],
+    [
+        ("hinge", "1 0 0"),
+        ("hinge", "0 1 0"),
+        ("hinge", "0 0 1"),
+        ("hinge", "0 0 -1"),
+        ("slide", "-1 0 0"),
+    ],
 )
 def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joint, axis):
-    """J' F by MuJoCo's Jacobian of the body's centre of mass, in place of the lever arm that both loops read."""
+    """J' F by MuJoCo's Jacobian of the body's centre of mass, in place of the lever arm that both
+    loops read.
+    """
     model = mechanism('joint="j"', joint, axis)
     data, jacobian, (channel,) = mujoco.MjData(model), np.zeros((3, 1)), channels(model)
     data.qpos[:] = 0.7
@@ -744,14 +845,22 @@ def test_the_generalised_force_of_a_horizontal_force_is_that_of_the_jacobian(joi
     mujoco.mj_jacBodyCom(model, data, jacobian, None, 1)
     force = channel["sign"]
     if joint == "hinge":
-        force = lever.py_func(np.rec.array(channel), data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel())
+        force = lever.py_func(
+            np.rec.array(channel), data.xipos.ravel(), data.xanchor.ravel(), data.xaxis.ravel()
+        )
     direction = channel["horizontal"] - 6
     assert 0 <= direction < 2
     assert force == pytest.approx(jacobian[direction, 0], rel=1e-9)
 
 
 def test_an_actuator_that_is_no_motor_of_gear_1_on_a_joint_is_refused(refused):
-    for drive in ['tendon="t"', 'joint="j" gear="2"', 'joint="j" gear="-1"', 'joint="j" gear="0"', 'jointinparent="j"']:
+    for drive in [
+        'tendon="t"',
+        'joint="j" gear="2"',
+        'joint="j" gear="-1"',
+        'joint="j" gear="0"',
+        'jointinparent="j"',
+    ]:
         refused(lambda drive=drive: channels(mechanism(drive)))
 
 
@@ -802,7 +911,12 @@ TOO_MUCH = {
 
 @pytest.mark.parametrize(
     ("kind", "start", "integrator"),
-    [("compiled", 0.0, "RK4"), ("compiled", 0.007, "Euler"), ("plain", 0.005, "RK4"), ("sum", 0.007, "RK4")],
+    [
+        ("compiled", 0.0, "RK4"),
+        ("compiled", 0.007, "Euler"),
+        ("plain", 0.005, "RK4"),
+        ("sum", 0.007, "RK4"),
+    ],
 )
 def test_an_infinite_disturbance_is_marked_at_its_own_sample(kind, start, integrator):
     with contextlib.nullcontext() if kind != "plain" else pytest.warns(smc.errors.PlainLoopWarning):
@@ -843,7 +957,12 @@ def flipped(data: bytes) -> bytes:
 
 def test_a_damaged_cache_is_written_again(added, tmp_path):
     assert [hits(added), hits(added)] == [0, 1]
-    damages = [lambda data: b"", lambda data: data[: len(data) // 2], flipped, lambda data: b"garbage" * 99]
+    damages = [
+        lambda data: b"",
+        lambda data: data[: len(data) // 2],
+        flipped,
+        lambda data: b"garbage" * 99,
+    ]
     for name, damage in zip(("*.nbi", "*.nbc", "*.nb?", "*.nbc"), damages, strict=True):
         for path in (tmp_path / "__pycache__").glob(name):
             path.write_bytes(damage(path.read_bytes()))
@@ -860,7 +979,9 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     def doubled(x):
         return 2.0 * x
 
-    assert compiled(numba.types.float64(numba.types.float64), doubled, cache=True).ctypes(1.5) == 3.0
+    assert (
+        compiled(numba.types.float64(numba.types.float64), doubled, cache=True).ctypes(1.5) == 3.0
+    )
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
@@ -880,7 +1001,11 @@ def test_a_child_forked_while_another_thread_compiles_can_compile():
         child = os.fork()
     if child == 0:
         signal.alarm(20)  # a child that hangs dies of it
-        os._exit(0 if global_compiler_lock.is_locked() is False and global_compiler_lock._lock.acquire() else 3)
+        os._exit(
+            0
+            if global_compiler_lock.is_locked() is False and global_compiler_lock._lock.acquire()
+            else 3
+        )
     thread.join()
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     assert not global_compiler_lock.is_locked()
@@ -899,7 +1024,9 @@ def test_ctrl_c_that_comes_while_numba_compiles_is_heard_when_it_is_done(monkeyp
                 return
             done.append(True)
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
+    before = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # a shell's background job ignores it
     monkeypatch.setattr(numba_internals, "CFunc", lambda *arguments: Pressed())
     with pytest.raises(KeyboardInterrupt):
         compiled(numba.types.float64(numba.types.float64), math.sin)
@@ -918,7 +1045,9 @@ def test_memory_that_runs_out_is_said_in_one_sentence(monkeypatch, refused):
             patch.setattr(RUN, "ScenarioBatch", runs_out)
             refused(lambda: smc.run([scenario(), scenario(seed=1)]))
             patch.setattr(reference, "run", runs_out)
-            refused(lambda: plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0)))))
+            refused(
+                lambda: plainly(scenario(made(lambda y, gains, memory: (json.dumps(y.t), 0.0))))
+            )
 
 
 @pytest.mark.parametrize("error", [ValueError("sour"), mujoco.FatalError("sour")])
@@ -929,7 +1058,9 @@ def test_another_error_is_not_taken_for_memory_that_ran_out(error):
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="not glibc")
 def test_many_runs_leave_no_memory_behind():
-    """They leave 8 to 12 kB each, once, as more of them are in one batch; without giving it back 45 to 100 kB."""
+    """They leave 8 to 12 kB each, once, as more of them are in one batch; without giving it back 45
+    to 100 kB.
+    """
 
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
@@ -946,9 +1077,13 @@ def test_many_runs_leave_no_memory_behind():
 def test_how_this_machine_rounds_is_part_of_what_a_run_is(monkeypatch):
     here = run_key.key(scenario())
     assert run_key.description(scenario())["versions"]["arithmetic"] == fingerprint.arithmetic()
-    monkeypatch.setattr(fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0))
     monkeypatch.setattr(
-        importlib.import_module("smc_mujoco.simulation.serialise"), "arithmetic", fingerprint.arithmetic.__wrapped__
+        fingerprint.math, "tanh", lambda x: math.nextafter(math.sinh(x) / math.cosh(x), 2.0)
+    )
+    monkeypatch.setattr(
+        importlib.import_module("smc_mujoco.simulation.serialise"),
+        "arithmetic",
+        fingerprint.arithmetic.__wrapped__,
     )
     versions = importlib.import_module("smc_mujoco.simulation.serialise")._versions
     versions.cache_clear()

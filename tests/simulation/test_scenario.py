@@ -1,4 +1,6 @@
-"""A Scenario takes what makes sense and refuses the rest with one sentence that names the field and the value."""
+"""A Scenario takes what makes sense and refuses the rest with one sentence that names the field and
+the value.
+"""
 
 import copy
 import dataclasses
@@ -29,14 +31,30 @@ def brief(value) -> str:
     return repr(value)[:20]
 
 
-NO_NUMBERS = [True, None, "1", "fast", b"1", [], [1.0], {}, (1.0, 2.0), 1 + 2j, np.bool_(True), np.array([1.0]), ...]
+NO_NUMBERS = [
+    True,
+    None,
+    "1",
+    "fast",
+    b"1",
+    [],
+    [1.0],
+    {},
+    (1.0, 2.0),
+    1 + 2j,
+    np.bool_(True),
+    np.array([1.0]),
+    ...,
+]
 
 
 def test_a_field_that_is_no_number_is_refused(refused):
     for field in ["input_delay", "physics_step"]:
         for value in NO_NUMBERS:
             if field != "physics_step" or value is not None:
-                refused(lambda value=value, field=field: scenario(**{field: value}), field, repr(value))
+                refused(
+                    lambda value=value, field=field: scenario(**{field: value}), field, repr(value)
+                )
 
 
 def test_a_bound_is_none_one_number_or_one_a_channel(refused):
@@ -51,9 +69,13 @@ def test_a_bound_is_none_one_number_or_one_a_channel(refused):
 def test_a_field_out_of_its_range_is_refused(refused):
     for field in ["u_max", "input_delay", "physics_step"]:
         for value in (NAN, -INF, -1.0, *(() if field == "u_max" else (INF,))):
-            refused(lambda value=value, field=field: scenario(**{field: value}), field, f"{value:g}")
+            refused(
+                lambda value=value, field=field: scenario(**{field: value}), field, f"{value:g}"
+            )
         for value in () if field == "input_delay" else (0, -0.0):
-            refused(lambda value=value, field=field: scenario(**{field: value}), field, "greater than 0")
+            refused(
+                lambda value=value, field=field: scenario(**{field: value}), field, "greater than 0"
+            )
         if field != "u_max":
             refused(lambda field=field: scenario(**{field: 10**400}), field)
 
@@ -79,7 +101,9 @@ def test_an_infinite_bound_on_the_command_is_fine():
     assert scenario(u_max=INF).resolved.u_max == INF
 
 
-@pytest.mark.parametrize("number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=brief)
+@pytest.mark.parametrize(
+    "number", [np.float64(0.5), np.float32(0.5), np.array(0.5), Fraction(1, 2)], ids=brief
+)
 def test_anything_that_is_a_number_is_taken_as_a_float(number):
     for field in ("duration", "control_period", "u_max", "input_delay", "x0", "v0"):
         value = getattr(scenario(**{field: number}), field)
@@ -124,9 +148,14 @@ def test_one_parameter_under_two_names_is_refused(refused):
         plant = smc.plant(name)
         both = {"mass": 1.2, plant.mass: 1.5}
         words = f"{plant.mass} 1.5 and mass 1.2, which are the same parameter of {name}: give one of them"
-        for fields, said in (({"mismatch": both}, "mismatch has"), ({"jump": smc.Jump(0.5, both)}, "Jump has")):
+        for fields, said in (
+            ({"mismatch": both}, "mismatch has"),
+            ({"jump": smc.Jump(0.5, both)}, "Jump has"),
+        ):
             refused(lambda fields=fields, plant=plant: scenario(plant=plant, **fields), said, words)
-        apart = scenario(plant=name, mismatch={"mass": 1.2}, jump=smc.Jump(0.5, {plant.mass: 1.5}))  # in turn
+        apart = scenario(
+            plant=name, mismatch={"mass": 1.2}, jump=smc.Jump(0.5, {plant.mass: 1.5})
+        )  # in turn
         mass = getattr(plant.values(apart.factors(10**6)), plant.mass)
         assert mass == pytest.approx(1.8 * plant.parameters[plant.mass])
 
@@ -140,7 +169,9 @@ def test_a_physics_step_that_divides_up_to_rounding_divides_exactly(count):
 
 def test_a_delay_that_is_no_whole_number_of_steps_is_refused(refused):
     for delay in [1e-4, 1.5e-3, 0.0107]:
-        refused(lambda delay=delay: scenario(input_delay=delay), "input_delay", f"{delay:g}", "0.001")
+        refused(
+            lambda delay=delay: scenario(input_delay=delay), "input_delay", f"{delay:g}", "0.001"
+        )
 
 
 def test_a_delay_beyond_the_run_is_refused(refused):
@@ -152,7 +183,22 @@ def test_a_run_shorter_than_a_period_is_refused(refused):
 
 
 def test_a_state_that_is_no_finite_number_is_refused(refused):
-    odd = [NAN, INF, -2e6, 10**400, True, "1", [NAN], [[1.0]], ["a"], [None], ..., b"1", {"a": 1.0}, np.zeros((1, 1))]
+    odd = [
+        NAN,
+        INF,
+        -2e6,
+        10**400,
+        True,
+        "1",
+        [NAN],
+        [[1.0]],
+        ["a"],
+        [None],
+        ...,
+        b"1",
+        {"a": 1.0},
+        np.zeros((1, 1)),
+    ]
     for field in ("x0", "v0"):
         for value in odd:
             refused(lambda value=value, field=field: scenario(**{field: value}), field)
@@ -163,12 +209,25 @@ def test_a_state_of_the_wrong_length_is_refused(refused):
     for field in ("x0", "v0"):
         for value in ([], [1.0, 2.0], np.zeros(4), np.zeros((10, 10))):
             words = f"{len(value)} values", "3 channels"
-            refused(lambda value=value, field=field: scenario(plant=plant, **{field: value}), field, *words)
-        refused(lambda field=field: scenario(**{field: range(10**9)}), field, "more than")  # is not made a list
+            refused(
+                lambda value=value, field=field: scenario(plant=plant, **{field: value}),
+                field,
+                *words,
+            )
+        refused(
+            lambda field=field: scenario(**{field: range(10**9)}), field, "more than"
+        )  # is not made a list
 
 
 def test_a_state_is_one_number_or_one_a_channel():
-    for value in (0.5, [0.5], np.array([0.5, 0.5, 0.5]), (0.5,) * 3, [np.float32(0.5)] * 3, np.array(0.5)):
+    for value in (
+        0.5,
+        [0.5],
+        np.array([0.5, 0.5, 0.5]),
+        (0.5,) * 3,
+        [np.float32(0.5)] * 3,
+        np.array(0.5),
+    ):
         made = scenario(plant=smc.plant("pendulum_network", n=3), x0=value, v0=value)
         assert made.resolved.x0 == made.resolved.v0 == (0.5, 0.5, 0.5)
 
@@ -213,7 +272,11 @@ ODD = [None, 5, 1.5, True, [], {}, ..., np.eye(30), np.array(["duffing", "x"]), 
 
 def test_what_is_no_name_at_all_is_refused_and_finds_nothing(refused):
     for value in ODD:
-        for field in ("plant", "law", *(() if value is None else ("velocity",))):  # None means the default
+        for field in (
+            "plant",
+            "law",
+            *(() if value is None else ("velocity",)),
+        ):  # None means the default
             refused(lambda field=field, value=value: scenario(**{field: value}), field)
         for find in (smc.plant, smc.law, smc.estimator):
             refused(lambda find=find, value=value: find(value))
@@ -242,7 +305,9 @@ def test_a_reference_that_is_not_one_signal_is_refused(refused):
 
 
 def test_what_is_left_out_or_none_is_quiet():
-    made = scenario(disturbance=None, noise=None, velocity=None, mismatch=None, jump=None, x0=None, v0=None)
+    made = scenario(
+        disturbance=None, noise=None, velocity=None, mismatch=None, jump=None, x0=None, v0=None
+    )
     assert made == scenario()
     assert made.resolved.velocity == smc.estimator("measured")
 
@@ -283,7 +348,11 @@ def test_a_factor_must_be_a_finite_number(refused):
 def test_a_plant_keeps_a_positive_mass(refused):
     for name, value in [("mass", 0.0), ("M", -1.0)]:
         refused(lambda name=name, value=value: scenario(mismatch={name: value}), name, f"{value:g}")
-        refused(lambda name=name, value=value: scenario(jump=smc.Jump(0.5, {name: value})), name, f"{value:g}")
+        refused(
+            lambda name=name, value=value: scenario(jump=smc.Jump(0.5, {name: value})),
+            name,
+            f"{value:g}",
+        )
 
 
 def test_factors_that_together_leave_no_mechanism_are_refused(refused):
@@ -302,7 +371,11 @@ def test_mass_means_the_plant_s_mass():
 
 def test_a_jump_after_the_end_is_refused(refused):
     for time in (1.0, 1.5, 1e300):
-        refused(lambda time=time: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})), "jump", f"{time:g}")
+        refused(
+            lambda time=time: scenario(duration=1.0, jump=smc.Jump(time, {"M": 2.0})),
+            "jump",
+            f"{time:g}",
+        )
 
 
 def test_a_jump_that_is_no_jump_is_refused(refused):
@@ -348,7 +421,9 @@ def test_a_positive_gain_is_one_of_the_gains(refused):
 
 def test_a_law_is_checked_even_when_it_was_put_together_by_hand(refused):
     gains = {"k": NAN, "c": 1.0}
-    refused(lambda: scenario(law=dataclasses.replace(smc.law("classical"), gains=gains)), "k", "nan")
+    refused(
+        lambda: scenario(law=dataclasses.replace(smc.law("classical"), gains=gains)), "k", "nan"
+    )
 
 
 def full():
@@ -358,7 +433,11 @@ def full():
         velocity=smc.estimator("filtered_difference", tau=1e-2),
         control_period=2e-3,
         reference=smc.Sine(0.1, 2.0),
-        disturbance=[smc.signals.OrnsteinUhlenbeck(0.1, 0.1), smc.signals.Pulse(1.0, 0.1, 0.2), smc.Step(1.0, 0.5)],
+        disturbance=[
+            smc.signals.OrnsteinUhlenbeck(0.1, 0.1),
+            smc.signals.Pulse(1.0, 0.1, 0.2),
+            smc.Step(1.0, 0.5),
+        ],
         noise=smc.Noise(0.01, 0.05),
         input_delay=3e-3,
         mismatch={"mass": 1.3},
@@ -371,7 +450,9 @@ def full():
 
 def test_scenarios_made_alike_are_equal():
     assert full() == full()
-    assert scenario() == scenario(plant=smc.plant("duffing"), law=smc.law("classical"), velocity="measured")
+    assert scenario() == scenario(
+        plant=smc.plant("duffing"), law=smc.law("classical"), velocity="measured"
+    )
     assert scenario(x0=1.5, v0=[0.0]) == scenario()
 
 
@@ -432,7 +513,9 @@ def test_a_surface_has_the_relative_degree_that_its_law_needs(refused):
 def test_a_law_that_cannot_do_without_the_model_gets_it_unless_told_otherwise():
     without = smc.Scenario(plant="cart_pole", law="hierarchical")
     assert without.resolved.model == "nominal"
-    assert smc.Scenario(plant="cart_pole", law="hierarchical", model="none").resolved.model == "none"
+    assert (
+        smc.Scenario(plant="cart_pole", law="hierarchical", model="none").resolved.model == "none"
+    )
     assert dataclasses.replace(without, law=smc.law("classical")).resolved.model == "none"
 
 
@@ -449,7 +532,11 @@ def test_a_missed_condition_warns_once_where_it_was_written():
 
 
 def test_the_field_s_usual_words_are_understood(refused):
-    for word, meant in (("STA", "super_twisting_attitude"), ("CTA", "continuous_twisting"), ("ISMC", "integral")):
+    for word, meant in (
+        ("STA", "super_twisting_attitude"),
+        ("CTA", "continuous_twisting"),
+        ("ISMC", "integral"),
+    ):
         refused(lambda word=word: smc.Scenario(plant="duffing", law=word), f"'{meant}'?")
     refused(lambda: smc.Scenario(plant="duffing", law="STA"), "'super_twisting' or")
     refused(lambda: smc.Scenario(plant="duffing", law="pid", reference=0.5))
@@ -466,7 +553,9 @@ def test_a_period_that_would_need_countless_default_steps_is_refused_at_once(ref
     for field in [{"control_period": 1e306}, {"clock": smc.Clock(1e-310)}]:
         refused(
             lambda field=field: smc.run(
-                smc.Scenario(plant="duffing", law="none", duration=0.01, actuator=[smc.Lag(0.01)], **field)
+                smc.Scenario(
+                    plant="duffing", law="none", duration=0.01, actuator=[smc.Lag(0.01)], **field
+                )
             )
         )
 

@@ -1,4 +1,6 @@
-"""Scenarios that can be run, and are hardly what their author means, say so; those of the study do not."""
+"""Scenarios that can be run, and are hardly what their author means, say so; those of the study do
+not.
+"""
 
 import dataclasses
 import math
@@ -15,12 +17,17 @@ pytestmark = pytest.mark.quick
 
 PENDULUM = smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01)
 DEGREES = [
-    {"x0": 30.0}, {"x0": -10.0}, {"reference": smc.Constant(30.0)},
-    {"reference": smc.Sine(amplitude=-90.0, omega=1.0)}, {"reference": smc.Step(720.0)},
-]  # fmt: skip
+    {"x0": 30.0},
+    {"x0": -10.0},
+    {"reference": smc.Constant(30.0)},
+    {"reference": smc.Sine(amplitude=-90.0, omega=1.0)},
+    {"reference": smc.Step(720.0)},
+]
 
 
-SUSPICIOUS = [  # fields of a number, and the ends of the numbers that are taken for another unit, with the end or not
+# fields of a number, and the ends of the numbers that are taken for another unit, with the end or
+# not
+SUSPICIOUS = [
     (lambda x: {"x0": x}, (3.0 * math.pi, False), (720.0, True)),
     (lambda x: {"reference": smc.Sine(-x, 1.0)}, (3.0 * math.pi, False), (720.0, True)),
 ]
@@ -43,7 +50,8 @@ def test_what_is_taken_for_another_unit_ends_where_it_should():
 def test_angles_of_several_turns_may_be_degrees():
     for fields in DEGREES:
         with pytest.warns(
-            smc.errors.ScenarioWarning, match=r"rad, \d+\.\d turns: if it is \S+ degrees, give math.radians\("
+            smc.errors.ScenarioWarning,
+            match=r"rad, \d+\.\d turns: if it is \S+ degrees, give math.radians\(",
         ) as caught:
             smc.Scenario(plant="inverted_pendulum", law="none", duration=0.01, **fields)
         assert [warning.filename for warning in caught] == [__file__]
@@ -59,7 +67,9 @@ def test_turns_ramps_places_and_what_is_no_angle_are_no_degrees():
 
 
 def test_a_motor_too_weak_for_gravity_at_the_start_says_so():
-    """m g l sin 0.5 = 1.176 N m; gear 1 gives 30 A times 0.0302 N m/A, 1 V at gear 12.25 gives 0.3699/0.299 N m."""
+    """m g l sin 0.5 = 1.176 N m; gear 1 gives 30 A times 0.0302 N m/A, 1 V at gear 12.25 gives
+    0.3699/0.299 N m.
+    """
     words = "DCMotor gives at most 0.906 N m at rest, and channel 0 of inverted_pendulum needs 1.18 to hold its start"
     with pytest.warns(smc.errors.ScenarioWarning, match=words):
         dataclasses.replace(PENDULUM, actuator=smc.DCMotor(gear=1.0))
@@ -70,7 +80,9 @@ def test_a_motor_too_weak_for_gravity_at_the_start_says_so():
         {"actuator": smc.DCMotor(gear=1.0), "u_max": 1.1},  # no motor could: it is to swing
     ):
         dataclasses.replace(PENDULUM, **fields)
-    with pytest.warns(smc.errors.ScenarioWarning, match=r"0.378 N at rest, and channel 0 of duffing needs 1.88"):
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"0.378 N at rest, and channel 0 of duffing needs 1.88"
+    ):
         smc.Scenario(plant="duffing", law="none", actuator=smc.DCMotor(resistance=23.5))
 
 

@@ -1,4 +1,6 @@
-"""Signals: their formulas, their statistics, what they refuse, and that what is compiled computes what is written."""
+"""Signals: their formulas, their statistics, what they refuse, and that what is compiled computes
+what is written.
+"""
 
 import copy
 import ctypes
@@ -46,15 +48,27 @@ FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * 4)
 NOISE = BandLimited(0.3, 5.0, 15.0)
 UNEVEN = TimeSeries([0.1, 0.2, 0.25, 0.7, 1.3], [1.0, -2.0, 0.5, 0.0, 3.0])
 EVERY = [
-    Constant(1.5), Sine(0.7, 11.0, 0.3), Step(1.5, 0.3), Pulse(-2.0, 0.3, 0.2), Impulse(0.02, 0.3),
-    Gust(2.0, 0.3, 0.7), OrnsteinUhlenbeck(0.5, 0.1), NOISE, UNEVEN, Ramp(2.0, 0.3), MinimumJerk(1.0, 0.2, 0.5),
-    Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)), Held((0.1, 0.2, 0.7), (1.0, -2.0, 0.5)),
+    Constant(1.5),
+    Sine(0.7, 11.0, 0.3),
+    Step(1.5, 0.3),
+    Pulse(-2.0, 0.3, 0.2),
+    Impulse(0.02, 0.3),
+    Gust(2.0, 0.3, 0.7),
+    OrnsteinUhlenbeck(0.5, 0.1),
+    NOISE,
+    UNEVEN,
+    Ramp(2.0, 0.3),
+    MinimumJerk(1.0, 0.2, 0.5),
+    Waypoints((0.1, 0.3, 0.7, 1.3), (0.2, 1.0, -0.5, 0.4)),
+    Held((0.1, 0.2, 0.7), (1.0, -2.0, 0.5)),
     Relay(0.5, s=0.3, rate=1.0, error=-0.2, slope=0.1),
-]  # fmt: skip
+]
 BLOW = Push("cart", x=2.0, z=-1.0, time=0.3, width=0.2)  # on a body, which not every plant has
 IN_SPACE = [BLOW, Wind(1.0, -2.0, time=0.3, width=0.4), Dryden(7.0, dt=5e-3)]
 SEEN = 0.3, -0.2, 0.1  # e, e' and s
-LED = [signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)]  # what a reference may be
+LED = [
+    signal for signal in EVERY if not (signal.random or signal.cartesian or signal.sees)
+]  # what a reference may be
 
 
 def scenario(**fields):
@@ -64,7 +78,10 @@ def scenario(**fields):
 def written(signal, times, seed=3, channel=1, stream=2):
     """Its values and derivatives at some times, (K, 3), by the Python function that it is."""
     memory, value = np.zeros(max(signal.memory, 1)), type(signal).value
-    state = (memory, seed, channel, stream) if signal.random else (signal.data,) if signal.series else ()
+    if signal.random:
+        state = (memory, seed, channel, stream)
+    else:
+        state = (signal.data,) if signal.series else ()
     state = (memory, *SEEN) if signal.sees else state
     return np.array([value(float(t), signal, *state) for t in times])
 
@@ -73,7 +90,10 @@ def compiled(signal, times, seed=3, channel=1, stream=2):
     """The same, by the C function that the callback calls."""
     function = cfunctions.compile_signal(signal)
     call = FUNCTION(function.address)
-    inputs, values = np.array([0.0, seed, channel, stream, *SEEN]), np.array([*cfunctions.signal_values(signal), 0.0])
+    inputs, values = (
+        np.array([0.0, seed, channel, stream, *SEEN]),
+        np.array([*cfunctions.signal_values(signal), 0.0]),
+    )
     memory, outputs, found = np.zeros(max(signal.memory, 1)), np.empty(3), []
     for t in times:
         inputs[0] = t
@@ -87,21 +107,35 @@ def path(signal, times, **key):
 
 
 def test_every_kind_of_the_library_is_tested_here():
-    kinds = {kind for kind in subclasses(Signal) if kind.__module__.startswith("smc_mujoco.simulation.")}
+    kinds = set()
+    for kind in subclasses(Signal):
+        if kind.__module__.startswith("smc_mujoco.simulation."):
+            kinds.add(kind)
     assert kinds - {PerChannel} == {type(signal) for signal in [*EVERY, *IN_SPACE]}
 
 
 @pytest.mark.parametrize("signal", [*EVERY, *IN_SPACE], ids=lambda s: type(s).__name__)
 def test_the_compiled_function_gives_the_bits_of_the_written_one(signal):
     edges = np.array([0.1, 0.2, 0.25, 0.3, 0.305, 0.5, 0.7, 1.0, 1.3])
-    times = np.sort(np.concatenate([np.arange(0.0, 1.6, 1e-3), edges, np.nextafter(edges, 2), np.nextafter(edges, 0)]))
+    times = np.sort(
+        np.concatenate(
+            [np.arange(0.0, 1.6, 1e-3), edges, np.nextafter(edges, 2), np.nextafter(edges, 0)]
+        )
+    )
     np.testing.assert_array_equal(compiled(signal, times), written(signal, times))
 
 
 def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
     times = np.linspace(0.0, 1.6, 16_001)
     known = [(signal, bounds) for signal in EVERY if (bounds := bounds_of(signal))]
-    assert {type(signal) for signal, _ in known} == {Constant, Sine, Step, Pulse, MinimumJerk, Relay}
+    assert {type(signal) for signal, _ in known} == {
+        Constant,
+        Sine,
+        Step,
+        Pulse,
+        MinimumJerk,
+        Relay,
+    }
     for signal, (bound, slope) in known:
         d = path(signal, times)
         steepest = np.abs(np.diff(d)).max() / times[1]
@@ -111,7 +145,9 @@ def test_bounds_of_a_signal_and_of_its_slope_are_reached_and_not_passed():
 
 @pytest.mark.parametrize("signal", EVERY, ids=lambda s: type(s).__name__)
 def test_a_signal_disturbs_alike_in_both_loops(signal):
-    made = scenario(plant=smc.plant("pendulum_network", n=2), disturbance=[signal, Sine(0.1, 3.0)], duration=0.4)
+    made = scenario(
+        plant=smc.plant("pendulum_network", n=2), disturbance=[signal, Sine(0.1, 3.0)], duration=0.4
+    )
     fast, slow = smc.run(made), reference.run(made)
     assert fast.failure is None
     for name in ("x", "v", "u", "d"):
@@ -147,25 +183,42 @@ def test_a_gust_gives_a_free_mass_its_impulse():
 @pytest.mark.parametrize(
     ("name", "angle"),
     [
-        ("inverted_pendulum", 0.0), ("pendulum_network", 1.0), ("inverted_pendulum_network", -1.0),
-        ("inverted_pendulum", math.pi / 2), ("pendulum_network", 2.5),
+        ("inverted_pendulum", 0.0),
+        ("pendulum_network", 1.0),
+        ("inverted_pendulum_network", -1.0),
+        ("inverted_pendulum", math.pi / 2),
+        ("pendulum_network", 2.5),
     ],
-)  # fmt: skip
+)
 def test_a_gust_pushes_a_pendulum_by_the_cosine_of_its_angle(name, angle):
-    """Against the same force on the joint, times l cos x at the start: the step is short, the angle stays."""
+    """Against the same force on the joint, times l cos x at the start: the step is short, the angle
+    stays.
+    """
     size = {"n": 3} if smc.plant(name).n > 1 else {}
-    common = {"plant": smc.plant(name, **size), "law": "none", "x0": angle, "duration": 1e-3, "physics_step": 1e-5}
+    common = {
+        "plant": smc.plant(name, **size),
+        "law": "none",
+        "x0": angle,
+        "duration": 1e-3,
+        "physics_step": 1e-5,
+    }
     base, gust, push = (
         smc.run(scenario(**common, disturbance=d))
         for d in (None, Gust(2.0, -1.0, 2.002), Constant(2.0 * math.cos(angle)))
     )
     length = smc.plant(name).parameters["l"]
-    np.testing.assert_allclose(gust.v[-1] - base.v[-1], length * (push.v[-1] - base.v[-1]), rtol=1e-3, atol=1e-7)
-    np.testing.assert_allclose(gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4)  # and is logged as it acts
+    np.testing.assert_allclose(
+        gust.v[-1] - base.v[-1], length * (push.v[-1] - base.v[-1]), rtol=1e-3, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        gust.d[-1], length * push.d[-1], rtol=1e-3, atol=1e-4
+    )  # and is logged as it acts
 
 
 def test_a_gust_turns_a_hinge_by_its_arm():
-    """Against MuJoCo's own torque of a force of 1 N at the body's centre of mass, which is off all axes."""
+    """Against MuJoCo's own torque of a force of 1 N at the body's centre of mass, which is off all
+    axes.
+    """
     for axis, force in (("x", "y"), ("y", "x"), ("z", "x")):
         for sign in (1, -1):
             turn = " ".join(str(sign * (name == axis)) for name in "xyz")
@@ -186,7 +239,9 @@ def test_a_gust_turns_a_hinge_by_its_arm():
             assert channel["horizontal"] == 6 + "xyz".index(force)
 
 
-@pytest.mark.parametrize(("step", "time"), [(1e-3, 0.0), (5e-4, 0.007), (2.5e-4, 1.001), (1e-4, 0.123)])
+@pytest.mark.parametrize(
+    ("step", "time"), [(1e-3, 0.0), (5e-4, 0.007), (2.5e-4, 1.001), (1e-4, 0.123)]
+)
 def test_an_impulse_has_its_integral_under_every_step(step, time):
     times = np.arange(round(2.0 / step)) * step
     assert path(Impulse(-0.3, time), times).sum() * step == pytest.approx(-0.3, rel=1e-12)
@@ -195,7 +250,13 @@ def test_an_impulse_has_its_integral_under_every_step(step, time):
 @pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
 def test_an_impulse_changes_the_momentum_by_itself(integrator):
     free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0, M=1.3)
-    common = {"plant": free, "law": "none", "v0": 0.1, "integrator": integrator, "physics_step": 1e-3}
+    common = {
+        "plant": free,
+        "law": "none",
+        "v0": 0.1,
+        "integrator": integrator,
+        "physics_step": 1e-3,
+    }
     trace = smc.run(scenario(**common, disturbance=Impulse(0.26, 0.1)))
     assert trace.v[99, 0] == pytest.approx(0.1, rel=1e-12)
     assert trace.v[-1, 0] == pytest.approx(0.1 + 0.26 / 1.3, rel=1e-9)
@@ -241,7 +302,9 @@ def test_the_frequencies_of_band_limited_noise_share_the_band_out():
     assert np.floor(part).tolist() == list(range(SINUSOIDS))
     assert np.std(part % 1.0) > 0.2
     assert abs(np.corrcoef(part, memory[SINUSOIDS:])[0, 1]) < 0.5
-    assert abs(np.corrcoef(part % 1.0, memory[SINUSOIDS:])[0, 1]) < 0.5  # a phase does not tell its frequency
+    assert (
+        abs(np.corrcoef(part % 1.0, memory[SINUSOIDS:])[0, 1]) < 0.5
+    )  # a phase does not tell its frequency
     assert np.all((memory[SINUSOIDS:] >= 0.0) & (memory[SINUSOIDS:] < 2 * math.pi))
 
 
@@ -261,14 +324,21 @@ def test_band_limited_noise_is_independent_in_seeds_channels_and_streams(other):
 
 
 def test_every_channel_has_band_limited_noise_of_its_own():
-    trace = smc.run(scenario(plant=smc.plant("pendulum_network", n=3), disturbance=[NOISE, NOISE], duration=1.0))
+    trace = smc.run(
+        scenario(plant=smc.plant("pendulum_network", n=3), disturbance=[NOISE, NOISE], duration=1.0)
+    )
     assert np.linalg.matrix_rank(trace.d) == 3
     alone = smc.run(dataclasses.replace(trace.scenario, disturbance=NOISE))
-    assert np.abs(trace.d - 2.0 * alone.d).max() > 0.1  # and every noise of a run has its own numbers
+    assert (
+        np.abs(trace.d - 2.0 * alone.d).max() > 0.1
+    )  # and every noise of a run has its own numbers
 
 
 def test_a_band_that_is_none_is_refused(refused):
-    for arguments, parts in (((0.1, 2.0, 2.0), ("high", "2 Hz")), ((0.1, 2.0, 1.0), ("high", "1 Hz", "2 Hz"))):
+    for arguments, parts in (
+        ((0.1, 2.0, 2.0), ("high", "2 Hz")),
+        ((0.1, 2.0, 1.0), ("high", "1 Hz", "2 Hz")),
+    ):
         refused(lambda arguments=arguments: BandLimited(*arguments), "BandLimited", *parts)
 
 
@@ -285,7 +355,9 @@ def test_a_time_series_is_straight_between_its_points_and_zero_outside():
         times, values = np.cumsum(rng.exponential(size=n)), rng.normal(size=n)
         at = np.concatenate([rng.uniform(0.0, times[-1] + 1.0, 200), times])
         expected = np.interp(at, times, values, left=0.0, right=0.0)
-        np.testing.assert_allclose(path(TimeSeries(times, values), at), expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(
+            path(TimeSeries(times, values), at), expected, rtol=1e-12, atol=1e-12
+        )
 
 
 def test_a_time_series_has_its_values_at_its_times_and_the_slope_behind_them():
@@ -300,7 +372,9 @@ def test_a_time_series_has_its_values_at_its_times_and_the_slope_behind_them():
 def test_a_recorded_run_is_all_there_wherever_decimal_times_put_its_end():
     for dt in (1e-3, 2e-3, 5e-3, 1e-2):
         for start, count in ((3, 7), (10, 100), (0, 999), (70, 30)):
-            series = TimeSeries([float(f"{i * dt:.6g}") for i in range(start, start + count)], [1.0] * count)
+            series = TimeSeries(
+                [float(f"{i * dt:.6g}") for i in range(start, start + count)], [1.0] * count
+            )
             on = [k for k in range(start + count + 3) if path(series, [k * dt])[0]]
             assert on == list(range(start, start + count))
 
@@ -318,7 +392,12 @@ def test_a_time_series_lives_as_long_as_its_scenario():
 
 
 def test_a_copy_of_a_signal_is_equal_and_runs_alike():
-    for again in (copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s)), dataclasses.replace):
+    for again in (
+        copy.copy,
+        copy.deepcopy,
+        lambda s: pickle.loads(pickle.dumps(s)),
+        dataclasses.replace,
+    ):
         for signal in EVERY:
             other = again(signal)
             assert other == signal
@@ -330,7 +409,9 @@ def test_a_copy_of_a_signal_is_equal_and_runs_alike():
 def test_time_series_that_differ_in_one_number_are_not_equal():
     assert dataclasses.replace(UNEVEN, values=[*UNEVEN.values[:-1], 3.1]) != UNEVEN
     assert dataclasses.replace(UNEVEN, times=[*UNEVEN.times[:-1], 1.4]) != UNEVEN
-    assert scenario(disturbance=UNEVEN) == scenario(disturbance=TimeSeries(UNEVEN.times, np.array(UNEVEN.values)))
+    assert scenario(disturbance=UNEVEN) == scenario(
+        disturbance=TimeSeries(UNEVEN.times, np.array(UNEVEN.values))
+    )
 
 
 def test_numbers_of_a_time_series_are_python_s_floats():
@@ -439,12 +520,20 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
         (GOOD.replace("0.1,2,6", "0,1,2,6"), {}, ("line 3", "4 cells for 3 columns")),
         (GOOD.replace("0.2,", "0.1,"), {}, ("line 4", "0.1 s comes after 0.1 s", "increase")),
         (GOOD.replace("0.2,", "0.05,"), {}, ("line 4", "0.05 s comes after 0.1 s", "increase")),
-        (GOOD + "0.5,1,1\n", {}, ("gap after line 5", "0.3 s to 0.5 s", "0.1 s apart", "fill it in")),
+        (
+            GOOD + "0.5,1,1\n",
+            {},
+            ("gap after line 5", "0.3 s to 0.5 s", "0.1 s apart", "fill it in"),
+        ),
         (GOOD.replace("0.1,2,6\n", ""), {}, ("gap after line 2", "0 s to 0.2 s")),
         (GOOD, {"column": "f"}, ("column", "'f'", "d, e, t")),
         (GOOD, {"column": 1}, ("column", "1", "d, e, t")),
         (GOOD, {"column": ["d"]}, ("column", "['d']", "d, e, t")),
-        (GOOD.replace("t,", "t [ms],"), {}, ("time column 't [ms]'", "not in seconds", "give times in s")),
+        (
+            GOOD.replace("t,", "t [ms],"),
+            {},
+            ("time column 't [ms]'", "not in seconds", "give times in s"),
+        ),
         ("0,1\n0.1,2\n", {"column": "d"}, ("'d'", "column 1, column 2")),
         ("t,d\n", {}, ("0 points", "two")),
         ("t,d\n0,1\n", {}, ("1 points", "two")),
@@ -455,7 +544,11 @@ def test_a_csv_file_that_is_not_sound_is_refused_with_its_line(file, refused):
         (b"t,d\n0,1\0\n", {}, ("CSV", "commas")),
         ('t,d\n0,"1\n', {}, ("CSV", "commas")),
     ):
-        refused(lambda content=content, asked=asked: TimeSeries.from_csv(file(content), **asked), "wind.csv", *parts)
+        refused(
+            lambda content=content, asked=asked: TimeSeries.from_csv(file(content), **asked),
+            "wind.csv",
+            *parts,
+        )
 
 
 def test_what_is_no_path_is_refused(refused):
@@ -474,7 +567,9 @@ def test_an_exported_trace_disturbs_another_run(tmp_path):
     series = TimeSeries.from_csv(first.export(tmp_path / "a.csv"), column="d")
     second = smc.run(scenario(disturbance=series))
     np.testing.assert_allclose(second.d, first.d, atol=1e-12)
-    np.testing.assert_allclose(second.x, first.x, atol=1e-5)  # straight lines between the samples of a sine
+    np.testing.assert_allclose(
+        second.x, first.x, atol=1e-5
+    )  # straight lines between the samples of a sine
 
 
 # as data
@@ -482,7 +577,9 @@ def test_an_exported_trace_disturbs_another_run(tmp_path):
 
 def test_a_signal_survives_json():
     for signal in (*EVERY, BLOW):
-        made = scenario(disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0])
+        made = scenario(
+            disturbance=[signal, Constant(1.0)], reference=signal if signal in LED else LED[0]
+        )
         assert serialise.restore(json.loads(json.dumps(serialise.describe(made)))) == made
 
 

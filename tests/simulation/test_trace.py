@@ -1,4 +1,6 @@
-"""A trace on disk is the trace in memory, to the last bit; what cannot be written or read costs one sentence."""
+"""A trace on disk is the trace in memory, to the last bit; what cannot be written or read costs one
+sentence.
+"""
 
 import contextlib
 import copy
@@ -67,8 +69,11 @@ def network(**fields):
         v0=1 / 3,
         reference=smc.Sine(0.1, 2.0, 0.3),
         disturbance=[
-            smc.Constant(0.1), smc.Step(0.1, 0.005), smc.signals.Pulse(0.1, 0.005, 0.01),
-            smc.signals.OrnsteinUhlenbeck(0.1, 0.1, 2e-3), Ramp(0.5),
+            smc.Constant(0.1),
+            smc.Step(0.1, 0.005),
+            smc.signals.Pulse(0.1, 0.005, 0.01),
+            smc.signals.OrnsteinUhlenbeck(0.1, 0.1, 2e-3),
+            Ramp(0.5),
         ],
         noise=smc.Noise(0.01, 0.05),
         input_delay=3e-3,
@@ -78,7 +83,7 @@ def network(**fields):
         integrator="implicitfast",
         u_max=math.inf,
         **fields,
-    )  # fmt: skip
+    )
 
 
 SCENARIOS = {
@@ -110,7 +115,8 @@ def trace(traces):
 
 def identical(a, b) -> bool:
     return all(
-        getattr(a, name).tobytes() == getattr(b, name).tobytes() and getattr(a, name).shape == getattr(b, name).shape
+        getattr(a, name).tobytes() == getattr(b, name).tobytes()
+        and getattr(a, name).shape == getattr(b, name).shape
         for name in ARRAYS
     )
 
@@ -142,13 +148,17 @@ def test_its_scenario_comes_back_equal_and_gives_the_same_trace(name, traces, tm
 @pytest.mark.slow
 def test_every_plant_and_law_comes_back(tmp_path):
     """Every plant under one law, and every law on one plant."""
-    plants = {law: [plant for plant in smc.plants() if law in smc.laws(plant)] for law in smc.laws()}
+    plants = {
+        law: [plant for plant in smc.plants() if law in smc.laws(plant)] for law in smc.laws()
+    }
     pairs = (
         {(plant, "classical") for plant in JOINTED}
         | {("quadrotor", "geometric")}
         | {(plants[law][0], law) for law in plants}
     )
-    many = [scenario(plant=plant, law=law, model="nominal", duration=2e-3) for plant, law in sorted(pairs)]
+    many = []
+    for plant, law in sorted(pairs):
+        many.append(scenario(plant=plant, law=law, model="nominal", duration=2e-3))
     for one, trace in zip(many, smc.run(many), strict=True):
         assert smc.load(trace.save(tmp_path / "a.npz")).scenario == one
 
@@ -163,7 +173,9 @@ def test_a_law_of_one_s_own_keeps_its_name_and_gains_but_not_its_code(traces, tm
 
 
 def test_a_free_body_comes_back_under_a_law_of_one_s_own(tmp_path, refused):
-    law = smc.law_function(joint=True, plants=("a free body",))(lambda y, gains, memory: (y.h, y.e))()
+    law = smc.law_function(joint=True, plants=("a free body",))(
+        lambda y, gains, memory: (y.h, y.e)
+    )()
     trace = smc.run(smc.Scenario(plant="quadrotor", law=law, duration=0.01))
     again = smc.load(trace.save(tmp_path / "a.npz"))
     np.testing.assert_array_equal(again.x, trace.x)
@@ -179,14 +191,20 @@ def test_a_law_of_one_s_own_is_never_taken_for_the_library_s(tmp_path, refused):
 def test_an_estimator_of_one_s_own_keeps_its_name(tmp_path):
     mine = smc.estimator_function(gains={"a": 1.0})(lambda y, gains, memory: gains.a * y.v)()
     again = smc.load(smc.run(scenario(velocity=mine)).save(tmp_path / "a.npz")).scenario
-    assert (again.resolved.velocity.name, dict(again.resolved.velocity.gains)) == (mine.name, {"a": 1.0})
+    assert (again.resolved.velocity.name, dict(again.resolved.velocity.gains)) == (
+        mine.name,
+        {"a": 1.0},
+    )
 
 
 def test_a_file_brings_the_parts_and_signals_that_nothing_has_used(tmp_path):
     made = smc.Scenario(
-        plant="duffing", law="none", duration=0.01, friction=smc.hardware.Sigmoid(1.0, 2.0),
+        plant="duffing",
+        law="none",
+        duration=0.01,
+        friction=smc.hardware.Sigmoid(1.0, 2.0),
         reference=smc.signals.TimeSeries((0.0, 1.0), (0.0, 0.1)),
-    )  # fmt: skip
+    )
     path = smc.run(made).save(tmp_path / "a.npz")
     code = f"import smc_mujoco as smc; s = smc.load({str(path)!r}).scenario; print(s.reference, s.friction)"
     done = python("-c", code)
@@ -201,7 +219,12 @@ def test_a_part_that_the_package_does_not_have_is_one_sentence():
 
 
 def test_the_arrays_are_read_only_wherever_a_trace_comes_from(trace, tmp_path):
-    for copied in (trace, smc.load(trace.save(tmp_path / "a.npz")), copy.deepcopy(trace), dataclasses.replace(trace)):
+    for copied in (
+        trace,
+        smc.load(trace.save(tmp_path / "a.npz")),
+        copy.deepcopy(trace),
+        dataclasses.replace(trace),
+    ):
         for name in ARRAYS:
             with pytest.raises(ValueError, match="read-only"):
                 getattr(copied, name)[0] = 1.0
@@ -242,7 +265,10 @@ def test_a_trace_is_saved_under_npz_only(trace, tmp_path, refused):
 
 def test_a_trace_is_exported_to_four_formats_only(trace, tmp_path, refused):
     for name in ("a.npz", "a.txt", "a", "a.CSV", ".csv", "csv", "a.csv.gz", ""):
-        refused(lambda name=name: trace.export(tmp_path / name if name else ""), ".csv, .mat, .mcap or .parquet")
+        refused(
+            lambda name=name: trace.export(tmp_path / name if name else ""),
+            ".csv, .mat, .mcap or .parquet",
+        )
         assert names(tmp_path) == []
 
 
@@ -258,14 +284,20 @@ def test_no_name_is_no_name(trace, refused):
 def test_csv_holds_every_number_to_the_last_bit(name, traces, tmp_path):
     trace = traces[name]
     with open(trace.export(tmp_path / "a.csv"), newline="") as file:
-        rows = [{re.sub(r" \[.*\]", "", head): cell for head, cell in row.items()} for row in csv.DictReader(file)]
+        rows = []
+        for row in csv.DictReader(file):
+            rows.append({re.sub(r" \[.*\]", "", head): cell for head, cell in row.items()})
     assert len(rows) == len(trace.t)
-    assert all(cell == repr(float(cell)) for row in rows for cell in row.values())  # no digit more than it takes
+    assert all(
+        cell == repr(float(cell)) for row in rows for cell in row.values()
+    )  # no digit more than it takes
     n = trace.x.shape[1]
     columns = ["t"] + [f"{name}{i if n > 1 else ''}" for name in ARRAYS[1:] for i in range(n)]
     assert list(rows[0]) == columns
     for column, expected in zip(
-        columns, [trace.t, *(getattr(trace, a)[:, i] for a in ARRAYS[1:] for i in range(n))], strict=True
+        columns,
+        [trace.t, *(getattr(trace, a)[:, i] for a in ARRAYS[1:] for i in range(n))],
+        strict=True,
     ):
         np.testing.assert_array_equal([float(row[column]) for row in rows], expected)
 
@@ -275,14 +307,26 @@ def test_mat_holds_every_array_and_the_scenario(name, traces, tmp_path):
     trace = traces[name]
     data = loadmat(trace.export(tmp_path / "a.mat"))
     for array in ARRAYS:
-        np.testing.assert_array_equal(data[array].reshape(getattr(trace, array).shape), getattr(trace, array))
+        np.testing.assert_array_equal(
+            data[array].reshape(getattr(trace, array).shape), getattr(trace, array)
+        )
     assert json.loads(str(data["scenario"][0]))["plant"]["name"] == trace.scenario.plant.name
 
 
 def test_every_format_has_the_units_of_each_column(tmp_path):
     """Of the cart and of its pole, of which one moves in m and the other in rad."""
     trace = smc.run(smc.Scenario(plant="cart_pole", law="hierarchical", duration=0.01))
-    units = {"t": "s", "x0": "m", "x1": "rad", "v0": "m/s", "v1": "rad/s", "s0": "", "s1": "", "r0": "m", "r1": "rad"}
+    units = {
+        "t": "s",
+        "x0": "m",
+        "x1": "rad",
+        "v0": "m/s",
+        "v1": "rad/s",
+        "s0": "",
+        "s1": "",
+        "r0": "m",
+        "r1": "rad",
+    }
     units |= {f"{name}{i}": unit for name in FORCES for i, unit in enumerate(("N", "N m"))}
     assert {name: trace.units()[name] for name in units} == units
     assert list(trace.units()) == list(trace.columns())
@@ -291,7 +335,11 @@ def test_every_format_has_the_units_of_each_column(tmp_path):
     schema = parquet.read_schema(trace.export(tmp_path / "a.parquet"))
     assert {field.name: field.metadata[b"unit"].decode() for field in schema} == units
     held = loadmat(trace.export(tmp_path / "a.mat"), simplify_cells=True)["units"]
-    assert {name: held[name] for name in ("x", "v", "u")} == {"x": "m, rad", "v": "m/s, rad/s", "u": "N, N m"}
+    assert {name: held[name] for name in ("x", "v", "u")} == {
+        "x": "m, rad",
+        "v": "m/s, rad/s",
+        "u": "N, N m",
+    }
     single = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
     assert loadmat(single.export(tmp_path / "b.mat"), simplify_cells=True)["units"]["u"] == "N"
 
@@ -303,7 +351,9 @@ def test_parquet_holds_every_number_to_the_last_bit_and_the_scenario(name, trace
     assert table.column_names == list(trace.columns())
     for column, expected in trace.columns().items():
         np.testing.assert_array_equal(table[column].to_numpy(), expected)
-    assert json.loads(table.schema.metadata[b"scenario"])["plant"]["name"] == trace.scenario.plant.name
+    assert (
+        json.loads(table.schema.metadata[b"scenario"])["plant"]["name"] == trace.scenario.plant.name
+    )
 
 
 # what is no trace
@@ -352,7 +402,9 @@ def tampered(trace, folder, about=None, **arrays) -> Path:
         held = dict(file)
     np.savez(
         path,
-        **held | {"about": np.array(json.dumps(about(json.loads(str(held["about"])))))} if about else held | arrays,
+        **held | {"about": np.array(json.dumps(about(json.loads(str(held["about"])))))}
+        if about
+        else held | arrays,
     )
     return path
 
@@ -411,7 +463,11 @@ def array(header: str, data: bytes = b"") -> bytes:
 
 
 def test_an_array_too_large_is_refused_before_it_is_read(trace, tmp_path, refused):
-    for name, shape, kind in [("x", (11, 3 * 10**6), "<f8"), ("t", (10**12,), "<f8"), ("about", (), "<U400000000")]:
+    for name, shape, kind in [
+        ("x", (11, 3 * 10**6), "<f8"),
+        ("t", (10**12,), "<f8"),
+        ("about", (), "<U400000000"),
+    ]:
         header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}}}"
         path = with_member(trace, tmp_path, name, array(header, bytes(3 * 10**7)))
         tracemalloc.start()
@@ -461,7 +517,10 @@ def test_a_pipe_that_nobody_writes_to_is_no_trace(name, tmp_path, refused):
 
 def test_a_scenario_that_could_not_be_read_back_is_not_saved(trace, tmp_path, monkeypatch, refused):
     monkeypatch.setattr("smc_mujoco.simulation.trace.MAX_TEXT", 100)
-    said = "its scenario is a text of", "and more than 100 are not read back: give it shorter time series"
+    said = (
+        "its scenario is a text of",
+        "and more than 100 are not read back: give it shorter time series",
+    )
     refused(lambda: trace.save(tmp_path / "a.npz"), *said)  # the text has the versions of packages
     assert names(tmp_path) == []
 
@@ -478,7 +537,9 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("ending", WRITERS)
-def test_where_a_file_stands_in_the_way_of_a_folder_one_sentence_says_so(ending, trace, tmp_path, refused):
+def test_where_a_file_stands_in_the_way_of_a_folder_one_sentence_says_so(
+    ending, trace, tmp_path, refused
+):
     (tmp_path / "file").write_text("")
     refused(lambda: WRITERS[ending](trace, tmp_path / "file" / f"a.{ending}"), f"a.{ending}")
 
@@ -490,7 +551,13 @@ def test_a_name_too_long_is_refused(trace, tmp_path, refused):
 @pytest.mark.skipif(sys.platform == "win32", reason="resource")
 @pytest.mark.parametrize(
     ("ending", "samples", "room"),
-    [("npz", 20, 300), ("npz", 3000, 9000), ("csv", 3000, 9000), ("mat", 20, 300), ("parquet", 3000, 9000)],
+    [
+        ("npz", 20, 300),
+        ("npz", 3000, 9000),
+        ("csv", 3000, 9000),
+        ("mat", 20, 300),
+        ("parquet", 3000, 9000),
+    ],
 )  # at the end, and in the middle
 def test_a_disk_that_is_full_leaves_the_old_file_and_no_other(ending, samples, room, tmp_path):
     import resource
@@ -543,11 +610,21 @@ def test_a_write_that_breaks_off_leaves_the_old_file_and_no_other(
 def test_a_voltage_and_a_feedforward_come_back_and_have_their_unit(tmp_path):
     motor = smc.DCMotor(8.4, 1e-3, 0.042, 1.0, 4e-6, voltage=10.0, command="voltage")
     trace = smc.run(
-        smc.Scenario(plant="furuta", law="none", actuator=motor, feedforward=smc.Sine(1.0, 9.0), duration=0.01)
+        smc.Scenario(
+            plant="furuta",
+            law="none",
+            actuator=motor,
+            feedforward=smc.Sine(1.0, 9.0),
+            duration=0.01,
+        )
     )
     assert {name: trace.units()[f"{name}0"] for name in FORCES} == {
-        "u": "V", "applied": "V", "d": "N m", "force": "N m", "reaction": "N m",
-    }  # fmt: skip
+        "u": "V",
+        "applied": "V",
+        "d": "N m",
+        "force": "N m",
+        "reaction": "N m",
+    }
     again = smc.load(trace.save(tmp_path / "a.npz"))
     assert again.scenario == trace.scenario
     assert "u0 [V]" in trace.export(tmp_path / "a.csv").read_text().partition("\n")[0]
@@ -564,5 +641,8 @@ def test_a_free_joint_has_the_goal_of_its_plant_as_reference():
 def test_what_is_no_path_is_refused_in_a_sentence(path):
     trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.01))
     for write in (trace.save, trace.export):
-        with pytest.raises(smc.ScenarioError, match=r"^the path is .*: give the name of a file or folder as a text$"):
+        with pytest.raises(
+            smc.ScenarioError,
+            match=r"^the path is .*: give the name of a file or folder as a text$",
+        ):
             write(path)

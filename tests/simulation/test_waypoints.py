@@ -3,12 +3,11 @@
 import mujoco
 import numpy as np
 import pytest
-from helpers import arms
+from helpers import arms, reference
 from helpers.runs import assert_same
 from numpy.polynomial import Polynomial
 
 import smc_mujoco as smc
-from helpers import reference
 
 pytestmark = pytest.mark.quick
 
@@ -25,7 +24,10 @@ def jerk_squared(times, states):
     total = 0.0
     for T, start, end in zip(np.diff(times), states[:-1], states[1:], strict=True):
         powers = np.array(
-            [[T**k, k * T ** (k - 1) if k else 0, k * (k - 1) * T ** (k - 2) if k > 1 else 0] for k in range(6)]
+            [
+                [T**k, k * T ** (k - 1) if k else 0, k * (k - 1) * T ** (k - 2) if k > 1 else 0]
+                for k in range(6)
+            ]
         )
         low = np.array([start[0], start[1], start[2] / 2])
         high = np.linalg.solve(powers[3:].T, np.array(end) - powers[:3].T @ low)
@@ -51,10 +53,9 @@ def test_waypoints_rates_are_derivatives_and_its_fourth_is_continuous():
     np.testing.assert_allclose((after - before) / (2 * h), dr, atol=1e-5)
     np.testing.assert_allclose((later - rate) / (2 * h), ddr, atol=1e-4)
     for knot in TIMES[1:-1]:
-        ends = [
-            Polynomial.fit(x, of(signal, x)[0], 5).deriv(4)(knot)
-            for x in knot + np.outer((-1, 1), np.linspace(0, 0.15, 12))
-        ]
+        ends = []
+        for x in knot + np.outer((-1, 1), np.linspace(0, 0.15, 12)):
+            ends.append(Polynomial.fit(x, of(signal, x)[0], 5).deriv(4)(knot))
         assert ends[0] == pytest.approx(ends[1], rel=1e-4)
 
 
@@ -69,14 +70,20 @@ def test_waypoints_has_the_least_jerk_of_all_through_its_points():
 
 
 def test_waypoints_of_two_points_are_minimum_jerk():
-    signal, move = smc.signals.Waypoints((0.5, 1.7), (0.0, 0.8)), smc.signals.MinimumJerk(0.8, 0.5, 1.2)
+    signal, move = (
+        smc.signals.Waypoints((0.5, 1.7), (0.0, 0.8)),
+        smc.signals.MinimumJerk(0.8, 0.5, 1.2),
+    )
     t = np.linspace(0.0, 2.0, 101)
     expected = np.array([move.value(one, move) for one in t]).T
     np.testing.assert_allclose(of(signal, t), expected, atol=1e-12)
 
 
 def test_a_run_follows_waypoints_in_both_loops(tmp_path):
-    signals = [smc.signals.Waypoints(TIMES, VALUES), smc.signals.Waypoints((0.0, 0.3, 2.0), (0.2, 0.4, 0.2))]
+    signals = [
+        smc.signals.Waypoints(TIMES, VALUES),
+        smc.signals.Waypoints((0.0, 0.3, 2.0), (0.2, 0.4, 0.2)),
+    ]
     scenario = smc.Scenario(
         plant="double_pendulum",
         law=smc.law("computed_torque_sliding", k=20.0),
@@ -112,7 +119,9 @@ def test_cartesian_path_moves_the_tip_through_its_points():
 def test_a_run_of_the_arm_follows_a_path_in_space():
     """Computed torque with the perfect model follows a minimum-jerk path to 1e-6 rad."""
     start = (0.1, 0.2, 0.3)
-    path = smc.signals.cartesian_path(arms.arm(), (0.0, 1.0), [tip(start), tip((0.2, 1.0, 0.0))], site="tip", x0=start)
+    path = smc.signals.cartesian_path(
+        arms.arm(), (0.0, 1.0), [tip(start), tip((0.2, 1.0, 0.0))], site="tip", x0=start
+    )
     trace = smc.run(
         smc.Scenario(
             plant=arms.arm(),
@@ -132,9 +141,13 @@ REFUSED = {
     "no tip": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2),
     "unknown site": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0)] * 2, site="tp"),
     "one coordinate": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [0.0, 1.0], site="tip"),
-    "two and three coordinates": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"),
+    "two and three coordinates": lambda: smc.signals.cartesian_path(
+        ARM(), (0, 1), [(0, 0, 0), (0, 0)], site="tip"
+    ),
     "sets": lambda: smc.signals.cartesian_path(ARM(), (0, 1), [{0.1}, {0.2}], site="tip"),
-    "free joint": lambda: smc.signals.cartesian_path("cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"),
+    "free joint": lambda: smc.signals.cartesian_path(
+        "cart_pole", (0, 1), [(0, 0, 0)] * 2, body="cart"
+    ),
     "start of another arm": lambda: smc.signals.cartesian_path(
         ARM(), (0, 1), [(0, 0, 0)] * 2, site="tip", x0=(0.1,) * 9
     ),
@@ -153,8 +166,14 @@ def test_a_point_beyond_reach_is_named_with_its_distance(refused):
         "the tip of double_pendulum does not reach (0, 0, 0.4601) m, point 1 of 101 on its path: it stays 8.",
         "m away; give points within reach, or another x0",
     )
-    refused(lambda: smc.signals.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said)
+    refused(
+        lambda: smc.signals.cartesian_path("double_pendulum", (0, 1), points, body="lower"), *said
+    )
 
 
 def test_a_path_of_countless_pieces_is_refused_at_once(refused):
-    refused(lambda: smc.signals.cartesian_path("panda", [0.0, 1e6], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7"))
+    refused(
+        lambda: smc.signals.cartesian_path(
+            "panda", [0.0, 1e6], [[0.5, 0.0, 0.5], [0.4, 0.0, 0.5]], body="link7"
+        )
+    )

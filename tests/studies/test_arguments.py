@@ -27,8 +27,13 @@ def stopped(monkeypatch):
     """What gains, combinations of runs and a study were given; none is searched or run."""
 
     def gains(trial, plant, laws, budget, **options):
-        names, given = [law.name for law in laws], [budget, trial.starts, trial.threads, trial.progress]
-        calls.append(f"gains {plant.name} {names} {trial.folder.name} {told(given)} {told(options)}")
+        names, given = (
+            [law.name for law in laws],
+            [budget, trial.starts, trial.threads, trial.progress],
+        )
+        calls.append(
+            f"gains {plant.name} {names} {trial.folder.name} {told(given)} {told(options)}"
+        )
         return [Candidate(coerce.law(law), (coerce.law(law),), "a remark") for law in laws]
 
     def combinations(plants, laws, conditions, seeds, *given):
@@ -67,7 +72,8 @@ CHANGES = {  # call -> argument, its value, and what a part is then given
 
 
 @pytest.mark.parametrize(
-    ("call", "name", "value", "given"), [(call, *change) for call, changes in CHANGES.items() for change in changes]
+    ("call", "name", "value", "given"),
+    [(call, *change) for call, changes in CHANGES.items() for change in changes],
 )
 def test_every_argument_reaches_the_search_for_gains_or_the_runs(call, name, value, given, stopped):
     asked = []
@@ -80,7 +86,9 @@ def test_every_argument_reaches_the_search_for_gains_or_the_runs(call, name, val
     assert given in asked[1]
 
 
-def test_by_default_laws_are_tuned_by_twelve_searches_and_run_on_all_from_a_key_that_is_drawn(stopped):
+def test_by_default_laws_are_tuned_by_twelve_searches_and_run_on_all_from_a_key_that_is_drawn(
+    stopped,
+):
     found = []
     for ask in (lambda: smc.which("duffing", laws=LAWS), lambda: smc.compare(LAWS)):
         stopped.clear()
@@ -89,18 +97,28 @@ def test_by_default_laws_are_tuned_by_twelve_searches_and_run_on_all_from_a_key_
         found.append([*stopped])
     which, compared = found
     for calls in found:
-        assert all("searches: 12" in call and "[64, None, None" in call for call in calls if call.startswith("gains"))
-        assert all("noise_key: 'drawn'" in call and "half_steps: True" in call for call in calls[-1:])
+        assert all(
+            "searches: 12" in call and "[64, None, None" in call
+            for call in calls
+            if call.startswith("gains")
+        )
+        assert all(
+            "noise_key: 'drawn'" in call and "half_steps: True" in call for call in calls[-1:]
+        )
     assert "['nominal', 'noise', 'sine'] range(0, 24) [5.0, None]" in which[1]
     assert len([call for call in compared if call.startswith("gains")]) == 5  # plants
 
 
-def test_robust_has_an_adversary_for_each_law_in_each_condition_with_the_bound_on_the_disturbance(stopped, monkeypatch):
+def test_robust_has_an_adversary_for_each_law_in_each_condition_with_the_bound_on_the_disturbance(
+    stopped, monkeypatch
+):
     """The contest is given; what is asked of it is told."""
     asked = []
     monkeypatch.setattr(fair_gains, "study", lambda runs, folder, **options: None)
     monkeypatch.setattr(adviser, "default_budget", lambda scenario, within: 1000)
-    monkeypatch.setattr(worst_case, "cached_worst_case", lambda *given, **options: asked.append((given, options)))
+    monkeypatch.setattr(
+        worst_case, "cached_worst_case", lambda *given, **options: asked.append((given, options))
+    )
 
     def contest(table, worst, candidates, plant, needs, relevant):
         asked.append((sorted(worst), needs, relevant))
@@ -112,7 +130,9 @@ def test_robust_has_an_adversary_for_each_law_in_each_condition_with_the_bound_o
     *attacks, contest_given = asked
     assert contest_given == (sorted(LAWS), ("calm", "robust"), 0.1)
     paths, runs, classes = zip(*(given[:3] for given, _ in attacks), strict=True)
-    assert [path.name for path in paths] == [f"{k}-duffing-{law}.json" for law in LAWS for k in (0, 1)]
+    assert [path.name for path in paths] == [
+        f"{k}-duffing-{law}.json" for law in LAWS for k in (0, 1)
+    ]
     assert [(one.law.name, one.condition) for one in runs] == [
         (law, name) for law in LAWS for name in ("nominal", "noise")
     ]
@@ -127,44 +147,81 @@ def LAW(y, gains, memory):
 OTHER = smc.Scenario(plant="van_der_pol", law="classical")
 PERIOD = Condition("slow", lambda plant, duration: {"control_period": 0.01})
 SCENES = [
-    {"title": ""}, {"title": 3}, {"conditions": {}}, {"conditions": [RUN]}, {"conditions": {"nominal": {}}},
-    {"conditions": {"nominal": {"a": 3}}}, {"conditions": {"": {"a": RUN}}}, {"conditions": {"nominal": {"": RUN}}},
-    {"conditions": {"nominal": {"a": RUN, "b": OTHER}}}, {"conditions": {"nominal": {"a": RUN, "A": RUN}}},
-    {"conditions": {"x": {"a": RUN}, "X": {"a": RUN}}}, {"film": "noise"}, {"figure": "figures"},
-    {"answers": ("itaee",)}, {"answer": "a"}, {"camera": (1.0,)},
-]  # fmt: skip
+    {"title": ""},
+    {"title": 3},
+    {"conditions": {}},
+    {"conditions": [RUN]},
+    {"conditions": {"nominal": {}}},
+    {"conditions": {"nominal": {"a": 3}}},
+    {"conditions": {"": {"a": RUN}}},
+    {"conditions": {"nominal": {"": RUN}}},
+    {"conditions": {"nominal": {"a": RUN, "b": OTHER}}},
+    {"conditions": {"nominal": {"a": RUN, "A": RUN}}},
+    {"conditions": {"x": {"a": RUN}, "X": {"a": RUN}}},
+    {"film": "noise"},
+    {"figure": "figures"},
+    {"answers": ("itaee",)},
+    {"answer": "a"},
+    {"camera": (1.0,)},
+]
 REFUSED = {
     smc.leaderboard: [{"metrics": "itae"}, {"metrics": []}, {"metrics": ["itaee"]}],
     smc.study: [
-        {"scenarios": [3]}, {"scenarios": []}, {"scenarios": "duffing"},
-        {"executor": "ray"}, {"executor": "dask://host"}, {"executor": "dask://:80"}, {"executor": "dask://host:65536"},
-        {"executor": 3}, {"noise_key": "secret"}, {"noise_key": -1}, {"noise_key": 2**53},
+        {"scenarios": [3]},
+        {"scenarios": []},
+        {"scenarios": "duffing"},
+        {"executor": "ray"},
+        {"executor": "dask://host"},
+        {"executor": "dask://:80"},
+        {"executor": "dask://host:65536"},
+        {"executor": 3},
+        {"noise_key": "secret"},
+        {"noise_key": -1},
+        {"noise_key": 2**53},
     ],
     smc.compare: [
-        {"metrics": ["itaee"]}, {"laws": "clasical"}, {"plants": "dufing"}, {"conditions": "nois"}, {"executor": "ray"},
+        {"metrics": ["itaee"]},
+        {"laws": "clasical"},
+        {"plants": "dufing"},
+        {"conditions": "nois"},
+        {"executor": "ray"},
     ],
     smc.which: [
-        {"needs": "fats"}, {"needs": "accurate, robst"}, {"needs": "two-gains", "laws": "pid"},
+        {"needs": "fats"},
+        {"needs": "accurate, robst"},
+        {"needs": "two-gains", "laws": "pid"},
         {"laws": [LAW, LAW(k=2.0)]},
     ],
     smc.accuracy: [
-        {"periods": [1e-3]}, {"periods": [1e-3, 1e-3]}, {"periods": [1e-3, 0.0]}, {"seeds": 0}, {"seeds": 10_001},
-        {"conditions": PERIOD}, {"conditions": "nois"},
+        {"periods": [1e-3]},
+        {"periods": [1e-3, 1e-3]},
+        {"periods": [1e-3, 0.0]},
+        {"seeds": 0},
+        {"seeds": 10_001},
+        {"conditions": PERIOD},
+        {"conditions": "nois"},
     ],
     smc.worst_case: [
-        {"scenario": "duffing"}, {"scenario": []}, {"scenario": [RUN, OTHER]}, {"within": 2.0}, {"metric": "rms"},
+        {"scenario": "duffing"},
+        {"scenario": []},
+        {"scenario": [RUN, OTHER]},
+        {"within": 2.0},
+        {"metric": "rms"},
         {"metric": "spread_bound"},
     ],
     smc.Scene: SCENES,
     smc.Table.read: [{"path": "none.parquet"}],
     scene.find: [{"name": "scenes/none.py"}, {"name": "vdp_nois"}],
-}  # fmt: skip
+}
 GIVEN = {
-    smc.leaderboard: {"table": None}, smc.study: {"scenarios": [RUN], "out": "study"}, smc.which: {"plant": "duffing"},
+    smc.leaderboard: {"table": None},
+    smc.study: {"scenarios": [RUN], "out": "study"},
+    smc.which: {"plant": "duffing"},
     smc.compare: {"laws": "classical", "plants": "duffing", "conditions": "nominal"},
-    smc.accuracy: {"laws": "classical", "plants": "duffing"}, smc.worst_case: {"scenario": RUN},
+    smc.accuracy: {"laws": "classical", "plants": "duffing"},
+    smc.worst_case: {"scenario": RUN},
     smc.Scene: {"title": "Two", "conditions": {"nominal": {"a": RUN}}},
-}  # fmt: skip
+}
 
 
 @pytest.mark.usefixtures("stopped")
@@ -180,10 +237,13 @@ def test_what_cannot_be_is_refused(call, monkeypatch, tmp_path, refused):
 @pytest.mark.parametrize(
     ("call", "given"),
     [
-        (smc.which, {"seeds": 1}), (smc.which, {"seeds": 10_000}), (smc.which, {"relevant": 0.0}),
-        (smc.compare, {"seeds": 1, "budget": 1, "relevant": 0.5}), (smc.compare, {"seeds": 1_000_000}),
+        (smc.which, {"seeds": 1}),
+        (smc.which, {"seeds": 10_000}),
+        (smc.which, {"relevant": 0.0}),
+        (smc.compare, {"seeds": 1, "budget": 1, "relevant": 0.5}),
+        (smc.compare, {"seeds": 1_000_000}),
     ],
-)  # fmt: skip
+)
 def test_bounds_themselves_are_accepted(call, given, stopped):
     with pytest.raises(Reached):
         call(**GIVEN[call] | given)

@@ -1,4 +1,6 @@
-"""Tasks of the arm: what seeds change, where the wall's path is, and the cost of the search for gains."""
+"""Tasks of the arm: what seeds change, where the wall's path is, and the cost of the search for
+gains.
+"""
 
 import re
 
@@ -35,7 +37,9 @@ def test_the_walls_path_is_as_far_from_its_face_as_it_says(task, behind):
 
 def test_the_cost_is_the_tips_rms_error_times_one_plus_the_variation():
     start = smc.plant("panda").rest
-    trace = smc.run(smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05))
+    trace = smc.run(
+        smc.Scenario(plant="panda", law=LAW, reference=arms.sway(), x0=start, duration=0.05)
+    )
     rms, rate = smc.metrics.tip_scores(trace)["rms_error"], smc.score(trace)["tv_rate"]
     assert arm_study.cost(trace) == pytest.approx(1e3 * rms * (1.0 + rate / 1000.0))
     assert np.isfinite(arm_study.cost(trace))
@@ -54,7 +58,9 @@ def test_a_run_that_fails_does_not_come_back_to_its_path():
 
 
 def test_a_law_whose_error_depends_on_the_physics_step_is_called_unstable():
-    """Time-delay control in the pick and place, 100, 177 or 129 mm by the step; computed torque is not."""
+    """Time-delay control in the pick and place, 100, 177 or 129 mm by the step; computed torque is
+    not.
+    """
     for name, expected in (("time_delay_sliding", True), ("computed_torque_sliding", False)):
         runs = [arms.scenario("payload", arms.gained(name), seed=1)]
         assert arm_study.unstable(runs, smc.run(runs)) is expected
@@ -62,24 +68,35 @@ def test_a_law_whose_error_depends_on_the_physics_step_is_called_unstable():
 
 @pytest.mark.slow
 def test_the_hybrid_law_presses_as_hard_as_it_should_and_stays_on_the_wall():
-    """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1 mm deep."""
-    known, unknown = smc.run([arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)])
+    """With the friction of a real arm, rubbing on the wall, and noise: within 5 %, and less than 1
+    mm deep.
+    """
+    known, unknown = smc.run(
+        [arms.scenario("wall", arms.hybrid(friction=one), seed=5) for one in (True, False)]
+    )
     for trace in (known, unknown):
         scores = smc.metrics.tip_scores(trace)
         assert abs(scores["force_error"]) < 5.0
         assert scores["touching"] == 100.0
         assert scores["depth"] < 1e-3
-    assert smc.metrics.tip_scores(known)["force_ripple"] < smc.metrics.tip_scores(unknown)["force_ripple"]
+    assert (
+        smc.metrics.tip_scores(known)["force_ripple"]
+        < smc.metrics.tip_scores(unknown)["force_ripple"]
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("task", "payload", "column"), [("sway", 2.0, 0), ("payload", 0.0, 2)])
 def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
-    """Each law's tip error and variation of u over 12 seeds, as `benchmarks/arm_study.py` prints them."""
+    """Each law's tip error and variation of u over 12 seeds, as `benchmarks/arm_study.py` prints
+    them.
+    """
     page = (ROOT / "docs" / "arms.md").read_text(encoding="utf-8")
     told = {
         name + outer.replace(" on ", "_").replace(" ", "_"): cells.split(" | ")
-        for name, outer, cells in re.findall(r"^\| `(\w+)`( on .*?)? \| (.* \| .* \| .*) \|$", page, re.MULTILINE)
+        for name, outer, cells in re.findall(
+            r"^\| `(\w+)`( on .*?)? \| (.* \| .* \| .*) \|$", page, re.MULTILINE
+        )
     }
     assert [*told] == [*arms.GAINS]
     for name in arms.GAINS:
@@ -89,6 +106,11 @@ def test_medians_of_the_page_are_those_of_its_runs(task, payload, column):
             assert told[name][column : column + 2] == ["unstable"] * 2, name
             continue
         rms = np.median([1e3 * smc.metrics.tip_scores(trace)["rms_error"] for trace in traces])
-        rate = np.median([max(one["tv_rate"] for one in smc.metrics.joint_scores(trace).values()) for trace in traces])
+        rate = np.median(
+            [
+                max(one["tv_rate"] for one in smc.metrics.joint_scores(trace).values())
+                for trace in traces
+            ]
+        )
         assert f"{rms:.3g}" == told[name][column].split()[0], name
         assert float(told[name][column + 1]) == pytest.approx(rate, rel=0.005), name

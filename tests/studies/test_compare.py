@@ -1,4 +1,6 @@
-"""One call that compares laws: gains by one rule, their sources, verdicts that say where, resumed from its folder."""
+"""One call that compares laws: gains by one rule, their sources, verdicts that say where, resumed
+from its folder.
+"""
 
 import dataclasses
 import functools
@@ -23,7 +25,9 @@ SHORT = {"duration": 0.5, "budget": 16, "progress": False}
 PLANTS = ["duffing", "inverted_pendulum"]
 
 
-@smc.law_function(gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(3.0, RATE, positive=True)})
+@smc.law_function(
+    gains={"lam": Gain(6.0, FORCE, positive=True), "k1": Gain(3.0, RATE, positive=True)}
+)
 def my_law(y, gains, memory):
     s = y.de + gains.k1 * y.e
     return -gains.lam * math.tanh(s), s
@@ -61,7 +65,9 @@ def kinds(found, plant="duffing"):
 @pytest.mark.slow
 def test_every_law_has_given_shipped_or_tuned_gains_and_its_table_says_which(found):
     assert kinds(found) == {"my_law": "tuned here", "classical": "shipped", "pid": "yours"}
-    assert found.gains["duffing"]["my_law"].gains != found.gains["inverted_pendulum"]["my_law"].gains
+    assert (
+        found.gains["duffing"]["my_law"].gains != found.gains["inverted_pendulum"]["my_law"].gains
+    )
     text = repr(found)
     for said in (r"my_law +tuned here +\d", r"classical +shipped +12", r"pid +yours +1 +kp=20"):
         assert re.search(said, text)
@@ -84,21 +90,28 @@ def test_a_comparison_s_table_of_gains_and_its_columns_for_programs_are_whole(fo
 
 
 def test_runs_use_every_set_of_gains_in_turn(found):
-    one = next(candidate for candidate in found.candidates["duffing"] if candidate.law.name == "my_law")
+    one = next(
+        candidate for candidate in found.candidates["duffing"] if candidate.law.name == "my_law"
+    )
     assert len(one.sets) > 1
     rows = found.table.select(plant="duffing", law="my_law", condition="encoder")
     used = [rows.scenario(i).law.gains for i in range(len(rows))]
     assert used == [one.sets[seed % len(one.sets)].gains for seed in range(8)]
     shipped = found.table.select(plant="duffing", law="classical", condition="encoder")
     known = gain_sets.tuned("duffing", "classical").sets
-    assert [shipped.scenario(i).law.gains["k"] for i in range(8)] == [known[seed]["k"] for seed in range(8)]
+    assert [shipped.scenario(i).law.gains["k"] for i in range(8)] == [
+        known[seed]["k"] for seed in range(8)
+    ]
 
 
 @pytest.mark.slow
 def test_a_verdict_names_its_metric_plant_and_condition(found):
     assert len(found.verdicts) == len(METRICS) * 4 + 2  # and J on unseen runs on each plant
     for board, verdict in zip(found.leaderboard, found.verdicts, strict=True):
-        condition = f" under {board.group['condition']}" if "condition" in board.group else ""
+        if "condition" in board.group:
+            condition = f" under {board.group['condition']}"
+        else:
+            condition = ""
         assert verdict.startswith(f"{board.label} on {board.group['plant']}{condition}: ")
         assert board.result in " ".join(repr(found).split())
 
@@ -152,27 +165,51 @@ def test_a_gain_without_a_unit_is_searched_about_its_default_and_that_is_said(tm
         warnings.simplefilter("error")
         made = smc.compare([plain_law, "classical"], "duffing", "nominal", 2, out=tmp_path, **SHORT)
     assert kinds(made)["plain_law"] == "tuned here"
-    assert "plain_law: lam and k1 have no unit, so their search is about the defaults and not by the rule" in repr(
-        made.remarks
+    assert (
+        "plain_law: lam and k1 have no unit, so their search is about the defaults and not by the rule"
+        in repr(made.remarks)
     )
-    with pytest.warns(smc.errors.ScenarioWarning, match="plain_law's lam and k1 have no unit, and so a search about"):
-        tuned = smc.tune("duffing", plain_law, budget=4, objective=Objective(duration=0.5), searches=1)
+    with pytest.warns(
+        smc.errors.ScenarioWarning,
+        match="plain_law's lam and k1 have no unit, and so a search about",
+    ):
+        tuned = smc.tune(
+            "duffing", plain_law, budget=4, objective=Objective(duration=0.5), searches=1
+        )
     assert tuned.bounds["lam"] == pytest.approx((4.0 * 10**-1.5, 4.0 * 10**1.5))
 
 
 def test_what_is_tuned_is_said_before_it_starts_and_only_once(tmp_path, capsys, monkeypatch):
-    """Two laws need two searches on each of two plants, of 30 s or 20 s, and one law has shipped gains."""
+    """Two laws need two searches on each of two plants, of 30 s or 20 s, and one law has shipped
+    gains.
+    """
     each = {"duffing": 30.0, "inverted_pendulum": 20.0}
-    monkeypatch.setattr(search, "expected_seconds", lambda plant, new, *_: len(new) * each[plant.name])
-    options = {"duration": 0.1, "searches": 2, "budget": 1, "tune": True, "out": tmp_path, "progress": True}
+    monkeypatch.setattr(
+        search, "expected_seconds", lambda plant, new, *_: len(new) * each[plant.name]
+    )
+    options = {
+        "duration": 0.1,
+        "searches": 2,
+        "budget": 1,
+        "tune": True,
+        "out": tmp_path,
+        "progress": True,
+    }
     laws = [my_law, plain_law, "classical"]
-    for said in (["my_law and plain_law on duffing and inverted_pendulum: 2 searches each, about 3 minutes"], []):
+    for said in (
+        ["my_law and plain_law on duffing and inverted_pendulum: 2 searches each, about 3 minutes"],
+        [],
+    ):
         smc.compare(laws, PLANTS, "nominal", 1, **options)
-        told = re.findall(r"^tuning (.*?)\. For less", capsys.readouterr().err, re.MULTILINE | re.DOTALL)
+        told = re.findall(
+            r"^tuning (.*?)\. For less", capsys.readouterr().err, re.MULTILINE | re.DOTALL
+        )
         assert [" ".join(text.split()) for text in told] == said
 
 
-def test_many_laws_on_a_model_of_ones_own_are_announced_at_once_with_the_cure(tmp_path, capsys, monkeypatch):
+def test_many_laws_on_a_model_of_ones_own_are_announced_at_once_with_the_cure(
+    tmp_path, capsys, monkeypatch
+):
     """One evaluation stands for all laws, and the words fit a terminal."""
     monkeypatch.setenv("COLUMNS", "80")
     asked = []
@@ -189,7 +226,9 @@ def test_many_laws_on_a_model_of_ones_own_are_announced_at_once_with_the_cure(tm
 
 
 def test_without_tuning_laws_have_their_defaults_and_no_winner_is_named_over_them(tmp_path):
-    made = smc.compare([my_law, smc.law("classical")], "duffing", "nominal", 8, False, out=tmp_path, **SHORT)
+    made = smc.compare(
+        [my_law, smc.law("classical")], "duffing", "nominal", 8, False, out=tmp_path, **SHORT
+    )
     assert kinds(made) == {"my_law": "default", "classical": "shipped"}
     assert made.remarks == ["my_law: default gains (on duffing)"]
     winners = [board.winner for board in made.leaderboard]
@@ -201,7 +240,15 @@ def test_a_plant_on_which_laws_cannot_be_tuned_says_so(tmp_path):
     with pytest.raises(smc.ScenarioError, match=r"tuning is not possible here: .* defaults=True"):
         smc.compare(None, ["duffing", "overhead_crane"], "nominal", 1, out=tmp_path, **SHORT)
     assert not list(tmp_path.iterdir())
-    made = smc.compare(None, "overhead_crane", "nominal", 1, out=tmp_path, defaults=True, **SHORT | {"duration": 0.1})
+    made = smc.compare(
+        None,
+        "overhead_crane",
+        "nominal",
+        1,
+        out=tmp_path,
+        defaults=True,
+        **SHORT | {"duration": 0.1},
+    )
     assert set(kinds(made, "overhead_crane").values()) == {"default"}
     assert all("tuning is not possible here: " in remark for remark in made.remarks)
 
@@ -211,9 +258,13 @@ def test_laws_that_nobody_named_come_with_gains_on_a_plant_where_any_do():
     assert usual["duffing"] == [*gain_sets.COMPARED]
     for name, laws in usual.items():
         assert (
-            set(gain_sets.LAWS) <= {law for law in laws if gain_sets.in_set(smc.plant(name), law, "tuned")} == {*laws}
+            set(gain_sets.LAWS)
+            <= {law for law in laws if gain_sets.in_set(smc.plant(name), law, "tuned")}
+            == {*laws}
         )
-    bare = dataclasses.replace(smc.plant("duffing", delta=0.5), name="mine", unmodelled="nobody wrote it")
+    bare = dataclasses.replace(
+        smc.plant("duffing", delta=0.5), name="mine", unmodelled="nobody wrote it"
+    )
     assert {*gain_sets.COMPARED} - {*compare._usual(bare)} == {"lqi", "mpc", "loop_shaping"}
 
 
@@ -235,9 +286,31 @@ def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
         "import smc_mujoco as smc\n\n@smc.law_function(gains={'k': 20.0, 'd': 5.0})\n"
         "def mine(y, gains, memory):\n    return -gains.k * y.e - gains.d * y.de, y.e\n"
     )
-    words = ["compare", "inverted_pendulum,duffing", "--law", "classical,mine.py", "--condition", "friction,encoder"]
-    words += ["--condition", "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)", "--no-tune"]
-    words += ["--seeds", "2", "--duration", "0.1", "--out", "results", "--latex", "table.tex", "--figure", "fig"]
+    words = [
+        "compare",
+        "inverted_pendulum,duffing",
+        "--law",
+        "classical,mine.py",
+        "--condition",
+        "friction,encoder",
+    ]
+    words += [
+        "--condition",
+        "worn: friction=Coulomb(0.05), sensor=Encoder(counts=4096)",
+        "--no-tune",
+    ]
+    words += [
+        "--seeds",
+        "2",
+        "--duration",
+        "0.1",
+        "--out",
+        "results",
+        "--latex",
+        "table.tex",
+        "--figure",
+        "fig",
+    ]
     with pytest.raises(SystemExit) as end:
         main.main(words)
     assert end.value.code in (0, None)
@@ -252,7 +325,10 @@ def test_one_command_tunes_runs_tables_and_draws(tmp_path, monkeypatch, capsys):
 
 def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(worst_case, "default_budget", lambda scenario, within: 8)
-    within, laws = smc.Uncertainty(disturbance=0.5), [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)]
+    within, laws = (
+        smc.Uncertainty(disturbance=0.5),
+        [smc.law("classical", k=5.0), smc.law("pid", kp=20.0)],
+    )
     made = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     for found in made.worst["duffing"].values():
         assert smc.score(smc.run(found.scenario))["rms_error"] == found.value >= found.median
@@ -261,13 +337,19 @@ def test_the_worst_found_is_told_beside_the_median_and_kept(tmp_path, monkeypatc
     assert all(number(each.value) in text for each in made.worst["duffing"].values())
     assert "worst found (m)" in made.to_latex()
     column = {row[0].text: row[-1] for row in made.leaderboard.tables[1].rows}
-    assert column == {law: (one.shown(one.value), f"median {one.shown(one.median)}", False, "", "")
-                      for law, one in made.worst["duffing"].items()}  # fmt: skip
+    assert column == {
+        law: (one.shown(one.value), f"median {one.shown(one.median)}", False, "", "")
+        for law, one in made.worst["duffing"].items()
+    }
     monkeypatch.setattr(worst_case, "worst_case", None)
     again = smc.compare(laws, "duffing", "nominal", 1, worst=within, out=tmp_path, **SHORT)
     assert again.worst["duffing"]["pid"].scenario == made.worst["duffing"]["pid"].scenario
     attacked = []
-    monkeypatch.setattr(worst_case, "cached_worst_case", lambda path, scenario, *_: attacked.append(scenario.duration))
+    monkeypatch.setattr(
+        worst_case,
+        "cached_worst_case",
+        lambda path, scenario, *_: attacked.append(scenario.duration),
+    )
     smc.compare(laws, "duffing", "nominal", 1, worst=True, quick=True, out=tmp_path / "other")
     assert attacked == [8.0, 8.0]  # s, where no duration is given, whatever that of the other runs
 
@@ -288,6 +370,8 @@ def test_conditions_are_names_with_commas_or_one_text(refused):
 
 @pytest.mark.parametrize("worst", [5, "x", None])
 def test_a_worst_case_that_is_no_class_is_refused_before_any_run(worst, tmp_path):
-    with pytest.raises(smc.ScenarioError, match=r"^worst is .*: give True or a class, such as smc.Uncertainty"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"^worst is .*: give True or a class, such as smc.Uncertainty"
+    ):
         smc.compare(["classical"], "duffing", worst=worst, out=tmp_path / "new")
     assert not (tmp_path / "new").exists()

@@ -26,7 +26,14 @@ ROOT = Path(__file__).parents[2]
 
 
 def mixed() -> list[smc.Scenario]:
-    return grid(["duffing", "pendulum_network"], ["classical", "none"], ["nominal", "coulomb"], 3, "study", 0.05)
+    return grid(
+        ["duffing", "pendulum_network"],
+        ["classical", "none"],
+        ["nominal", "coulomb"],
+        3,
+        "study",
+        0.05,
+    )
 
 
 @smc.law_function
@@ -42,15 +49,23 @@ def test_batches_hold_every_scenario_once_and_agree_on_its_layout(monkeypatch, s
     monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", steps)
     scenarios = mixed()
     found = list(executors.batches(scenarios, threads=2))
-    assert sorted(map(id, scenarios)) == sorted(id(one.scenario) for batch in found for one in batch)
+    assert sorted(map(id, scenarios)) == sorted(
+        id(one.scenario) for batch in found for one in batch
+    )
     for batch in [[one.scenario for one in batch] for batch in found]:
-        assert len({(s.plant.name, s.resolved.integrator, s.resolved.physics_step) for s in batch}) == 1
+        assert (
+            len({(s.plant.name, s.resolved.integrator, s.resolved.physics_step) for s in batch})
+            == 1
+        )
         assert len(batch) == 1 or sum(s.work for s in batch) <= 2 * steps
 
 
 def test_a_batch_is_bounded_by_memory_however_many_threads_there_are():
     scenarios = [paper.scenario("duffing", "classical", seed=seed) for seed in range(400)]
-    assert max(len(batch) for batch in executors.batches(scenarios, threads=512)) <= executors.MAX_WORK / 10_000
+    assert (
+        max(len(batch) for batch in executors.batches(scenarios, threads=512))
+        <= executors.MAX_WORK / 10_000
+    )
 
 
 def test_what_does_not_compile_goes_in_small_batches():
@@ -59,16 +74,22 @@ def test_what_does_not_compile_goes_in_small_batches():
 
 
 def test_outcomes_come_in_the_order_of_the_batch_and_do_not_depend_on_it():
-    batch = [smc.Scenario(plant="duffing", law=fails_late(when=w), duration=0.05) for w in (1.0, 0.01, 0.02)]
+    batch = []
+    for w in (1.0, 0.01, 0.02):
+        batch.append(smc.Scenario(plant="duffing", law=fails_late(when=w), duration=0.05))
     together = [executors.result_columns(trace) for trace in executors.run_batch(batch, 2)]
-    assert together == [executors.result_columns(trace) for s in batch for trace in executors.run_batch([s], 1)]
+    assert together == [
+        executors.result_columns(trace) for s in batch for trace in executors.run_batch([s], 1)
+    ]
     assert [found["diverged_at"] for found in together] == [None, 0.011, 0.021]
 
 
 def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_heard():
     batches = list(executors.batches(mixed(), threads=1))
     finished = []
-    executors.compute_here(batches, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces])))
+    executors.compute_here(
+        batches, 1, lambda batch, traces: finished.append((batch, [t.scenario for t in traces]))
+    )
     assert [batch for batch, _ in finished] == batches
     assert [[one.scenario for one in batch] for batch in batches] == [done for _, done in finished]
 
@@ -86,10 +107,23 @@ def test_a_batch_is_finished_while_the_next_one_runs_and_what_that_raises_is_hea
 
 
 @pytest.mark.parametrize(
-    "name", ["ray", "dask", "dask://", "dask://host", "dask://host:port", "dask://a:99999", None, 3, np.zeros(2)]
+    "name",
+    [
+        "ray",
+        "dask",
+        "dask://",
+        "dask://host",
+        "dask://host:port",
+        "dask://a:99999",
+        None,
+        3,
+        np.zeros(2),
+    ],
 )
 def test_an_executor_that_there_is_not_is_one_sentence(name):
-    with pytest.raises(smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT', a dask Client or a"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"give 'local', 'dask://HOST:PORT', a dask Client or a"
+    ):
         executors.as_executor(name)
 
 
@@ -103,7 +137,9 @@ def test_without_the_package_the_sentence_says_what_to_install(tmp_path, monkeyp
 
 
 class Elsewhere(ThreadPoolExecutor):
-    """Workers that get bytes, as those of another process do; from task `last` on they come to an end."""
+    """Workers that get bytes, as those of another process do; from task `last` on they come to an
+    end.
+    """
 
     tasks, last = 0, 10**9
 
@@ -138,7 +174,9 @@ def test_the_workers_of_any_executor_find_the_same_table(tmp_path, monkeypatch):
         study(mixed(), tmp_path / "elsewhere", executor=pool)
         assert pool.submit(abs, -1).result() == 1  # it stays open
     study(mixed(), tmp_path / "local")
-    tables = [(tmp_path / where / "results.parquet").read_bytes() for where in ("elsewhere", "local")]
+    tables = []
+    for where in ("elsewhere", "local"):
+        tables.append((tmp_path / where / "results.parquet").read_bytes())
     assert pool.tasks > 4
     assert tables[0] == tables[1]
 
@@ -153,18 +191,23 @@ def test_no_more_batches_are_under_way_than_allowed(monkeypatch):
                 assert pool.tasks - len(finished) <= 2
                 yield [prepare(scenario)]
 
-        executors.compute_elsewhere(batches(), pool, lambda batch, outcomes: finished.append(batch[0].scenario))
+        executors.compute_elsewhere(
+            batches(), pool, lambda batch, outcomes: finished.append(batch[0].scenario)
+        )
     assert sorted(map(repr, finished)) == sorted(map(repr, mixed()))
 
 
 @pytest.mark.parametrize("end", [died, cancelled, refused])
-def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(end, tmp_path, monkeypatch):
+def test_when_an_executor_stops_one_sentence_says_so_and_what_is_finished_stays(
+    end, tmp_path, monkeypatch
+):
     monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 200)
     monkeypatch.setattr(executors, "MAX_BATCHES_SENT", 1)
     with Elsewhere(1) as pool:
         pool.last, pool.end = 4, end
         with pytest.raises(
-            smc.ScenarioError, match=r"^the executor has stopped \(.+\): start it and the study again to continue$"
+            smc.ScenarioError,
+            match=r"^the executor has stopped \(.+\): start it and the study again to continue$",
         ):
             study(mixed(), tmp_path, executor=pool)
     assert len(list((tmp_path / "parts").glob("*.parquet"))) == 3
@@ -189,7 +232,10 @@ def test_finished_parts_are_kept_before_an_error_is_raised(monkeypatch):
             ("smc_mujoco.studies.run_key.key", lambda scenario, plants=None: "other"),
             "a worker has other code for .*: install the same",
         ),
-        (("pickle.loads", lambda data: smc.nowhere), "a worker says .*: install there what your laws import"),
+        (
+            ("pickle.loads", lambda data: smc.nowhere),
+            "a worker says .*: install there what your laws import",
+        ),
     ],
 )
 def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, monkeypatch):
@@ -202,10 +248,14 @@ def test_a_worker_that_would_run_something_else_is_one_sentence(change, said, mo
 
 
 def test_a_law_without_a_module_is_sent_by_value(monkeypatch):
-    scenario = smc.Scenario(plant="duffing", duration=0.1, law=smc.law_function(lambda y, gains, memory: (-y.e, y.e))())
+    scenario = smc.Scenario(
+        plant="duffing", duration=0.1, law=smc.law_function(lambda y, gains, memory: (-y.e, y.e))()
+    )
     found = []
     with Elsewhere(1) as pool:
-        executors.compute_elsewhere([[prepare(scenario)]], pool, lambda batch, its: found.extend(its))
+        executors.compute_elsewhere(
+            [[prepare(scenario)]], pool, lambda batch, its: found.extend(its)
+        )
     assert found == [executors.result_columns(smc.run(scenario))]
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
     with pytest.raises(smc.ScenarioError, match="put it into a module, or pip install cloudpickle"):
@@ -273,12 +323,22 @@ def wait(there: Callable[[], object]) -> None:
 
 
 @pytest.fixture(scope="module")
-def dask(tmp_path_factory) -> Iterator[tuple[str, list[subprocess.Popen], Callable[[], subprocess.Popen]]]:
+def dask(
+    tmp_path_factory,
+) -> Iterator[tuple[str, list[subprocess.Popen], Callable[[], subprocess.Popen]]]:
     """The address of a scheduler; its process and that of its worker; what starts another worker."""
     tmp_path = tmp_path_factory.mktemp("dask")
     file = tmp_path / "scheduler.json"
     common = "--no-dashboard", "--scheduler-file", str(file)
-    scheduler = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", *common]
+    scheduler = [
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        *common,
+    ]
     worker = ["-m", "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", *common]
     worker += ["--local-directory", str(tmp_path)]
     running = [start(*scheduler, log=tmp_path / "scheduler.log")]
@@ -349,7 +409,9 @@ def test_a_worker_that_is_killed_in_mid_run_changes_nothing(dask, half_done, tmp
 
 
 @pytest.mark.slow
-def test_a_study_that_is_killed_in_mid_run_goes_on_over_the_workers_with_the_same_bytes(dask, half_done, tmp_path):
+def test_a_study_that_is_killed_in_mid_run_goes_on_over_the_workers_with_the_same_bytes(
+    dask, half_done, tmp_path
+):
     half_done.kill()
     half_done.wait()
     done = (tmp_path / "hashes").read_text().split()
@@ -362,7 +424,9 @@ def test_a_study_that_is_killed_in_mid_run_goes_on_over_the_workers_with_the_sam
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(dask, half_done, tmp_path):
+def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs_stay(
+    dask, half_done, tmp_path
+):
     _, (scheduler, *_), _ = dask
     scheduler.send_signal(signal.SIGKILL)
     (tmp_path / "go").touch()
@@ -376,7 +440,9 @@ def test_a_scheduler_that_is_killed_in_mid_run_is_one_sentence_and_finished_runs
 
 @pytest.mark.slow
 def test_without_a_scheduler_there_the_sentence_says_so(tmp_path):
-    client = start("-c", CLIENT, str(tmp_path), "dask://127.0.0.1:9", "0.5", log=tmp_path / "client.log")
+    client = start(
+        "-c", CLIENT, str(tmp_path), "dask://127.0.0.1:9", "0.5", log=tmp_path / "client.log"
+    )
     client.communicate(timeout=300)
     said = (tmp_path / "client.log").read_text().splitlines()[-1]
     assert said.startswith("no dask at dask://127.0.0.1:9")

@@ -1,7 +1,9 @@
-"""A study that is killed goes on where it was: nothing finished is lost or done twice, and the table is the same.
+"""A study that is killed goes on where it was: nothing finished is lost or done twice, and the
+table is the same.
 
-One process loads and compiles once, and forks a process for every life of the study, before any simulation has made a
-thread. A life says through a pipe what it does; what was there when it was killed is all that the next one knows.
+One process loads and compiles once, and forks a process for every life of the study, before any
+simulation has made a thread. A life says through a pipe what it does; what was there when it was
+killed is all that the next one knows.
 """
 
 import json
@@ -139,7 +141,10 @@ def test_on_a_full_disk_a_study_stops_with_one_sentence_and_later_goes_on(tmp_pa
     assert len(done.stderr.splitlines()) == 1
     files = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
     names = sorted(path.name for path in files if path.suffix != ".parquet")
-    assert (names, len(files)) == ([], 2)  # two finished parts, no noise key yet, and nothing half done
+    assert (names, len(files)) == (
+        [],
+        2,
+    )  # two finished parts, no noise key yet, and nothing half done
     scenarios = grid(["duffing"], ["classical"], ["noise"], 20, "study", 0.05)
     study(scenarios, tmp_path)
     study(scenarios, tmp_path / "undisturbed")

@@ -1,4 +1,6 @@
-"""The sentence that answers a scene: computed from its runs, ties named as ties, and told by every scene."""
+"""The sentence that answers a scene: computed from its runs, ties named as ties, and told by every
+scene.
+"""
 
 import dataclasses
 import functools
@@ -21,7 +23,8 @@ RUN = smc.Scenario(plant="duffing", law="classical", x0=1.0, duration=2.0)
 
 
 def made(scenario: smc.Scenario, settled: float, size: float = 1.0, **fields: object) -> smc.Trace:
-    """A trace without a run: it reaches 0.1 % of its start, times `size`, at the share `settled` of the duration.
+    """A trace without a run: it reaches 0.1 % of its start, times `size`, at the share `settled` of
+    the duration.
 
     Command, force, speed and reaction grow with `size`; there is no reaction up to a size of 3.
     """
@@ -42,11 +45,15 @@ def made(scenario: smc.Scenario, settled: float, size: float = 1.0, **fields: ob
 
 def single(**settled: float) -> Outcome:
     """One condition whose runs settle at these shares of 2 s."""
-    return Outcome(traces={"nominal": {label: made(RUN, share) for label, share in settled.items()}})
+    return Outcome(
+        traces={"nominal": {label: made(RUN, share) for label, share in settled.items()}}
+    )
 
 
 def several(**settled: dict[str, float]) -> Outcome:
-    traces = {name: {label: made(RUN, share) for label, share in runs.items()} for name, runs in settled.items()}
+    traces = {}
+    for name, runs in settled.items():
+        traces[name] = {label: made(RUN, share) for label, share in runs.items()}
     return Outcome(traces=traces)
 
 
@@ -89,7 +96,10 @@ def test_positions_that_the_sensor_does_not_tell_apart_are_tied_as_on_leaderboar
         label: dataclasses.replace(run, scenario=dataclasses.replace(run.scenario, noise=noise))
         for label, run in runs.items()
     }
-    assert Outcome(traces={"nominal": runs}).least("ultimate_bound") == "a and b tied (0.00110 to 0.00440 m)"
+    assert (
+        Outcome(traces={"nominal": runs}).least("ultimate_bound")
+        == "a and b tied (0.00110 to 0.00440 m)"
+    )
 
 
 def test_a_run_that_failed_has_no_value_and_nothing_holds_for_it():
@@ -128,7 +138,9 @@ def test_those_are_the_runs_for_which_something_holds():
 
 
 def test_leaders_lead_or_are_tied_in_every_measure():
-    runs = {label: made(RUN, share, size) for label, share, size in (("a", 0.5, 9.0), ("b", 0.505, 1.0))}
+    runs = {}
+    for label, share, size in (("a", 0.5, 9.0), ("b", 0.505, 1.0)):
+        runs[label] = made(RUN, share, size)
     outcome = Outcome(traces={"nominal": runs})
     assert outcome.leaders("settling_time") == ["a", "b"]
     assert outcome.leaders("settling_time", "tv_rate") == ["b"]
@@ -141,7 +153,9 @@ def test_over_conditions_a_winner_of_all_has_a_range_and_others_their_conditions
     same = several(near={"a": 0.2, "b": 0.4}, far={"a": 0.3, "b": 0.6})
     assert same.least("settling_time") == "a in both conditions (0.400 to 0.600 s)"
     assert same["far"].least("settling_time") == "a (0.600 s)"
-    mixed = several(near={"a": 0.2, "b": 0.4}, far={"a": 0.6, "b": 0.3}, farther={"a": 0.5, "b": 0.5})
+    mixed = several(
+        near={"a": 0.2, "b": 0.4}, far={"a": 0.6, "b": 0.3}, farther={"a": 0.5, "b": 0.5}
+    )
     assert mixed.least("settling_time") == "a (near), b (far), both tied (farther)"
 
 
@@ -151,7 +165,10 @@ def test_who_says_in_which_conditions():
         far={"a": 0.2, "b": 0.2, "c": NEVER},
         farther={"a": 0.2, "b": NEVER, "c": NEVER},
     )
-    assert runs.who("settles", "settle") == "a settles in all 3 conditions, b in all but farther, c in none"
+    assert (
+        runs.who("settles", "settle")
+        == "a settles in all 3 conditions, b in all but farther, c in none"
+    )
     assert runs.only("c").who("settles", "settle") == "c does not settle in any condition"
     assert runs.only("a").who("settles", "settle") == "a settles in all 3 conditions"
     few = several(near={"a": 0.2, "b": NEVER}, far={"a": NEVER, "b": NEVER})
@@ -188,7 +205,9 @@ def test_values_of_plants_with_other_units_have_no_common_range():
 def test_a_measure_may_be_a_function():
     runs = single(a=0.4, b=0.2)
     assert runs.least(lambda trace: trace.x[50, 0], unit="m") == "both tied (0.00110 m)"
-    assert runs.least(lambda trace: trace.x[60 if trace is runs.traces["nominal"]["a"] else 10, 0]).startswith("a (")
+    assert runs.least(
+        lambda trace: trace.x[60 if trace is runs.traces["nominal"]["a"] else 10, 0]
+    ).startswith("a (")
 
 
 def test_names_that_are_not_there_are_refused():
@@ -223,7 +242,9 @@ def test_what_the_answer_of_a_scene_raises_reaches_its_author():
         scene(lambda runs: runs.nothing).sentence(single(a=0.2).traces)
 
 
-@pytest.mark.parametrize(("answer", "says"), [(lambda runs: 3, "is 3"), (lambda runs: " ", "returns text")])
+@pytest.mark.parametrize(
+    ("answer", "says"), [(lambda runs: 3, "is 3"), (lambda runs: " ", "returns text")]
+)
 def test_an_answer_that_is_none_is_refused_in_a_sentence(answer, says):
     with pytest.raises(smc.ScenarioError, match=f"the answer of scene 'Two' .*{says}"):
         scene(answer).sentence(single(a=0.2).traces)
@@ -238,13 +259,14 @@ def test_an_answer_that_is_none_is_refused_in_a_sentence(answer, says):
 def declared(path: Path) -> tuple[smc.Scene, dict[str, dict[str, smc.Trace]]]:
     """A scene, and traces that differ from label to label and from condition to condition."""
     found = scenes.read(path)
-    traces = {
-        condition: {
-            label: made(scenario, 0.1 + 0.11 * i + 0.2 * k if i < 2 + k else NEVER, 0.5 + 2.5 * i + k)
+    traces = {}
+    for k, (condition, runs) in enumerate(found.conditions.items()):
+        traces[condition] = {
+            label: made(
+                scenario, 0.1 + 0.11 * i + 0.2 * k if i < 2 + k else NEVER, 0.5 + 2.5 * i + k
+            )
             for i, (label, scenario) in enumerate(runs.items())
         }
-        for k, (condition, runs) in enumerate(found.conditions.items())
-    }
     return found, traces
 
 
@@ -260,7 +282,9 @@ def test_a_scene_has_an_answer_of_its_own_in_one_sentence_that_singles_out_none_
     assert not re.search(r"\.\s", sentence)
     assert sentence.endswith(".")
     assert len(sentence) < 480  # six lines of a terminal
-    equal = {name: dict.fromkeys(runs, made(next(iter(runs.values())).scenario, 0.3)) for name, runs in traces.items()}
+    equal = {}
+    for name, runs in traces.items():
+        equal[name] = dict.fromkeys(runs, made(next(iter(runs.values())).scenario, 0.3))
     labels = "|".join(re.escape(label) for label in Outcome(traces=traces).labels)
     assert not re.search(rf"(?:: |under |with )(?:{labels}) (?:\(|in )", found.sentence(equal))
 
@@ -282,7 +306,9 @@ def test_a_scene_s_sentence_changes_when_any_number_behind_it_does(path, monkeyp
         def other(measure, name=name):
             value = function(measure)
             of_this = name == (measure if isinstance(measure, str) else measure.__name__)
-            return (lambda run: 1.0 / (0.7 + min(value(run), 1e9))) if of_this else value
+            if of_this:
+                return lambda run: 1.0 / (0.7 + min(value(run), 1e9))
+            return value
 
         monkeypatch.setattr(words, "_function", other)
         assert found.sentence(traces) != sentence, name
@@ -296,6 +322,10 @@ def test_a_scene_s_sentence_changes_when_any_number_behind_it_does(path, monkeyp
     monkeypatch.setattr(words, "_true", counted)
     found.sentence(traces)
     for code in asked:
-        monkeypatch.setattr(words, "_true", lambda holds, run, code=code: true(holds, run) != (holds.__code__ is code))
+        monkeypatch.setattr(
+            words,
+            "_true",
+            lambda holds, run, code=code: true(holds, run) != (holds.__code__ is code),
+        )
         assert found.sentence(traces) != sentence, code.co_name
     assert seen | asked

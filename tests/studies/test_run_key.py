@@ -33,17 +33,26 @@ scenario = functools.partial(runs.scenario, duration=0.05)
 @pytest.mark.parametrize("plant", scenarios.PLANTS)
 def test_every_condition_is_known_by_its_name(plant):
     made = grid([plant], ["observer_free"], list(scenarios.CONDITIONS), 2, "study")
-    assert [condition(s) for s in made[::2]] == [condition(s) for s in made[1::2]] == list(scenarios.CONDITIONS)
+    assert (
+        [condition(s) for s in made[::2]]
+        == [condition(s) for s in made[1::2]]
+        == list(scenarios.CONDITIONS)
+    )
 
 
 def test_a_condition_that_the_paper_has_not_is_told_by_what_differs():
     assert condition(scenario(smc.law("classical"), u_max=4.0, seed=3)) == "u_max=4.0"
-    assert condition(scenario(smc.law("classical"), friction=smc.Coulomb(0.2))) == "friction=(Coulomb(level=0.2),)"
+    assert (
+        condition(scenario(smc.law("classical"), friction=smc.Coulomb(0.2)))
+        == "friction=(Coulomb(level=0.2),)"
+    )
     many = {
         "noise": smc.Noise(0.1, 0.2),
         "disturbance": (smc.Sine(0.1, 2.0), smc.signals.Pulse(2.0, time=0.01, width=0.1)),
     }
-    names = [condition(scenario(smc.law("classical"), input_delay=delay, **many)) for delay in (0.001, 0.002)]
+    names = []
+    for delay in (0.001, 0.002):
+        names.append(condition(scenario(smc.law("classical"), input_delay=delay, **many)))
     assert len(set(names)) == 2
     assert max(map(len, names)) < 80
 
@@ -66,7 +75,9 @@ def test_equal_scenarios_have_one_key_and_others_another():
 def test_other_versions_are_other_runs(monkeypatch):
     before = key(scenario(smc.law("classical")))
     described = serialise.describe
-    monkeypatch.setattr(serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}})
+    monkeypatch.setattr(
+        serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
+    )
     assert key(scenario(smc.law("classical"))) != before
 
 
@@ -93,7 +104,9 @@ class Push(smc.Signal):
 """
 
 
-def written(law="-gains.k * helper(y.e)", helper="GAIN * x", constant="2.0", signal="p.amplitude", before="") -> str:
+def written(
+    law="-gains.k * helper(y.e)", helper="GAIN * x", constant="2.0", signal="p.amplitude", before=""
+) -> str:
     """The key of a run under a law of the user's."""
     space: dict = {"__name__": "written"}
     text = before + LAW.format(law=law, helper=helper, constant=constant, signal=signal)
@@ -104,11 +117,14 @@ def written(law="-gains.k * helper(y.e)", helper="GAIN * x", constant="2.0", sig
 @pytest.mark.parametrize(
     "edit",
     [
-        {"law": "-2.0 * gains.k * helper(y.e)"}, {"law": "gains.k * helper(y.e)"}, {"helper": "GAIN * math.tanh(x)"},
-        {"constant": "3.0"}, {"signal": "2.0 * p.amplitude"},
+        {"law": "-2.0 * gains.k * helper(y.e)"},
+        {"law": "gains.k * helper(y.e)"},
+        {"helper": "GAIN * math.tanh(x)"},
+        {"constant": "3.0"},
+        {"signal": "2.0 * p.amplitude"},
     ],
     ids=["constant of the law", "sign", "helper", "global constant", "signal"],
-)  # fmt: skip
+)
 def test_an_edited_law_is_another_run(edit):
     assert written() != written(**edit)
 
@@ -133,7 +149,9 @@ def test_a_comment_or_a_line_more_is_no_edit():
 def test_another_order_of_a_class_s_definitions_is_no_edit():
     one, other = {"a": 1.0, "b": 2.0}, {"b": 2.0, "a": 1.0}
     assert fingerprint.of(type("Mine", (), one)) == fingerprint.of(type("Mine", (), other))
-    assert fingerprint.of(type("Mine", (), one)) != fingerprint.of(type("Mine", (), {"a": 2.0, "b": 1.0}))
+    assert fingerprint.of(type("Mine", (), one)) != fingerprint.of(
+        type("Mine", (), {"a": 2.0, "b": 1.0})
+    )
 
 
 def test_a_key_does_not_depend_on_the_process():
@@ -144,7 +162,9 @@ def test_a_key_does_not_depend_on_the_process():
 
 
 def test_types_that_a_compiler_has_made_by_then_change_no_key(monkeypatch):
-    """A law of many joints reaches llvmlite, which keeps each type that it has made, and numba, which numbers them."""
+    """A law of many joints reaches llvmlite, which keeps each type that it has made, and numba,
+    which numbers them.
+    """
     joint = smc.Scenario(plant="inverted_pendulum_network", law="passivity_based")
     before = key(joint), fingerprint.now(joint.law.function)
     ir.IntType(57)
@@ -216,14 +236,26 @@ def package(factor: float) -> ModuleType:
 @pytest.mark.parametrize(
     "made",
     [
-        lambda k: Weighted(k).law, lambda k: functools.partial(Weighted.law, weight=k),
-        lambda k: reaching(functools.partial(max, k)), lambda k: reaching(np.vectorize(lambda x: k * x)),
-        lambda k: reaching(np.poly1d([k, 1.0])), lambda k: reaching(package(k), "THING.inner.helper(y.e)"),
+        lambda k: Weighted(k).law,
+        lambda k: functools.partial(Weighted.law, weight=k),
+        lambda k: reaching(functools.partial(max, k)),
+        lambda k: reaching(np.vectorize(lambda x: k * x)),
+        lambda k: reaching(np.poly1d([k, 1.0])),
+        lambda k: reaching(package(k), "THING.inner.helper(y.e)"),
         lambda k: reaching(type("Table", (), {"values": (k, 1.0)}), "THING.values[0]"),
         lambda k: reaching(None, "helper(y.e)", f"@functools.cache\ndef helper(x): return {k} * x"),
     ],
-    ids=["method", "partial", "global partial", "vectorized", "object", "package", "class", "kept results"],
-)  # fmt: skip
+    ids=[
+        "method",
+        "partial",
+        "global partial",
+        "vectorized",
+        "object",
+        "package",
+        "class",
+        "kept results",
+    ],
+)
 def test_everything_that_a_law_reaches_is_in_its_fingerprint(made):
     assert fingerprint.of(made(1.0)) == fingerprint.of(made(1.0)) != fingerprint.of(made(2.0))
 
@@ -235,10 +267,14 @@ def test_an_object_that_changed_is_another():
     assert fingerprint.of(policy) != before
 
 
-def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(monkeypatch, tmp_path):
+def test_a_key_changes_with_the_code_of_the_package_but_not_with_that_of_its_report(
+    monkeypatch, tmp_path
+):
     scenario = smc.Scenario(plant="duffing", law="classical", duration=1.0)
     package = tmp_path / "smc_mujoco"
-    shutil.copytree(fingerprint.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains"))
+    shutil.copytree(
+        fingerprint.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__", "tuned_gains")
+    )
     monkeypatch.setattr(fingerprint, "PACKAGE", package)
 
     def now() -> str:
@@ -266,7 +302,9 @@ def test_replaced_functions_of_a_plant_change_the_key():
     def nothing(*given):
         yield from ()
 
-    exec("def generated(x, v, i, q): return 0.0, 2.0", made := {})  # without a module, as SymPy's lambdify
+    exec(
+        "def generated(x, v, i, q): return 0.0, 2.0", made := {}
+    )  # without a module, as SymPy's lambdify
     own = smc.Scenario(plant="duffing", law="classical", duration=0.1)
     contacts, mechanisms = own.plant.contacts, own.plant.mechanisms
     changes = (
@@ -284,7 +322,9 @@ def test_replaced_functions_of_a_plant_change_the_key():
 
 
 def test_metrics_are_the_same_after_a_score():
-    """A cache of results that they reach would change the hash of their code, and so discard stored studies."""
+    """A cache of results that they reach would change the hash of their code, and so discard stored
+    studies.
+    """
     formulas = tuple(metric.formula for metric in metrics())
     before = fingerprint.now(formulas)
     smc.score(smc.run(scenario(smc.law("classical"))))

@@ -1,4 +1,6 @@
-"""Every shipped scene asks its question and runs; the paper's study has its conditions and its numbers."""
+"""Every shipped scene asks its question and runs; the paper's study has its conditions and its
+numbers.
+"""
 
 import ast
 import contextlib
@@ -19,9 +21,17 @@ FOLDER = Path(smc.__file__).parents[1] / "scenes"
 FILES = sorted(FOLDER.glob("*.py"))
 EVERY = pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 TEN = {
-    "inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "vdp_nominal", "vdp_noise", "vdp_disturbance",
-    "control_signals", "delay", "parameter_jump",
-}  # fmt: skip
+    "inverted_pendulum",
+    "van_der_pol",
+    "duffing",
+    "pendulum_network",
+    "vdp_nominal",
+    "vdp_noise",
+    "vdp_disturbance",
+    "control_signals",
+    "delay",
+    "parameter_jump",
+}
 BESIDE = ("import math", "import arms")  # what a scene may import beside smc
 LAWS = ["observer_free", "classical", "adaptive", "super_twisting"]
 
@@ -56,10 +66,15 @@ def test_a_scene_asks_one_question_and_says_what_to_look_for_in_few_lines_of_pub
     tree = ast.parse(path.read_text())
     nodes = list(ast.walk(tree))
     imports = [node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert [ast.unparse(node) for node in imports if ast.unparse(node) not in BESIDE] == ["import smc_mujoco as smc"]
+    assert [ast.unparse(node) for node in imports if ast.unparse(node) not in BESIDE] == [
+        "import smc_mujoco as smc"
+    ]
     used = {n.attr for n in nodes if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "smc"}
     assert used <= set(dir(smc))
-    of_paper = {n.attr for n in nodes if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "smc.paper"}
+    of_paper = set()
+    for n in nodes:
+        if isinstance(n, ast.Attribute) and ast.unparse(n.value) == "smc.paper":
+            of_paper.add(n.attr)
     assert not [name for name in of_paper if name.startswith("_") or not hasattr(smc.paper, name)]
 
 
@@ -79,7 +94,9 @@ def test_a_scene_runs_and_its_traces_are_saved(path, tmp_path):
     scene = declared_shortly(path)
     with contextlib.redirect_stdout(io.StringIO()):  # its progress bar
         traces = show.simulate(scene, threads=None)
-    assert {c: list(runs) for c, runs in traces.items()} == {c: list(runs) for c, runs in scene.conditions.items()}
+    assert {c: list(runs) for c, runs in traces.items()} == {
+        c: list(runs) for c, runs in scene.conditions.items()
+    }
     for condition, runs in traces.items():
         for label, trace in runs.items():
             assert trace.scenario == scene.conditions[condition][label]
@@ -89,7 +106,10 @@ def test_a_scene_runs_and_its_traces_are_saved(path, tmp_path):
     assert len(saved) == sum(map(len, traces.values()))
     for file, (_, _, scenario) in zip(saved, scene.runs(), strict=True):
         again = smc.load(file).scenario
-        own = scenario.law if again.law.function is None else again.law
+        if again.law.function is None:
+            own = scenario.law
+        else:
+            own = again.law
         assert dataclasses.replace(again, law=own) == scenario
     assert set(tmp_path.iterdir()) == {*saved}
 
@@ -105,7 +125,9 @@ def test_a_scene_of_each_kind_of_figure_is_drawn(name, tmp_path, monkeypatch):
 
     monkeypatch.setattr(page, "write", render_the_first)
     scene = declared_shortly(FOLDER / f"{name}.py")
-    two = {condition: dict([*runs.items()][:2]) for condition, runs in [*scene.conditions.items()][:2]}
+    two = {}
+    for condition, runs in [*scene.conditions.items()][:2]:
+        two[condition] = dict([*runs.items()][:2])
     scene = dataclasses.replace(scene, conditions=two, film="")
     with contextlib.redirect_stdout(io.StringIO()):
         traces = show.simulate(scene, threads=None)
@@ -159,24 +181,43 @@ CONDITIONS = {
 }
 JUMPS = {
     "jump_mild": {
-        "inverted_pendulum": {"mass": 2.0}, "pendulum_network": {"mass": 2.0},
-        "inverted_pendulum_network": {"mass": 2.0}, "van_der_pol": {"mu": 3.0}, "duffing": {"alpha": 3.0},
+        "inverted_pendulum": {"mass": 2.0},
+        "pendulum_network": {"mass": 2.0},
+        "inverted_pendulum_network": {"mass": 2.0},
+        "van_der_pol": {"mu": 3.0},
+        "duffing": {"alpha": 3.0},
     },
     "jump_hard": {
-        "inverted_pendulum": {"mass": 25.912}, "pendulum_network": {"mass": 11.062},
-        "inverted_pendulum_network": {"mass": 22.681}, "van_der_pol": {"mu": 9.0}, "duffing": {"alpha": 27.684},
+        "inverted_pendulum": {"mass": 25.912},
+        "pendulum_network": {"mass": 11.062},
+        "inverted_pendulum_network": {"mass": 22.681},
+        "van_der_pol": {"mu": 9.0},
+        "duffing": {"alpha": 27.684},
     },
-}  # fmt: skip
+}
 COMMON = {
-    "duration": 10.0, "control_period": 0.001, "physics_step": 0.001, "u_max": 6.0, "integrator": "RK4", "seed": 0,
-    "reference": smc.Constant(0.0), "disturbance": (), "noise": smc.Noise(), "input_delay": 0.0,
-    "velocity": smc.estimator("measured"), "mismatch": {}, "jump": None,
-}  # fmt: skip
+    "duration": 10.0,
+    "control_period": 0.001,
+    "physics_step": 0.001,
+    "u_max": 6.0,
+    "integrator": "RK4",
+    "seed": 0,
+    "reference": smc.Constant(0.0),
+    "disturbance": (),
+    "noise": smc.Noise(),
+    "input_delay": 0.0,
+    "velocity": smc.estimator("measured"),
+    "mismatch": {},
+    "jump": None,
+}
 PLANTS = {
     "inverted_pendulum": ({"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81}, (0.5,)),
     "van_der_pol": ({"M": 1.0, "mu": 1.0, "k": 1.0}, (2.0,)),
     "duffing": ({"M": 1.0, "delta": 0.2, "alpha": -1.0, "beta": 1.0}, (1.5,)),
-    "pendulum_network": ({"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5}, (0.8, -0.4, 0.6, -0.2, 0.5)),
+    "pendulum_network": (
+        {"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},
+        (0.8, -0.4, 0.6, -0.2, 0.5),
+    ),
     "inverted_pendulum_network": (
         {"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},
         (0.8, -0.4, 0.6, -0.2, 0.5),
@@ -196,7 +237,13 @@ GAINS = {
         "classical": {"k": 6.0, "c": 2.849},
         "boundary_layer": {"k": 5.763, "c": 2.768, "phi": 0.01578},
         "adaptive": {"gamma": 66.11, "c": 2.853, "k0": 0.0},
-        "adaptive_leak": {"gamma": 7.738, "c": 2.821, "leak": 0.9379, "deadzone": 0.03367, "k0": 0.0},
+        "adaptive_leak": {
+            "gamma": 7.738,
+            "c": 2.821,
+            "leak": 0.9379,
+            "deadzone": 0.03367,
+            "k0": 0.0,
+        },
         "super_twisting": {"k1": 4.567, "k2": 45.47, "c": 2.16, "w_max": 6.0},
     },
     "duffing": {
@@ -204,7 +251,13 @@ GAINS = {
         "classical": {"k": 3.91, "c": 3.576},
         "boundary_layer": {"k": 6.0, "c": 3.975, "phi": 0.5429},
         "adaptive": {"gamma": 600.0, "c": 4.371, "k0": 0.0},
-        "adaptive_leak": {"gamma": 13.87, "c": 4.256, "leak": 2.979, "deadzone": 0.009447, "k0": 0.0},
+        "adaptive_leak": {
+            "gamma": 13.87,
+            "c": 4.256,
+            "leak": 2.979,
+            "deadzone": 0.009447,
+            "k0": 0.0,
+        },
         "super_twisting": {"k1": 8.073, "k2": 0.3443, "c": 4.061, "w_max": 6.0},
     },
     "pendulum_network": {
@@ -229,7 +282,10 @@ GAINS = {
 def stated(plant: str, condition: str) -> dict:
     """The fields of a scenario of the study, without its plant and law."""
     if condition in JUMPS:
-        return COMMON | {"disturbance": SINE, "jump": smc.Jump(time=5.0, factors=JUMPS[condition][plant])}
+        return COMMON | {
+            "disturbance": SINE,
+            "jump": smc.Jump(time=5.0, factors=JUMPS[condition][plant]),
+        }
     return COMMON | CONDITIONS[condition]
 
 
@@ -239,7 +295,10 @@ def test_the_study_has_these_conditions_and_no_other():
 
 @pytest.mark.parametrize(
     ("plant", "condition"),
-    [*(("duffing", name) for name in CONDITIONS), *((plant, name) for plant in PLANTS for name in JUMPS)],
+    [
+        *(("duffing", name) for name in CONDITIONS),
+        *((plant, name) for plant in PLANTS for name in JUMPS),
+    ],
 )
 def test_a_condition_of_the_study_has_its_numbers_and_changes_nothing_else(plant, condition):
     comparison = smc.paper.comparison(plant, condition)
@@ -287,7 +346,9 @@ def test_a_name_that_the_study_does_not_have_is_answered_with_the_nearest(names,
 )
 def test_the_van_der_pol_scenes_are_the_study_s_conditions(scene, conditions):
     declared = scenes.read(FOLDER / f"{scene}.py").conditions
-    assert declared == {name: smc.paper.comparison("van_der_pol", given) for name, given in conditions.items()}
+    assert declared == {
+        name: smc.paper.comparison("van_der_pol", given) for name, given in conditions.items()
+    }
 
 
 def test_the_delay_scene_delays_by_10_20_and_50_ms():
@@ -299,7 +360,10 @@ def test_the_delay_scene_delays_by_10_20_and_50_ms():
 def test_the_jump_scene_jumps_mildly_and_hard_at_half_time():
     declared = scenes.read(FOLDER / "parameter_jump.py").conditions
     jumps = {name: {scenario.jump for scenario in runs.values()} for name, runs in declared.items()}
-    assert jumps == {"mild": {smc.Jump(5.0, {"mass": 2.0})}, "hard": {smc.Jump(5.0, {"mass": 25.912})}}
+    assert jumps == {
+        "mild": {smc.Jump(5.0, {"mass": 2.0})},
+        "hard": {smc.Jump(5.0, {"mass": 25.912})},
+    }
 
 
 def ends_of(name):
@@ -312,7 +376,9 @@ def ends_of(name):
 def test_a_drone_upside_down_loses_the_height_of_another_coding():
     traces, names = ends_of("quadrotor_flip")
     published = {"geometric": 6.30, "quaternion_sliding": 3.64, "adaptive_quaternion_sliding": 3.69}
-    assert {law: names["lost"](traces[law]) for law in published} == pytest.approx(published, rel=0.1)
+    assert {law: names["lost"](traces[law]) for law in published} == pytest.approx(
+        published, rel=0.1
+    )
 
 
 def test_a_quaternion_s_sign_turns_a_drone_by_40_degrees_and_its_absence_by_320():
@@ -327,5 +393,7 @@ def test_what_happens_once_happens_at_half_time(plant):
         assert jumping.jump is not None
         assert jumping.jump.time == duration / 2
         for condition in ("step", "pulse", "contact"):
-            (signal,) = smc.paper.scenario(plant, "observer_free", condition, duration=duration).disturbance
+            (signal,) = smc.paper.scenario(
+                plant, "observer_free", condition, duration=duration
+            ).disturbance
             assert signal.time == duration / 2

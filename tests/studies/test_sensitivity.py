@@ -1,4 +1,6 @@
-"""What explains a score: indices against closed forms, regions and improvements against planted ones, whole runs."""
+"""What explains a score: indices against closed forms, regions and improvements against planted
+ones, whole runs.
+"""
 
 import dataclasses
 import math
@@ -23,7 +25,11 @@ def space(*names: str) -> SimpleNamespace:
 
 
 def test_indices_of_ishigami_s_function_are_its_closed_forms():
-    """T. Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone, and a fourth never."""
+    """T.
+
+    Ishigami & T. Homma, ISUMA 1990, with a = 7, b = 0.1: two axes act together, one alone, and a
+    fourth never.
+    """
     n, three = 4096, 2.0 * math.pi
     designs = module.designs(n, 4, 0)
     x = three * designs - math.pi
@@ -46,7 +52,11 @@ def test_an_interval_is_a_point_at_the_level_0_and_grows_to_both_sides_with_the_
     for level in (0.0, 0.9):
         monkeypatch.setattr(module, "LEVEL", level)
         axes = module.indices(space("a", "b"), scores, n, designs[: 2 * n], scores[: 2 * n], 0)
-        ends.append(np.array([(kind.low, kind.high) for axis in axes for kind in (axis.first, axis.total)]).T)
+        ends.append(
+            np.array(
+                [(kind.low, kind.high) for axis in axes for kind in (axis.first, axis.total)]
+            ).T
+        )
     lows, highs = np.swapaxes(ends, 0, 1)
     assert lows[0] == pytest.approx(highs[0])
     assert np.all(np.diff(lows, axis=0) < 0.0)
@@ -55,23 +65,38 @@ def test_an_interval_is_a_point_at_the_level_0_and_grows_to_both_sides_with_the_
 
 @pytest.mark.parametrize("seed", range(3))
 def test_no_axis_explains_more_alone_than_with_others(seed):
-    """Few points, and an axis that tells all but 1 %: the estimates of the others' first indices are up to 0.1."""
+    """Few points, and an axis that tells all but 1 %: the estimates of the others' first indices
+    are up to 0.1.
+    """
     n, k = 64, 4
     designs = module.designs(n, k, seed)
     scores = designs[:, 0] + 0.1 * designs[:, 1:].sum(axis=1) - 1.0
     axes = module.indices(space(*"abcd"), scores, n, designs[: 2 * n], scores[: 2 * n], seed)
-    assert all(one <= more for axis in axes for one, more in zip(axis.first[:3], axis.total[:3], strict=True))
+    assert all(
+        one <= more
+        for axis in axes
+        for one, more in zip(axis.first[:3], axis.total[:3], strict=True)
+    )
     assert axes[0].first.median > 0.8
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_sums_of_first_indices_are_at_most_1_and_of_total_ones_at_least(seed):
-    """With few points an estimate of either sum may lie half of it beyond: eight axes that add up, and a cliff."""
+    """With few points an estimate of either sum may lie half of it beyond: eight axes that add up,
+    and a cliff.
+    """
     n, k = 16, 8
     designs = module.designs(n, k, seed)
-    for scores in (designs.sum(axis=1) - 5.0, (designs[:, 0] > 0.8) + 0.2 * designs[:, 1] * designs[:, 2] - 1.0):
-        axes = module.indices(space(*"abcdefgh"), scores, n, designs[: 2 * n], scores[: 2 * n], seed)
-        first, total = (sum(getattr(axis, kind).median for axis in axes) for kind in ("first", "total"))
+    for scores in (
+        designs.sum(axis=1) - 5.0,
+        (designs[:, 0] > 0.8) + 0.2 * designs[:, 1] * designs[:, 2] - 1.0,
+    ):
+        axes = module.indices(
+            space(*"abcdefgh"), scores, n, designs[: 2 * n], scores[: 2 * n], seed
+        )
+        first, total = (
+            sum(getattr(axis, kind).median for axis in axes) for kind in ("first", "total")
+        )
         assert first <= 1.0 + 1e-12
         assert total >= 1.0 - 1e-12
 
@@ -85,7 +110,10 @@ def test_estimates_beyond_what_indices_obey_are_brought_within():
 
 
 def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
-    """The first axis tells nearly all. Saltelli's estimates (2010) err three times as much; total ones are equal."""
+    """The first axis tells nearly all.
+
+    Saltelli's estimates (2010) err three times as much; total ones are equal.
+    """
     from scipy.stats import sobol_indices
 
     n, k, errors = 32, 8, []
@@ -93,11 +121,15 @@ def test_first_indices_leave_out_what_two_samples_have_in_common_by_chance():
         designs = module.designs(n, k, seed)
         scores = 10.0 * designs[:, 0] + 0.3 * designs[:, 1:].sum(axis=1)
         a, b, *mixed = scores.reshape(-1, 1, n)
-        theirs = sobol_indices(func={"f_A": a.copy(), "f_B": b.copy(), "f_AB": np.array(mixed)}, n=n)
+        theirs = sobol_indices(
+            func={"f_A": a.copy(), "f_B": b.copy(), "f_AB": np.array(mixed)}, n=n
+        )
         first, total = module.estimates(a, b, np.array(mixed))
         np.testing.assert_allclose(total[0], np.ravel(theirs.total_order), atol=1e-12)
         true = np.array([100.0] + [0.09] * 7) / (100.0 + 7 * 0.09)
-        errors.append([np.square(its - true).mean() for its in (first[0], np.ravel(theirs.first_order))])
+        errors.append(
+            [np.square(its - true).mean() for its in (first[0], np.ravel(theirs.first_order))]
+        )
     ours, saltelli = np.sqrt(np.mean(errors, axis=0))
     assert ours < saltelli / 3.0
 
@@ -152,21 +184,29 @@ def test_an_axis_of_chance_bounds_no_region_and_is_not_improved():
 
 def test_the_improvement_is_told_by_the_half_that_did_not_choose_it():
     shares = np.random.default_rng(1).random((400, 2))
-    values = np.where(np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1])  # better above, in the half that tells
+    values = np.where(
+        np.arange(400) < 200, shares[:, 1], 2.0 - shares[:, 1]
+    )  # better above, in the half that tells
     assert module.improvement(space("a", "b"), shares, values) is None
 
 
 def test_a_run_is_a_plain_scenario_and_an_axis_that_acts_on_nothing_has_the_index_0():
-    """Without a command no bound on it acts; and every score is that of a scenario which anybody can run again."""
+    """Without a command no bound on it acts; and every score is that of a scenario which anybody
+    can run again.
+    """
     base = scenario(law="none", plant="van_der_pol")
     over = smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0))
-    found, alone = (smc.sensitivity(base, over, points=16, threads=threads) for threads in (None, 1))
+    found, alone = (
+        smc.sensitivity(base, over, points=16, threads=threads) for threads in (None, 1)
+    )
     indices = {axis.name: axis for axis in found.axes}
     assert indices["mass"].total.median > 0.8
     assert indices["bound"].total[:3] == indices["bound"].first[:3] == (0.0, 0.0, 0.0)
     np.testing.assert_array_equal(found.values, alone.values)
     row = found.space.scenario_at(found.shares[5])
-    assert row.mismatch["mass"] == found.space.column(found.space.names.index("mass"), found.shares)[5]
+    assert (
+        row.mismatch["mass"] == found.space.column(found.space.names.index("mass"), found.shares)[5]
+    )
     assert smc.score(smc.run(row))["rms_error"] == found.values[5]
     assert found.runs == 16 * 4
 
@@ -184,7 +224,9 @@ def test_a_run_fails_where_its_force_is_too_small_and_one_without_a_score_has_th
 
 def test_levels_and_chance_are_axes():
     """A level scales the force and the errors that chance draws; equal chances draw the same."""
-    found = module.Space(scenario(), smc.Uncertainty(disturbance=2.0, position_noise=1e-3, delay=(0.0, 0.01)))
+    found = module.Space(
+        scenario(), smc.Uncertainty(disturbance=2.0, position_noise=1e-3, delay=(0.0, 0.01))
+    )
     assert found.names == ("delay", "disturbance", "noise", "chance")
     rows = [1.0, 0.5, 0.2, 0.3], [0.0, 1.0, 0.4, 0.3], [0.0, 1.0, 0.4, 0.6]
     low, high, other = (found.scenario_at(np.array(row)) for row in rows)
@@ -200,16 +242,18 @@ def test_levels_and_chance_are_axes():
 
 def test_encoder_bound_and_period_take_all_of_their_ranges():
     base = scenario(u_max=4.0, physics_step=0.5e-3)
-    members = Members([base], smc.Uncertainty(encoder=(256, 4096), bound=(0.5, 1.0), period=(0.4, 3.0)))
+    members = Members(
+        [base], smc.Uncertainty(encoder=(256, 4096), bound=(0.5, 1.0), period=(0.4, 3.0))
+    )
     low, middle, high = (members.with_constants(np.full(3, share)) for share in (0.0, 0.5, 1.0))
     assert [vars(one.sensor)["counts"] for one in (low, middle, high)] == [256, 1024, 4096]
     assert [one.u_max for one in (low, middle, high)] == [2.0, 3.0, 4.0]
     assert [one.control_period for one in (low, high)] == pytest.approx([0.5e-3, 3e-3])
     assert {one.physics_step for one in (low, middle, high)} == {0.5e-3}
     kept = dataclasses.replace(base, sensor=smc.Encoder(64, bias=0.1))
-    assert Members([kept], smc.Uncertainty(encoder=(256, 512))).with_constants(np.ones(1)).sensor == smc.Encoder(
-        512, bias=0.1
-    )
+    assert Members([kept], smc.Uncertainty(encoder=(256, 512))).with_constants(
+        np.ones(1)
+    ).sensor == smc.Encoder(512, bias=0.1)
     with pytest.raises(smc.ScenarioError, match="period cannot differ: leave it out of within"):
         smc.worst_case(base, within=smc.Uncertainty(period=(1.0, 2.0)))
     with pytest.raises(smc.ScenarioError, match="none that differs: give the scenario a u_max"):
@@ -226,7 +270,16 @@ def test_a_jitter_keeps_the_delays_of_a_fine_step_and_an_axis_of_one_value_is_re
 
 def test_the_default_class_has_the_axes_of_machines():
     found = module.Space(base := scenario(), default_over(base))
-    assert set(found.names) == {"mass", "friction", "delay", "noise", "encoder", "bound", "period", "chance"}
+    assert set(found.names) == {
+        "mass",
+        "friction",
+        "delay",
+        "noise",
+        "encoder",
+        "bound",
+        "period",
+        "chance",
+    }
     assert default_points(scenario(duration=8.0), 8) == 32
     assert default_points(scenario(duration=5.0), 8) == 64
     assert default_points(scenario(plant="panda", law="computed_torque", duration=10.0), 8) == 8
@@ -235,11 +288,14 @@ def test_the_default_class_has_the_axes_of_machines():
 def test_few_points_are_told():
     """A total index needs 32 points or more for an interval that covers about what it says."""
     few, enough = (
-        smc.sensitivity(scenario(duration=0.1), smc.Uncertainty(mass=(0.5, 2.0)), points=n) for n in (16, 32)
+        smc.sensitivity(scenario(duration=0.1), smc.Uncertainty(mass=(0.5, 2.0)), points=n)
+        for n in (16, 32)
     )
     assert "16 points, which is few" in str(few.tables[0])
     assert "which is few" not in str(enough.tables[0])
-    assert [row[:3] for row in enough.tables[0].rows] == [["mass", "0.5 of nominal", "2 of nominal"]]
+    assert [row[:3] for row in enough.tables[0].rows] == [
+        ["mass", "0.5 of nominal", "2 of nominal"]
+    ]
 
 
 def test_scores_that_only_mixed_points_tell_apart_explain_nothing_and_no_index_is_above_1():
@@ -256,13 +312,20 @@ def test_scores_that_only_mixed_points_tell_apart_explain_nothing_and_no_index_i
 def test_runs_without_a_score_are_counted_and_too_many_are_not_explained():
     base = scenario(plant="inverted_pendulum", law="observer_free", duration=1.0)
     over = smc.Uncertainty(bound=(0.05, 1.0))
-    with pytest.raises(smc.ScenarioError, match="no run of 48 has a settling_time: give longer runs, another metric"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match="no run of 48 has a settling_time: give longer runs, another metric",
+    ):
         smc.sensitivity(dataclasses.replace(base, duration=0.1), over, "settling_time", points=16)
-    found = smc.sensitivity(dataclasses.replace(base, duration=4.0), over, "settling_time", points=16)
+    found = smc.sensitivity(
+        dataclasses.replace(base, duration=4.0), over, "settling_time", points=16
+    )
     assert 0 < found.unscored < 16
     assert f"{found.unscored} runs have no score" in str(found.tables[0])
     many = dataclasses.replace(found, unscored=20)
-    assert many.sentences[0].startswith("20 of 32 runs have no settling time, too many to explain it: take another")
+    assert many.sentences[0].startswith(
+        "20 of 32 runs have no settling time, too many to explain it: take another"
+    )
     assert "All of 32 runs fail." in dataclasses.replace(found, failed=np.ones(32, bool)).sentences
 
 
@@ -273,21 +336,35 @@ def test_a_broken_law_is_named():
             raise RuntimeError("boom")
         return -y.e, y.e
 
-    with pytest.raises(smc.ScenarioError, match=r"no run of 24 has a rms_error: .*boom.*: correct the law"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"no run of 24 has a rms_error: .*boom.*: correct the law"
+    ):
         smc.sensitivity(scenario(law=broken), smc.Uncertainty(mass=(0.5, 2.0)), points=8)
 
 
 def test_words_name_one_culprit_only_if_the_intervals_part():
-    found = smc.sensitivity(scenario(law="none"), smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0)), points=16)
+    found = smc.sensitivity(
+        scenario(law="none"), smc.Uncertainty(mass=(0.5, 2.0), bound=(0.2, 1.0)), points=16
+    )
     assert found.sentences[0].startswith("Mass explains")
     total = found.axes[0].total
-    mass, delay = total._replace(low=0.8), total._replace(median=0.0, low=0.0, high=0.9)  # the second reaches the first
-    axes = [found.axes[0]._replace(name=name, total=its) for name, its in (("mass", mass), ("delay", delay))]
+    mass, delay = (
+        total._replace(low=0.8),
+        total._replace(median=0.0, low=0.0, high=0.9),
+    )  # the second reaches the first
+    axes = []
+    for name, its in (("mass", mass), ("delay", delay)):
+        axes.append(found.axes[0]._replace(name=name, total=its))
     same = dataclasses.replace(found, axes=tuple(axes))
     assert "the intervals of mass and delay overlap" in same.sentences[0]
-    assert "All of 4 runs have the same" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
+    assert (
+        "All of 4 runs have the same" in dataclasses.replace(found, values=np.ones(4)).sentences[0]
+    )
     some = np.arange(32) < 5
-    assert "5 of 32 runs fail, in no region" in dataclasses.replace(found, failed=some, regions=()).sentences[1]
+    assert (
+        "5 of 32 runs fail, in no region"
+        in dataclasses.replace(found, failed=some, regions=()).sentences[1]
+    )
 
 
 def test_what_cannot_be_answered_is_refused():
@@ -306,7 +383,9 @@ def test_a_picture_has_a_bar_for_each_axis_and_a_dot_for_each_run():
     over = smc.Uncertainty(mass=(0.5, 2.0), delay=(0.0, 0.02))
     found = smc.sensitivity(scenario(), over, points=16)
     bars, runs = found.figure().axes
-    assert [label.get_text() for label in bars.get_yticklabels()] == [axis.name for axis in found.axes]
+    assert [label.get_text() for label in bars.get_yticklabels()] == [
+        axis.name for axis in found.axes
+    ]
     assert sum(len(dots.get_offsets()) for dots in runs.collections) == 32
     assert {runs.get_xlabel(), runs.get_ylabel()} == {"mass (of nominal)", "delay (ms)"}
     one = smc.sensitivity(scenario(), smc.Uncertainty(mass=(0.5, 2.0)), points=16).figure().axes[1]

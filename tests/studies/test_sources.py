@@ -1,4 +1,6 @@
-"""Whose gains: a study keeps their sources, boards and pictures show them, and no winner is named over defaults."""
+"""Whose gains: a study keeps their sources, boards and pictures show them, and no winner is named
+over defaults.
+"""
 
 import dataclasses
 
@@ -10,7 +12,10 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.source import Search
 from smc_mujoco.studies import run_key
 
-FAST, SLOW = (smc.law("observer_free", lam=6.0, k1=k1).named(name) for k1, name in ((4.0, "fast"), (2.0, "slow")))
+FAST, SLOW = (
+    smc.law("observer_free", lam=6.0, k1=k1).named(name)
+    for k1, name in ((4.0, "fast"), (2.0, "slow"))
+)
 
 
 def at_default(law):
@@ -79,9 +84,14 @@ def test_equal_gains_are_one_run_and_the_table_has_the_source_of_this_study(fold
     parts = sorted((folder / "parts").iterdir())
     again = ranked([FAST, at_default(SLOW)], folder)
     assert sorted((folder / "parts").iterdir()) == parts  # nothing ran again
-    assert [entry.interval for entry in first[0].entries] == [entry.interval for entry in again[0].entries]
+    assert [entry.interval for entry in first[0].entries] == [
+        entry.interval for entry in again[0].entries
+    ]
     table = smc.Table.read(folder)
-    assert dict(zip(table.column("law"), table.column("source"), strict=True)) == {"fast": "yours", "slow": "default"}
+    assert dict(zip(table.column("law"), table.column("source"), strict=True)) == {
+        "fast": "yours",
+        "slow": "default",
+    }
     assert table.scenario(16).law.source.kind == "default"
     one, other = (smc.Scenario(plant="duffing", law=law) for law in (SLOW, at_default(SLOW)))
     assert run_key.key(one) == run_key.key(other)
@@ -95,7 +105,13 @@ def test_a_table_keeps_the_search_behind_the_gains(tmp_path):
 
 @pytest.mark.slow
 def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
-    options = {"seeds": 16, "duration": 2.5, "conditions": "nominal", "needs": "on-track", "out": tmp_path}
+    options = {
+        "seeds": 16,
+        "duration": 2.5,
+        "conditions": "nominal",
+        "needs": "on-track",
+        "out": tmp_path,
+    }
     slow = dataclasses.replace(at_default(SLOW), template=None)  # else it would be tuned
     advice = smc.which("duffing", laws=[FAST, slow], **options)
     (sentence,) = advice.answer
@@ -111,11 +127,22 @@ def test_an_adviser_names_no_law_over_rivals_at_their_defaults(tmp_path):
 def test_compare_names_a_winner_over_defaults_with_an_option(tmp_path, capsys):
     laws = "fast: observer_free(lam=6, k1=2), adaptive"
     options = [
-        "--condition", "nominal", "--seeds", "16", "--duration", "2", "--gains", "default", "--out", str(tmp_path),
-    ]  # fmt: skip
+        "--condition",
+        "nominal",
+        "--seeds",
+        "16",
+        "--duration",
+        "2",
+        "--gains",
+        "default",
+        "--out",
+        str(tmp_path),
+    ]
     for extra in ([], ["--defaults"]):
         with pytest.raises(SystemExit):
-            main.main(["compare", "duffing", "--law", laws, *options, "--out", str(tmp_path), *extra])
+            main.main(
+                ["compare", "duffing", "--law", laws, *options, "--out", str(tmp_path), *extra]
+            )
         printed = " ".join(capsys.readouterr().out.split())
         assert ("none is named over adaptive with default gains" in printed) == (not extra)
         assert "adaptive default" in printed

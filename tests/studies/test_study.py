@@ -25,7 +25,9 @@ from smc_mujoco.studies.table import Table
 scenario = functools.partial(runs.scenario, duration=0.05)
 
 
-def small(seeds: int = 2, conditions: tuple[str, ...] = ("nominal", "noise"), duration: float = 0.05) -> list:
+def small(
+    seeds: int = 2, conditions: tuple[str, ...] = ("nominal", "noise"), duration: float = 0.05
+) -> list:
     return grid(["duffing"], ["observer_free", "classical"], conditions, seeds, "study", duration)
 
 
@@ -65,7 +67,14 @@ def raises(y, gains, memory):
 
 
 def test_the_grid_is_every_combination_in_order():
-    made = grid(["duffing", "van_der_pol"], ["classical", "adaptive"], ["nominal", "noise"], 2, "study", duration=1.0)
+    made = grid(
+        ["duffing", "van_der_pol"],
+        ["classical", "adaptive"],
+        ["nominal", "noise"],
+        2,
+        "study",
+        duration=1.0,
+    )
     names = [(s.plant.name, condition(s), s.law.name, s.seed) for s in made]
     assert names == [
         (plant, name, law, seed)
@@ -82,7 +91,9 @@ def test_seed_0_is_the_papers_own_scenario():
 
 
 def test_a_seed_has_one_start_for_all_laws_and_conditions_near_the_papers():
-    made = grid(["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study")
+    made = grid(
+        ["pendulum_network"], ["classical", "adaptive"], ["nominal", "coulomb"], [3, 4], "study"
+    )
     starts = {s.seed: {t.resolved.x0 for t in made if t.seed == s.seed} for s in made}
     assert all(len(found) == 1 for found in starts.values())
     nominal = np.array(made[0].plant.x0)
@@ -117,15 +128,26 @@ def test_the_grid_takes_iterators():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"plants": ["dufing"]}, "did you mean 'duffing'"), ({"laws": ["clasical"]}, "did you mean 'classical'"),
-        ({"conditions": ["noisy"]}, "unknown condition"), ({"seeds": 0}, "seeds is 0"),
-        ({"seeds": [-1]}, "seed is -1"), ({"plants": 3}, "plants is 3: give several"), ({"plants": [3]}, "plant is 3"),
-        ({"conditions": []}, "give several"), ({"seeds": None}, "seeds is None: give a whole number"),
+        ({"plants": ["dufing"]}, "did you mean 'duffing'"),
+        ({"laws": ["clasical"]}, "did you mean 'classical'"),
+        ({"conditions": ["noisy"]}, "unknown condition"),
+        ({"seeds": 0}, "seeds is 0"),
+        ({"seeds": [-1]}, "seed is -1"),
+        ({"plants": 3}, "plants is 3: give several"),
+        ({"plants": [3]}, "plant is 3"),
+        ({"conditions": []}, "give several"),
+        ({"seeds": None}, "seeds is None: give a whole number"),
         ({"plants": paper.PLANTS, "seeds": 10**6}, "5,000,000 runs: give fewer seeds"),
     ],
-)  # fmt: skip
+)
 def test_what_the_grid_cannot_make_is_one_sentence(change, said):
-    arguments = {"plants": ["duffing"], "laws": ["classical"], "conditions": ["noise"], "seeds": 1, "gains": "study"}
+    arguments = {
+        "plants": ["duffing"],
+        "laws": ["classical"],
+        "conditions": ["noise"],
+        "seeds": 1,
+        "gains": "study",
+    }
     with pytest.raises(smc.ScenarioError, match=said) as error:
         grid(**(arguments | change))
     assert "\n" not in str(error.value)
@@ -146,7 +168,10 @@ def test_what_cannot_be_studied_is_refused_before_anything_runs(tmp_path):
 
 
 def test_failed_runs_have_no_scores_and_their_own_words_in_any_company(tmp_path, monkeypatch):
-    failing = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [scenario(raises()), *small(1)]
+    failing = [scenario(fails_late(when=when)) for when in (0.01, 0.02, 0.03)] + [
+        scenario(raises()),
+        *small(1),
+    ]
     study(failing, tmp_path / "together")
     monkeypatch.setattr(executors, "MAX_WORK_PER_THREAD", 1)
     table = study(failing, tmp_path / "alone")
@@ -228,7 +253,9 @@ def test_a_part_that_is_none_is_computed_again(tmp_path, monkeypatch, ran, harm)
 def test_runs_of_other_versions_are_run_again(tmp_path, monkeypatch):
     study(small(), tmp_path)
     described = serialise.describe
-    monkeypatch.setattr(serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}})
+    monkeypatch.setattr(
+        serialise, "describe", lambda s: described(s) | {"versions": {"mujoco": "99"}}
+    )
     table = study(small(), tmp_path)
     assert set(table.column("versions")) == {'{"mujoco": "99"}'}
 
@@ -289,7 +316,9 @@ def test_all_traces_are_saved_and_none_twice(tmp_path, none_runs):
     none_runs()
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()}
     study(small(), tmp_path / "a", traces="all")
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()} == before
+    assert {
+        path: path.stat().st_mtime_ns for path in (tmp_path / "a" / "traces").iterdir()
+    } == before
     row = run_key.row(small()[0])
     file = trace_file(tmp_path / "a" / "traces", row)
     assert file.name == f"duffing-nominal-observer_free-0-{row['hash'][:8]}.npz"

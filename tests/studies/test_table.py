@@ -22,7 +22,14 @@ from smc_mujoco.studies.table import MAX_ROWS, Table, content
 
 
 def small(seeds: int = 2) -> list[smc.Scenario]:
-    return grid(["duffing"], ["observer_free", "classical"], ["nominal", "noise"], seeds, "study", duration=0.05)
+    return grid(
+        ["duffing"],
+        ["observer_free", "classical"],
+        ["nominal", "noise"],
+        seeds,
+        "study",
+        duration=0.05,
+    )
 
 
 def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
@@ -31,9 +38,19 @@ def test_rows_are_the_scores_of_the_runs_in_order(tmp_path):
     for s, row in zip(scenarios, table.rows(), strict=True):
         assert row["hash"] == key(s)
         scores = smc.score(smc.run(s))
-        assert {name: row[name] for name in scores} == {n: None if math.isnan(v) else v for n, v in scores.items()}
-        assert (row["plant"], row["law"], row["condition"]) == (s.plant.name, s.law.name, condition(s))
-        assert (row["seed"], row["duration"], json.loads(row["gains"])) == (s.seed, s.duration, dict(s.law.gains))
+        assert {name: row[name] for name in scores} == {
+            n: None if math.isnan(v) else v for n, v in scores.items()
+        }
+        assert (row["plant"], row["law"], row["condition"]) == (
+            s.plant.name,
+            s.law.name,
+            condition(s),
+        )
+        assert (row["seed"], row["duration"], json.loads(row["gains"])) == (
+            s.seed,
+            s.duration,
+            dict(s.law.gains),
+        )
         assert (row["failure"], row["diverged_at"], row["spread_bound"]) == (None, None, None)
 
 
@@ -49,7 +66,9 @@ def test_a_table_is_read_back_selected_and_run_again(tmp_path):
     table = Table.read(tmp_path / "results.parquet")
     assert table.rows() == Table.read(tmp_path).rows()
     chosen = table.select(law="classical", condition=["noise"])
-    assert set(zip(chosen.column("law"), chosen.column("condition"), strict=True)) == {("classical", "noise")}
+    assert set(zip(chosen.column("law"), chosen.column("condition"), strict=True)) == {
+        ("classical", "noise")
+    }
     i = len(chosen) - 1
     assert chosen.scenario(i) == scenarios[-1]
     assert np.array_equal(chosen.trace(i).x, smc.run(scenarios[-1]).x)
@@ -116,7 +135,9 @@ def test_a_table_without_a_digest_is_read_and_a_part_without_one_is_computed_aga
     paths = [tmp_path / "results.parquet", *(tmp_path / "parts").glob("*.parquet")]
     for path in paths:  # as another program writes them
         old = pq.read_table(path)
-        pq.write_table(old.replace_schema_metadata({"scores": old.schema.metadata[b"scores"]}), path)
+        pq.write_table(
+            old.replace_schema_metadata({"scores": old.schema.metadata[b"scores"]}), path
+        )
     assert Table.read(tmp_path).rows() == rows
     store = Store(tmp_path)
     store.open(resume=True)
@@ -128,7 +149,9 @@ def test_a_digest_of_other_rows_is_refused_and_a_copy_of_some_rows_is_a_table(tm
     path = tmp_path / "results.parquet"
     metadata = {"digest": pq.ParquetFile(path).metadata.metadata[b"digest"]}
     pq.write_table(table.data.slice(1).replace_schema_metadata(metadata), path)
-    with pytest.raises(smc.ScenarioError, match="it is damaged, or was changed, since it was written"):
+    with pytest.raises(
+        smc.ScenarioError, match="it is damaged, or was changed, since it was written"
+    ):
         Table.read(path)
     pq.write_table(table.data.slice(1), path)
     assert Table.read(path).rows() == table.rows()[1:]
@@ -148,7 +171,9 @@ def test_a_pipe_is_no_table(tmp_path):
 def test_a_law_of_yours_is_in_the_table_with_its_code(tmp_path):
     s = smc.Scenario(plant="duffing", law=fails_late(when=1.0), duration=0.05)
     table = study([s], tmp_path)
-    assert smc.score(table.trace(0)) == pytest.approx(smc.score(smc.run(s)), rel=0, abs=0, nan_ok=True)
+    assert smc.score(table.trace(0)) == pytest.approx(
+        smc.score(smc.run(s)), rel=0, abs=0, nan_ok=True
+    )
     with pytest.raises(smc.ScenarioError, match="came from a file without its code"):
         Table.read(tmp_path).trace(0)
 
@@ -157,7 +182,10 @@ def test_a_law_of_yours_is_in_the_table_with_its_code(tmp_path):
 
 
 def test_a_notebook_shows_the_first_rows_and_says_how_many_more(tmp_path):
-    table = study(grid(["duffing"], ["classical", fails_late()], ["nominal"], 5, "study", duration=0.05), tmp_path)
+    table = study(
+        grid(["duffing"], ["classical", fails_late()], ["nominal"], 5, "study", duration=0.05),
+        tmp_path,
+    )
     shown = table._repr_html_()
     assert shown.count("<tr>") == 1 + MAX_ROWS + 1
     assert "Table(10 runs: 1 plant, 2 laws, 1 condition)" in shown
@@ -175,7 +203,9 @@ def test_packages_that_speak_arrow_read_the_table_as_it_is(tmp_path):
     table = study(small(), tmp_path)
     assert pa.table(table).equals(table.data)
     old, new = pa.string(), pa.large_string()
-    wanted = pa.schema([field.with_type(new) if field.type == old else field for field in table.data.schema])
+    wanted = pa.schema(
+        [field.with_type(new) if field.type == old else field for field in table.data.schema]
+    )
     assert pa.RecordBatchReader.from_stream(table, wanted).schema.field("law").type == new
     frame = table.to_pandas()
     assert list(frame.columns) == table.data.column_names

@@ -1,4 +1,6 @@
-"""The pytest plugin: what a user's tests on step responses say when they pass, fail, are recorded and are mistaken."""
+"""The pytest plugin: what a user's tests on step responses say when they pass, fail, are recorded
+and are mistaken.
+"""
 
 import contextlib
 import importlib.metadata
@@ -45,8 +47,12 @@ def test_it_settles(step_response):
 
 @pytest.fixture(scope="module", autouse=True)
 def _warm():
-    """What a session in this process would import is imported before it, for it is forgotten after it."""
-    response = respond("inverted_pendulum", smc.law("boundary_layer"), 0.2, "nominal", {"duration": 0.01})
+    """What a session in this process would import is imported before it, for it is forgotten after
+    it.
+    """
+    response = respond(
+        "inverted_pendulum", smc.law("boundary_layer"), 0.2, "nominal", {"duration": 0.01}
+    )
     assert response.max_u > 0
 
 
@@ -64,7 +70,9 @@ def undrawn(monkeypatch):
 
 @pytest.fixture
 def session(pytester, undrawn):
-    """Run a test file, given as text, in a new folder; what pytest printed. outcomes: how many tests of each."""
+    """Run a test file, given as text, in a new folder; what pytest printed. outcomes: how many
+    tests of each.
+    """
 
     def run(text: str, *options: str, **outcomes: int) -> str:
         pytester.makepyfile(test_my_laws=HEAD + text)
@@ -82,7 +90,10 @@ def test_a_bad_law_fails_with_a_table_of_its_metrics(session):
     said = session(BAD, failed=1)
     assert "assert (inf < 0.6" in said
     assert "inverted_pendulum under boundary_layer(k=6, c=8, phi=2), step 0.2 rad" in said
-    rows = {line.split()[0]: re.split(r"  +", line) for line in said.splitlines() if re.match(r"\w+ {2,}\S", line)}
+    rows = {}
+    for line in said.splitlines():
+        if re.match(r"\w+ {2,}\S", line):
+            rows[line.split()[0]] = re.split(r"  +", line)
     assert rows["metric"] == ["metric", "value"]
     assert rows["settling_time"] == ["settling_time", "never"]
     assert rows["steady_error"][1].endswith(" rad")
@@ -96,7 +107,10 @@ def test_a_pair_of_limits_holds_from_both_sides(value, kept):
     assert found.within == kept
     assert found.limit == "1 .. 2"
     assert bound("driven chattering_amplitude", math.nan, "rad", 0.0).within  # no limit cycle
-    assert (bound("overshoot", value, "%", 2.0).within, bound("overshoot", value, "%", 1.9).within) == (
+    assert (
+        bound("overshoot", value, "%", 2.0).within,
+        bound("overshoot", value, "%", 1.9).within,
+    ) == (
         value <= 2.0,
         value < 1.9,
     )
@@ -119,9 +133,12 @@ def test_failed(step_response): pendulum(step_response, mismatch={"mass": 1e-9})
 
 def test_a_run_that_fails_says_why(session):
     said = session(
-        "def test(step_response): pendulum(step_response, mismatch={'mass': 1e-9}).check(overshoot=5)", failed=1
+        "def test(step_response): pendulum(step_response, mismatch={'mass': 1e-9}).check(overshoot=5)",
+        failed=1,
     )
-    assert re.search(r"^E +AssertionError: inverted_pendulum under .*: the plant diverged", said, re.MULTILINE)
+    assert re.search(
+        r"^E +AssertionError: inverted_pendulum under .*: the plant diverged", said, re.MULTILINE
+    )
     assert "failed: the plant diverged" in said
 
 
@@ -158,12 +175,22 @@ def test_a_mistake_is_one_sentence(step_response, refused):
         "'duffing', 'classical', step=1, reference=smc.Step(2)",
         "'duffing', lambda y, g, m: (0.0, 0.0), step=1",
     ]:
-        refused(lambda call=call: eval(f"step_response({call})", {"smc": smc, "step_response": step_response}))
+        refused(
+            lambda call=call: eval(
+                f"step_response({call})", {"smc": smc, "step_response": step_response}
+            )
+        )
 
 
 def test_a_limit_that_is_none_is_one_sentence(step_response, refused):
     r = step_response("duffing", "none", step=1, duration=0.01)
-    for limits in ({}, {"overshot": 5}, {"spread_bound": 5}, {"overshoot": (5, 1)}, {"overshoot": (1, 2, 3)}):
+    for limits in (
+        {},
+        {"overshot": 5},
+        {"spread_bound": 5},
+        {"overshoot": (5, 1)},
+        {"overshoot": (1, 2, 3)},
+    ):
         refused(lambda limits=limits: r.check(**limits))
 
 
@@ -176,7 +203,10 @@ def test_a_failure_tells_each_limit_with_its_unit_and_whether_it_held(pole):
     assert (heads, first[-1]) == (["metric", "value", "limit", "ok"], "(r)")
     assert [row[-1] for row in rows] == ["NO", "NO", "yes", "yes"]
     assert [row[0] for row in rows] == ["overshoot", "rise_time", "peak", "chattering_amplitude"]
-    assert rows[:2] == [["overshoot", "7", "%", "<=", "5", "NO"], ["rise_time", "never", "0.1", "..", "0.3", "NO"]]
+    assert rows[:2] == [
+        ["overshoot", "7", "%", "<=", "5", "NO"],
+        ["rise_time", "never", "0.1", "..", "0.3", "NO"],
+    ]
     assert {"overshoot", "rise_time"} <= {*first}
     assert {"peak", "chattering_amplitude"}.isdisjoint(first)
     assert repr(pole).startswith("StepResponse(cart_pole under hierarchical(")
@@ -206,13 +236,17 @@ def pole(step_response):
 
 def test_a_pole_on_a_cart_has_its_own_metrics_in_its_own_unit(pole):
     assert (pole.trace.r == [0.3, 0.0]).all()
-    assert {name: float(value) for name, value in pole.scores["free"].items()} == smc.scores(pole.trace)["free"]
+    assert {name: float(value) for name, value in pole.scores["free"].items()} == smc.scores(
+        pole.trace
+    )["free"]
     assert pole.metrics.keys() == pole.scores["driven"].keys() == smc.score(pole.trace).keys()
     assert pole.scores["free"]["peak"] > 1e-4
     peak = next(line for line in pole.table().splitlines() if line.startswith("free peak "))
     assert peak.split()[3:] == ["rad"]
     assert pole.value("peak")[1] == "m"
-    with pytest.raises(AttributeError, match="spread_bound compares channels and cart_pole has one of a kind"):
+    with pytest.raises(
+        AttributeError, match="spread_bound compares channels and cart_pole has one of a kind"
+    ):
         pole.spread_bound  # noqa: B018
 
 
@@ -233,7 +267,9 @@ def test_a_golden_metric_that_no_longer_exists_is_named_with_the_cure(pole, tmp_
 def test_fields_of_a_test_replace_those_of_its_condition(step_response):
     r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, seed=7)
     assert (r.scenario.noise, r.scenario.seed) == (smc.Noise(0.01, 0.05), 7)
-    r = step_response("duffing", "none", step=0.1, condition="noise", duration=0.01, noise=smc.Noise(0.5))
+    r = step_response(
+        "duffing", "none", step=0.1, condition="noise", duration=0.01, noise=smc.Noise(0.5)
+    )
     assert r.scenario.noise == smc.Noise(0.5)
 
 
@@ -272,7 +308,9 @@ def test_a(step_response):
         failed=1,
     )
     names = [f"test_my_laws.py_test_a-{plant}.png" for plant in ("duffing", "van_der_pol")]
-    assert re.findall(r"^figure: (.*)$", said, re.MULTILINE) == [str(pytester.path / "out" / name) for name in names]
+    assert re.findall(r"^figure: (.*)$", said, re.MULTILINE) == [
+        str(pytester.path / "out" / name) for name in names
+    ]
 
 
 def test_a_figure_that_cannot_be_drawn_hides_nothing(session, monkeypatch):
@@ -310,7 +348,11 @@ def test_golden_metrics_are_asked_for_recorded_and_compared(session, pytester):
     session(good, passed=1)
     said = session(other, failed=1)
     assert set(re.findall(r"^(\S+\.py):\d+: ", said, re.MULTILINE)) == {"test_my_laws.py"}
-    assert re.search(r"^E +AssertionError: settling_time is 0\.\d+ s, golden 0\.422 ± 0\.001 \(", said, re.MULTILINE)
+    assert re.search(
+        r"^E +AssertionError: settling_time is 0\.\d+ s, golden 0\.422 ± 0\.001 \(",
+        said,
+        re.MULTILINE,
+    )
     assert "if it is meant, run pytest --smc-update)" in said
     assert re.search(r"^E +overshoot +1\.\d+ % +1\.\d+ ± 0\.5 +yes$", said, re.MULTILINE)
     session(other, "--smc-update", passed=1)
@@ -319,9 +361,15 @@ def test_golden_metrics_are_asked_for_recorded_and_compared(session, pytester):
 
 def test_a_golden_file_is_plain_and_holds_each_call(session, pytester):
     session(GOLDEN.replace("PHI", "2.0"), "--smc-update", passed=1)
-    held = json.loads((pytester.path / "test_my_laws.golden.json").read_text(), parse_constant=pytest.fail)
+    held = json.loads(
+        (pytester.path / "test_my_laws.golden.json").read_text(), parse_constant=pytest.fail
+    )
     assert list(held) == ["test_as_ever", "test_as_ever 2"]
-    assert held["test_as_ever"]["settling_time"] == {"value": "Infinity", "tolerance": 0.001, "unit": "s"}
+    assert held["test_as_ever"]["settling_time"] == {
+        "value": "Infinity",
+        "tolerance": 0.001,
+        "unit": "s",
+    }
     assert len(held["test_as_ever 2"]) > 10
     assert "stick_time" not in held["test_as_ever 2"]
     session(GOLDEN.replace("PHI", "2.0"), passed=1)  # "never" is as golden as a number
@@ -333,9 +381,15 @@ def test_a_broken_golden_file_is_one_sentence(tmp_path, refused):
         refused(lambda: golden.read(tmp_path / "a.json"))
 
 
-@pytest.mark.parametrize(("tolerances", "off"), [({}, False), ({"tv": 9}, False), ({"tv": 0}, True)])
+@pytest.mark.parametrize(
+    ("tolerances", "off"), [({}, False), ({"tv": 9}, False), ({"tv": 0}, True)]
+)
 def test_tolerances_of_a_test_replace_those_of_the_file(step_response, tmp_path, tolerances, off):
-    runs = [step_response("duffing", smc.law("boundary_layer", k=k), step=0.1, duration=0.5) for k in (3.0, 3.001)]
+    runs = []
+    for k in (3.0, 3.001):
+        runs.append(
+            step_response("duffing", smc.law("boundary_layer", k=k), step=0.1, duration=0.5)
+        )
     golden.record(tmp_path / "a.json", "test", runs[0], {})
     with pytest.raises(AssertionError, match=r"^tv is ") if off else contextlib.nullcontext():
         golden.compare(tmp_path / "a.json", "test", runs[1], tolerances)
@@ -349,7 +403,9 @@ def test_a_golden_metric_of_0_allows_rounding_and_no_more(step_response, tmp_pat
     stored = json.loads(file.read_text())
     stored["test"]["overshoot"]["value"] = recorded
     file.write_text(json.dumps(stored))
-    with pytest.raises(AssertionError, match="overshoot is 0 %") if off else contextlib.nullcontext():
+    with (
+        pytest.raises(AssertionError, match="overshoot is 0 %") if off else contextlib.nullcontext()
+    ):
         golden.compare(file, "test", response, {})
 
 
@@ -399,11 +455,23 @@ def plant(): return 3
     ("marker", "arguments", "sentence"),
     [
         ("plants=['dufing']", "plant", "unknown plant 'dufing': did you mean 'duffing'?"),
-        ("plant=['duffing']", "plant", "unknown argument of marker smc 'plant': did you mean 'plants'?"),
+        (
+            "plant=['duffing']",
+            "plant",
+            "unknown argument of marker smc 'plant': did you mean 'plants'?",
+        ),
         ("plants=[]", "plant", "plants of marker smc is []: give names, as in @pytest.mark.smc("),
         ("['duffing']", "plant", "marker smc is given ['duffing']: name its arguments"),
-        ("plants=['duffing']", "condition", "marker smc gives plants and the test takes no plant: add the argument"),
-        ("", "", "marker smc is on a test that takes neither plant nor condition: add the arguments"),
+        (
+            "plants=['duffing']",
+            "condition",
+            "marker smc gives plants and the test takes no plant: add the argument",
+        ),
+        (
+            "",
+            "",
+            "marker smc is on a test that takes neither plant nor condition: add the arguments",
+        ),
     ],
 )
 def test_a_wrong_marker_is_one_sentence(session, marker, arguments, sentence):

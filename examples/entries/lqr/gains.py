@@ -1,4 +1,6 @@
-"""Write entry.toml, with the gains of python-control's LQR for each plant's linear model: pip install control."""
+"""Write entry.toml, with the gains of python-control's LQR for each plant's linear model: pip
+install control.
+"""
 
 from pathlib import Path
 
@@ -14,7 +16,13 @@ source = "python-control 0.10.2, control.lqr"
 licence = "Apache-2.0"
 division = "free"
 """
-PLANTS = "inverted_pendulum", "van_der_pol", "duffing", "pendulum_network", "inverted_pendulum_network"
+PLANTS = (
+    "inverted_pendulum",
+    "van_der_pol",
+    "duffing",
+    "pendulum_network",
+    "inverted_pendulum_network",
+)
 
 text = HEAD
 for plant in PLANTS:

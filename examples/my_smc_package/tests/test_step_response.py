@@ -1,4 +1,6 @@
-"""Tests that the package is found by name, that its plant obeys its equation, and that its law brings it to a step."""
+"""Tests that the package is found by name, that its plant obeys its equation, and that its law
+brings it to a step.
+"""
 
 import numpy as np
 import pytest
@@ -25,4 +27,6 @@ def test_the_cart_moves_as_its_equation_says():
     trace = smc.run(smc.Scenario(plant="sprung_cart", law="none", duration=1.0))
     p = smc.plant("sprung_cart").parameters
     acceleration = (-p["b"] * trace.v[:, 0] - p["k"] * trace.x[:, 0]) / p["M"]
-    assert trace.v[-1, 0] - trace.v[0, 0] == pytest.approx(np.trapezoid(acceleration, trace.t), abs=1e-5)
+    assert trace.v[-1, 0] - trace.v[0, 0] == pytest.approx(
+        np.trapezoid(acceleration, trace.t), abs=1e-5
+    )

@@ -1,12 +1,13 @@
-"""The runs of an objective without MuJoCo: a plant's equation, integrated by RK4 under the same compiled controller.
+"""The runs of an objective without MuJoCo: a plant's equation, integrated by RK4 under the same
+compiled controller.
 
-A search evaluates thousands of runs, and its best gains are then run by MuJoCo, whose J is the one on record. So this
-engine may only find gains. It takes a fifteenth of MuJoCo's time, and its J differs from MuJoCo's by rounding, which
-laws that chatter magnify to about 1e-3.
+A search evaluates thousands of runs, and its best gains are then run by MuJoCo, whose J is the one
+on record. So this engine may only find gains. It takes a fifteenth of MuJoCo's time, and its J
+differs from MuJoCo's by rounding, which laws that chatter magnify to about 1e-3.
 
-The equation is the compiled nominal model of the plant, with the true parameters: x_i'' = f_i(x, v) + g_i(x) (u_i +
-d_i). Its state stands in an mjData, in which the callback of every run reads and writes as in a run of MuJoCo. A law,
-a signal or a sensor thus has one implementation.
+The equation is the compiled nominal model of the plant, with the true parameters: x_i'' = f_i(x, v)
++ g_i(x) (u_i + d_i). Its state stands in an mjData, in which the callback of every run reads and
+writes as in a run of MuJoCo. A law, a signal or a sensor thus has one implementation.
 """
 
 # pyright: reportCallIssue=false
@@ -29,9 +30,10 @@ from smc_mujoco.simulation.prepare import Prepared, pack
 from smc_mujoco.simulation.signals import Push
 from smc_mujoco.simulation.state import channel_at, simulation_at
 
-# One run: addresses of mjModel, mjData and the record, of the callback and the nominal model, of the plant's parameters
-# before and after a jump, which comes at `jump_step` (-1: never), of fields of mjData, of what the nominal model reads,
-# and of SCRATCH numbers a channel. `memoryless`: 1 if the disturbances depend on time alone.
+# One run: addresses of mjModel, mjData and the record, of the callback and the nominal model, of
+# the plant's parameters before and after a jump, which comes at `jump_step` (-1: never), of fields
+# of mjData, of what the nominal model reads, and of SCRATCH numbers a channel. `memoryless`: 1 if
+# the disturbances depend on time alone.
 FIELDS = ("qpos", "qvel", "ctrl", "xfrc_applied", "sensordata", "userdata")
 OWNERS, CHANGES = ("model", "data", "record"), ("before", "after", "jump_step")
 ADDRESSES = (*OWNERS, "callback", "nominal", *CHANGES, "memoryless", *FIELDS, "seen", "scratch")
@@ -41,16 +43,25 @@ SCRATCH = 12  # state at a step's start, and measured; velocities and accelerati
 
 
 def fits(prepared: Prepared) -> bool:
-    """Return whether a run's mechanism is nothing but its plant's equation, in compiled functions, under RK4."""
+    """Return whether a run's mechanism is nothing but its plant's equation, in compiled functions,
+    under RK4.
+    """
     s = prepared.scenario.resolved
-    other = isinstance(s.plant.nominal, NominalModel) or s.plant.unmodelled or s.plant.direct or s.plant.free
+    other = (
+        isinstance(s.plant.nominal, NominalModel)
+        or s.plant.unmodelled
+        or s.plant.direct
+        or s.plant.free
+    )
     plain = s.plain_equation and not s.actuator and s.sensor is None and s.integrator == "RK4"
     on_joints = not any(d.cartesian or isinstance(d, Push) for d in s.disturbance)
     return bool(plain and on_joints and not other and not prepared.why_not)
 
 
 class EquationRun:
-    """A run that can be repeated, with its record, numbers and log as in a ScenarioBatch, and an mjData."""
+    """A run that can be repeated, with its record, numbers and log as in a ScenarioBatch, and an
+    mjData.
+    """
 
     def __init__(self, prepared: Prepared):
         self.prepared = prepared  # the record has addresses of its arrays
@@ -72,10 +83,18 @@ class EquationRun:
         fields["userdata"][:] = callback.magic(), state.address(self.record)
         channels = prepared.mechanism.channels
         fields["qpos"][channels["qpos"]], fields["qvel"][channels["qvel"]] = s.x0, s.v0
-        changes = *map(state.address, self.parameters), s.jump_step, not any(d.memory for d in s.disturbance)
+        changes = (
+            *map(state.address, self.parameters),
+            s.jump_step,
+            not any(d.memory for d in s.disturbance),
+        )
         places = *map(state.address, fields.values()), state.address(self.seen), at
         self.run = np.array([(*owners, *functions, *changes, *places)], RUN)
-        self.changed = [self.record.view(np.uint8), self.packed.numbers, *fields.values()]  # what a run changes
+        self.changed = [
+            self.record.view(np.uint8),
+            self.packed.numbers,
+            *fields.values(),
+        ]  # what a run changes
         self.at_start = [array.copy() for array in self.changed]
 
     def restart(self) -> None:
@@ -95,7 +114,9 @@ def _parameters(plant: Plant, factors: Mapping[str, float]) -> np.ndarray:
 
 @functools.cache
 def _loop() -> Any:
-    """Return the compiled loop of a run, void(address of its RUN), from numba's cache on disk if it is there."""
+    """Return the compiled loop of a run, void(address of its RUN), from numba's cache on disk if it
+    is there.
+    """
     ours = callback.magic()  # so that the code in the cache is that of these sources
 
     def simulate(address):
@@ -108,51 +129,80 @@ def _loop() -> Any:
 
 @njit(error_model="numpy")
 def _simulate(run, sim):
-    """Take all steps of a run, with a callback where it does something, and one at the end, for the last sample."""
+    """Take all steps of a run, with a callback where it does something, and one at the end, for the
+    last sample.
+    """
     n, h, qpos, qvel = sim.n, sim.step, pointer(run.qpos), pointer(run.qvel)
     x, v = pointer(run.scratch), pointer(run.scratch + 8 * n)
     speed, a = pointer(run.scratch + 32 * n), pointer(run.scratch + 64 * n)
     for step in range((sim.samples - 1) * sim.steps):
-        parameters = run.before if run.jump_step < 0 or step < run.jump_step else run.after
+        if run.jump_step < 0 or step < run.jump_step:
+            parameters = run.before
+        else:
+            parameters = run.after
         for i in range(n):
             channel = channel_at(sim.channels, i)
             x[i], v[i] = qpos[channel.qpos], qvel[channel.qvel]
         for stage in range(4):
-            past = 0.0 if stage == 0 else (h if stage == 3 else 0.5 * h)
+            if stage == 0:
+                past = 0.0
+            else:
+                past = h if stage == 3 else 0.5 * h
             for i in range(n):
                 channel, before = channel_at(sim.channels, i), (stage - 1) * n + i
                 if stage > 0:
-                    qpos[channel.qpos], qvel[channel.qvel] = x[i] + past * speed[before], v[i] + past * a[before]
+                    qpos[channel.qpos], qvel[channel.qvel] = (
+                        x[i] + past * speed[before],
+                        v[i] + past * a[before],
+                    )
                 speed[stage * n + i] = qvel[channel.qvel]
             if (stage > 0 and sim.disturbance_count == 0) or (stage == 2 and run.memoryless != 0):
-                sim.calls += 1  # all that the callback does here: disturbances at the time of stage 1 are there already
+                # all that the callback does here: disturbances at the time of stage 1 are there
+                # already
+                sim.calls += 1
             elif not _call_back(run, sim):
                 return
             if not _accelerate(run, sim, parameters, run.scratch + 64 * n + 8 * stage * n):
                 return
         for i in range(n):
             channel, first, last = channel_at(sim.channels, i), n + i, 3 * n + i
-            qpos[channel.qpos] = x[i] + h / 6.0 * (speed[i] + 2.0 * (speed[first] + speed[n + first]) + speed[last])
+            qpos[channel.qpos] = x[i] + h / 6.0 * (
+                speed[i] + 2.0 * (speed[first] + speed[n + first]) + speed[last]
+            )
             qvel[channel.qvel] = v[i] + h / 6.0 * (a[i] + 2.0 * (a[first] + a[n + first]) + a[last])
     _call_back(run, sim)
 
 
 @njit(error_model="numpy", inline="always")
 def _call_back(run, sim):
-    """Call the callback at the state in mjData, with sensors that read it. Return whether the run has not failed."""
+    """Call the callback at the state in mjData, with sensors that read it.
+
+    Return whether the run has not failed.
+    """
     qpos, qvel, sensors = pointer(run.qpos), pointer(run.qvel), pointer(run.sensordata)
     for i in range(sim.n):
         channel = channel_at(sim.channels, i)
-        sensors[channel.x_sensor], sensors[channel.v_sensor] = qpos[channel.qpos], qvel[channel.qvel]
+        sensors[channel.x_sensor], sensors[channel.v_sensor] = (
+            qpos[channel.qpos],
+            qvel[channel.qvel],
+        )
     call_callback(run.callback, run.model, run.data)
     return sim.failure == state.FINE
 
 
 @njit(error_model="numpy")
 def _accelerate(run, sim, parameters, a):
-    """Write the accelerations (n,) at a stage's state to an address. Return False if the nominal model raises."""
+    """Write the accelerations (n,) at a stage's state to an address.
+
+    Return False if the nominal model raises.
+    """
     n, seen, out = sim.n, seen_at(run.seen, 0), sim.model
-    qpos, qvel, ctrl, xfrc = pointer(run.qpos), pointer(run.qvel), pointer(run.ctrl), pointer(run.xfrc_applied)
+    qpos, qvel, ctrl, xfrc = (
+        pointer(run.qpos),
+        pointer(run.qvel),
+        pointer(run.ctrl),
+        pointer(run.xfrc_applied),
+    )
     x, v = pointer(run.scratch + 16 * n), pointer(run.scratch + 24 * n)
     for i in range(n):
         channel = channel_at(sim.channels, i)

@@ -3,10 +3,11 @@
     evaluate = Evaluator(goal, cases, ("lam", "k1"))      # once a search
     evaluate([(6.0, 2.5), (6.0, 3.0)])                    # an Evaluation for each
 
-A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator prepares them once, puts
-the gains of each candidate into the buffers that compiled code reads, and takes J from the logs. It has three engines:
-MuJoCo, in a Batch that lasts; the plant's `equation`, which may only find gains; and the reference loop, for laws that
-do not compile. J is that of `Objective.terms_of_run`.
+A search evaluates hundreds of sets of gains of one law in the same few runs. So an evaluator
+prepares them once, puts
+the gains of each candidate into the buffers that compiled code reads, and takes J from the logs. It
+has three engines: MuJoCo, in a Batch that lasts; the plant's `equation`, which may only find gains;
+and the reference loop, for laws that do not compile. J is that of `Objective.terms_of_run`.
 """
 
 import dataclasses
@@ -25,13 +26,22 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import callback, state
 from smc_mujoco.simulation.prepare import Packed, Prepared, prepare
-from smc_mujoco.simulation.run import BATCH_BYTES, PlainLoopWarning, ScenarioBatch, cores, memory_for, run
+from smc_mujoco.simulation.run import (
+    BATCH_BYTES,
+    PlainLoopWarning,
+    ScenarioBatch,
+    cores,
+    memory_for,
+    run,
+)
 from smc_mujoco.simulation.scenario import Scenario
 
 MUJOCO, EQUATION, PYTHON = "MuJoCo", "the equation", "the reference loop"  # engines
 Gains = tuple[float, ...]
 Costs = tuple[float, float]  # tracking and variation of a run
-Terms = Callable[[int, float | None, np.ndarray], Costs]  # number of a case, when it failed, s, (K + 1, n) LOG -> costs
+Terms = Callable[
+    [int, float | None, np.ndarray], Costs
+]  # number of a case, when it failed, s, (K + 1, n) LOG -> costs
 
 
 class Evaluator:
@@ -57,7 +67,12 @@ class Evaluator:
         constraints: bool = True,
         slots: int = 1,
     ):
-        self.goal, self.cases, self.names, self.threads = goal, list(cases), tuple(names), cores(threads)
+        self.goal, self.cases, self.names, self.threads = (
+            goal,
+            list(cases),
+            tuple(names),
+            cores(threads),
+        )
         prepared = [prepare(case) for case in self.cases]
         with memory_for(prepared):
             if any(item.why_not for item in prepared):
@@ -65,14 +80,22 @@ class Evaluator:
             elif by_equation and all(map(equation.fits, prepared)):
                 self.engine, self._run = EQUATION, _Equations(prepared, self.names, self.threads)
             else:
-                self.engine, self._run = MUJOCO, _Batches(prepared, self.names, self.threads, constraints, slots)
+                self.engine, self._run = (
+                    MUJOCO,
+                    _Batches(prepared, self.names, self.threads, constraints, slots),
+                )
 
     def __call__(self, candidates: Sequence[Gains]) -> list[Evaluation]:
         """Return the evaluations of sets of gains."""
-        terms = self._terms_of_traces(candidates) if self._run is None else self._run(candidates, self._terms)
+        if self._run is None:
+            terms = self._terms_of_traces(candidates)
+        else:
+            terms = self._run(candidates, self._terms)
         size, made = len(self.cases), []
         for k, gains in enumerate(candidates):
-            tracking, variation = (float(sum(term)) for term in zip(*terms[k * size : (k + 1) * size], strict=True))
+            tracking, variation = (
+                float(sum(term)) for term in zip(*terms[k * size : (k + 1) * size], strict=True)
+            )
             cost = tracking + self.goal.weight * variation + self.excess(gains)
             made.append(Evaluation(gains, cost, tracking, variation))
         return made
@@ -90,8 +113,13 @@ class Evaluator:
     def _terms_of_traces(self, candidates: Sequence[Gains]) -> list[Costs]:
         laws = [self.law(gains) for gains in candidates]
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlainLoopWarning)  # the runs of the law's own gains have warned
-            traces = run([dataclasses.replace(case, law=law) for law in laws for case in self.cases], self.threads)
+            warnings.simplefilter(
+                "ignore", PlainLoopWarning
+            )  # the runs of the law's own gains have warned
+            traces = run(
+                [dataclasses.replace(case, law=law) for law in laws for case in self.cases],
+                self.threads,
+            )
         return [self.goal.terms_of_run(trace) for trace in traces]
 
     def _terms(self, index: int, failed_at: float | None, log: np.ndarray) -> Costs:
@@ -121,10 +149,14 @@ def _batched(candidates: Sequence[Gains], size: int) -> list[Sequence[Gains]]:
     return [candidates[first : first + size] for first in range(0, len(candidates), size)]
 
 
-def _putter(prepared: Prepared, names: Sequence[str], record: Any, packed: Packed) -> Callable[[Gains], None]:
+def _putter(
+    prepared: Prepared, names: Sequence[str], record: Any, packed: Packed
+) -> Callable[[Gains], None]:
     """Return the function that puts a candidate's gains among the numbers of a run."""
     law, at = prepared.scenario.law, int(record["law"]["parameters"])
-    values = state.view(packed.numbers, at, (len(law.gains), prepared.scenario.plant.n if law.joint else 1))
+    values = state.view(
+        packed.numbers, at, (len(law.gains), prepared.scenario.plant.n if law.joint else 1)
+    )
     rows = [list(law.gains).index(name) for name in names]
 
     def put(gains: Gains) -> None:
@@ -140,14 +172,20 @@ class _Equations:
         self.cases, self.slots = len(prepared), _that_fit(prepared, threads)
         self.runs = [equation.EquationRun(item) for _ in range(self.slots) for item in prepared]
         self.put = [_putter(one.prepared, names, one.record[0], one.packed) for one in self.runs]
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        if threads > 1:
+            self.pool = ThreadPoolExecutor(threads)
+        else:
+            self.pool = None
 
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
         made: list[Costs] = []
         for some in _batched(candidates, self.slots):
             runs = range(len(some) * self.cases)
             each = functools.partial(self._one, some, terms)
-            made += map(each, runs) if self.pool is None else self.pool.map(each, runs)
+            if self.pool is None:
+                made += map(each, runs)
+            else:
+                made += self.pool.map(each, runs)
         return made
 
     def _one(self, candidates: Sequence[Gains], terms: Terms, i: int) -> Costs:
@@ -158,14 +196,24 @@ class _Equations:
         one.simulate()
         record = one.record[0]
         failed = record["failure"] != state.FINE
-        time = float(record["failed_step"]) * one.scenario.physics_step if failed else None
+        if failed:
+            time = float(record["failed_step"]) * one.scenario.physics_step
+        else:
+            time = None
         return terms(i % self.cases, time, one.log)
 
 
 class _Batches:
     """The runs by MuJoCo: a Batch for each group of cases that can share one."""
 
-    def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int, constraints: bool, slots: int):
+    def __init__(
+        self,
+        prepared: Sequence[Prepared],
+        names: Sequence[str],
+        threads: int,
+        constraints: bool,
+        slots: int,
+    ):
         groups: dict[Hashable, list[int]] = {}
         for index, item in enumerate(prepared):
             groups.setdefault(item.key, []).append(index)
@@ -173,7 +221,8 @@ class _Batches:
         self.groups = list(groups.values())
         with callback.installed():
             self.batches = [
-                _Again([prepared[i] for i in its] * self.slots, names, threads, constraints) for its in self.groups
+                _Again([prepared[i] for i in its] * self.slots, names, threads, constraints)
+                for its in self.groups
             ]
 
     def __call__(self, candidates: Sequence[Gains], terms: Terms) -> list[Costs]:
@@ -184,7 +233,9 @@ class _Batches:
                 batch.again([gains for gains in some for _ in its])
                 for k in range(len(some) * len(its)):
                     index = its[k % len(its)]
-                    rows[k // len(its) * self.cases + index] = terms(index, batch.failed_at(k), batch.logs[k])
+                    rows[k // len(its) * self.cases + index] = terms(
+                        index, batch.failed_at(k), batch.logs[k]
+                    )
             made += rows
         return made
 
@@ -192,7 +243,9 @@ class _Batches:
 class _Again(ScenarioBatch):
     """A ScenarioBatch that runs again and again, each time with other gains."""
 
-    def __init__(self, prepared: Sequence[Prepared], names: Sequence[str], threads: int, constraints: bool):
+    def __init__(
+        self, prepared: Sequence[Prepared], names: Sequence[str], threads: int, constraints: bool
+    ):
         super().__init__(prepared, threads, constraints)
         self.first_records = self.records.copy()
         self.first_numbers = [packed.numbers.copy() for packed in self.packed]
@@ -226,9 +279,11 @@ class _Again(ScenarioBatch):
 
 
 def sums(log: np.ndarray, period: float) -> tuple[float, float, float]:
-    """Return ITAE, sum |x0| and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of its trace do.
+    """Return ITAE, sum |x0| and TV of a log, (K + 1, n) LOG, as `metrics.itae` and `metrics.tv` of
+    its trace do.
 
-    Terms are added in their order, so that the last bit, which a search may magnify, is the same on every machine.
+    Terms are added in their order, so that the last bit, which a search may magnify, is the same on
+    every machine.
     """
     errors = functools.reduce(np.add, np.abs(log["x"] - log["r"]).T)
     weighted = np.arange(len(log)) * period * errors
@@ -248,17 +303,26 @@ def objectives(
     """Return J of laws on instances that no search has seen, (laws,), s^2, computed by MuJoCo.
 
     Args:
-      laws: with their gains. Law i runs on instance i: its own starts and noise, one run for each condition.
+      laws: with their gains. Law i runs on instance i: its own starts and noise, one run for each
+        condition.
       instances: numbers of the instances, in place of 0, 1, ...
       threads: as in `run`.
       halved: whether the runs have half their physics step.
     """
-    numbers = range(len(laws)) if instances is None else instances
+    if instances is None:
+        numbers = range(len(laws))
+    else:
+        numbers = instances
     if len(numbers) != len(laws):
-        raise ScenarioError(f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law")
+        raise ScenarioError(
+            f"{len(laws)} laws and {len(numbers)} instances: give an instance for each law"
+        )
     cases = [goal.unseen(plant, law, number) for law, number in zip(laws, numbers, strict=True)]
     if halved:
-        cases = [[dataclasses.replace(c, physics_step=0.5 * c.resolved.physics_step) for c in its] for its in cases]
+        cases = [
+            [dataclasses.replace(c, physics_step=0.5 * c.resolved.physics_step) for c in its]
+            for its in cases
+        ]
     traces = iter(run([case for its in cases for case in its], threads))
     made = [goal.evaluation(its[0], [next(traces) for _ in its]) for its in cases]
     return np.array([one.objective for one in made])

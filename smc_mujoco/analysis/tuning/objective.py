@@ -1,22 +1,26 @@
-"""The objective of tuning: tracking error plus variation of the command, summed over several conditions.
+"""The objective of tuning: tracking error plus variation of the command, summed over several
+conditions.
 
     J = sum over the conditions of  ITAE / sum |x0|  +  w TV / (u_max duration)        in s^2
 
-ITAE is that of `metrics`, summed over the channels like |x0|. TV is the total variation of u, worst channel. A command
-that jumps from bound to bound at every sample has TV / (u_max duration) = 2 / h, with h the control period. The weight
-is w = h times 1 s^2 = 1e-3 s^3, chosen so that such chattering costs 2 s^2, as much as a run that stays at x0 for its
-first 2 s. Without it ("tracking", w = 0), chattering costs nothing.
+ITAE is that of `metrics`, summed over the channels like |x0|. TV is the total variation of u, worst
+channel. A command that jumps from bound to bound at every sample has TV / (u_max duration) = 2 / h,
+with h the control period. The weight is w = h times 1 s^2 = 1e-3 s^3, chosen so that such
+chattering costs 2 s^2, as much as a run that stays at x0 for its first 2 s. Without it ("tracking",
+w = 0), chattering costs nothing.
 
-Of a free body ITAE / sum |x0| is added up over position and attitude, with |x0| the distance from the reference at the
-start, and 1 m or 1 rad where that is 0; TV / u_max is that of its worst force or torque, each over its own bound.
-Where tilt follows from the force, only the heading counts.
+Of a free body ITAE / sum |x0| is added up over position and attitude, with |x0| the distance from
+the reference at the start, and 1 m or 1 rad where that is 0; TV / u_max is that of its worst force
+or torque, each over its own bound. Where tilt follows from the force, only the heading counts.
 
-The conditions are those in which laws are ranked: nominal, noise, delay, a sine and a constant disturbance, and 30 %
-less and 30 % more mass. Their runs have seeds, noise and initial states that no grid uses, so no law is judged on runs
-that it was tuned on. `evaluator.objectives` computes J on instances that no search has seen either.
+The conditions are those in which laws are ranked: nominal, noise, delay, a sine and a constant
+disturbance, and 30 % less and 30 % more mass. Their runs have seeds, noise and initial states that
+no grid uses, so no law is judged on runs that it was tuned on. `evaluator.objectives` computes J on
+instances that no search has seen either.
 
-A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure. This is more than
-any other run costs, and decreases with t. With a bound on predicted chattering, gains beyond it cost more than that.
+A failed run has no ITAE. It costs FAILURE_COST (2 - t / duration), with t the time of the failure.
+This is more than any other run costs, and decreases with t. With a bound on predicted chattering,
+gains beyond it cost more than that.
 """
 
 import dataclasses
@@ -36,21 +40,33 @@ from smc_mujoco.simulation.grid import GRID_SEEDS, START_CURE, Starts, checked_s
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-DURATION = 5.0  # s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
-CONDITIONS = tuple(NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"))
+DURATION = (
+    5.0  # s, chosen: half the study's, at least 8 T of its plants; settled runs add little later
+)
+CONDITIONS = tuple(
+    NAMED[n] for n in ("nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy")
+)
 DEFAULT_STARTS = Starts()
 SEEDS_PER_SEARCH = 1000  # each condition uses one of them
-SEARCHES, MAX_SEARCHES = 12, 1000  # of a tuning: with 12, 12 runs of two laws decide between them, see `ranking`
+SEARCHES, MAX_SEARCHES = (
+    12,
+    1000,
+)  # of a tuning: with 12, 12 runs of two laws decide between them, see `ranking`
 BUDGET, MAX_BUDGET = 64, 10_000  # evaluations of a search, for each gain
 Searches = Annotated[int, Whole(low=1, high=MAX_SEARCHES)]
 Budget = Annotated[int, Whole(low=1, high=MAX_BUDGET)]
 MAX_TUNING_SEED = 10**9
 UNSEEN = MAX_SEARCHES * (MAX_TUNING_SEED + 1)  # instances from this one on belong to no search
-FAILURE_COST = 1e9  # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
+FAILURE_COST = (
+    1e9  # s^2, also the cap of ITAE / |x0|, reached without a failure only from |x0| < 0.05
+)
 
 
 class Evaluation(NamedTuple):
-    """One set of gains, in the order of `Tuned.bounds`: J = tracking + weight variation + `Objective.excess`."""
+    """One set of gains, in the order of `Tuned.bounds`:
+
+    J = tracking + weight variation + `Objective.excess`.
+    """
 
     gains: tuple[float, ...]
     objective: float
@@ -67,41 +83,62 @@ class Evaluation(NamedTuple):
 class Objective:
     """J as data. Tunings can be compared only if their objectives are equal.
 
-    `chattering` bounds the predicted amplitude of the limit cycle of s of the first channel, in its unit, in the first
-    condition, see `smc.chattering`. None: chattering costs its variation only.
+    `chattering` bounds the predicted amplitude of the limit cycle of s of the first channel, in its
+    unit, in the first condition, see `smc.chattering`. None: chattering costs its variation only.
     """
 
-    conditions: tuple[Condition, ...] = CONDITIONS  # names, or your own; each is one run of a candidate
+    conditions: tuple[Condition, ...] = (
+        CONDITIONS  # names, or your own; each is one run of a candidate
+    )
     starts: Starts = DEFAULT_STARTS  # initial states of the runs
     weight: Natural = 1e-3  # w, s^3
     duration: Positive = DURATION  # of a run, s
     control_period: Positive = CONTROL_PERIOD  # s
-    u_max: Positive | None = None  # bound on |u|, the same for every law, N or N m; default: as in a grid
+    u_max: Positive | None = (
+        None  # bound on |u|, the same for every law, N or N m; default: as in a grid
+    )
     chattering: Positive | None = None
 
     def __post_init__(self):
-        conditions = self.conditions if isinstance(self.conditions, tuple | list) else (self.conditions,)
+        if isinstance(self.conditions, tuple | list):
+            conditions = self.conditions
+        else:
+            conditions = (self.conditions,)
         if not 0 < len(conditions) <= SEEDS_PER_SEARCH:
-            raise ScenarioError(f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')")
+            raise ScenarioError(
+                f"conditions is {shown(self.conditions)}: give names, such as ('nominal', 'noise')"
+            )
         object.__setattr__(self, "conditions", tuple(map(find_condition, conditions)))
         checked_starts(self.starts)
         constrain(self)
 
     def __str__(self) -> str:
         terms = f"ITAE/|x0| + {self.weight:g} TV/(u_max {self.duration:g} s)"
-        bound = "" if self.u_max is None else f", |u| <= {self.u_max:g}"
-        bound += "" if self.chattering is None else f", predicted chattering of s <= {self.chattering:g}"
+        if self.u_max is None:
+            bound = ""
+        else:
+            bound = f", |u| <= {self.u_max:g}"
+        if self.chattering is None:
+            bound += ""
+        else:
+            bound += f", predicted chattering of s <= {self.chattering:g}"
         return f"sum over {', '.join(one.name for one in self.conditions)} of {terms}{bound}"
 
     def describe(self) -> dict[str, Any]:
         """Return it as JSON data, from which `restore` makes an equal one."""
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return values | {"conditions": list(map(str, self.conditions)), "starts": dataclasses.asdict(self.starts)}
+        return values | {
+            "conditions": list(map(str, self.conditions)),
+            "starts": dataclasses.asdict(self.starts),
+        }
 
-    def scenarios(self, plant: Plant | str, law: Component, seed: int = 0, search: int = 0) -> list[Scenario]:
+    def scenarios(
+        self, plant: Plant | str, law: Component, seed: int = 0, search: int = 0
+    ) -> list[Scenario]:
         """Return one run for each condition, of a search of a tuning with this seed.
 
-        Every candidate of a search gets the same initial states and the same noise, those of other searches get others.
+        Every candidate of a search gets the same initial states and the same noise, those of other
+        searches get others.
         """
         return self._instance(plant, law, MAX_SEARCHES * seed + search)
 
@@ -112,34 +149,51 @@ class Objective:
         cases = []
         for i, (condition, changes) in enumerate(zip(self.conditions, fields, strict=True)):
             self.starts.check_condition(condition.name, changes)
-            case = self.starts.place(dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_SEARCH * number + i)
+            case = self.starts.place(
+                dataclasses.replace(first, **changes), GRID_SEEDS + SEEDS_PER_SEARCH * number + i
+            )
             if not any(case.resolved.x0):
                 where = f"starts at 0 under {condition.name!r}, where a law has nothing to do"
                 raise ScenarioError(f"{case.plant.name} {where}: {START_CURE}")
             cases.append(case)
         return cases
 
-    def evaluation(self, case: Scenario, traces: list[Trace], gains: tuple[float, ...] = ()) -> Evaluation:
+    def evaluation(
+        self, case: Scenario, traces: list[Trace], gains: tuple[float, ...] = ()
+    ) -> Evaluation:
         """Return the evaluation of a candidate, given its first case and the traces of all."""
         tracking, variation = map(sum, zip(*map(self.terms_of_run, traces), strict=True))
         cost = tracking + self.weight * variation + self.excess(case)
         return Evaluation(gains, float(cost), float(tracking), float(variation))
 
     def terms_of_run(self, trace: Trace) -> tuple[float, float]:
-        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its cost, and 0."""
+        """Return ITAE / sum |x0| in s^2 and TV / (u_max duration) in 1/s; for a failed run its
+        cost, and 0.
+        """
         if trace.diverged_at is not None:
             return self.terms_of_failure(trace.diverged_at)
         if trace.scenario.plant.pose:
             return self.terms_of_pose(trace.scenario, trace.x, trace.r, trace.u)
-        return self.terms_of_sums(trace.scenario, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace))
+        return self.terms_of_sums(
+            trace.scenario, metrics.itae(trace), np.abs(trace.x[0]).sum(), metrics.tv(trace)
+        )
 
-    def terms_of_sums(self, case: Scenario, itae: float, start: float, tv: float) -> tuple[float, float]:
+    def terms_of_sums(
+        self, case: Scenario, itae: float, start: float, tv: float
+    ) -> tuple[float, float]:
         """Return the terms of a run with this ITAE, sum |x0| and TV."""
-        bound = float(np.max(case.resolved.u_max)) if self.u_max is None else self.u_max
+        if self.u_max is None:
+            bound = float(np.max(case.resolved.u_max))
+        else:
+            bound = self.u_max
         return min(itae / start, FAILURE_COST), tv / (bound * self.duration)
 
-    def terms_of_pose(self, case: Scenario, x: np.ndarray, r: np.ndarray, u: np.ndarray) -> tuple[float, float]:
-        """Return the terms of a run of a free body, from its log, (K + 1, 6) each; NaN where the log has one."""
+    def terms_of_pose(
+        self, case: Scenario, x: np.ndarray, r: np.ndarray, u: np.ndarray
+    ) -> tuple[float, float]:
+        """Return the terms of a run of a free body, from its log, (K + 1, 6) each; NaN where the
+        log has one.
+        """
         e, t = np.abs(pose_errors(x, r)), case.control_period * np.arange(len(x))
         turns = [i for i in case.plant.judged if i >= 3]
         parts = e[:, :3].sum(axis=1), e[:, turns].sum(axis=1)
@@ -156,13 +210,19 @@ class Objective:
         return self._instance(plant, law, UNSEEN + instance)
 
     def excess(self, case: Scenario) -> float:
-        """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to the amplitude."""
+        """Return what predicted chattering costs, s^2: 0 up to the bound, above it in proportion to
+        the amplitude.
+        """
         if self.chattering is None:
             return 0.0
         from smc_mujoco.analysis.chattering import predict
 
         cycle = predict(case, ranges=False)
-        amplitude = cycle.amplitude if cycle else cycle.amplitude_range[1]  # the largest possible if none is predicted
+        # the largest possible if none is predicted
+        if cycle:
+            amplitude = cycle.amplitude
+        else:
+            amplitude = cycle.amplitude_range[1]
         if not amplitude > self.chattering:
             return 0.0
         return 2.0 * FAILURE_COST * len(self.conditions) * amplitude / self.chattering
@@ -173,7 +233,9 @@ def restore(data: Mapping[str, Any]) -> Objective:
     starts = dict(data.get("starts", {}))
     if starts.get("x0") is not None:
         starts["x0"] = tuple(starts["x0"])
-    return Objective(**dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts)})
+    return Objective(
+        **dict(data) | {"conditions": tuple(data["conditions"]), "starts": Starts(**starts)}
+    )
 
 
 OBJECTIVES = {"balanced": Objective(), "tracking": Objective(weight=0.0)}

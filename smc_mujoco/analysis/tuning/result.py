@@ -18,7 +18,14 @@ from smc_mujoco.control.component import Component
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import serialise
 
-COMPARED_FIELDS = ("rule", "plant", "definition", "budget", "seed", "versions")  # equal in tunings that are compared
+COMPARED_FIELDS = (
+    "rule",
+    "plant",
+    "definition",
+    "budget",
+    "seed",
+    "versions",
+)  # equal in tunings that are compared
 HEADINGS = ("gain", "tuned", "searched from", "to", "")  # of a tuning's table
 SAVED_FIELDS = ("before", "rule", "budget", "seed", "scales", "bounds", "searched", "versions")
 NEAR = 0.03  # of the best J: gains within it are as good
@@ -33,7 +40,9 @@ class Found:
     best: Evaluation  # its J is MuJoCo's, on the runs of this search
     history: tuple[Evaluation, ...]  # the accurate evaluations, in order, by the engine
     evaluations: int  # number of sets of gains that were evaluated, cheaply or accurately
-    engine: str  # see `evaluator`; its J may differ from MuJoCo's by what chattering makes of rounding
+    engine: (
+        str  # see `evaluator`; its J may differ from MuJoCo's by what chattering makes of rounding
+    )
 
     @property
     def chosen(self) -> Evaluation:
@@ -42,9 +51,14 @@ class Found:
 
     def near(self, names: Iterable[str]) -> Ranges:
         """Return the ranges of the gains whose J is within 3 % of the best one."""
-        near = [one.gains for one in self.history if one.objective <= self.chosen.objective * (1.0 + NEAR)]
+        near = []
+        for one in self.history:
+            if one.objective <= self.chosen.objective * (1.0 + NEAR):
+                near.append(one.gains)
         columns = zip(*near, strict=True)
-        return {name: (min(values), max(values)) for name, values in zip(names, columns, strict=True)}
+        return {
+            name: (min(values), max(values)) for name, values in zip(names, columns, strict=True)
+        }
 
     def save(self, path: Path) -> Path:
         """Write a .json file that `load_found` reads back."""
@@ -72,7 +86,9 @@ class Tuned(Tables):
 
     law: Component  # with the gains of the least J
     searches: tuple[Found, ...]  # in order
-    before: float  # J of the law's original gains, from which no search starts, on the runs of the best search, s^2
+    # J of the law's original gains, from which no search starts, on the runs of the best search,
+    # s^2
+    before: float
     plant: Plant
     definition: Objective  # with its conditions and u_max
     rule: str  # the search, in words
@@ -84,14 +100,21 @@ class Tuned(Tables):
     versions: dict[str, str]  # of the packages that the numbers depend on
 
     def __repr__(self) -> str:
-        return f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, {self.verdict})"
+        return (
+            f"Tuned({self.plant.name}, {self.law}, objective={self.objective:.4g}, {self.verdict})"
+        )
 
     @property
     def tables(self) -> list[Tabular]:
-        """One table, a line for each gain: its value, the bounds of its search, and whether it is at one of them."""
+        """One table, a line for each gain: its value, the bounds of its search, and whether it is
+        at one of them.
+        """
         rows = []
         for name, (low, high) in self.searched.items():
-            remark = f"at its {self.at_bound[name]} bound" if name in self.at_bound else ""
+            if name in self.at_bound:
+                remark = f"at its {self.at_bound[name]} bound"
+            else:
+                remark = ""
             rows.append((name, f"{self.gains[name]:g}", f"{low:.3g}", f"{high:.3g}", remark))
         notes = (
             str(self.definition),
@@ -99,7 +122,14 @@ class Tuned(Tables):
             f"objective {self.objective:.4g} s², with the law's own gains {self.before:.4g} s²; "
             f"{counted(self.evaluations, 'set')} of gains, seed {self.seed}",
         )
-        return [Tabular(headings=HEADINGS, rows=rows, title=f"{self.law.name} on {self.plant.name}", notes=notes)]
+        return [
+            Tabular(
+                headings=HEADINGS,
+                rows=rows,
+                title=f"{self.law.name} on {self.plant.name}",
+                notes=notes,
+            )
+        ]
 
     def sourced(self) -> "Tuned":
         """Return the tuning with a law that names these searches as the source of its gains."""
@@ -139,16 +169,26 @@ class Tuned(Tables):
     @property
     def at_bound(self) -> dict[str, str]:
         """Gain -> "lower" or "upper", if it is within 2 % of a bound of the search."""
-        limits = search_space.force_limits(self.law, self.law.gains, self.definition.u_max or math.inf)
+        limits = search_space.force_limits(
+            self.law, self.law.gains, self.definition.u_max or math.inf
+        )
         tight = 1.0 - search_space.ROUNDING_TOLERANCE
-        full = {name: "upper" for name, gain in self.gains.items() if gain >= limits.get(name, math.inf) * tight}
+        full = {}
+        for name, gain in self.gains.items():
+            if gain >= limits.get(name, math.inf) * tight:
+                full[name] = "upper"
         return search_space.at_bound(self.gains, self.searched) | full
 
     @property
     def near(self) -> Ranges:
-        """Gain -> its lowest and highest value in sets whose J is within 3 % of the best one of their search."""
+        """Gain -> its lowest and highest value in sets whose J is within 3 % of the best one of
+        their search.
+        """
         of_searches = [found.near(self.bounds) for found in self.searches]
-        return {n: (min(one[n][0] for one in of_searches), max(one[n][1] for one in of_searches)) for n in self.bounds}
+        return {
+            n: (min(one[n][0] for one in of_searches), max(one[n][1] for one in of_searches))
+            for n in self.bounds
+        }
 
     @property
     def evaluations(self) -> int:
@@ -172,7 +212,9 @@ class Tuned(Tables):
 
     @property
     def front(self) -> list[Evaluation]:
-        """The Pareto front of the history in tracking and variation, by tracking, without failed ones."""
+        """The Pareto front of the history in tracking and variation, by tracking, without failed
+        ones.
+        """
         front: list[Evaluation] = []
         for one in sorted(self.history, key=lambda e: (e.tracking, e.variation)):
             if not one.failed and (not front or one.variation < front[-1].variation):
@@ -183,13 +225,18 @@ class Tuned(Tables):
         """Return what `control.gain_sets` stores of it, without the history."""
         first = self.searches[0].chosen
         return {
-            "gains": list(self.bounds), "sets": [one.gains for one in self.sets],
-            "objectives": [_short(one.objective) for one in self.sets], "evaluations": self.evaluations,
-            "seed": self.seed, "at_bound": self.at_bound,
+            "gains": list(self.bounds),
+            "sets": [one.gains for one in self.sets],
+            "objectives": [_short(one.objective) for one in self.sets],
+            "evaluations": self.evaluations,
+            "seed": self.seed,
+            "at_bound": self.at_bound,
             "near": {name: tuple(map(_short, ends)) for name, ends in self.near.items()},
             "front": [(_short(one.tracking), _short(one.variation)) for one in self.front],
-            "first": (_short(first.tracking), _short(first.variation)), "rule": self.rule, "versions": self.versions,
-        }  # fmt: skip
+            "first": (_short(first.tracking), _short(first.variation)),
+            "rule": self.rule,
+            "versions": self.versions,
+        }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write a .json file that `load` reads back."""
@@ -211,7 +258,9 @@ def load(path: str | os.PathLike[str], plant: Plant | None = None) -> Tuned:
         data = read_json(file)
         scenario = serialise.restore(data["scenario"], plant)
         fields: dict[str, Any] = {name: data[name] for name in SAVED_FIELDS}
-        fields |= {name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")}
+        fields |= {
+            name: {k: tuple(v) for k, v in data[name].items()} for name in ("bounds", "searched")
+        }
         return Tuned(
             **fields,
             searches=tuple(map(_found, data["searches"])),
@@ -230,7 +279,9 @@ def compare(tuned: Sequence[Tuned]) -> list[Tuned]:
     if not tuned:
         raise ScenarioError("cannot compare []: give a list of tunings")
     for one in tuned:
-        pairs = {field: (getattr(one, field), getattr(tuned[0], field)) for field in COMPARED_FIELDS}
+        pairs = {}
+        for field in COMPARED_FIELDS:
+            pairs[field] = (getattr(one, field), getattr(tuned[0], field))
         pairs["number of searches"] = len(one.searches), len(tuned[0].searches)
         for name, (value, other) in pairs.items():
             if value != other:

@@ -1,26 +1,29 @@
 """Gains by one rule for every law: same actuator bound, objective, budget and search space.
 
-A tuning makes several searches, twelve in a comparison. Each has its own start, its own seed, and its own runs with
-other initial states and noise, so they share nothing: what they end with is a sample of what a user gets who tunes the
-law. Run i of a study uses the gains that search i found, see `gain_sets`. A search has 64 evaluations for each gain:
+A tuning makes several searches, twelve in a comparison. Each has its own start, its own seed, and
+its own runs with other initial states and noise, so they share nothing: what they end with is a
+sample of what a user gets who tunes the
+law. Run i of a study uses the gains that search i found, see `gain_sets`. A search has 64
+evaluations for each gain:
 
 1. An eighth screens a Latin hypercube in the logarithm of the gains.
-2. A half evolves from the best of them by CMA-ES (N. Hansen & A. Ostermeier, Evolutionary Computation 9:159, 2001; the
-   package cmaes), which copes with the rough J of laws that chatter.
-3. The rest descends from the best by COBYQA (T. M. Ragonneau, PhD thesis, The Hong Kong Polytechnic University, 2022;
-   scipy's), which fits a quadratic model to the logarithm of J within a trust region. It ends when 2 n + 2 evaluations,
-   with n gains, lower J by less than 0.1 %.
+2. A half evolves from the best of them by CMA-ES (N. Hansen & A. Ostermeier, Evolutionary
+   Computation 9:159, 2001; the package cmaes), which copes with the rough J of laws that chatter.
+3. The rest descends from the best by COBYQA (T. M. Ragonneau, PhD thesis, The Hong Kong Polytechnic
+   University, 2022; scipy's), which fits a quadratic model to the logarithm of J within a trust
+   region. It ends when 2 n + 2 evaluations, with n gains, lower J by less than 0.1 %.
 
-Where a plant is nothing but its equation under RK4, the `equation` takes the place of MuJoCo, in a fifteenth of the
-time. J on record is MuJoCo's, from one evaluation of the best gains. If the two J differ by more than 1 %, the search
-is made again in MuJoCo. Elsewhere the first two stages are cheap: they use Euler's method in place of RK4, or one step
-of another integrator a control period, and leave out limits and contacts that are the plant's own. Descents run as a
-scenario does.
+Where a plant is nothing but its equation under RK4, the `equation` takes the place of MuJoCo, in a
+fifteenth of the time. J on record is MuJoCo's, from one evaluation of the best gains. If the two J
+differ by more than 1 %, the search is made again in MuJoCo. Elsewhere the first two stages are
+cheap: they use Euler's method in place of RK4, or one step of another integrator a control period,
+and leave out limits and contacts that are the plant's own. Descents run as a scenario does.
 
-Gains are rounded to four digits, so the printed gains are those that were run. In the first two stages a set that was
-evaluated before costs no budget. `search_space` gives the box from which starts are drawn; a search may leave it by a
-decade. `Tuned.at_bound` names gains at that limit. No search depends on the others, so more of them repeat those of
-fewer. `objective` defines what is minimised.
+Gains are rounded to four digits, so the printed gains are those that were run. In the first two
+stages a set that was evaluated before costs no budget. `search_space` gives the box from which
+starts are drawn; a search may leave it by a decade. `Tuned.at_bound` names gains at that limit. No
+search depends on the others, so more of them repeat those of fewer. `objective` defines what is
+minimised.
 """
 
 import contextlib
@@ -53,7 +56,13 @@ from smc_mujoco.analysis.tuning.search_space import Box
 from smc_mujoco.common import fingerprint
 from smc_mujoco.common.cache import cached
 from smc_mujoco.common.constraints import FilePath, Whole, constrained
-from smc_mujoco.common.errors import BrokenLawError, ScenarioError, ScenarioWarning, find, users_stacklevel
+from smc_mujoco.common.errors import (
+    BrokenLawError,
+    ScenarioError,
+    ScenarioWarning,
+    find,
+    users_stacklevel,
+)
 from smc_mujoco.common.progress import bar
 from smc_mujoco.common.text import joined
 from smc_mujoco.common.version import versions
@@ -78,8 +87,8 @@ PATIENCE = 1e-3  # a descent ends when 2 n + 2 evaluations lower J by a smaller 
 GAIN_DIGITS = 4
 
 AGREEMENT = 0.01  # of J: the equation's and MuJoCo's differ by less, or MuJoCo searches again
-# Shares of a search's budget that are used, as a rule: by a descent, which ends early, and by all stages of a search by
-# the equation with MuJoCo's evaluation in the end.
+# Shares of a search's budget that are used, as a rule: by a descent, which ends early, and by all
+# stages of a search by the equation with MuJoCo's evaluation in the end.
 LAST_SHARE, USUAL_SHARE = 0.1, 1.0
 SLOTS = 8  # candidates that MuJoCo screens at once: as many as CMA-ES asks for with five gains
 RULE = (
@@ -106,13 +115,16 @@ def tune(
     searches: Searches = SEARCHES,
     folder: Annotated[str | os.PathLike[str], FilePath()] | None = None,
 ) -> Tuned:
-    """Find gains of a law on the plant by independent searches, by the rule that is the same for every law.
+    """Find gains of a law on the plant by independent searches, by the rule that is the same for
+    every law.
 
     Args:
-      plant, law: names, or your own plant and law. No search starts from the law's gains; `Tuned.before` is their
-        objective. Gains declared with `held=True` keep their value.
-      budget: largest number of sets of gains that a search evaluates for each gain, each in one run per condition.
-      seed: seed of the searches, and of initial states and noise, which differ between searches; at most 10^9.
+      plant, law: names, or your own plant and law. No search starts from the law's gains;
+        `Tuned.before` is their objective. Gains declared with `held=True` keep their value.
+      budget: largest number of sets of gains that a search evaluates for each gain, each in one run
+        per condition.
+      seed: seed of the searches, and of initial states and noise, which differ between searches; at
+        most 10^9.
       objective: an Objective, "balanced", or "tracking", without a cost of the variation of u.
       threads, progress: as in `run`.
       conditions, starts, chattering: in place of the objective's, see `Objective`.
@@ -120,21 +132,30 @@ def tune(
       folder: keeps each search as soon as it ends. After a kill, the same call goes on there.
 
     Raises:
-      ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales, an argument out of
-        range, or a law whose own code fails in every run, with its own gains and with those of a whole search.
+      ScenarioError: a gain of unknown unit whose default is not positive, a plant without scales,
+        an argument out of range, or a law whose own code fails in every run, with its own gains and
+        with those of a whole search.
 
     Warns:
-      ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's original gains are better
+      ScenarioWarning: a gain of unknown unit, which is searched about its default; the law's
+      original gains are better
         than any that were tried; or all chatter more than is wanted.
     """
     changes = {"conditions": conditions, "starts": starts, "chattering": chattering}
-    goal = objective if isinstance(objective, Objective) else find("objective", objective, OBJECTIVES)
-    goal = dataclasses.replace(goal, **{name: value for name, value in changes.items() if value is not None})
+    if isinstance(objective, Objective):
+        goal = objective
+    else:
+        goal = find("objective", objective, OBJECTIVES)
+    goal = dataclasses.replace(
+        goal, **{name: value for name, value in changes.items() if value is not None}
+    )
     task = _task(plant, coerce.law(law), goal, budget, seed, threads)
     if search_space.without_unit(task.law):
         _warn(_without_unit_warning(task.law))
     failure, codes = _failure_of_law(task), None if folder is None else task.codes()
-    with bar(f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True) as shown:
+    with bar(
+        f"{task.law.name} on {task.plant.name}", searches * task.size, shown=progress, counted=True
+    ) as shown:
 
         def found(i: int) -> Found:
             made = task.kept(i, failure, shown.advance, folder, codes)
@@ -148,12 +169,17 @@ def tune(
 
 @dataclasses.dataclass
 class Trials:
-    """The evaluations of one search. `cheap` screens candidates, `accurate` decides; both may be the same."""
+    """The evaluations of one search.
+
+    `cheap` screens candidates, `accurate` decides; both may be the same.
+    """
 
     cheap: Evaluator
     accurate: Evaluator
     names: tuple[str, ...]
-    limit: Callable[[dict[str, float]], dict[str, float]]  # gains -> the largest values of some of them
+    limit: Callable[
+        [dict[str, float]], dict[str, float]
+    ]  # gains -> the largest values of some of them
     report: Callable[[int], None]  # called with the number of new evaluations
     screened: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
     decided: dict[Gains, Evaluation] = dataclasses.field(default_factory=dict)
@@ -187,7 +213,9 @@ class Trials:
             gains[name] = min(gains[name], _rounded(largest))
         return tuple(gains.values())
 
-    def _costs(self, candidates: list[Gains], evaluate: Evaluator, known: dict[Gains, Evaluation]) -> np.ndarray:
+    def _costs(
+        self, candidates: list[Gains], evaluate: Evaluator, known: dict[Gains, Evaluation]
+    ) -> np.ndarray:
         new = list(dict.fromkeys(gains for gains in candidates if gains not in known))
         known.update(zip(new, evaluate(new), strict=True))
         self.report(len(new))
@@ -198,8 +226,12 @@ def _rounded(gain: float) -> float:
     return float(f"{gain:.{GAIN_DIGITS}g}")
 
 
-def _screened(trials: Trials, box: Box, random: np.random.Generator, size: int) -> tuple[np.ndarray, float]:
-    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the middle if size is 0."""
+def _screened(
+    trials: Trials, box: Box, random: np.random.Generator, size: int
+) -> tuple[np.ndarray, float]:
+    """Return the log10 gains of the best of a Latin hypercube in the box, and their J; the middle
+    if size is 0.
+    """
     from scipy.stats.qmc import LatinHypercube
 
     low, high = np.log10(list(box.values())).T
@@ -213,7 +245,9 @@ def _screened(trials: Trials, box: Box, random: np.random.Generator, size: int) 
 def _evolved(
     trials: Trials, box: Box, random: np.random.Generator, logs: np.ndarray, cost: float, size: int
 ) -> np.ndarray:
-    """Return the best log10 gains of an evolution from those given, whose J is `cost`, within a box."""
+    """Return the best log10 gains of an evolution from those given, whose J is `cost`, within a
+    box.
+    """
     from cmaes import CMA
 
     if len(logs) < 2:  # CMA-ES adapts a covariance
@@ -234,7 +268,9 @@ class _Enough(Exception):
 
 
 def _descend(trials: Trials, box: Box, logs: np.ndarray, size: int) -> None:
-    """Descend from log10 gains within a box with at most `size` accurate evaluations, until they gain too little."""
+    """Descend from log10 gains within a box with at most `size` accurate evaluations, until they
+    gain too little.
+    """
     from scipy.optimize import Bounds, minimize
 
     low, high = np.log10(list(box.values())).T
@@ -249,7 +285,10 @@ def _descend(trials: Trials, box: Box, logs: np.ndarray, size: int) -> None:
 
     if size <= 1:
         return
-    bounds, radii = Bounds(low, high), {"initial_tr_radius": FIRST_RADIUS, "final_tr_radius": LAST_RADIUS}  # pyright: ignore[reportArgumentType]
+    bounds, radii = (
+        Bounds(low, high),
+        {"initial_tr_radius": FIRST_RADIUS, "final_tr_radius": LAST_RADIUS},
+    )  # pyright: ignore[reportArgumentType]
     with contextlib.suppress(_Enough):
         minimize(cost, logs, method="COBYQA", bounds=bounds, options={"maxfev": size - 1, **radii})
 
@@ -277,25 +316,44 @@ class Task(NamedTuple):
         return self.goal.scenarios(self.plant, self.law, self.seed, i)
 
     def codes(self) -> Any:
-        """Return hashes of the code that every search depends on. It takes 20 ms for a user's law."""
+        """Return hashes of the code that every search depends on.
+
+        It takes 20 ms for a user's law.
+        """
         template = self.law.template
         ranges = template and (dict(template.gains), dict(template.conditions))
         return code_hashes(self.cases(0)[0], {}), fingerprint.of((self.law.function, ranges))
 
-    def kept(self, i: int, failure: str, report: Report, folder: str | os.PathLike[str] | None, codes: Any) -> Found:
+    def kept(
+        self,
+        i: int,
+        failure: str,
+        report: Report,
+        folder: str | os.PathLike[str] | None,
+        codes: Any,
+    ) -> Found:
         """Return what search i finds, or has found in an earlier call with this folder."""
         if folder is None:
             return self.search(i, failure, report)
         first, *_ = self.cases(i)
-        depends = serialise.describe(first), self.goal.describe(), codes, self.budget, list(self.box.items())
+        depends = (
+            serialise.describe(first),
+            self.goal.describe(),
+            codes,
+            self.budget,
+            list(self.box.items()),
+        )
         path = Path(folder) / f"{self.plant.name}-{self.law.name}-{i}.json"
-        return cached(path, depends, lambda: self.search(i, failure, report), Found.save, load_found)
+        return cached(
+            path, depends, lambda: self.search(i, failure, report), Found.save, load_found
+        )
 
     def search(self, i: int, failure: str, report: Report) -> Found:
         """Make search i.
 
-        Bad gains may make the numbers of a law overflow, and others may cure that. So a law whose own gains fail in
-        every run is refused, with this failure, only after a whole search in which every run fails.
+        Bad gains may make the numbers of a law overflow, and others may cure that. So a law whose
+        own gains fail in every run is refused, with this failure, only after a whole search in
+        which every run fails.
         """
         cases, names = self.cases(i), tuple(self.box)
         by_equation = Evaluator(self.goal, cases, names, self.threads, by_equation=True)
@@ -328,29 +386,45 @@ class Task(NamedTuple):
         return self.goal.evaluation(cases[0], run(cases, self.threads), gains)
 
     def _found(self, trials: Trials, best: Evaluation, failure: str) -> Found:
-        if failure and self.budget >= BUDGET and best.objective >= FAILURE_COST * len(self.goal.conditions):
+        if (
+            failure
+            and self.budget >= BUDGET
+            and best.objective >= FAILURE_COST * len(self.goal.conditions)
+        ):
             raise _broken(self.law, failure)
         history, engine = tuple(trials.decided.values()), trials.accurate.engine
         return Found(best=best, history=history, evaluations=trials.count, engine=engine)
 
 
-def _task(plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None) -> Task:
+def _task(
+    plant: Plant | str, law: Component, goal: Objective, budget: int, seed: int, threads: int | None
+) -> Task:
     """Return what the searches of a tuning share: plant, bound on u, and search space."""
     first, *others = goal.scenarios(plant, law, seed)
     if len(units := sorted({one.efforts[0] for one in (first, *others)})) > 1:
         both = f"{units[0]} and {units[1]}"
-        raise ScenarioError(f"the conditions of a tuning have commands in {both}: tune for each drive alone")
+        raise ScenarioError(
+            f"the conditions of a tuning have commands in {both}: tune for each drive alone"
+        )
     bound = goal.u_max or (default_u_max(first.plant) if first.force_command else min(first.limits))
     goal = dataclasses.replace(goal, u_max=bound)
     reach = goal.starts.largest(dataclasses.replace(first, x0=None))
-    per_u = None if first.stepper else first.nominal_drive.gain
+    if first.stepper:
+        per_u = None
+    else:
+        per_u = first.nominal_drive.gain
     scales = search_space.scales(first.plant, bound, reach, per_u)
     box = search_space.box(first.law, scales)
-    return Task(first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads)
+    return Task(
+        first.law, first.plant, goal, scales, box, search_space.widened(box), budget, seed, threads
+    )
 
 
 def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
-    """Return why a law cannot be tuned on a plant, or "". Raise BrokenLawError if it cannot even be run there."""
+    """Return why a law cannot be tuned on a plant, or "".
+
+    Raise BrokenLawError if it cannot even be run there.
+    """
     try:
         _task(plant, coerce.law(law), goal, BUDGET, 0, None)
     except BrokenLawError:
@@ -361,12 +435,17 @@ def why_not(plant: Plant, law: Component | Template, goal: Objective) -> str:
 
 
 def expected_seconds(
-    plant: Plant, laws: Sequence[Component | Template], goal: Objective, budget: int, threads: int | None
+    plant: Plant,
+    laws: Sequence[Component | Template],
+    goal: Objective,
+    budget: int,
+    threads: int | None,
 ) -> float:
-    """Return about how long a search for each of several laws takes, s, from evaluations in the middle of a box.
+    """Return about how long a search for each of several laws takes, s, from evaluations in the
+    middle of a box.
 
-    Most of an evaluation's time is the mechanism's. So the first of the library's laws stands for all of them; a law of
-    the user's, which may not compile, is evaluated itself.
+    Most of an evaluation's time is the mechanism's. So the first of the library's laws stands for
+    all of them; a law of the user's, which may not compile, is evaluated itself.
     """
     tasks = [_task(plant, coerce.law(law), goal, budget, 0, threads) for law in laws]
     seconds, of_library = 0.0, None
@@ -383,7 +462,10 @@ def _seconds(task: Task) -> float:
     """Return about how long an evaluation takes, s."""
     middle = tuple(math.sqrt(low * high) for low, high in task.box.values())
     accurate = Evaluator(task.goal, task.cases(0), tuple(task.box), task.threads, by_equation=True)
-    engines = [accurate] if accurate.engine == EQUATION else [_cheap(accurate), accurate]
+    if accurate.engine == EQUATION:
+        engines = [accurate]
+    else:
+        engines = [_cheap(accurate), accurate]
 
     def seconds(evaluate: Evaluator) -> float:
         evaluate([middle])  # compiles
@@ -391,12 +473,17 @@ def _seconds(task: Task) -> float:
         evaluate([middle])
         return time.perf_counter() - start
 
-    shares = (USUAL_SHARE,) if len(engines) == 1 else (SCREENED_SHARE + EVOLVED_SHARE, LAST_SHARE)
+    if len(engines) == 1:
+        shares = (USUAL_SHARE,)
+    else:
+        shares = (SCREENED_SHARE + EVOLVED_SHARE, LAST_SHARE)
     return sum(share * seconds(one) for share, one in zip(shares, engines, strict=True))
 
 
 def _cheap(accurate: Evaluator) -> Evaluator:
-    """Return an evaluator that screens candidates at less cost; the same one for laws that do not compile."""
+    """Return an evaluator that screens candidates at less cost; the same one for laws that do not
+    compile.
+    """
     if accurate.engine == PYTHON:
         return accurate
     with warnings.catch_warnings():
@@ -408,7 +495,9 @@ def _cheap(accurate: Evaluator) -> Evaluator:
 
 
 def _coarse(case: Scenario) -> Scenario:
-    """Return a case under Euler's method in place of RK4, or with one step a control period, if it allows that."""
+    """Return a case under Euler's method in place of RK4, or with one step a control period, if it
+    allows that.
+    """
     case = stepped_by_mujoco(case)
     if case.resolved.integrator == "RK4":
         return dataclasses.replace(case, integrator="Euler")
@@ -419,7 +508,9 @@ def _coarse(case: Scenario) -> Scenario:
 
 
 def _only_limits(case: Scenario) -> bool:
-    """Return whether MuJoCo's constraints are only limits and contacts of the plant itself, which rarely act."""
+    """Return whether MuJoCo's constraints are only limits and contacts of the plant itself, which
+    rarely act.
+    """
     model = with_values(prepare(case).mechanism.model, case)
     plain = not case.friction and case.contact.kind == "none" and case.mechanism == "equation"
     dry = model.neq or model.dof_frictionloss.any() or model.tendon_frictionloss.any()
@@ -451,21 +542,29 @@ def _warn_of_result(tuned: Tuned) -> None:
     tried = f"tried for {tuned.law.name} on {tuned.plant.name}"
     if tuned.objective > tuned.before:
         values = f"an objective of {tuned.objective:.3g} s² instead of {tuned.before:.3g} s²"
-        _warn(f"no set of gains {tried} is better than the law's own, with {values}: give a larger budget")
+        _warn(
+            f"no set of gains {tried} is better than the law's own, with {values}: give a larger budget"
+        )
     first, *_ = tuned.definition.scenarios(tuned.plant, tuned.law, tuned.seed)
     if tuned.definition.excess(first):
         words = f"to chatter with more than {tuned.definition.chattering:g}"
-        _warn(f"all gains {tried} are predicted {words}: give a larger budget, or a larger chattering")
+        _warn(
+            f"all gains {tried} are predicted {words}: give a larger budget, or a larger chattering"
+        )
 
 
 def _failure_of_law(task: Task) -> str:
-    """Return how the first run failed, if the law fails in every run, and the plant in none; else "".
+    """Return how the first run failed, if the law fails in every run, and the plant in none; else
+    "".
 
     Raise BrokenLawError if it fails at once, or does not compile either.
     """
     cases = task.cases(0)
     traces: list[Trace] = run(cases, task.threads)
-    failure = traces[0].broken if all(trace.broken for trace in traces) else ""
+    if all(trace.broken for trace in traces):
+        failure = traces[0].broken
+    else:
+        failure = ""
     if failure and (all(trace.diverged_at == 0.0 for trace in traces) or prepare(cases[0]).why_not):
         raise _broken(task.law, failure)
     return failure
@@ -481,6 +580,11 @@ def _warn(words: str) -> None:
 
 def _without_unit_warning(law: Component) -> str:
     names = list(search_space.without_unit(law))
-    have, whose = ("have", "their defaults") if len(names) > 1 else ("has", "its default")
+    if len(names) > 1:
+        have, whose = ("have", "their defaults")
+    else:
+        have, whose = ("has", "its default")
     search = f"no unit, and so a search about {whose} in place of the rule of all laws"
-    return f"{law.name}'s {joined(names)} {have} {search}: {unit_cure(names[0], law.gains[names[0]])}"
+    return (
+        f"{law.name}'s {joined(names)} {have} {search}: {unit_cure(names[0], law.gains[names[0]])}"
+    )

@@ -7,29 +7,33 @@ The plant has four scales, from which each gain's scale follows:
     M = 1 / g(0)        inertia, kg m^2 or kg; of the driven joints, where others are free
     T = sqrt(M X / u_max)   s, time in which the actuator moves the plant from rest by X / 2
 
-A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5, and a search may leave
-this box by a decade. That holds for forces too, such as lambda of -lambda tanh(s), as the actuator clips the command of
-every law alike. A law with 1 / tau in place of k has the same search. A law may divide a gain by another one, such as
-k by b in the force k / b, where b is an estimate of g. Then k / b is searched as far as a force, for the b of each
-candidate. The law declares this with `Gain(2.0, ACCELERATION, over="b")`.
+A gain with the unit F^a X^b T^c is searched in log space over its scale times 10^-1.5 .. 10^1.5,
+and a search may leave this box by a decade. That holds for forces too, such as lambda of -lambda
+tanh(s), as the actuator clips the command of every law alike. A law with 1 / tau in place of k has
+the same search. A law may divide a gain by another one, such as k by b in the force k / b, where b
+is an estimate of g. Then k / b is searched as far as a force, for the b of each candidate. The law
+declares this with `Gain(2.0, ACCELERATION, over="b")`.
 
-Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest |x0| of all joints,
-also of free ones, which must have one unit: on a cart with a pole, in m and rad, no distance says how far the pole may
-lean.
+Where u is a voltage or an acceleration, F is its bound and g is x'' per unit of u. X is the largest
+|x0| of all joints, also of free ones, which must have one unit: on a cart with a pole, in m and
+rad, no distance says how far the pole may lean.
 
-A free body has these scales twice, as its forces and torques differ: of its position, with X the largest distance from
-rest at the start, and of its attitude, with X = 1 rad, since it tilts to move wherever it starts. A gain that is
-declared with `turns=True` is of the attitude.
+A free body has these scales twice, as its forces and torques differ: of its position, with X the
+largest distance from rest at the start, and of its attitude, with X = 1 rad, since it tilts to move
+wherever it starts. A gain that is declared with `turns=True` is of the attitude.
 
-A law declares the unit of each gain, and which gains the search leaves as they are: initial values, exponents, table
-sizes, a plant's parameters, filters and number formats of a processor. A gain that a law was given as 0 stays 0, which
-says what terms the law has. A gain of unknown unit is searched over as many decades about its default:
+A law declares the unit of each gain, and which gains the search leaves as they are: initial values,
+exponents, table sizes, a plant's parameters, filters and number formats of a processor. A gain that
+a law was given as 0 stays 0, which
+says what terms the law has. A gain of unknown unit is searched over as many decades about its
+default:
 
-    @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0, held=True)})
+    @smc.law_function(gains={"lam": Gain(6.0, FORCE), "k1": Gain(2.5, RATE), "order": Gain(2.0,
+    held=True)})
 
-Some laws contain a number with a unit, such as the width 1 of tanh(s): their gains have the units that leave this
-number unchanged. A law that takes g as 1 treats forces and accelerations in the same way; one that needs the nominal
-model declares which of both a gain is.
+Some laws contain a number with a unit, such as the width 1 of tanh(s): their gains have the units
+that leave this number unchanged. A law that takes g as 1 treats forces and accelerations in the
+same way; one that needs the nominal model declares which of both a gain is.
 """
 
 import dataclasses
@@ -66,29 +70,45 @@ def unit(law: Component, name: str) -> Unit | None:
     """Return the unit of a law's gain; None for a gain that is not searched and has none."""
     gain = _gain(law, name)
     if gain.unit is None and not gain.held:
-        raise ScenarioError(f"tuning knows no unit of {law.name}'s gain {name!r}: {unit_cure(name, gain.default)}")
+        raise ScenarioError(
+            f"tuning knows no unit of {law.name}'s gain {name!r}: {unit_cure(name, gain.default)}"
+        )
     return gain.unit  # pyright: ignore[reportReturnType]
 
 
 def without_unit(law: Component) -> dict[str, float]:
     """Return gain -> default of the searched gains whose unit is not known."""
     gains = {name: _gain(law, name) for name in law.gains}
-    return {name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held}
+    return {
+        name: gain.default for name, gain in gains.items() if gain.unit is None and not gain.held
+    }
 
 
 def unit_size(law: Component, name: str, scales: Mapping[str, float]) -> float:
-    """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is not searched."""
+    """Return the size of a gain's unit for these sizes of F, X and T; 1 for a gain that is not
+    searched.
+    """
     gain_unit, gain = unit(law, name), _gain(law, name)
-    return 1.0 if gain_unit is None or gain.held else gain_unit.of(_scales_of(gain, scales))
+    if gain_unit is None or gain.held:
+        return 1.0
+    return gain_unit.of(_scales_of(gain, scales))
 
 
 def _scales_of(gain: Gain, scales: Mapping[str, float]) -> Mapping[str, float]:
-    """Return F, X and T of the channels that a gain is of; of a plant without a pose there is one set."""
-    return {name: scales.get(name + OF_TURNS * gain.turns, scales[name]) for name in ("F", "X", "T")}
+    """Return F, X and T of the channels that a gain is of; of a plant without a pose there is one
+    set.
+    """
+    return {
+        name: scales.get(name + OF_TURNS * gain.turns, scales[name]) for name in ("F", "X", "T")
+    }
 
 
-def scales(plant: Plant, u_max: float, reach: float | None = None, per_u: float | None = 1.0) -> dict[str, float]:
-    """Return the plant's X, F, M and T in SI units. Those of a free body's attitude have names that end in OF_TURNS.
+def scales(
+    plant: Plant, u_max: float, reach: float | None = None, per_u: float | None = 1.0
+) -> dict[str, float]:
+    """Return the plant's X, F, M and T in SI units.
+
+    Those of a free body's attitude have names that end in OF_TURNS.
 
     Args:
       plant: of which g is taken.
@@ -99,7 +119,10 @@ def scales(plant: Plant, u_max: float, reach: float | None = None, per_u: float 
     if plant.unscaled:
         raise ScenarioError(f"cannot tune on {plant.name}: {plant.unscaled}")
     if plant.pose and isinstance(plant.nominal, NominalModel):
-        M, limits = plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M, plant.limits
+        M, limits = (
+            plant.nominal.dynamics(np.array(plant.x0), np.zeros(plant.n), plant.values({})).M,
+            plant.limits,
+        )
         force, torque = (min([u_max, *limits[i : i + 3]]) for i in (0, 3))
         of_turns = _scales(1.0 / max(np.diag(M)[3:]), torque, 1.0)
         own = _scales(1.0 / M[0, 0], force, SPREAD if reach is None else reach)
@@ -107,11 +130,18 @@ def scales(plant: Plant, u_max: float, reach: float | None = None, per_u: float 
     zeros = np.zeros(plant.n)
     g = min(abs(plant.nominal(zeros, zeros, i, plant.values({}))[1]) for i in range(plant.driven))
     g = 1.0 if per_u is None else g * per_u
-    X = max(abs(x) for x in plant.x0) if reach is None else reach
+    if reach is None:
+        X = max(abs(x) for x in plant.x0)
+    else:
+        X = reach
     if not X > 0.0:
-        raise ScenarioError(f"{plant.name} starts at 0, where a law has nothing to do: {START_CURE}")
+        raise ScenarioError(
+            f"{plant.name} starts at 0, where a law has nothing to do: {START_CURE}"
+        )
     if not (math.isfinite(g) and g > 0.0):
-        raise ScenarioError(f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant")
+        raise ScenarioError(
+            f"{plant.name} has g(0) = {g:g}: tuning needs a joint that u moves; choose another plant"
+        )
     return _scales(g, u_max, X)
 
 
@@ -126,17 +156,23 @@ def left_out(law: Component, name: str) -> bool:
 
 
 def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return gain -> lowest and highest start of the search, for all gains of a law that are searched."""
+    """Return gain -> lowest and highest start of the search, for all gains of a law that are
+    searched.
+    """
     bounds = {}
     if not law.uniform:
-        raise ScenarioError(f"tuning needs gains that all channels share, not {law}: give one number for each gain")
+        raise ScenarioError(
+            f"tuning needs gains that all channels share, not {law}: give one number for each gain"
+        )
     defaults = without_unit(law)
     for name in law.gains:
         if name in defaults:
             if not defaults[name] > 0.0:
                 unit(law, name)  # raises: there is neither a unit nor a size
             bounds[name] = (defaults[name] * 10**-HALF_WIDTH, defaults[name] * 10**HALF_WIDTH)
-        elif (gain_unit := unit(law, name)) is not None and not (_gain(law, name).held or left_out(law, name)):
+        elif (gain_unit := unit(law, name)) is not None and not (
+            _gain(law, name).held or left_out(law, name)
+        ):
             scale = gain_unit.of(_scales_of(_gain(law, name), plant_scales))
             bounds[name] = (scale * 10**-HALF_WIDTH, scale * 10**HALF_WIDTH)
     if not bounds:
@@ -146,16 +182,28 @@ def box(law: Component, plant_scales: Mapping[str, float]) -> dict[str, tuple[fl
 
 def at_bound(gains: Mapping[str, float], bounds: Box) -> dict[str, str]:
     """Return gain -> "lower" or "upper" for gains within 2 % of a bound in log space."""
-    places = {name: math.log(gains[name] / low) / math.log(high / low) for name, (low, high) in bounds.items()}
-    near = {name: place for name, place in places.items() if min(place, 1.0 - place) <= BOUND_MARGIN}
+    places = {
+        name: math.log(gains[name] / low) / math.log(high / low)
+        for name, (low, high) in bounds.items()
+    }
+    near = {}
+    for name, place in places.items():
+        if min(place, 1.0 - place) <= BOUND_MARGIN:
+            near[name] = place
     return {name: "lower" if place < 0.5 else "upper" for name, place in near.items()}
 
 
 def force_limits(law: Component, gains: Mapping[str, float], u_max: float) -> dict[str, float]:
-    """Return the largest value of each gain k that the law divides by another one, b: that of a force, times b."""
+    """Return the largest value of each gain k that the law divides by another one, b: that of a
+    force, times b.
+    """
     declared = law.template.gains if law.template else {}
     values, largest = {**law.gains, **gains}, u_max * 10 ** (HALF_WIDTH + WIDENING)
-    return {name: largest * values[gain.over] for name, gain in declared.items() if gain.over is not None}
+    return {
+        name: largest * values[gain.over]
+        for name, gain in declared.items()
+        if gain.over is not None
+    }
 
 
 def widened(bounds: Box) -> dict[str, tuple[float, float]]:

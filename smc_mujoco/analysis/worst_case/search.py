@@ -2,20 +2,24 @@
 
 A search tries the same members in the same order, whatever its budget:
 
-1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees the loop;
-2. the corners of the constants of the class, at most 16, each with both constant forces and a relay of e';
-3. relays of weighted sums of these, forces that switch once, and waves about the frequency at which the loop swings;
-   then errors of measurement, constant or switching as the loop swings;
-4. the worst member so far, with a force along the motion from some time on: such a force drives a fallen pendulum;
-5. in turns, two ways to change the worst members. The first reverses a piece of a force, shifts a switch or moves
-   constants, in members of different origin. The second is an evolution of the worst member by separable CMA-ES (R. Ros
-   & N. Hansen, PPSN X, 2008; package cmaes), which adds straight lines between knots to its force and cuts the sum off
-   at the bound.
+1. constant forces, and relays that switch with the sign of s, of e and of e': an adversary who sees
+  the loop;
+2. the corners of the constants of the class, at most 16, each with both constant forces and a relay
+  of e';
+3. relays of weighted sums of these, forces that switch once, and waves about the frequency at which
+   the loop swings; then errors of measurement, constant or switching as the loop swings;
+4. the worst member so far, with a force along the motion from some time on: such a force drives a
+  fallen pendulum;
+5. in turns, two ways to change the worst members. The first reverses a piece of a force, shifts a
+   switch or moves constants, in members of different origin. The second is an evolution of the
+   worst member by separable CMA-ES (R. Ros & N. Hansen, PPSN X, 2008; package cmaes), which adds
+   straight lines between knots to its force and cuts the sum off at the bound.
 
-A larger budget only continues a search, so its worst is never milder. A search also ends when a run fails, because
-nothing is worse. The force of a relay is recorded and replayed, so every member is an ordinary scenario. A force is a
-number for each control sample, as a share of its bound. The error of a linear loop is a convex function of the force,
-so the worst force jumps between its bounds, as most of these do.
+A larger budget only continues a search, so its worst is never milder. A search also ends when a run
+fails, because nothing is worse. The force of a relay is recorded and replayed, so every member is
+an ordinary scenario. A force is a number for each control sample, as a share of its bound. The
+error of a linear loop is a convex function of the force, so the worst force jumps between its
+bounds, as most of these do.
 """
 
 import dataclasses
@@ -34,19 +38,34 @@ from smc_mujoco.simulation.signals import Relay
 from smc_mujoco.simulation.trace import Trace
 
 BATCH_MEMBERS = 16  # run at once; chosen
-CHANGES_PER_PARENT = (7, 4, 3, 2)  # in a batch: of the worst member, then of the worst of each other origin; chosen
+CHANGES_PER_PARENT = (
+    7,
+    4,
+    3,
+    2,
+)  # in a batch: of the worst member, then of the worst of each other origin; chosen
 MAX_CORNERS = 16
 FORCE_KNOTS = 32  # in an evolution; chosen
 KNOT_DEVIATION = 0.5  # first standard deviation of a knot, over the bound; chosen
 GENERATIONS = 4  # of an evolution, before the next one begins with the worst member so far; chosen
 FAILED_KEY = math.inf, math.inf
 SIGNS = 1.0, -1.0
-RELAY_SIGNALS = {"sign of s": "s", "sign of e": "error", "sign of e'": "rate"}  # strategy -> signal that a relay sees
+RELAY_SIGNALS = {
+    "sign of s": "s",
+    "sign of e": "error",
+    "sign of e'": "rate",
+}  # strategy -> signal that a relay sees
 PHASE_LEADS = (-1.2, -0.6, 0.6, 1.2)  # rad, of weighted sums of e' and e before e'; chosen
 SWITCH_TIMES = (0.25, 0.5, 0.75)  # of a force that switches once, as shares of a run; chosen
-EARLY_SWITCH_TIMES = (1 / 32, 1 / 16, 1 / 8)  # the same while the loop still moves from its start; chosen
+EARLY_SWITCH_TIMES = (
+    1 / 32,
+    1 / 16,
+    1 / 8,
+)  # the same while the loop still moves from its start; chosen
 FREQUENCY_RATIOS = (0.5, 0.8, 1.0, 1.25, 2.0)  # frequencies of waves over that of the loop; chosen
-MAX_FREQUENCY_SHARE = 0.1  # of the control frequency: a faster oscillation of the loop is chattering; chosen
+MAX_FREQUENCY_SHARE = (
+    0.1  # of the control frequency: a faster oscillation of the loop is chattering; chosen
+)
 
 
 class Case(NamedTuple):
@@ -69,13 +88,26 @@ class Search:
     """A search among the members of a class."""
 
     def __init__(
-        self, members: Members, metric: Metric, budget: int, threads: int | None, report: Callable[[int], None]
+        self,
+        members: Members,
+        metric: Metric,
+        budget: int,
+        threads: int | None,
+        report: Callable[[int], None],
     ):
-        self.members, self.metric, self.budget, self.threads, self.report = members, metric, budget, threads, report
+        self.members, self.metric, self.budget, self.threads, self.report = (
+            members,
+            metric,
+            budget,
+            threads,
+            report,
+        )
         self.tried: list[Tried] = []  # every member that was run, in order
         self.runs = 0
         self.broken = ""  # how the law or a signal failed first, in a sentence
-        self.swing: Trace | None = None  # the first run under a relay of e', or without a force, for its frequency
+        self.swing: Trace | None = (
+            None  # the first run under a relay of e', or without a force, for its frequency
+        )
 
     @property
     def worst(self) -> Tried:
@@ -90,7 +122,13 @@ class Search:
     def search(self, rng: np.random.Generator, known: Sequence[Tried]) -> None:
         """Try the strategies, beginning with members that were run before."""
         self.tried += [one._replace(origin=-1 - i) for i, one in enumerate(known)]
-        batches = self._simple(), self._corners(), self._at_loop_frequency(), self._driven(), self._changed(rng)
+        batches = (
+            self._simple(),
+            self._corners(),
+            self._at_loop_frequency(),
+            self._driven(),
+            self._changed(rng),
+        )
         for batch in itertools.chain(*batches):
             self.run(batch)
             if self.runs >= self.budget or self.worst.key == FAILED_KEY:
@@ -108,9 +146,13 @@ class Search:
             if self.swing is None and (relay.rate > 0.0 if relay else not self.members.forced):
                 self.swing = trace
             if relay:
-                member = dataclasses.replace(member, force=recorded_force(trace, relay, member.force))
+                member = dataclasses.replace(
+                    member, force=recorded_force(trace, relay, member.force)
+                )
                 if relay.slope or relay.start or trace.scenario.clock.jitter:
-                    replays.append(Case(member))  # the recorded force differs a little from that of the relay
+                    replays.append(
+                        Case(member)
+                    )  # the recorded force differs a little from that of the relay
                     continue
             tried[i] = Tried(member, self._key(trace), first + i if origin < 0 else origin)
         done = [one for one in tried if one]
@@ -126,23 +168,41 @@ class Search:
         return (self.metric.absent if math.isnan(value) else value), error
 
     def _simple(self) -> Iterator[list[Case]]:
-        """Yield constant forces and relays, with the constants of the class in the middle of their ranges."""
+        """Yield constant forces and relays, with the constants of the class in the middle of their
+        ranges.
+        """
         if self.members.forced:
             signals = itertools.product(RELAY_SIGNALS.items(), SIGNS)
-            relays = [self._relayed(kind, sign, **{signal: 1.0}) for (kind, signal), sign in signals]
+            relays = []
+            for (kind, signal), sign in signals:
+                relays.append(self._relayed(kind, sign, **{signal: 1.0}))
             yield [*(self._forced("constant", force) for force in self._constants()), *relays]
 
     def _at_loop_frequency(self) -> Iterator[list[Case]]:
-        """Yield members for the frequency at which the loop swings, also with constants in the middle."""
+        """Yield members for the frequency at which the loop swings, also with constants in the
+        middle.
+        """
         members = self.members
         if members.forced and self.swing:
-            yield [*self._weighted_sums(self.swing), *self._single_switches(), *self._waves(self.swing)]
+            yield [
+                *self._weighted_sums(self.swing),
+                *self._single_switches(),
+                *self._waves(self.swing),
+            ]
         if members.times:
-            base = self.worst.member if members.forced else members.bare
+            if members.forced:
+                base = self.worst.member
+            else:
+                base = members.bare
             if self.swing is None:
                 yield [Case(members.bare.named("no error"))]
-            errors = measurement_errors(self.swing, members.times, members.hold) if self.swing else ()
-            yield [Case(dataclasses.replace(base, noise=noise, kind=kind)) for kind, noise in errors]
+            if self.swing:
+                errors = measurement_errors(self.swing, members.times, members.hold)
+            else:
+                errors = ()
+            yield [
+                Case(dataclasses.replace(base, noise=noise, kind=kind)) for kind, noise in errors
+            ]
 
     def _driven(self) -> Iterator[list[Case]]:
         """Yield the worst member so far, with a force along the motion from some time on."""
@@ -150,7 +210,9 @@ class Search:
             worst, end = self.worst, self.members.samples * self.members.h
             kind, then = worst.member.kind, "sign of e'"
             member = worst.member.named(kind if kind == then else f"{kind}, then {then}")
-            relays = [Relay(self.members.within.disturbance, rate=1.0, start=share * end) for share in SWITCH_TIMES]
+            relays = []
+            for share in SWITCH_TIMES:
+                relays.append(Relay(self.members.within.disturbance, rate=1.0, start=share * end))
             yield [Case(member, relay, worst.origin) for relay in relays]
 
     def _relayed(self, kind: str, sign: float = 1.0, **weights: float) -> Case:
@@ -159,27 +221,42 @@ class Search:
 
     def _forced(self, kind: str, force: np.ndarray) -> Case:
         """Return a member with a force, limited to the class."""
-        return Case(dataclasses.replace(self.members.bare, kind=kind, force=self.members.limited(force)))
+        return Case(
+            dataclasses.replace(self.members.bare, kind=kind, force=self.members.limited(force))
+        )
 
     def _constants(self) -> list[np.ndarray]:
         return [np.full(self.members.samples + 1, sign) for sign in SIGNS]
 
     def _single_switches(self) -> Iterator[Case]:
-        """Yield forces that change their sign once: in the first swing, or when an integral has settled."""
+        """Yield forces that change their sign once: in the first swing, or when an integral has
+        settled.
+        """
         samples = self.members.samples
         for share, sign in itertools.product((*SWITCH_TIMES, *EARLY_SWITCH_TIMES), SIGNS):
-            yield self._forced("one switch", np.where(np.arange(samples + 1) < share * samples, sign, -sign))
+            yield self._forced(
+                "one switch", np.where(np.arange(samples + 1) < share * samples, sign, -sign)
+            )
 
     def _weighted_sums(self, trace: Trace) -> Iterator[Case]:
-        """Yield relays of weighted sums of e' and e, or of e' and s, each divided by its size in a run."""
-        sizes = {name: float(np.nan_to_num(part).std()) or 1.0 for name, part in relay_signals(trace).items()}
+        """Yield relays of weighted sums of e' and e, or of e' and s, each divided by its size in a
+        run.
+        """
+        sizes = {}
+        for name, part in relay_signals(trace).items():
+            sizes[name] = float(np.nan_to_num(part).std()) or 1.0
         for lead in PHASE_LEADS:
-            weights = {"rate": math.cos(lead) / sizes["rate"], "error": math.sin(lead) / sizes["error"]}
+            weights = {
+                "rate": math.cos(lead) / sizes["rate"],
+                "error": math.sin(lead) / sizes["error"],
+            }
             yield self._relayed("sign of e' and e", **weights)
         yield self._relayed("sign of e' and s", rate=1.0 / sizes["rate"], s=1.0 / sizes["s"])
 
     def _waves(self, trace: Trace) -> Iterator[Case]:
-        """Yield square waves and sines about the frequency at which a loop swings under a relay of e'."""
+        """Yield square waves and sines about the frequency at which a loop swings under a relay of
+        e'.
+        """
         phase = 2.0 * math.pi * loop_frequency(trace) * trace.t
         for pitch in FREQUENCY_RATIOS:
             yield self._forced("square wave", np.where(np.sin(pitch * phase) >= 0.0, 1.0, -1.0))
@@ -187,14 +264,18 @@ class Search:
             yield self._forced("sine", np.sin(phase + shift))
 
     def _corners(self) -> Iterator[list[Case]]:
-        """Yield the corners of the constants, spread evenly over all of them if there are more than MAX_CORNERS."""
+        """Yield the corners of the constants, spread evenly over all of them if there are more than
+        MAX_CORNERS.
+        """
         ends = self.members.ends
         if not ends:
             return
         corners = math.prod(map(len, ends))
         count = min(corners, MAX_CORNERS)
         for i in range(count):
-            places = np.unravel_index(round(i * (corners - 1) / (count - 1)), [*map(len, ends)], order="F")
+            places = np.unravel_index(
+                round(i * (corners - 1) / (count - 1)), [*map(len, ends)], order="F"
+            )
             shares = np.array([choices[place] for choices, place in zip(ends, places, strict=True)])
             corner = dataclasses.replace(self.members.bare, shares=shares, kind="corner")
             if not self.members.forced:
@@ -237,7 +318,10 @@ class Search:
         for _ in range(GENERATIONS):
             points = [evolution.ask() for _ in range(BATCH_MEMBERS)]
             before = len(self.tried)
-            yield [Case(self.members.moved(start.member, z, FORCE_KNOTS), origin=start.origin) for z in points]
+            yield [
+                Case(self.members.moved(start.member, z, FORCE_KNOTS), origin=start.origin)
+                for z in points
+            ]
             keys = [one.key for one in self.tried[before:]]
             order = sorted(range(len(keys)), key=keys.__getitem__, reverse=True)
             ranks = {i: float(rank) for rank, i in enumerate(order)}
@@ -246,14 +330,18 @@ class Search:
 
 
 def relay_signals(trace: Trace) -> dict[str, np.ndarray]:
-    """Return what a relay sees of channel 0 at the control samples: "s", "rate" and "error", (samples + 1,) each."""
+    """Return what a relay sees of channel 0 at the control samples: "s", "rate" and "error",
+    (samples + 1,) each.
+    """
     r = trace.r[:, 0]
     dr = np.diff(r, prepend=r[:1]) / trace.scenario.control_period
     return {"s": trace.s[:, 0], "rate": trace.v[:, 0] - dr, "error": trace.x[:, 0] - r}
 
 
 def recorded_force(trace: Trace, relay: Relay, before: np.ndarray) -> np.ndarray:
-    """Return the force of a relay over its bound, (samples + 1,), and `before` until the relay starts."""
+    """Return the force of a relay over its bound, (samples + 1,), and `before` until the relay
+    starts.
+    """
     parts = relay_signals(trace)
     aim = relay.s * parts["s"] + relay.rate * parts["rate"] + relay.error * parts["error"]
     goals = np.where(np.nan_to_num(aim) > 0.0, relay.amplitude, -relay.amplitude)
@@ -263,18 +351,24 @@ def recorded_force(trace: Trace, relay: Relay, before: np.ndarray) -> np.ndarray
             force += min(max(goal - force, -relay.slope), relay.slope)
             goals[i] = force
     goals /= abs(relay.amplitude)
-    return np.where(trace.t < relay.start, before, goals) if relay.start else goals
+    if relay.start:
+        return np.where(trace.t < relay.start, before, goals)
+    return goals
 
 
 def loop_frequency(trace: Trace) -> float:
     """Return the frequency at which a loop swings under a relay of e', Hz."""
     late = np.nan_to_num(trace.x[:, 0] - trace.r[:, 0])[len(trace.t) // 4 :]
     swings = max(1.0, np.count_nonzero(np.diff(late > late.mean())) / 2.0)
-    return min(swings / (0.75 * float(trace.t[-1])), MAX_FREQUENCY_SHARE / trace.scenario.control_period)
+    return min(
+        swings / (0.75 * float(trace.t[-1])), MAX_FREQUENCY_SHARE / trace.scenario.control_period
+    )
 
 
 def measurement_errors(trace: Trace, times: int, hold: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield errors of position and velocity, (2, times), each for `hold` samples: constant, and as a loop swings."""
+    """Yield errors of position and velocity, (2, times), each for `hold` samples: constant, and as
+    a loop swings.
+    """
     for signs in itertools.product(SIGNS, repeat=2):
         yield "constant error", np.repeat(np.reshape(signs, (2, 1)), times, axis=1)
     for part in relay_signals(trace).values():

@@ -1,8 +1,10 @@
-"""Classes of uncertainty: all that an adversary may do to a scenario, as bounds that are fixed before anything is run.
+"""Classes of uncertainty: all that an adversary may do to a scenario, as bounds that are fixed
+before anything is run.
 
     within = smc.Uncertainty(disturbance=2.0, mass=(0.7, 1.3), delay=(0.0, 0.005))
 
-A member of a class is one choice within all of its bounds. `Members` makes scenarios of members. A member has
+A member of a class is one choice within all of its bounds. `Members` makes scenarios of members. A
+member has
 
     shares      one number in [0, 1] for each constant that may differ: set, delay, mass, friction, bound, x0, ...
     force       |force_k| <= 1, a number for each control sample: the disturbance over its bound
@@ -33,13 +35,16 @@ from smc_mujoco.simulation.time_series import Held, TimeSeries
 KNOT_SPACING = 0.5  # s between the knots of a random disturbance, straight lines in between; chosen
 MIN_KNOTS = 8  # of a random disturbance in a run; chosen
 MAX_PIECE_SHARE = 0.4  # of a run: the longest piece of a force that a change reverses; chosen
-SHIFT_PROBABILITY = 0.5  # that a change of a force shifts a switch, if it has one, instead of reversing a piece; chosen
+# that a change of a force shifts a switch, if it has one, instead of reversing a piece; chosen
+SHIFT_PROBABILITY = 0.5
 MOVE_PROBABILITY = 0.5  # of each constant, in a change of constants; chosen
 CONSTANT_DEVIATION = 0.3  # standard deviation by which a constant moves, of its range; chosen
 JITTER_SHARES = 8  # jitter is a multiple of this part of the control period; chosen
 MULTIPLE_TOLERANCE = 1e-6  # of a step: a bound so close to a multiple is one
 ROUNDING = 1e-12  # of the largest force: a smaller change of slope is none
-DEFAULT_FORCE_SHARE = 1 / 6  # of the force of the weakest drive: the disturbance of the default class; chosen
+DEFAULT_FORCE_SHARE = (
+    1 / 6
+)  # of the force of the weakest drive: the disturbance of the default class; chosen
 DEFAULT_FRICTION_SCALE = (0.5, 1.5)  # of the default class; chosen
 
 Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
@@ -48,26 +53,34 @@ Range = Annotated[tuple[float, float], constraints.Range(low=0.0)]
 @suggesting
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Uncertainty:
-    """What may happen: bounds on disturbance, noise, delay and parameters. Everything left out is as in the scenario.
+    """What may happen: bounds on disturbance, noise, delay and parameters.
+
+    Everything left out is as in the scenario.
 
     Attributes:
-      disturbance: |d| <= this, N or N m, the same force on every driven joint, beside the scenario's own disturbances.
+      disturbance: |d| <= this, N or N m, the same force on every driven joint, beside the
+        scenario's own disturbances.
       slope: |d'| <= this, N/s or N m/s; None: d may jump.
-      position_noise, velocity_noise: bounds on errors of measurement, rad or m, and per second, beside the scenario's
-        own noise. The adversary chooses the errors, the same in every channel.
+      position_noise, velocity_noise: bounds on errors of measurement, rad or m, and per second,
+        beside the scenario's own noise. The adversary chooses the errors, the same in every
+        channel.
       hold: time for which each error of measurement lasts, s.
-      delay: lowest and highest input delay, s, beside the scenario's own; those tried are multiples of its physics
-        step.
-      jitter: largest delay of a sample, s, see `smc.Clock`; those tried are eighths of the control period. The
-        scenario's seed decides which samples are late.
+      delay: lowest and highest input delay, s, beside the scenario's own; those tried are multiples
+        of its physics step.
+      jitter: largest delay of a sample, s, see `smc.Clock`; those tried are eighths of the control
+        period. The scenario's seed decides which samples are late.
       mass: lowest and highest factor on the plant's mass.
-      parameters: name -> lowest and highest factor on other parameters of the plant, or what is added to one of
-        `plant.added`: {"payload": (0.0, 2.0)}.
-      friction: lowest and highest dry friction, N or N m, beside the scenario's own; `friction_scale` leaves it out.
-      friction_scale: lowest and highest factor on the friction of the scenario and on the dry friction of its plant.
-      encoder: lowest and highest counts of a position encoder, see `smc.Encoder`; equal ratios are equally likely.
+      parameters: name -> lowest and highest factor on other parameters of the plant, or what is
+        added to one of `plant.added`: {"payload": (0.0, 2.0)}.
+      friction: lowest and highest dry friction, N or N m, beside the scenario's own;
+        `friction_scale` leaves it out.
+      friction_scale: lowest and highest factor on the friction of the scenario and on the dry
+        friction of its plant.
+      encoder: lowest and highest counts of a position encoder, see `smc.Encoder`; equal ratios are
+        equally likely.
       bound: lowest and highest factor on u_max.
-      period: lowest and highest factor on the control period; those tried are multiples of the physics step.
+      period: lowest and highest factor on the control period; those tried are multiples of the
+        physics step.
       x0: how far each channel may start from the scenario's x0, as a share of it.
 
     Raises:
@@ -93,35 +106,81 @@ class Uncertainty:
     def __post_init__(self):
         constrain(self)
         if not isinstance(self.parameters, Mapping):
-            raise ScenarioError(f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name")
+            raise ScenarioError(
+                f"Uncertainty's parameters are {shown(self.parameters)}: give a range for each name"
+            )
         of = constraints.Range()
-        ranges = {str(name): of(f"Uncertainty's {name}", value) for name, value in self.parameters.items()}
+        ranges = {
+            str(name): of(f"Uncertainty's {name}", value) for name, value in self.parameters.items()
+        }
         vars(self)["parameters"] = frozen(ranges)  # the class is frozen
-        bounds = self.disturbance, self.position_noise, self.velocity_noise, self.jitter, self.x0, self.encoder
+        bounds = (
+            self.disturbance,
+            self.position_noise,
+            self.velocity_noise,
+            self.jitter,
+            self.x0,
+            self.encoder,
+        )
         ends = self.delay, self.mass, self.friction, self.friction_scale, self.bound, self.period
-        if not any(bounds) and not any(low < high for low, high in (*ends, *self.parameters.values())):
+        if not any(bounds) and not any(
+            low < high for low, high in (*ends, *self.parameters.values())
+        ):
             cure = "give a bound, such as disturbance=2.0"
             raise ScenarioError(f"Uncertainty allows nothing but the scenario itself: {cure}")
 
     def words(self, plant: Plant) -> str:
         """Return the class as a line of text, such as "|d| <= 2 N, mass x 0.7 to 1.3"."""
         x, u = plant.units[0], EFFORT[plant.units[0]]
-        parts = [f"|d| <= {self.disturbance:g} {u}"] if self.disturbance else []
-        parts += [f"|d'| <= {self.slope:g} {u}/s"] if self.disturbance and self.slope is not None else []
+        if self.disturbance:
+            parts = [f"|d| <= {self.disturbance:g} {u}"]
+        else:
+            parts = []
+        if self.disturbance and self.slope is not None:
+            parts += [f"|d'| <= {self.slope:g} {u}/s"]
+        else:
+            parts += []
         hold = f" held for {self.hold:g} s"
-        parts += [f"position errors <= {self.position_noise:g} {x}{hold}"] if self.position_noise else []
-        parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{hold}"] if self.velocity_noise else []
-        ranges = {"delay (s)": self.delay, f"friction ({u})": self.friction, "friction x": self.friction_scale}
-        ranges |= {"mass x": self.mass, **self.parameters, "u_max x": self.bound, "control period x": self.period}
-        ranges |= {"encoder counts": self.encoder} if self.encoder else {}
-        parts += [f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high]
-        parts += [f"jitter <= {self.jitter:g} s"] if self.jitter else []
-        parts += [f"x0 within {100 * self.x0:g} %"] if self.x0 else []
+        if self.position_noise:
+            parts += [f"position errors <= {self.position_noise:g} {x}{hold}"]
+        else:
+            parts += []
+        if self.velocity_noise:
+            parts += [f"velocity errors <= {self.velocity_noise:g} {x}/s{hold}"]
+        else:
+            parts += []
+        ranges = {
+            "delay (s)": self.delay,
+            f"friction ({u})": self.friction,
+            "friction x": self.friction_scale,
+        }
+        ranges |= {
+            "mass x": self.mass,
+            **self.parameters,
+            "u_max x": self.bound,
+            "control period x": self.period,
+        }
+        if self.encoder:
+            ranges |= {"encoder counts": self.encoder}
+        else:
+            ranges |= {}
+        parts += [
+            f"{name} {low:g} to {high:g}" for name, (low, high) in ranges.items() if low < high
+        ]
+        if self.jitter:
+            parts += [f"jitter <= {self.jitter:g} s"]
+        else:
+            parts += []
+        if self.x0:
+            parts += [f"x0 within {100 * self.x0:g} %"]
+        else:
+            parts += []
         return ", ".join(parts)
 
 
 def default_class(scenario: Scenario) -> Uncertainty:
-    """Return the default class of a scenario: what its plant declares as `uncertain`, and friction within 50 %.
+    """Return the default class of a scenario: what its plant declares as `uncertain`, and friction
+    within 50 %.
 
     If the plant declares nothing: a disturbance up to a sixth of the force of the weakest drive.
     """
@@ -129,34 +188,56 @@ def default_class(scenario: Scenario) -> Uncertainty:
     return Uncertainty(
         disturbance=0.0 if declared else DEFAULT_FORCE_SHARE * strength(scenario),
         parameters=declared,
-        friction_scale=DEFAULT_FRICTION_SCALE if scenario.friction or _dry(scenario.plant) else (1.0, 1.0),
+        friction_scale=DEFAULT_FRICTION_SCALE
+        if scenario.friction or _dry(scenario.plant)
+        else (1.0, 1.0),
     )
 
 
 def strength(scenario: Scenario) -> float:
     """Return the largest force that every drive can hold, N or N m."""
-    return scenario.stepper.stall if scenario.stepper else min(scenario.limits) * scenario.nominal_drive.gain
+    if scenario.stepper:
+        return scenario.stepper.stall
+    return min(scenario.limits) * scenario.nominal_drive.gain
 
 
 def outside(scenario: Scenario, within: Uncertainty) -> str:
-    """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if nothing is known."""
+    """Return how a class around a scenario goes beyond the theorem of its law, in words; "" if
+    nothing is known.
+    """
     reasons, u = [], EFFORT[scenario.plant.units[0]]
     known = [its for signal in scenario.disturbance if (its := bounds_of(signal))]
     of_class = within.disturbance, (within.slope or math.inf) if within.disturbance else 0.0
     d, slope = map(sum, zip(of_class, *known, strict=True))
     if d >= (largest := strength(scenario)):
         reasons.append(f"no law holds |d| = {d:g} {u} with drives of {largest:.3g} {u}")
-    admits = {} if scenario.law.template is None else scenario.law.template.admits
-    for gains in [SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)][:1]:
+    if scenario.law.template is None:
+        admits = {}
+    else:
+        admits = scenario.law.template.admits
+    for gains in [
+        SimpleNamespace(**one.gains) for one in scenario.law.of_channels(scenario.plant.driven)
+    ][:1]:
         if d and "d" in admits and d >= (bound := admits["d"](gains)):
             reasons.append(f"its theorem needs |d| < {bound:.3g} {u} with these gains")
         if d and "d'" in admits and slope >= (bound := admits["d'"](gains)):
             reasons.append(f"its theorem needs |d'| < {bound:.3g} {u}/s with these gains")
-    noise = within.position_noise or within.velocity_noise or scenario.noise != Noise() or scenario.sensor
-    beside = {"delay": within.delay[1] or scenario.input_delay, "noise": noise, "drives": scenario.actuator}
+    noise = (
+        within.position_noise
+        or within.velocity_noise
+        or scenario.noise != Noise()
+        or scenario.sensor
+    )
+    beside = {
+        "delay": within.delay[1] or scenario.input_delay,
+        "noise": noise,
+        "drives": scenario.actuator,
+    }
     beside |= {"late or missed samples": within.jitter or not scenario.clock.regular}
     if admits and any(beside.values()):
-        reasons.append(f"its theorem is without {joined(name for name, there in beside.items() if there)}")
+        reasons.append(
+            f"its theorem is without {joined(name for name, there in beside.items() if there)}"
+        )
     return "; ".join(reasons)
 
 
@@ -175,10 +256,12 @@ class Member:
 
 
 class Members:
-    """The members of a class around one scenario, or around the same scenario on several parameter sets.
+    """The members of a class around one scenario, or around the same scenario on several parameter
+    sets.
 
-    `constants` has a `Constant` for each share of a member. If there are several parameter sets, the first chooses one.
-    `ends` are the shares at corners. `bare` has no force or noise, and shares of 0.5, on the first parameter set.
+    `constants` has a `Constant` for each share of a member. If there are several parameter sets,
+    the first chooses one. `ends` are the shares at corners. `bare` has no force or noise, and
+    shares of 0.5, on the first parameter set.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], within: Uncertainty):
@@ -186,16 +269,29 @@ class Members:
         self.scenario, self.within, self.h = scenario, within, scenario.control_period
         self.samples = scenario.samples
         self.forced = within.disturbance > 0.0
-        self.slope = 0.0 if within.slope is None else within.slope * self.h  # N or N m a sample; 0: d may jump
+        # N or N m a sample; 0: d may jump
+        if within.slope is None:
+            self.slope = 0.0
+        else:
+            self.slope = within.slope * self.h
         _check_class(scenario, within)
-        sets = Constant(name="set", bounds=(0.0, count), put=lambda _, at: scenarios[min(int(at), count - 1)])
+        sets = Constant(
+            name="set", bounds=(0.0, count), put=lambda _, at: scenarios[min(int(at), count - 1)]
+        )
         self.constants = [sets] * (count > 1) + list(_constants(scenario, within))
         self.ends = [[0.0, 1.0] for _ in self.constants]
-        self.hold = max(1, round(within.hold / self.h))  # samples that an error of measurement lasts
-        self.times = -(-self.samples // self.hold) if within.position_noise or within.velocity_noise else 0
+        self.hold = max(
+            1, round(within.hold / self.h)
+        )  # samples that an error of measurement lasts
+        if within.position_noise or within.velocity_noise:
+            self.times = -(-self.samples // self.hold)
+        else:
+            self.times = 0
         if self.times and any(scenario.noise.errors):
             cure = "the adversary chooses them: leave them out"
-            raise ScenarioError(f"the scenario has errors of measurement, {scenario.noise.errors}, and {cure}")
+            raise ScenarioError(
+                f"the scenario has errors of measurement, {scenario.noise.errors}, and {cure}"
+            )
         middle = np.full(len(self.constants), 0.5)
         if count > 1:
             self.ends[0], middle[0] = [(i + 0.5) / count for i in range(count)], 0.0
@@ -203,7 +299,9 @@ class Members:
         for constant in self.constants:
             constant.check(scenario)
         for share in (0.0, 1.0):
-            self.with_constants(np.full(len(self.constants), share))  # raises where bounds do not go together
+            self.with_constants(
+                np.full(len(self.constants), share)
+            )  # raises where bounds do not go together
 
     def with_constants(self, shares: np.ndarray) -> Scenario:
         """Return the scenario with constants of the class."""
@@ -213,7 +311,10 @@ class Members:
         return scenario
 
     def scenario_of(self, member: Member, relay: Relay | None = None) -> Scenario:
-        """Return the scenario of a member. From its start on, a relay takes the place of the member's force."""
+        """Return the scenario of a member.
+
+        From its start on, a relay takes the place of the member's force.
+        """
         scenario, force = self.with_constants(member.shares), self.within.disturbance * member.force
         if relay:
             force = np.where(np.arange(len(force)) * self.h < relay.start, force, 0.0)
@@ -221,17 +322,28 @@ class Members:
         scenario = dataclasses.replace(scenario, disturbance=(*scenario.disturbance, *signals))
         if not self.times:
             return scenario
-        bounds = {"position_error": self.within.position_noise, "velocity_error": self.within.velocity_noise}
+        bounds = {
+            "position_error": self.within.position_noise,
+            "velocity_error": self.within.velocity_noise,
+        }
         t = (np.arange(self.times + 1) * self.hold * self.h).tolist()
         rows = zip(bounds.items(), member.noise, strict=True)
-        errors = {name: Held(t, [*(bound * row).tolist(), 0.0]) for (name, bound), row in rows if bound}
+        errors = {}
+        for (name, bound), row in rows:
+            if bound:
+                errors[name] = Held(t, [*(bound * row).tolist(), 0.0])
         return dataclasses.replace(scenario, noise=dataclasses.replace(scenario.noise, **errors))
 
     def signal(self, values: np.ndarray) -> Signal:
-        """Return values at the samples as a signal: steps if it may jump and does so rarely, else straight lines."""
+        """Return values at the samples as a signal: steps if it may jump and does so rarely, else
+        straight lines.
+        """
         change = np.diff(values)
         steps = not self.slope and 2 * np.count_nonzero(change) < len(change)
-        bends = change != 0.0 if steps else np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
+        if steps:
+            bends = change != 0.0
+        else:
+            bends = np.abs(np.diff(change)) > ROUNDING * np.abs(values).max()
         at = np.unique(np.concatenate([[0], np.flatnonzero(bends) + 1, [len(values) - 1]]))
         return (Held if steps else TimeSeries)((at * self.h).tolist(), values[at].tolist())
 
@@ -241,14 +353,19 @@ class Members:
         if not change or np.abs(np.diff(force)).max(initial=0.0) <= change:
             return force
         limited = [before := float(force[0])]
-        limited += [before := min(max(value, before - change), before + change) for value in force[1:].tolist()]
+        limited += [
+            before := min(max(value, before - change), before + change)
+            for value in force[1:].tolist()
+        ]
         return np.array(limited)
 
     def random(self, rng: np.random.Generator) -> Member:
         """Return a member drawn at random: uniform constants, knots and errors."""
         knot = min(KNOT_SPACING, self.samples * self.h / MIN_KNOTS)
         knots = np.arange(math.ceil(self.samples * self.h / knot) + 1) * knot
-        values = np.interp(np.arange(self.samples + 1) * self.h, knots, rng.uniform(-1.0, 1.0, len(knots)))
+        values = np.interp(
+            np.arange(self.samples + 1) * self.h, knots, rng.uniform(-1.0, 1.0, len(knots))
+        )
         return Member(
             rng.uniform(size=len(self.constants)),
             self.limited(values) if self.forced else np.zeros(0),
@@ -258,12 +375,18 @@ class Members:
 
     def changed(self, member: Member, rng: np.random.Generator) -> Member:
         """Return a member that differs from one in its force, its noise or its constants."""
-        weights = np.array([3.0 * self.forced, 2.0 * (self.times > 0), len(self.constants) > 0], float)
+        weights = np.array(
+            [3.0 * self.forced, 2.0 * (self.times > 0), len(self.constants) > 0], float
+        )
         what = rng.choice(3, p=weights / weights.sum())
         if what == 0:
-            return dataclasses.replace(member, force=self.limited(mutated_signal(member.force, rng)))
+            return dataclasses.replace(
+                member, force=self.limited(mutated_signal(member.force, rng))
+            )
         if what == 1:
-            return dataclasses.replace(member, noise=np.array([mutated_signal(row, rng) for row in member.noise]))
+            return dataclasses.replace(
+                member, noise=np.array([mutated_signal(row, rng) for row in member.noise])
+            )
         moves = rng.normal(0.0, CONSTANT_DEVIATION, len(self.constants))
         moves = moves * (rng.random(len(self.constants)) < MOVE_PROBABILITY)
         return dataclasses.replace(member, shares=np.clip(member.shares + moves, 0.0, 1.0))
@@ -273,26 +396,47 @@ class Members:
         return len(self.constants) + knots * (self.forced + 2 * (self.times > 0))
 
     def moved(self, member: Member, z: np.ndarray, knots: int) -> Member:
-        """Return a member moved by z, (size,): its constants, then knots of lines that are added to its signals."""
-        m, rows = len(self.constants), np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots))
-        shares, at = np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0), np.linspace(0.0, 1.0, knots)
+        """Return a member moved by z, (size,): its constants, then knots of lines that are added to
+        its signals.
+        """
+        m, rows = (
+            len(self.constants),
+            np.reshape(z[len(self.constants) : self.size(knots)], (-1, knots)),
+        )
+        shares, at = (
+            np.clip(member.shares + CONSTANT_DEVIATION * z[:m], 0.0, 1.0),
+            np.linspace(0.0, 1.0, knots),
+        )
 
         def added(row: np.ndarray, more: np.ndarray) -> np.ndarray:
-            return np.clip(row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0)
+            return np.clip(
+                row + 2.0 * np.interp(np.linspace(0.0, 1.0, len(row)), at, more), -1.0, 1.0
+            )
 
-        force = self.limited(added(member.force, rows[0])) if self.forced else member.force
-        noise = [added(*pair) for pair in zip(member.noise, rows[-2:], strict=True)] if self.times else member.noise
+        if self.forced:
+            force = self.limited(added(member.force, rows[0]))
+        else:
+            force = member.force
+        if self.times:
+            noise = [added(*pair) for pair in zip(member.noise, rows[-2:], strict=True)]
+        else:
+            noise = member.noise
         return Member(shares, force, np.array(noise), member.kind)
 
 
 def mutated_signal(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return values, (K,), of which a random piece is reversed in sign, or a switch comes earlier or later."""
+    """Return values, (K,), of which a random piece is reversed in sign, or a switch comes earlier
+    or later.
+    """
     mutated, last = values.copy(), len(values) - 1
     length = round(math.exp(rng.uniform(0.0, math.log(max(2.0, MAX_PIECE_SHARE * last)))))
     switches = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1])) + 1
     if len(switches) and rng.random() < SHIFT_PROBABILITY:
         at = int(rng.choice(switches))
-        piece = slice(max(0, at - length), at) if rng.random() < 0.5 else slice(at, at + length)
+        if rng.random() < 0.5:
+            piece = slice(max(0, at - length), at)
+        else:
+            piece = slice(at, at + length)
     else:
         at = int(rng.integers(1 - length, max(last, 2 - length)))
         piece = slice(max(0, at), at + length)
@@ -307,16 +451,22 @@ class Constant:
     name: str
     bounds: tuple[float, float]
     put: Callable[[Scenario, float], Scenario]  # the scenario with a value
-    unit: str = ""  # of a value; "" for a factor, "added" for what is added to a parameter, "%" for a relative change
+    # of a value; "" for a factor, "added" for what is added to a parameter, "%" for a relative
+    # change
+    unit: str = ""
     geometric: bool = False  # whether equal ratios, rather than equal differences, are equal shares
 
     def value(self, share: float) -> float:
         """Return the value at a share in [0, 1] of the range."""
         low, high = self.bounds
-        return low * (high / low) ** share if self.geometric else min(low + share * (high - low), high)
+        if self.geometric:
+            return low * (high / low) ** share
+        return min(low + share * (high - low), high)
 
     def check(self, scenario: Scenario) -> None:
-        """Raise ScenarioError, which names the bound, if the scenario cannot have it at an end of its range."""
+        """Raise ScenarioError, which names the bound, if the scenario cannot have it at an end of
+        its range.
+        """
         for value in self.bounds:
             try:
                 self.put(scenario, value)
@@ -327,14 +477,20 @@ class Constant:
 
 
 def _check_class(scenario: Scenario, within: Uncertainty) -> None:
-    """Raise ScenarioError for a parameter that the plant does not have, or for a delay beyond the end of a run."""
+    """Raise ScenarioError for a parameter that the plant does not have, or for a delay beyond the
+    end of a run.
+    """
     plant = scenario.plant
     if foreign := [name for name in within.parameters if name not in (*plant.parameters, "mass")]:
         fields = [field.name for field in dataclasses.fields(within) if field.name != "parameters"]
         known = ", ".join(sorted({*fields, *plant.parameters}))
-        raise ScenarioError(f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from {known}")
+        raise ScenarioError(
+            f"no bound and no parameter of {plant.name} is called {foreign[0]!r}: choose from {known}"
+        )
     if (longest := scenario.duration - scenario.input_delay) < within.delay[1]:
-        raise ScenarioError(f"Uncertainty's delay reaches {within.delay[1]:g} s: give at most {longest:g}, a run's end")
+        raise ScenarioError(
+            f"Uncertainty's delay reaches {within.delay[1]:g} s: give at most {longest:g}, a run's end"
+        )
 
 
 def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
@@ -348,42 +504,70 @@ def _constants(scenario: Scenario, within: Uncertainty) -> Iterator[Constant]:
             unit="s",
         )
     if within.jitter:
-        _, jitter = _multiples("jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES)
-        yield Constant(name="jitter", bounds=(0.0, jitter / scenario.control_period), put=with_jitter, unit="periods")
+        _, jitter = _multiples(
+            "jitter", (0.0, within.jitter), scenario.control_period / JITTER_SHARES
+        )
+        yield Constant(
+            name="jitter",
+            bounds=(0.0, jitter / scenario.control_period),
+            put=with_jitter,
+            unit="periods",
+        )
     for name, bounds in {"mass": within.mass, **within.parameters}.items():
         if bounds != (1.0, 1.0):
             unit = "added" if name in plant.added else ""
-            yield Constant(name=name, bounds=bounds, put=functools.partial(_with_factor, name=name), unit=unit)
+            yield Constant(
+                name=name, bounds=bounds, put=functools.partial(_with_factor, name=name), unit=unit
+            )
     if within.friction_scale != (1.0, 1.0):
         if not (scenario.friction or _dry(plant)):
             cure = "give it some, such as friction=smc.Coulomb(0.1), or a class with friction=(0.0, 0.1)"
-            raise ScenarioError(f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: {cure}")
-        yield Constant(name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale)
+            raise ScenarioError(
+                f"Uncertainty's friction_scale is of {plant.name}, which has no friction here: {cure}"
+            )
+        yield Constant(
+            name="friction_scale", bounds=within.friction_scale, put=_with_friction_scale
+        )
     if within.friction != (0.0, 0.0):
         yield Constant(name="friction", bounds=within.friction, put=with_friction, unit=effort)
     if within.encoder:
-        yield Constant(name="encoder", bounds=within.encoder, put=_with_counts, unit="counts", geometric=True)
+        yield Constant(
+            name="encoder", bounds=within.encoder, put=_with_counts, unit="counts", geometric=True
+        )
     if within.bound != (1.0, 1.0):
         if not math.isfinite(min(scenario.limits)):
             cure = "give the scenario a u_max"
-            raise ScenarioError(f"Uncertainty's bound is of {plant.name}, whose u_max has none that differs: {cure}")
+            raise ScenarioError(
+                f"Uncertainty's bound is of {plant.name}, whose u_max has none that differs: {cure}"
+            )
         yield Constant(name="bound", bounds=within.bound, put=_with_bound)
     for i in range(plant.n if within.x0 else 0):
         name = f"x0 {i + 1}" if plant.n > 1 else "x0"
-        yield Constant(name=name, bounds=(-within.x0, within.x0), put=functools.partial(_with_start, i=i), unit="%")
+        yield Constant(
+            name=name,
+            bounds=(-within.x0, within.x0),
+            put=functools.partial(_with_start, i=i),
+            unit="%",
+        )
     if within.period != (1.0, 1.0):
         yield Constant(
-            name="period", bounds=_multiples("period", within.period, 1.0 / scenario.steps), put=_with_period
+            name="period",
+            bounds=_multiples("period", within.period, 1.0 / scenario.steps),
+            put=_with_period,
         )
 
 
 def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[float, float]:
-    """Return the lowest and the highest multiple of a step within bounds; refuse a range with one, or only 0."""
+    """Return the lowest and the highest multiple of a step within bounds; refuse a range with one,
+    or only 0.
+    """
     low = math.ceil(bounds[0] / step - MULTIPLE_TOLERANCE) * step
     high = math.floor(bounds[1] / step + MULTIPLE_TOLERANCE) * step
     if high < max(low, step) or (low == high and bounds[0] < bounds[1]):
         unit = "" if name == "period" else " s"
-        told = f"from {bounds[0]:g} to {bounds[1]:g}{unit}, and a run has multiples of {step:g}{unit}"
+        told = (
+            f"from {bounds[0]:g} to {bounds[1]:g}{unit}, and a run has multiples of {step:g}{unit}"
+        )
         raise ScenarioError(f"Uncertainty's {name} is {told}: give a range with several of these")
     return low, high
 
@@ -391,31 +575,46 @@ def _multiples(name: str, bounds: tuple[float, float], step: float) -> tuple[flo
 def _with_delay(scenario: Scenario, delay: float) -> Scenario:
     """Return the scenario with an input delay longer by a number of physics steps."""
     step = scenario.resolved.physics_step
-    return dataclasses.replace(scenario, input_delay=(scenario.delay_steps + round(delay / step)) * step)
+    return dataclasses.replace(
+        scenario, input_delay=(scenario.delay_steps + round(delay / step)) * step
+    )
 
 
 def _with_factor(scenario: Scenario, value: float, name: str) -> Scenario:
-    """Return the scenario with a factor on a parameter of the plant, or a term for a parameter of `plant.added`."""
+    """Return the scenario with a factor on a parameter of the plant, or a term for a parameter of
+    `plant.added`.
+    """
     plant, mismatch = scenario.plant, dict(scenario.mismatch)
-    name = plant.mass if name == "mass" and plant.mass in mismatch else name
-    mismatch[name] = mismatch.get(name, 0.0) + value if name in plant.added else mismatch.get(name, 1.0) * value
+    if name == "mass" and plant.mass in mismatch:
+        name = plant.mass
+    if name in plant.added:
+        mismatch[name] = mismatch.get(name, 0.0) + value
+    else:
+        mismatch[name] = mismatch.get(name, 1.0) * value
     return dataclasses.replace(scenario, mismatch=mismatch)
 
 
 def _with_counts(scenario: Scenario, counts: float) -> Scenario:
     """Return the scenario with an encoder of so many counts; all else of its sensor stays."""
-    return dataclasses.replace(scenario, sensor=dataclasses.replace(scenario.sensor or Encoder(), counts=round(counts)))
+    return dataclasses.replace(
+        scenario, sensor=dataclasses.replace(scenario.sensor or Encoder(), counts=round(counts))
+    )
 
 
 def _with_bound(scenario: Scenario, factor: float) -> Scenario:
     """Return the scenario with a factor on u_max."""
     u_max = scenario.resolved.u_max
-    scaled = tuple(factor * bound for bound in u_max) if isinstance(u_max, tuple) else factor * u_max
+    if isinstance(u_max, tuple):
+        scaled = tuple(factor * bound for bound in u_max)
+    else:
+        scaled = factor * u_max
     return dataclasses.replace(scenario, u_max=scaled)
 
 
 def _with_period(scenario: Scenario, factor: float) -> Scenario:
-    """Return the scenario with a factor on the control period, to the next multiple of the same physics step."""
+    """Return the scenario with a factor on the control period, to the next multiple of the same
+    physics step.
+    """
     step = scenario.resolved.physics_step
     period = max(1, round(factor * scenario.control_period / step)) * step
     return dataclasses.replace(scenario, control_period=period, physics_step=step)
@@ -440,14 +639,18 @@ def _dry(plant: Plant) -> list[str]:
 
 def _with_friction_scale(scenario: Scenario, factor: float) -> Scenario:
     """Return the scenario with a factor on its friction, and on the dry friction of its plant."""
-    scenario = dataclasses.replace(scenario, friction=tuple(part.scaled(factor) for part in scenario.friction))
+    scenario = dataclasses.replace(
+        scenario, friction=tuple(part.scaled(factor) for part in scenario.friction)
+    )
     for name in _dry(scenario.plant):
         scenario = _with_factor(scenario, factor, name)
     return scenario
 
 
 def with_jitter(scenario: Scenario, level: float) -> Scenario:
-    """Return the scenario whose samples are late by up to `level` control periods, counted in eighths of one."""
+    """Return the scenario whose samples are late by up to `level` control periods, counted in
+    eighths of one.
+    """
     steps = math.lcm(JITTER_SHARES, scenario.steps)  # so that delays stay multiples of a step
     jitter = round(level * JITTER_SHARES) / JITTER_SHARES * scenario.control_period
     clock = dataclasses.replace(scenario.clock, jitter=jitter)

@@ -1,4 +1,5 @@
-"""RealAIGym's boards for pendubot and acrobot: criteria, scores, robustness test, published rows and this package's.
+"""RealAIGym's boards for pendubot and acrobot: criteria, scores, robustness test, published rows
+and this package's.
 
     trace = smc.run(smc.boards.entry("acrobot"))   # an optimised trajectory under a Riccati law
     smc.boards.criteria(trace)                     # swing-up time, energy, ...
@@ -8,11 +9,12 @@
     trace = smc.run(smc.boards.on_board("pendubot", my_law()))
     smc.boards.board(trace, "my law")              # the published rows with this one among them
 
-    smc.boards.global_row("my law", smc.boards.on_board("pendubot", my_law()))  # the board of 2025, with resets
+    smc.boards.global_row("my law", smc.boards.on_board("pendubot", my_law()))  # the board of 2025,
+    with resets
 
-`experiments(robot)` has the entry and its control experiments: other feedbacks, and measured velocities;
-`global_experiments(robot)` those of the board of 2025. A law by any design may be an entry. docs/boards.md tells the
-rules and what this package's entries reach.
+`experiments(robot)` has the entry and its control experiments: other feedbacks, and measured
+velocities; `global_experiments(robot)` those of the board of 2025. A law by any design may be an
+entry. docs/boards.md tells the rules and what this package's entries reach.
 """
 
 from smc_mujoco.benchmark.realaigym.entries import FEEDBACKS as FEEDBACKS

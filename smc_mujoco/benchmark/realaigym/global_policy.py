@@ -1,18 +1,20 @@
-"""The boards of 2025 (version 3): a minute in which the machine is carried off 15 times, and has to come back.
+"""The boards of 2025 (version 3): a minute in which the machine is carried off 15 times, and has to
+come back.
 
     score = time with the tip above 0.9 (l1 + l2), over 60 s
 
-The machine starts at rest, hanging. At 15 times, 3.75 k s +- 1 s, a PID with gravity compensation drives both joints
-for 0.2 s towards angles in -pi .. pi, without setting the state; then the law acts again. It is not told, and is not
-asked meanwhile. Nothing counts but the time above the line, resets included. A swing-up is a rise above it, more than
-1 s after the last one that counted.
+The machine starts at rest, hanging. At 15 times, 3.75 k s +- 1 s, a PID with gravity compensation
+drives both joints for 0.2 s towards angles in -pi .. pi, without setting the state; then the law
+acts again. It is not told, and is not asked meanwhile. Nothing counts but the time above the line,
+resets included. A swing-up is a rise above it, more than 1 s after the last one that counted.
 
-The published simulator is repeated: RK4 and commands at 2 ms, no noise, no friction, t summed step by step, by which
-resets begin; a derivative of the PID for a period of 1 ms, its sums kept from reset to reset; its gravity compensation
-after its limit and before that of the motors. Times and goals are drawn by numpy's legacy generator as today's code
-draws them; the published rows were made by an earlier one, on resets that differ from row to row. So what is told of a
-law is its mean over seeds. The machine is chaotic: differences below 0.08 mean nothing, see docs/boards.md.
-Source: leaderboard/*/simulation_v3, controller/global_policy_testing_controller.py and controller/pid of
+The published simulator is repeated: RK4 and commands at 2 ms, no noise, no friction, t summed step
+by step, by which resets begin; a derivative of the PID for a period of 1 ms, its sums kept from
+reset to reset; its gravity compensation after its limit and before that of the motors. Times and
+goals are drawn by numpy's legacy generator as today's code draws them; the published rows were made
+by an earlier one, on resets that differ from row to row. So what is told of a law is its mean over
+seeds. The machine is chaotic: differences below 0.08 mean nothing, see docs/boards.md. Source:
+leaderboard/*/simulation_v3, controller/global_policy_testing_controller.py and controller/pid of
 github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
 
@@ -36,7 +38,7 @@ from smc_mujoco.benchmark.realaigym.simulator import (
     T,
     answered,
     stepped,
-)  # fmt: skip
+)
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 from smc_mujoco.mechanisms.plants.double_pendulum import L2, MODEL_1_1, TORQUE_LIMIT
@@ -44,12 +46,21 @@ from smc_mujoco.simulation.scenario import Scenario
 
 DURATION, STEPS, SEEDS = 60.0, 30_000, (0, 1, 2, 3)
 RESETS, RESET_TIME, APART = 15, 0.2, 1.0  # of a minute; s; s, between two swing-ups that count
-KP, KI, KD, PID_PERIOD = 10.0, 0.1, 1.0, 1e-3  # N m/rad, N m/(rad s), N m s/rad; s, which is not the step
-LEVER = MODEL_1_1["m1"] * MODEL_1_1["r1"] + MODEL_1_1["m2"] * MODEL_1_1["l1"]  # kg m, of the shoulder's gravity
+KP, KI, KD, PID_PERIOD = (
+    10.0,
+    0.1,
+    1.0,
+    1e-3,
+)  # N m/rad, N m/(rad s), N m s/rad; s, which is not the step
+LEVER = (
+    MODEL_1_1["m1"] * MODEL_1_1["r1"] + MODEL_1_1["m2"] * MODEL_1_1["l1"]
+)  # kg m, of the shoulder's gravity
 
 
 class Run(NamedTuple):
-    """A minute: states (q1, q2, q1', q2'), (30001, 4), and the torques of shoulder and elbow, N m, (30000, 2)."""
+    """A minute: states (q1, q2, q1', q2'), (30001, 4), and the torques of shoulder and elbow, N m,
+    (30000, 2).
+    """
 
     states: np.ndarray
     torques: np.ndarray
@@ -76,7 +87,9 @@ class Run(NamedTuple):
 
 
 def resets(seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times at which resets begin, s, (15,), and the angles that they aim at, rad, (15, 2)."""
+    """Return the times at which resets begin, s, (15,), and the angles that they aim at, rad, (15,
+    2).
+    """
     rng = np.random.RandomState(seed)
     states = rng.uniform(0.0, 2.0 * math.pi, (10 * RESETS + 1, 4)) - math.pi
     times = DURATION / (RESETS + 1) * np.arange(1, RESETS + 1) + 2.0 * (rng.rand(RESETS) - 0.5)
@@ -95,11 +108,23 @@ def minute(scenario: Scenario, seed: int) -> Run:
     functions = np.array([machine.law.address, machine.estimator.address])
     with delay_ctrl_c():  # numba may compile it now
         raised = _minute(
-            functions, machine.gains, machine.filter, *memories, machine.known, machine.driven, machine.limit,
-            machine.uses_model, times, goals, run.states, run.torques,
-        )  # fmt: skip
+            functions,
+            machine.gains,
+            machine.filter,
+            *memories,
+            machine.known,
+            machine.driven,
+            machine.limit,
+            machine.uses_model,
+            times,
+            goals,
+            run.states,
+            run.torques,
+        )
     if raised:
-        raise ScenarioError("the law raised an exception on the board of 2025: run it in a scenario")
+        raise ScenarioError(
+            "the law raised an exception on the board of 2025: run it in a scenario"
+        )
     return run
 
 
@@ -107,18 +132,48 @@ def global_row(name: str, scenario: Scenario, seeds: Sequence[int] = SEEDS) -> G
     """Return a law's row of the board of 2025: means over the resets of some seeds."""
     runs = [minute(scenario, seed) for seed in seeds]
     swing_ups, uptime = (
-        float(np.mean(values)) for values in zip(*((r.swing_ups, r.uptime) for r in runs), strict=True)
+        float(np.mean(values))
+        for values in zip(*((r.swing_ups, r.uptime) for r in runs), strict=True)
     )
     return GlobalRow(name, swing_ups, uptime, uptime / DURATION)
 
 
 @njit(error_model="numpy")
 def _minute(
-    functions, gains, tuning, memory, memories, known, driven, limit, uses_model, times, goals, states, torques
+    functions,
+    gains,
+    tuning,
+    memory,
+    memories,
+    known,
+    driven,
+    limit,
+    uses_model,
+    times,
+    goals,
+    states,
+    torques,
 ):
-    """Run a minute; states and torques are written. Return whether the law or its estimator raised an exception."""
-    p = (known[0], known[1], known[2], known[3], known[4], known[5], known[6], known[7], known[8], known[9], known[10],
-         known[11], known[12], known[13])  # fmt: skip
+    """Run a minute; states and torques are written.
+
+    Return whether the law or its estimator raised an exception.
+    """
+    p = (
+        known[0],
+        known[1],
+        known[2],
+        known[3],
+        known[4],
+        known[5],
+        known[6],
+        known[7],
+        known[8],
+        known[9],
+        known[10],
+        known[11],
+        known[12],
+        known[13],
+    )
     x, seen, y, room = (0.0, 0.0, 0.0, 0.0), np.zeros(4), np.zeros(MEASUREMENT_SIZE), np.zeros(ROOM)
     y[DT], y[LIMIT], y[USES_MODEL] = STEP, limit, uses_model
     total, before, count, resets_done = np.zeros(2), np.zeros(2), 0, 0
@@ -135,7 +190,10 @@ def _minute(
             for joint in range(2):
                 error = goals[resets_done - 1, joint] - x[joint]
                 total[joint] += error
-                rate = (error - before[joint]) / PID_PERIOD if count > 2 else 0.0
+                if count > 2:
+                    rate = (error - before[joint]) / PID_PERIOD
+                else:
+                    rate = 0.0
                 wanted = KP * error + KI * PID_PERIOD * total[joint] + KD * rate
                 before[joint] = error
                 wanted = min(max(wanted, -TORQUE_LIMIT), TORQUE_LIMIT) + gravity[joint]
@@ -144,7 +202,9 @@ def _minute(
         else:
             seen[0], seen[1], seen[2], seen[3] = x
             y[T] = t
-            wanted, raised = answered(functions, gains, tuning, memory, memories, known, driven, seen, y, room)
+            wanted, raised = answered(
+                functions, gains, tuning, memory, memories, known, driven, seen, y, room
+            )
             if raised:
                 return True
             u[driven], u[1 - driven] = min(max(wanted, -limit), limit), 0.0

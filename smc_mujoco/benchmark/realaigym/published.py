@@ -1,15 +1,18 @@
 """Published rows of RealAIGym's simulation boards of pendubot and acrobot.
 
-Sources: the boards of github.com/dfki-ric-underactuated-lab/real_ai_gym_leaderboard (the double pendulum's software and
-boards are BSD-3-Clause), as they stood after the AI Olympics at IROS 2024; archived_leaderboards/ has version 1, and
-leaderboards/icra2025 version 3, of April 2025. The machines of versions 2 and 3 are design C.1, model 1.1, and so are
-this package's. Those of version 1 had other parameters.
+Sources: the boards of github.com/dfki-ric-underactuated-lab/real_ai_gym_leaderboard (the double
+pendulum's software and boards are BSD-3-Clause), as they stood after the AI Olympics at IROS 2024;
+archived_leaderboards/ has version 1, and leaderboards/icra2025 version 3, of April 2025. The
+machines of versions 2 and 3 are design C.1, model 1.1, and so are this package's. Those of version
+1 had other parameters.
 """
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
-SOURCE = "RealAIGym leaderboards, DFKI Robotics Innovation Center, github.com/dfki-ric-underactuated-lab"
+SOURCE = (
+    "RealAIGym leaderboards, DFKI Robotics Innovation Center, github.com/dfki-ric-underactuated-lab"
+)
 
 
 class Row(NamedTuple):
@@ -27,7 +30,9 @@ class Row(NamedTuple):
 
 
 class RobustnessRow(NamedTuple):
-    """An entry of a robustness board: percent of survived cases of each test, and the mean of all tests in 0 .. 1."""
+    """An entry of a robustness board: percent of survived cases of each test, and the mean of all
+    tests in 0 .. 1.
+    """
 
     name: str
     model: float
@@ -40,7 +45,9 @@ class RobustnessRow(NamedTuple):
 
 
 class GlobalRow(NamedTuple):
-    """An entry of a board of 2025: how often the tip rose above the line, how long it was there, s, and the score."""
+    """An entry of a board of 2025: how often the tip rose above the line, how long it was there, s,
+    and the score.
+    """
 
     name: str
     swing_ups: float

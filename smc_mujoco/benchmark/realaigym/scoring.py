@@ -1,6 +1,7 @@
 """Criteria and scores of RealAIGym's simulation boards, of a run of pendubot or acrobot.
 
-A run starts at rest, hanging, and lasts 10 s, with RK4 and a command every 2 ms. Sums leave out the last sample, which
+A run starts at rest, hanging, and lasts 10 s, with RK4 and a command every 2 ms. Sums leave out the
+last sample, which
 is only the end of the last step:
 
     swing-up time       first t from which the tip stays above 0.9 (l1 + l2); a run that never does has failed
@@ -14,8 +15,9 @@ is only the end of the last step:
     v1:  score = 1 - sum w c / n,                 w/n of the seven criteria as in V1
     v2:  score = 1 - (1/5) sum tanh(pi c / n),    of five criteria, n as in V2
 
-A failed run scores 0. Source: src/python/double_pendulum/analysis/leaderboard.py and leaderboard/*/simulation_v* of
-github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
+A failed run scores 0. Source: src/python/double_pendulum/analysis/leaderboard.py and
+leaderboard/*/simulation_v* of github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause),
+rewritten here.
 """
 
 import math
@@ -33,10 +35,21 @@ from smc_mujoco.simulation.trace import Trace
 MIN_TIP_HEIGHT = 0.9  # of the length of both links, which the tip must exceed
 # Criterion -> weight and norm in version 1, norm in version 2.
 V1 = {
-    "swing_up_time": (0.2, 10.0), "max_torque": (0.1, 6.0), "energy": (0.1, 100.0), "integrated_torque": (0.1, 60.0),
-    "torque_cost": (0.1, 360.0), "torque_smoothness": (0.2, 12.0), "velocity_cost": (0.2, 1000.0),
-}  # fmt: skip
-V2 = {"swing_up_time": 20.0, "energy": 60.0, "torque_cost": 20.0, "torque_smoothness": 0.1, "velocity_cost": 400.0}
+    "swing_up_time": (0.2, 10.0),
+    "max_torque": (0.1, 6.0),
+    "energy": (0.1, 100.0),
+    "integrated_torque": (0.1, 60.0),
+    "torque_cost": (0.1, 360.0),
+    "torque_smoothness": (0.2, 12.0),
+    "velocity_cost": (0.2, 1000.0),
+}
+V2 = {
+    "swing_up_time": 20.0,
+    "energy": 60.0,
+    "torque_cost": 20.0,
+    "torque_smoothness": 0.1,
+    "velocity_cost": 400.0,
+}
 VERSIONS = {"v1": V1, "v2": V2}
 ROBOTS = ("acrobot", "pendubot")
 
@@ -59,7 +72,10 @@ class Criteria(NamedTuple):
 
 
 def shoulder_first(robot: str) -> list[int]:
-    """Return the channels of shoulder and elbow. Raise ScenarioError for another plant than pendubot and acrobot."""
+    """Return the channels of shoulder and elbow.
+
+    Raise ScenarioError for another plant than pendubot and acrobot.
+    """
     return find("robot of the boards", robot, {"acrobot": [1, 0], "pendubot": [0, 1]})
 
 
@@ -73,9 +89,17 @@ def criteria(trace: Trace) -> Criteria:
     joints = shoulder_first(plant.name)
     if trace.failure is not None:
         return Criteria(*[math.inf] * len(Criteria._fields))
-    q, v, u, t, l1 = trace.x[:, joints], trace.v[:, joints], trace.u[:, 0], trace.t, plant.parameters["l1"]
+    q, v, u, t, l1 = (
+        trace.x[:, joints],
+        trace.v[:, joints],
+        trace.u[:, 0],
+        trace.t,
+        plant.parameters["l1"],
+    )
     tip = -l1 * np.cos(q[:, 0]) - L2 * np.cos(q[:, 0] + q[:, 1])
-    low = np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1  # as published: first and last left out
+    low = (
+        np.flatnonzero(tip[1:-1] <= MIN_TIP_HEIGHT * (l1 + L2)) + 1
+    )  # as published: first and last left out
     first = low[-1] + 1 if len(low) else 1
     step, torque = np.diff(t), np.abs(u[:-1])
     return Criteria(
@@ -91,22 +115,35 @@ def criteria(trace: Trace) -> Criteria:
 
 @constrained
 def score(
-    run: Trace | Mapping[str, Any] | Criteria | Row, version: Annotated[str, OneOf(names=(*VERSIONS,))] = "v2"
+    run: Trace | Mapping[str, Any] | Criteria | Row,
+    version: Annotated[str, OneOf(names=(*VERSIONS,))] = "v2",
 ) -> float:
-    """Return the score of a run, in 0 .. 1, or of criteria by name, such as those of a published row.
+    """Return the score of a run, in 0 .. 1, or of criteria by name, such as those of a published
+    row.
 
     Raises:
       ScenarioError: an unknown version, a criterion that is missing, or another plant.
     """
     wanted = VERSIONS[version]
-    measured = criteria(run) if isinstance(run, Trace) else run
-    values: Mapping[str, Any] = measured if isinstance(measured, Mapping) else measured._asdict()
+    if isinstance(run, Trace):
+        measured = criteria(run)
+    else:
+        measured = run
+    values: Mapping[str, Any]
+    if isinstance(measured, Mapping):
+        values = measured
+    else:
+        values = measured._asdict()
     for name in wanted:
         if values.get(name) is None:
-            raise ScenarioError(f"criterion {name} of board {version} is missing in {shown(values)}: give a number")
+            raise ScenarioError(
+                f"criterion {name} of board {version} is missing in {shown(values)}: give a number"
+            )
         number(name, values[name], low=0.0, infinite=True)
     if not math.isfinite(values["swing_up_time"]):
         return 0.0
     if version == "v1":
         return 1.0 - sum(weight * values[name] / norm for name, (weight, norm) in V1.items())
-    return 1.0 - sum(math.tanh(math.pi * values[name] / norm) for name, norm in V2.items()) / len(V2)
+    return 1.0 - sum(math.tanh(math.pi * values[name] / norm) for name, norm in V2.items()) / len(
+        V2
+    )

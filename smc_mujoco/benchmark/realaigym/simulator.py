@@ -1,4 +1,5 @@
-"""RealAIGym's robustness test: six ways in which the machine differs from the model, at many levels.
+"""RealAIGym's robustness test: six ways in which the machine differs from the model, at many
+levels.
 
     model            one parameter at 21 values: Ir 0 to 1e-4 kg m^2; m1 r1, I1, m2 r2, m2, I2 at 75 to 125 %; b of each
                      joint -0.1 to 0.1 N m s/rad; cf of each -0.2 to 0.2 N m
@@ -8,16 +9,17 @@
     delay            positions and velocities 0 to 40 ms late
     perturbations    50 profiles of 3 pulses, standard width 0.05 to 0.1 s, amplitude 0.5 to 5 N m, beside the motor
 
-A case is survived if after 10 s the state is within (0.35, 0.35, 1, 1) of upright and at rest; a level with several
-runs if more than half of these do. Each test's percentage has the same weight.
+A case is survived if after 10 s the state is within (0.35, 0.35, 1, 1) of upright and at rest; a
+level with several runs if more than half of these do. Each test's percentage has the same weight.
 
-The published simulator is repeated here, because some of these machines cannot be built: friction that pushes, a
-response beyond 1. It is RK4 at 2 ms of the double pendulum's equation, with the dry friction cf arctan(100 q'). The law
-and its estimator run as in every scenario, compiled, by their addresses. In the published simulator a pulse on the
-joint without a motor has no effect (its input matrix is 0 there), so only the driven joint's are drawn. The published
-test has other random numbers at every run. Here they depend only on `SEED`, and for a law that is not of this package
-on a noise key, which is drawn when the test begins: no law can know its noise.
-Source: leaderboard/*/robustness_v2 and src/python/double_pendulum of
+The published simulator is repeated here, because some of these machines cannot be built: friction
+that pushes, a response beyond 1. It is RK4 at 2 ms of the double pendulum's equation, with the dry
+friction cf arctan(100 q'). The law and its estimator run as in every scenario, compiled, by their
+addresses. In the published simulator a pulse on the joint without a motor has no effect (its input
+matrix is 0 there), so only the driven joint's are drawn. The published test has other random
+numbers at every run. Here they depend only on `SEED`, and for a law that is not of this package on
+a noise key, which is drawn when the test begins: no law can know its noise. Source:
+leaderboard/*/robustness_v2 and src/python/double_pendulum of
 github.com/dfki-ric-underactuated-lab/double_pendulum (BSD-3-Clause), rewritten here.
 """
 
@@ -44,8 +46,16 @@ STEP, STEPS = 2e-3, 5000  # s; number of steps
 UPRIGHT_TOLERANCES = (0.35, 0.35, 1.0, 1.0)  # rad, rad, rad/s, rad/s, of upright and at rest
 LEVELS, REPEATS, PROFILES, PULSES = 21, 10, 50, 3
 MIN_PULSE_GAP, PULSE_WIDTH, PULSE_AMPLITUDE = 1.0, (0.05, 0.1), (0.5, 5.0)  # s; s; N m
-SCALED_PARAMETERS = {"m1r1": "r1", "I1": "I1", "m2r2": "r2", "m2": "m2", "I2": "I2"}  # what is scaled -> the parameter
-MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(SCALED_PARAMETERS, (0.75, 1.25))  # parameter -> ends of its values
+SCALED_PARAMETERS = {
+    "m1r1": "r1",
+    "I1": "I1",
+    "m2r2": "r2",
+    "m2": "m2",
+    "I2": "I2",
+}  # what is scaled -> the parameter
+MODEL_LEVELS = {"Ir": (0.0, 1e-4)} | dict.fromkeys(
+    SCALED_PARAMETERS, (0.75, 1.25)
+)  # parameter -> ends of its values
 MODEL_LEVELS |= {"b1": (-0.1, 0.1), "b2": (-0.1, 0.1), "cf1": (-0.2, 0.2), "cf2": (-0.2, 0.2)}
 MEASUREMENT_SIZE, ROOM = len(Measurement._fields), 11
 T, DT, LIMIT, USES_MODEL, X, V, E, DE, Q, DQ, F, G, FQ, GQ = (  # places in a measurement
@@ -62,21 +72,30 @@ class Case:
     test: str = ""  # one of TESTS
     name: str = ""  # the parameter that differs in the test "model", else the test
     value: float = 0.0  # its level
-    parameters: Mapping[str, float] = dataclasses.field(default_factory=dict)  # true values, where they differ
+    parameters: Mapping[str, float] = dataclasses.field(
+        default_factory=dict
+    )  # true values, where they differ
     velocity_noise: float = 0.0  # standard deviation, rad/s
     torque_noise: float = 0.0  # standard deviation, N m
     response: float = 1.0  # r of the motor
     delay: int = 0  # of the measurement, in control periods
-    pulses: tuple[tuple[float, float, float], ...] = ()  # centre (s), standard width (s) and amplitude (N m) of each
+    pulses: tuple[
+        tuple[float, float, float], ...
+    ] = ()  # centre (s), standard width (s) and amplitude (N m) of each
     seed: int = 0  # of the noise
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Robustness:
-    """The result of the test: percent of survived levels of each test, and the score, their mean in 0 .. 1."""
+    """The result of the test: percent of survived levels of each test, and the score, their mean in
+    0 .. 1.
+    """
 
-    survived: Mapping[str, tuple[tuple[str, float, bool], ...]]  # test -> (name, level, whether the law survived it)
-    noise_key: int = 0  # key of the random numbers: a scenario with it repeats them; 0 if they depend on SEED alone
+    survived: Mapping[
+        str, tuple[tuple[str, float, bool], ...]
+    ]  # test -> (name, level, whether the law survived it)
+    # key of the random numbers: a scenario with it repeats them; 0 if they depend on SEED alone
+    noise_key: int = 0
 
     def __repr__(self) -> str:
         tests = ", ".join(f"{test} {percent:.1f} %" for test, percent in self.percent.items())
@@ -85,7 +104,10 @@ class Robustness:
     @property
     def percent(self) -> dict[str, float]:
         """Percent of the levels of each test that the law survived."""
-        return {test: 100.0 * float(np.mean([ok for *_, ok in levels])) for test, levels in self.survived.items()}
+        return {
+            test: 100.0 * float(np.mean([ok for *_, ok in levels]))
+            for test, levels in self.survived.items()
+        }
 
     @property
     def score(self) -> float:
@@ -94,7 +116,10 @@ class Robustness:
 
 
 def cases(key: int = 0) -> list[Case]:
-    """Return every run of the test, in order, with the pulses of a noise key. Runs of one level stand together."""
+    """Return every run of the test, in order, with the pulses of a noise key.
+
+    Runs of one level stand together.
+    """
     listed = list[Case]()
 
     def levels(low: float, high: float) -> list[float]:
@@ -102,9 +127,15 @@ def cases(key: int = 0) -> list[Case]:
 
     for name, ends in MODEL_LEVELS.items():
         parameter = SCALED_PARAMETERS.get(name, name)
-        unit = MODEL_1_1[parameter] if name in SCALED_PARAMETERS else 1.0
+        if name in SCALED_PARAMETERS:
+            unit = MODEL_1_1[parameter]
+        else:
+            unit = 1.0
         cases_of = [(value, {parameter: unit * value}) for value in levels(*ends)]
-        listed += [Case(test="model", name=name, value=value, parameters=changed) for value, changed in cases_of]
+        listed += [
+            Case(test="model", name=name, value=value, parameters=changed)
+            for value, changed in cases_of
+        ]
 
     def case(test: str, value: float, **fields: Any) -> Case:
         return Case(test=test, name=test, value=value, **fields)
@@ -119,26 +150,37 @@ def cases(key: int = 0) -> list[Case]:
 
 
 def _pulses(rng: np.random.Generator) -> tuple[tuple[float, float, float], ...]:
-    """Return the pulses of the driven joint: half of those of a profile, which lie at least MIN_PULSE_GAP apart."""
+    """Return the pulses of the driven joint: half of those of a profile, which lie at least
+    MIN_PULSE_GAP apart.
+    """
     count = 2 * PULSES
-    centres = np.cumsum(MIN_PULSE_GAP + rng.uniform(0.0, (STEP * STEPS - (count + 1) * MIN_PULSE_GAP) / count, count))
+    centres = np.cumsum(
+        MIN_PULSE_GAP
+        + rng.uniform(0.0, (STEP * STEPS - (count + 1) * MIN_PULSE_GAP) / count, count)
+    )
     widths, reach = rng.uniform(*PULSE_WIDTH, PULSES), PULSE_AMPLITUDE[1] - PULSE_AMPLITUDE[0]
     amplitudes = rng.uniform(-reach, reach, PULSES)
     amplitudes += np.copysign(PULSE_AMPLITUDE[0], amplitudes)
     rows = zip(rng.permutation(centres)[:PULSES], widths, amplitudes, strict=True)
-    return tuple((float(centre), float(width), float(amplitude)) for centre, width, amplitude in rows)
+    return tuple(
+        (float(centre), float(width), float(amplitude)) for centre, width, amplitude in rows
+    )
 
 
-def robustness(scenario: Scenario, report: Callable[[float, float], None] | None = None) -> Robustness:
+def robustness(
+    scenario: Scenario, report: Callable[[float, float], None] | None = None
+) -> Robustness:
     """Return what a law survives of the robustness test.
 
     Args:
-      scenario: plant pendubot or acrobot; its law and velocity estimator are tested. The law may know the plant's
-        nominal parameters if the scenario says so. If its noise_key is 0, and the law is your own, one is drawn.
+      scenario: plant pendubot or acrobot; its law and velocity estimator are tested. The law may
+        know the plant's nominal parameters if the scenario says so. If its noise_key is 0, and the
+        law is your own, one is drawn.
       report: called with the number of runs done and the number of all.
 
     Raises:
-      ScenarioError: another plant, a surface, a reference that moves, or a law that does not compile.
+      ScenarioError: another plant, a surface, a reference that moves, or a law that does not
+        compile.
     """
     machine, todo = Machine(scenario), cases(0)
     levels: dict[tuple[str, str, float], list[bool]] = {}
@@ -154,11 +196,19 @@ def robustness(scenario: Scenario, report: Callable[[float, float], None] | None
 
 
 def upright(state: np.ndarray) -> bool:
-    """Return whether a state (q1, q2, q1', q2') is within UPRIGHT_TOLERANCES of rest upright; inf is not."""
+    """Return whether a state (q1, q2, q1', q2') is within UPRIGHT_TOLERANCES of rest upright; inf
+    is not.
+    """
     if not np.isfinite(state).all():
         return False
-    angles = [math.remainder(state[0] - math.pi, 2.0 * math.pi), math.remainder(state[1], 2.0 * math.pi)]
-    return all(abs(value) < limit for value, limit in zip((*angles, *state[2:]), UPRIGHT_TOLERANCES, strict=True))
+    angles = [
+        math.remainder(state[0] - math.pi, 2.0 * math.pi),
+        math.remainder(state[1], 2.0 * math.pi),
+    ]
+    return all(
+        abs(value) < limit
+        for value, limit in zip((*angles, *state[2:]), UPRIGHT_TOLERANCES, strict=True)
+    )
 
 
 class Machine:
@@ -167,27 +217,45 @@ class Machine:
     def __init__(self, scenario: Scenario):
         resolved = scenario.resolved
         self.driven = shoulder_first(scenario.plant.name).index(0)
-        if scenario.surface is not None or resolved.reference != REST or scenario.feedforward is not None:
+        if (
+            scenario.surface is not None
+            or resolved.reference != REST
+            or scenario.feedforward is not None
+        ):
             raise ScenarioError(
                 f"the robustness test of {scenario.plant.name} is only of the law and its estimator: leave out "
                 "surface, reference and feedforward"
             )
         law, velocity = scenario.law.of_channel(0), resolved.velocity
         try:
-            self.law, self.estimator = cfunctions.compile_component(law), cfunctions.compile_component(velocity)
+            self.law, self.estimator = (
+                cfunctions.compile_component(law),
+                cfunctions.compile_component(velocity),
+            )
         except NotCompilable as error:
-            raise ScenarioError(f"the robustness test runs compiled laws only, and {error}") from None
-        self.gains, self.filter = np.array([*law.gains.values(), 0.0]), np.array([*velocity.gains.values(), 0.0])
+            raise ScenarioError(
+                f"the robustness test runs compiled laws only, and {error}"
+            ) from None
+        self.gains, self.filter = (
+            np.array([*law.gains.values(), 0.0]),
+            np.array([*velocity.gains.values(), 0.0]),
+        )
         self.sizes = law.memory, velocity.memory
         self.known = np.array([scenario.plant.parameters[name] for name in MODEL_1_1])
         self.key, self.limit = 0, scenario.limits[0]
         self.uses_model = float(resolved.model == "nominal")
 
     def simulate(self, case: Case) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states (q1, q2, q1', q2'), (5001, 4), and the motor's torque, N m, (5000,), of a case."""
+        """Return the states (q1, q2, q1', q2'), (5001, 4), and the motor's torque, N m, (5000,), of
+        a case.
+        """
         true = dict(zip(MODEL_1_1, self.known, strict=True)) | dict(case.parameters)
         t, rng = STEP * np.arange(STEPS), np.random.default_rng([SEED, case.seed, self.key])
-        noise = rng.normal(size=(STEPS, 3)) * [case.velocity_noise, case.velocity_noise, case.torque_noise]
+        noise = rng.normal(size=(STEPS, 3)) * [
+            case.velocity_noise,
+            case.velocity_noise,
+            case.torque_noise,
+        ]
         pulse = np.zeros(STEPS)
         for centre, width, amplitude in case.pulses:
             pulse += amplitude * np.exp(-0.5 * ((t - centre) / width) ** 2)
@@ -196,11 +264,26 @@ class Machine:
         functions = np.array([self.law.address, self.estimator.address])
         with delay_ctrl_c():  # numba may compile it now
             raised = _simulate(
-                functions, self.gains, self.filter, *memories, self.known, np.array(list(true.values())), self.driven,
-                self.limit, self.uses_model, noise, pulse, case.response, case.delay, states, torque,
-            )  # fmt: skip
+                functions,
+                self.gains,
+                self.filter,
+                *memories,
+                self.known,
+                np.array(list(true.values())),
+                self.driven,
+                self.limit,
+                self.uses_model,
+                noise,
+                pulse,
+                case.response,
+                case.delay,
+                states,
+                torque,
+            )
         if raised:
-            raise ScenarioError("the law raised an exception in the robustness test: run it in a scenario")
+            raise ScenarioError(
+                "the law raised an exception in the robustness test: run it in a scenario"
+            )
         return states, torque
 
 
@@ -208,7 +291,9 @@ class Machine:
 def _slope(x, u1, u2, p):
     """Return the derivative of the state (4 numbers) under torques on both joints."""
     m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, cf1, cf2, grav = p
-    a1, a2, W11, W12, W22 = accelerations(x[0], x[1], x[2], x[3], m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, grav)
+    a1, a2, W11, W12, W22 = accelerations(
+        x[0], x[1], x[2], x[3], m1, m2, l1, r1, r2, I1, I2, Ir, gear, b1, b2, grav
+    )
     u1 -= cf1 * math.atan(100.0 * x[2])
     u2 -= cf2 * math.atan(100.0 * x[3])
     return x[2], x[3], a1 + W11 * u1 + W12 * u2, a2 + W12 * u1 + W22 * u2
@@ -232,36 +317,105 @@ def stepped(x, u1, u2, p):
 
 @njit(error_model="numpy")
 def answered(functions, gains, tuning, memory, memories, known, driven, seen, y, room):
-    """Return a law's answer to a measured state, (4,), and whether it or its estimator raised an exception.
+    """Return a law's answer to a measured state, (4,), and whether it or its estimator raised an
+    exception.
 
-    `y` has t, dt, limit and model, and gets the rest of the measurement; `room` is ROOM numbers to work in.
+    `y` has t, dt, limit and model, and gets the rest of the measurement; `room` is ROOM numbers to
+    work in.
     """
-    control, reading, estimate, position, velocity = room[:2], room[2:5], room[5:7], room[7:9], room[9:]
+    control, reading, estimate, position, velocity = (
+        room[:2],
+        room[2:5],
+        room[5:7],
+        room[7:9],
+        room[9:],
+    )
     for joint in range(2):
         reading[0], reading[1], reading[2] = STEP, seen[joint], seen[2 + joint]
-        if call(functions[1], reading.ctypes.data, tuning.ctypes.data, memories[joint].ctypes.data,
-                estimate.ctypes.data) != 0:  # fmt: skip
+        if (
+            call(
+                functions[1],
+                reading.ctypes.data,
+                tuning.ctypes.data,
+                memories[joint].ctypes.data,
+                estimate.ctypes.data,
+            )
+            != 0
+        ):
             return 0.0, True
         position[joint], velocity[joint] = seen[joint], estimate[0]
     f1, f2, W11, W12, W22 = accelerations(
-        position[0], position[1], velocity[0], velocity[1], known[0], known[1], known[2], known[3], known[4], known[5],
-        known[6], known[7], known[8], known[9], known[10], known[13],
-    )  # fmt: skip
-    f, fq, g, free = (f1, f2, W11, 1) if driven == 0 else (f2, f1, W22, 0)
+        position[0],
+        position[1],
+        velocity[0],
+        velocity[1],
+        known[0],
+        known[1],
+        known[2],
+        known[3],
+        known[4],
+        known[5],
+        known[6],
+        known[7],
+        known[8],
+        known[9],
+        known[10],
+        known[13],
+    )
+    if driven == 0:
+        f, fq, g, free = (f1, f2, W11, 1)
+    else:
+        f, fq, g, free = (f2, f1, W22, 0)
     y[X], y[V], y[E], y[DE] = position[driven], velocity[driven], position[driven], velocity[driven]
     y[Q], y[DQ], y[F], y[G], y[FQ], y[GQ] = position[free], velocity[free], f, g, fq, W12
-    raised = call(functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data) != 0
+    raised = (
+        call(
+            functions[0], y.ctypes.data, gains.ctypes.data, memory.ctypes.data, control.ctypes.data
+        )
+        != 0
+    )
     return control[0], raised
 
 
 @njit(error_model="numpy")
 def _simulate(
-    functions, gains, tuning, memory, memories, known, true, driven, limit, uses_model, noise, pulse, response, delay,
-    states, torque,
-):  # fmt: skip
-    """Run a case; states and torque are written. Return whether the law or its estimator raised an exception."""
-    parameters = (true[0], true[1], true[2], true[3], true[4], true[5], true[6], true[7], true[8], true[9], true[10],
-                  true[11], true[12], true[13])  # fmt: skip
+    functions,
+    gains,
+    tuning,
+    memory,
+    memories,
+    known,
+    true,
+    driven,
+    limit,
+    uses_model,
+    noise,
+    pulse,
+    response,
+    delay,
+    states,
+    torque,
+):
+    """Run a case; states and torque are written.
+
+    Return whether the law or its estimator raised an exception.
+    """
+    parameters = (
+        true[0],
+        true[1],
+        true[2],
+        true[3],
+        true[4],
+        true[5],
+        true[6],
+        true[7],
+        true[8],
+        true[9],
+        true[10],
+        true[11],
+        true[12],
+        true[13],
+    )
     x, motor, seen = (0.0, 0.0, 0.0, 0.0), 0.0, np.zeros(4)
     y, room = np.zeros(MEASUREMENT_SIZE), np.zeros(ROOM)
     y[DT], y[LIMIT], y[USES_MODEL] = STEP, limit, uses_model
@@ -270,7 +424,9 @@ def _simulate(
         seen[2] += noise[k, 0]
         seen[3] += noise[k, 1]
         y[T] = k * STEP
-        wanted, raised = answered(functions, gains, tuning, memory, memories, known, driven, seen, y, room)
+        wanted, raised = answered(
+            functions, gains, tuning, memory, memories, known, driven, seen, y, room
+        )
         if raised:
             return True
         motor += response * (min(max(wanted, -limit), limit) - motor)

@@ -5,7 +5,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from smc_mujoco.benchmark.realaigym.entries import FEEDBACKS, entry, on_board
-from smc_mujoco.benchmark.realaigym.published import GLOBAL, ROBUSTNESS, SIMULATION, GlobalRow, RobustnessRow, Row
+from smc_mujoco.benchmark.realaigym.published import (
+    GLOBAL,
+    ROBUSTNESS,
+    SIMULATION,
+    GlobalRow,
+    RobustnessRow,
+    Row,
+)
 from smc_mujoco.benchmark.realaigym.scoring import criteria, score, shoulder_first
 from smc_mujoco.benchmark.realaigym.simulator import Robustness
 from smc_mujoco.common import errors
@@ -20,29 +27,47 @@ KEY = (
     "are clipped at 6 N m. *: measured velocities, as in published rows; else velocities from a filter of 5 positions"
 )
 # Fields of a Scenario that are an entry's own. The rules fix all others.
-DESIGN_FIELDS = ("law", "model", "surface", "velocity", "reference", "feedforward", "seed", "noise_key", "condition")
+DESIGN_FIELDS = (
+    "law",
+    "model",
+    "surface",
+    "velocity",
+    "reference",
+    "feedforward",
+    "seed",
+    "noise_key",
+    "condition",
+)
 
 
 def experiments(robot: str) -> dict[str, Scenario]:
-    """Return name of row -> run of the entry and of its control experiments, each with both kinds of velocities."""
+    """Return name of row -> run of the entry and of its control experiments, each with both kinds
+    of velocities.
+    """
     rows = {f"trajectory + {feedback}": entry(robot, feedback) for feedback in FEEDBACKS}
-    measured = {name + MEASURED_MARK: dataclasses.replace(run, velocity="measured") for name, run in rows.items()}
+    measured = {}
+    for name, run in rows.items():
+        measured[name + MEASURED_MARK] = dataclasses.replace(run, velocity="measured")
     return rows | measured
 
 
 def board(runs: Trace | Mapping[str, Trace], name: str = NAME) -> tuple[Row, ...]:
-    """Return the rows of the version-2 simulation board of a trace's plant, with the trace's row under this name.
+    """Return the rows of the version-2 simulation board of a trace's plant, with the trace's row
+    under this name.
 
     Args:
       runs: a trace, or name -> trace for several rows; traces of one plant.
       name: of the row of a single trace.
 
     Raises:
-      ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards', a law that
-        needs the Python loop and knows more than its measurements, or a name that cannot be printed or is that of a
-        published row.
+      ScenarioError: another plant than pendubot and acrobot, a run by other rules than the boards',
+        a law that needs the Python loop and knows more than its measurements, or a name that cannot
+        be printed or is that of a published row.
     """
-    traces = runs if isinstance(runs, Mapping) else {name: runs}
+    if isinstance(runs, Mapping):
+        traces = runs
+    else:
+        traces = {name: runs}
     robot = next(iter(traces.values())).scenario.plant.name
     shoulder_first(robot)
     rows = [_row(label, trace, robot) for label, trace in traces.items()]
@@ -52,7 +77,9 @@ def board(runs: Trace | Mapping[str, Trace], name: str = NAME) -> tuple[Row, ...
 def robustness_board(robot: str, results: Mapping[str, Robustness]) -> tuple[RobustnessRow, ...]:
     """Return the rows of the robustness board of a robot, with rows of results by name."""
     shoulder_first(robot)
-    rows = [RobustnessRow(name=name, score=result.score, **result.percent) for name, result in results.items()]
+    rows = []
+    for name, result in results.items():
+        rows.append(RobustnessRow(name=name, score=result.score, **result.percent))
     return _ranked(ROBUSTNESS[robot], rows)
 
 
@@ -63,10 +90,15 @@ def global_board(robot: str, rows: Sequence[GlobalRow]) -> tuple[GlobalRow, ...]
 
 
 def _ranked(published: tuple[Any, ...], rows: list[Any]) -> tuple[Any, ...]:
-    """Return published and other rows, best score first. Refuse a name that cannot be printed or is taken."""
+    """Return published and other rows, best score first.
+
+    Refuse a name that cannot be printed or is taken.
+    """
     for row in rows:
         if errors.name("name of the row", row.name) in [one.name for one in published]:
-            raise errors.ScenarioError(f"name of the row is {row.name!r}, which a published row has: give another")
+            raise errors.ScenarioError(
+                f"name of the row is {row.name!r}, which a published row has: give another"
+            )
     return tuple(sorted((*published, *rows), key=lambda row: -row.score))
 
 
@@ -79,11 +111,23 @@ def _row(name: str, trace: Trace, robot: str) -> Row:
                 f"the run has {rule} {errors.shown(value)}, and the boards have {errors.shown(right)}: "
                 "use smc.boards.on_board"
             )
-    return Row(name=name, score=score(values), **{field: getattr(values, field) for field in Row._fields[1:6]})
+    return Row(
+        name=name,
+        score=score(values),
+        **{field: getattr(values, field) for field in Row._fields[1:6]},
+    )
 
 
 def _ruled(scenario: Scenario) -> dict[str, object]:
-    """Return name -> value of all that the rules fix: the plant's parameters, and the fields not in DESIGN_FIELDS."""
+    """Return name -> value of all that the rules fix: the plant's parameters, and the fields not in
+    DESIGN_FIELDS.
+    """
     resolved = scenario.resolved
-    fields = [field.name for field in dataclasses.fields(Scenario) if field.name not in (*DESIGN_FIELDS, "u_max")]
-    return {**scenario.plant.parameters, **{name: getattr(resolved, name) for name in ("limits", *fields)}}
+    fields = []
+    for field in dataclasses.fields(Scenario):
+        if field.name not in (*DESIGN_FIELDS, "u_max"):
+            fields.append(field.name)
+    return {
+        **scenario.plant.parameters,
+        **{name: getattr(resolved, name) for name in ("limits", *fields)},
+    }

@@ -1,18 +1,20 @@
-"""This package's entries on the boards of 2025: a sliding mode pumps energy, and a linear law catches.
+"""This package's entries on the boards of 2025: a sliding mode pumps energy, and a linear law
+catches.
 
-    pump:   s = v + c (e - ref),   ref = A sat((E0 + m - E) / w) tanh(r / v_s),   v' = -c v - K sat(s / phi)
-    catch:  u = -k'z where z'P z < level
+    pump:   s = v + c (e - ref),   ref = A sat((E0 + m - E) / w) tanh(r / v_s),   v' = -c v - K
+    sat(s / phi) catch:  u = -k'z where z'P z < level
 
-The driven joint, with e its angle from upright and v its speed, follows a reference that swings as the free part does,
-by more where energy is missing. E0 is upright's. Of the pendubot E is the energy of the lower link alone about its
-joint, and r its speed times the cosine of its angle; of the acrobot that of the machine, and the shoulder's speed. u
-gives the wanted v' on the nominal model (collocated linearisation). z is the distance from upright, and P and k'
-solve its Riccati equation for Q = diag(10, 10, 1, 1), R = 1.
+The driven joint, with e its angle from upright and v its speed, follows a reference that swings as
+the free part does, by more where energy is missing. E0 is upright's. Of the pendubot E is the
+energy of the lower link alone about its joint, and r its speed times the cosine of its angle; of
+the acrobot that of the machine, and the shoulder's speed. u gives the wanted v' on the nominal
+model (collocated linearisation). z is the distance from upright, and P and k' solve its Riccati
+equation for Q = diag(10, 10, 1, 1), R = 1.
 
-Gains were found by random search on the resets of seeds 100 to 115 (`python benchmarks/swing_up.py ROBOT --resets`).
-`global_experiments` has the entry and its control experiments.
-Source: M. W. Spong, The swing up control problem for the acrobot, IEEE Control Systems Magazine 15(1):49, 1995 (the
-linearisation, and a reference that pumps), with a sliding surface in place of his linear law.
+Gains were found by random search on the resets of seeds 100 to 115 (`python benchmarks/swing_up.py
+ROBOT --resets`). `global_experiments` has the entry and its control experiments. Source: M. W.
+Spong, The swing up control problem for the acrobot, IEEE Control Systems Magazine 15(1):49, 1995
+(the linearisation, and a reference that pumps), with a sliding surface in place of his linear law.
 """
 
 import dataclasses
@@ -31,27 +33,51 @@ from smc_mujoco.simulation.scenario import Scenario
 
 GLOBAL_NAME = "sliding swing-up"
 GAINS: Mapping[str, Mapping[str, float]] = {  # rad, 1/s, rad/s^2, rad/s, J, J, rad/s, N m rad
-    "acrobot": {"A": 1.426, "c": 21.05, "K": 300.0, "phi": 0.4459, "m": -0.2029, "w": 0.7947, "v_s": 0.2134,
-                "level": 213.1},
-    "pendubot": {"A": 2.138, "c": 32.11, "K": 300.0, "phi": 0.5452, "m": 0.6214, "w": 2.0, "v_s": 0.6516,
-                 "level": 44.01},
-}  # fmt: skip
+    "acrobot": {
+        "A": 1.426,
+        "c": 21.05,
+        "K": 300.0,
+        "phi": 0.4459,
+        "m": -0.2029,
+        "w": 0.7947,
+        "v_s": 0.2134,
+        "level": 213.1,
+    },
+    "pendubot": {
+        "A": 2.138,
+        "c": 32.11,
+        "K": 300.0,
+        "phi": 0.5452,
+        "m": 0.6214,
+        "w": 2.0,
+        "v_s": 0.6516,
+        "level": 44.01,
+    },
+}
 NEVER_BENDS = 1e4  # factor on K and phi by which sat(s / phi) is s / phi
-MODEL = tuple(MODEL_1_1[name] for name in ("m1", "m2", "l1", "r1", "r2", "I1", "I2", "Ir", "gear", "b1", "b2", "grav"))
+MODEL = tuple(
+    MODEL_1_1[name]
+    for name in ("m1", "m2", "l1", "r1", "r2", "I1", "I2", "Ir", "gear", "b1", "b2", "grav")
+)
 M1, M2, L1, R1, R2, I1, I2, *_, GRAVITY = MODEL
 LOWER, UPPER = GRAVITY * M2 * R2, GRAVITY * (M1 * R1 + M2 * L1)  # N m, gravity's torques at most
 COUPLING, INERTIA = M2 * L1 * R2, I1 + I2 + M2 * L1**2  # kg m^2
 
 
 def upright_law(robot: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return k and P of the linear law that holds the machine upright, of z = (q1 - pi, q2, q1', q2')."""
+    """Return k and P of the linear law that holds the machine upright, of z = (q1 - pi, q2, q1',
+    q2').
+    """
     from scipy.linalg import solve_continuous_are
 
     driven, step, A, b = shoulder_first(robot).index(0), 1e-6, np.zeros((4, 4)), np.zeros((4, 1))
     A[:2, 2:] = np.eye(2)
     for joint in range(2):
         d = step * np.eye(2)[joint]
-        ahead, behind = (accelerations(math.pi + sign * d[0], sign * d[1], 0.0, 0.0, *MODEL) for sign in (1.0, -1.0))
+        ahead, behind = (
+            accelerations(math.pi + sign * d[0], sign * d[1], 0.0, 0.0, *MODEL)
+            for sign in (1.0, -1.0)
+        )
         A[2:, joint] = np.subtract(ahead[:2], behind[:2]) / (2.0 * step)
     b[2:, 0] = accelerations(math.pi, 0.0, 0.0, 0.0, *MODEL)[2 + driven : 4 + driven]
     solved = solve_continuous_are(A, b, np.diag([10.0, 10.0, 1.0, 1.0]), [[1.0]])
@@ -66,7 +92,10 @@ def _swing_up(robot: str) -> Template:
     shoulder = robot == "pendubot"
 
     def law(y, gains, memory):
-        q1, q2, v1, v2 = (y.x, y.q, y.v, y.dq) if shoulder else (y.q, y.x, y.dq, y.v)
+        if shoulder:
+            q1, q2, v1, v2 = (y.x, y.q, y.v, y.dq)
+        else:
+            q1, q2, v1, v2 = (y.q, y.x, y.dq, y.v)
         z = (nearest(q1 - math.pi), nearest(q2), v1, v2)
         cost = u = 0.0
         for i in range(4):
@@ -81,17 +110,30 @@ def _swing_up(robot: str) -> Template:
         else:
             swing, cosine = v1, COUPLING * math.cos(q2)
             missing = UPPER * (1.0 + math.cos(q1)) + LOWER * (1.0 + math.cos(q1 + q2))
-            missing -= (0.5 * INERTIA + cosine) * v1 * v1 + (I2 + cosine) * v1 * v2 + 0.5 * I2 * v2 * v2
-        reference = gains.A * min(max((missing + gains.m) / gains.w, -1.0), 1.0) * math.tanh(swing / gains.v_s)
+            missing -= (
+                (0.5 * INERTIA + cosine) * v1 * v1 + (I2 + cosine) * v1 * v2 + 0.5 * I2 * v2 * v2
+            )
+        reference = (
+            gains.A
+            * min(max((missing + gains.m) / gains.w, -1.0), 1.0)
+            * math.tanh(swing / gains.v_s)
+        )
         e = z[0] if shoulder else z[1]
         s = y.v + gains.c * (e - reference)
         wanted = -gains.c * y.v - gains.K * min(max(s / gains.phi, -1.0), 1.0)
         return (wanted - y.f) / y.g, s
 
-    law.__name__ = law.__qualname__ = f"{robot}_sliding_swing_up"  # by which files and other processes find it
-    law.__doc__ = f"Swing-up of the {robot} from anywhere: a sliding mode pumps energy, a linear law catches."
+    law.__name__ = law.__qualname__ = (
+        f"{robot}_sliding_swing_up"  # by which files and other processes find it
+    )
+    law.__doc__ = (
+        f"Swing-up of the {robot} from anywhere: a sliding mode pumps energy, a linear law catches."
+    )
     return law_function(
-        gains=dict(GAINS[robot]), positive=("A", "c", "K", "phi", "w", "v_s"), plants=(robot,), requires_model=True
+        gains=dict(GAINS[robot]),
+        positive=("A", "c", "K", "phi", "w", "v_s"),
+        plants=(robot,),
+        requires_model=True,
     )(law)
 
 
@@ -100,9 +142,14 @@ pendubot_sliding_swing_up = _swing_up("pendubot")
 
 
 def global_entry(robot: str, **gains: float) -> Scenario:
-    """Return what this package enters on the board of 2025 of a robot: its law, measured velocities, nominal model."""
+    """Return what this package enters on the board of 2025 of a robot: its law, measured
+    velocities, nominal model.
+    """
     shoulder_first(robot)
-    law = acrobot_sliding_swing_up if robot == "acrobot" else pendubot_sliding_swing_up
+    if robot == "acrobot":
+        law = acrobot_sliding_swing_up
+    else:
+        law = pendubot_sliding_swing_up
     return dataclasses.replace(on_board(robot, law(**gains).sourced(SHIPPED)), model="nominal")
 
 
@@ -111,8 +158,11 @@ def global_experiments(robot: str) -> dict[str, Scenario]:
     made, gains = global_entry(robot), GAINS[robot]
     straight = {name: NEVER_BENDS * gains[name] for name in ("K", "phi")}
     return {
-        GLOBAL_NAME: made, "the same, linear": global_entry(robot, **straight),
-        "the same, no pump": global_entry(robot, A=1e-9), "the same, no catch": global_entry(robot, level=0.0),
+        GLOBAL_NAME: made,
+        "the same, linear": global_entry(robot, **straight),
+        "the same, no pump": global_entry(robot, A=1e-9),
+        "the same, no catch": global_entry(robot, level=0.0),
         "linear law alone": global_entry(robot, level=1e99),
-        "trajectory + Riccati*": entry(robot, velocity="measured"), "u = 0": on_board(robot, "none"),
-    }  # fmt: skip
+        "trajectory + Riccati*": entry(robot, velocity="measured"),
+        "u = 0": on_board(robot, "none"),
+    }

@@ -1,1 +1,4 @@
-"""Commands of the command line: plain functions that `cli.main` registers. Importing them is cheap."""
+"""Commands of the command line: plain functions that `cli.main` registers.
+
+Importing them is cheap.
+"""

@@ -26,7 +26,9 @@ Bound = Annotated[
         "position_noise, velocity_noise, hold (of an error, s), jitter (s), x0 (a share of it).",
     ),
 ]
-Metric = Annotated[str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")]
+Metric = Annotated[
+    str, typer.Option(help="The score to look at, any that `smc-mujoco show` lists; more is worse.")
+]
 BOUNDS = {  # what sentences about a class say in Python -> on the command line
     r"\bUncertainty's ": "--bound ",
     r"\bUncertainty\b": "--bound",
@@ -47,11 +49,16 @@ def tune(
         str, typer.Option(help="balanced: error, and variation of u; tracking: only error.")
     ] = "balanced",
     searches: Annotated[int, typer.Option(min=1, help="Searches, which share nothing.")] = 12,
-    budget: Annotated[int, typer.Option(min=1, help="Sets of gains that a search tries at most, for each gain.")] = 64,
+    budget: Annotated[
+        int, typer.Option(min=1, help="Sets of gains that a search tries at most, for each gain.")
+    ] = 64,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the searches and of the noise.")] = 0,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.json", help="Also write gains, history and provenance to a file, and each search."),
+        typer.Option(
+            metavar="FILE.json",
+            help="Also write gains, history and provenance to a file, and each search.",
+        ),
     ] = None,
     condition: options.Conditions = None,
     x0: options.X0 = None,
@@ -59,11 +66,13 @@ def tune(
 ) -> None:
     """Find a law's gains on a plant by a rule that is the same for every law.
 
-    Each gain is searched over the same number of decades about a scale that follows from its unit and the plant. The
-    objective is error times time, plus variation of u, summed over seven conditions in runs of 5 s: nominal, noise,
-    delay, a sine and a constant disturbance, 30 % more and 30 % less mass. Each search has its own start, noise and
-    initial states, so their results show how much a tuning decides by chance. The same seed gives the same gains. With
-    --out each search is kept in the folder FILE-searches: if you stop the command, it continues there.
+    Each gain is searched over the same number of decades about a scale that follows from its unit
+    and the plant. The objective is error times time, plus variation of u, summed over seven
+    conditions in runs of 5 s: nominal, noise, delay, a sine and a constant disturbance, 30 % more
+    and 30 % less mass. Each search has its own start, noise and initial states, so their results
+    show how much a tuning decides by chance. The same seed gives the same gains. With
+    --out each search is kept in the folder FILE-searches: if you stop the command, it continues
+    there.
 
     Example: smc-mujoco tune duffing observer_free --out duffing.json
     """
@@ -72,9 +81,22 @@ def tune(
 
     options.check_files(out)
     terminal, start = Terminal(), options.starts(x0)
-    tested, folder = options.conditions(condition) or None, out and out.with_name(f"{out.stem}-searches")
+    tested, folder = (
+        options.conditions(condition) or None,
+        out and out.with_name(f"{out.stem}-searches"),
+    )
     tuned = search.tune(
-        plant, law, budget, seed, objective, threads, True, tested, start, searches=searches, folder=folder
+        plant,
+        law,
+        budget,
+        seed,
+        objective,
+        threads,
+        True,
+        tested,
+        start,
+        searches=searches,
+        folder=folder,
     )
     terminal.print(tuned)
     terminal.note(f"{terminal.seconds:.0f} s", "dim")
@@ -93,19 +115,24 @@ def margins(
     ] = None,
     gains: options.Gains = "tuned",
     quick: Annotated[
-        bool, typer.Option("--quick", help="Shorter runs, coarser results; default 2 plants, 4 laws, 2 kinds.")
+        bool,
+        typer.Option(
+            "--quick", help="Shorter runs, coarser results; default 2 plants, 4 laws, 2 kinds."
+        ),
     ] = False,
     condition: options.Condition = "nominal",
     x0: options.X0 = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
-    """Find how much a law tolerates: the largest level at which the error still ends below 5 % of its start.
+    """Find how much a law tolerates: the largest level at which the error still ends below 5 % of
+    its start.
 
-    A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one, noise is the
-    standard deviation of the position (that of the velocity is 5/s times as large), and the delay of the command is in
-    s. The column theory has the limit of the loop linearised at rest, such as the delay at which rest becomes unstable,
-    if the law can be linearised. A law may tolerate more, with a small steady oscillation.
+    A constant disturbance and dry friction are in N or N m, mass is a multiple of the nominal one,
+    noise is the standard deviation of the position (that of the velocity is 5/s times as large),
+    and the delay of the command is in s. The column theory has the limit of the loop linearised at
+    rest, such as the delay at which rest becomes unstable, if the law can be linearised. A law may
+    tolerate more, with a small steady oscillation.
 
     Example: smc-mujoco margins duffing --law observer_free,classical --kinds delay
     """
@@ -120,12 +147,16 @@ def margins(
 
     terminal = Terminal()
     options.check_files(json)
-    machines = [as_plant(text) for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS)]
+    machines = []
+    for text in options.names(plants, QUICK_MARGINS["plants"] if quick else PLANTS):
+        machines.append(as_plant(text))
     chosen = options.laws(law, QUICK_MARGINS["laws"] if quick else gain_sets.LAWS)
     kind = options.names(kinds, QUICK_MARGINS["kinds"] if quick else KINDS)
     with bar("margins") as progress:
         start = options.starts(x0)
-        results = search(machines, chosen, kind, gains, quick, threads, progress.reached, condition, start)
+        results = search(
+            machines, chosen, kind, gains, quick, threads, progress.reached, condition, start
+        )
     for name in kind:
         terminal.print(tables.margins(name, [margin for margin in results if margin.kind == name]))
     words = f"{counted(len(results), 'margin')}, {options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s"
@@ -138,7 +169,9 @@ def worst(
     plant: Annotated[
         str,
         typer.Argument(
-            metavar="PLANT|RIG", autocompletion=options.PLANTS, help="A plant, FILE.xml:joint+joint, or a rig's sets."
+            metavar="PLANT|RIG",
+            autocompletion=options.PLANTS,
+            help="A plant, FILE.xml:joint+joint, or a rig's sets.",
         ),
     ],
     law: options.Laws = None,
@@ -148,27 +181,37 @@ def worst(
     gains: options.Gains = "tuned",
     condition: options.Condition = "nominal",
     duration: Annotated[
-        float, typer.Option(help="Duration of the runs, s; the error of the first quarter does not count.")
+        float,
+        typer.Option(
+            help="Duration of the runs, s; the error of the first quarter does not count."
+        ),
     ] = 8.0,
-    budget: Annotated[int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")] = None,
+    budget: Annotated[
+        int | None, typer.Option(min=1, help="Runs of a search; default: about 10 s a law.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 0,
     out: Annotated[Path | None, options.picture("the worst runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
-    """Find the worst that can happen to laws within bounds that you give: an adversary instead of random seeds.
+    """Find the worst that can happen to laws within bounds that you give: an adversary instead of
+    random seeds.
 
-    Only what you bound is uncertain; all else is as in the condition. By default that is what the plant declares, as an
-    arm's payload, or else a disturbance up to a sixth of what the weakest drive gives. On a rig, such as qube_servo,
-    the adversary also chooses a parameter set. The search is the same for all laws; there may be worse than it finds.
+    Only what you bound is uncertain; all else is as in the condition. By default that is what the
+    plant declares, as an arm's payload, or else a disturbance up to a sixth of what the weakest
+    drive gives. On a rig, such as qube_servo, the adversary also chooses a parameter set. The
+    search is the same for all laws; there may be worse than it finds.
 
-    The column "worst found" has the error of the worst run, the column "median" that of as many random runs within the
-    bounds. Laws are ordered by the worst. A line below the table says where the bounds go beyond the theorem of a law.
-    The law of your file has its default gains: tune it first (`smc-mujoco tune`).
+    The column "worst found" has the error of the worst run, the column "median" that of as many
+    random runs within the bounds. Laws are ordered by the worst. A line below the table says where
+    the bounds go beyond the theorem of a law. The law of your file has its default gains: tune it
+    first (`smc-mujoco tune`).
 
-    Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2 --bound mass=0.7:1.3
+    Example: smc-mujoco worst duffing --law classical,super_twisting,observer_free --disturbance 2
+    --bound mass=0.7:1.3
 
-    Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --bound payload=0:2
+    Example: smc-mujoco worst panda --law computed_torque_sliding --gains default --bound
+    payload=0:2
     """
     with delay_ctrl_c():
         from smc_mujoco.common.files import write_json
@@ -179,9 +222,15 @@ def worst(
     options.check_files(json, *files(out))
     chosen, cases = _attacked_cases(plant, law, condition, duration, gains)
     with options.as_options(BOUNDS):
-        results = WorstCases(worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases)
+        results = WorstCases(
+            worst_case(runs, metric, within, budget, seed, threads, progress=True) for runs in cases
+        )
     terminal.print(results)
-    terminal.note(f"{sum(case.tried for case in results)} runs, {options.gains_used(chosen, gains)}", "dim", wrap=True)
+    terminal.note(
+        f"{sum(case.tried for case in results)} runs, {options.gains_used(chosen, gains)}",
+        "dim",
+        wrap=True,
+    )
     if json:
         terminal.wrote(write_json(json, [case.about() for case in results]))
     if out:
@@ -199,7 +248,10 @@ def sensitivity(
     condition: options.Condition = "nominal",
     duration: Annotated[float, typer.Option(help="Duration of the runs, s.")] = 5.0,
     points: Annotated[
-        int | None, typer.Option(min=8, help="Points, a power of 2; default: as many as take about 20 s of a core.")
+        int | None,
+        typer.Option(
+            min=8, help="Points, a power of 2; default: as many as take about 20 s of a core."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the points.")] = 0,
     out: Annotated[Path | None, options.picture("the indices and the runs")] = None,
@@ -208,15 +260,17 @@ def sensitivity(
 ) -> None:
     """Find what breaks a law: how much of a score each uncertainty explains, and where runs fail.
 
-    Mass, friction, delay, noise and the like vary together within bounds. The column "alone" has the share of the
-    score's variance that an axis explains by itself, "with others" also what it does together with others. Below the
-    table stand the axis that explains most, where runs fail, and which axis to narrow first.
+    Mass, friction, delay, noise and the like vary together within bounds. The column "alone" has
+    the share of the score's variance that an axis explains by itself, "with others" also what it
+    does together with others. Below the table stand the axis that explains most, where runs fail,
+    and which axis to narrow first.
 
-    Without bounds: mass x 0.7 to 1.3, delay up to 20 control periods, friction up to a twentieth of what the weakest
-    drive gives, noise up to 1 mrad or 1 mm, encoders of 2^11 to 2^15 counts, half to all of u_max, and a control period
-    up to 4 times as long.
+    Without bounds: mass x 0.7 to 1.3, delay up to 20 control periods, friction up to a twentieth of
+    what the weakest drive gives, noise up to 1 mrad or 1 mm, encoders of 2^11 to 2^15 counts, half
+    to all of u_max, and a control period up to 4 times as long.
 
-    Example: smc-mujoco sensitivity duffing --law super_twisting --bound delay=0:0.02,mass=0.7:1.3 --out breaks.png
+    Example: smc-mujoco sensitivity duffing --law super_twisting --bound delay=0:0.02,mass=0.7:1.3
+    --out breaks.png
     """
     with delay_ctrl_c():
         from smc_mujoco.common.files import write_json
@@ -245,12 +299,18 @@ def sensitivity(
 
 
 def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | None":
-    """Return the class of the options --disturbance and --bound: numbers and ranges; None if neither is given."""
+    """Return the class of the options --disturbance and --bound: numbers and ranges; None if
+    neither is given.
+    """
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.common import constraints
 
     known = constraints.of_fields(Uncertainty)
-    fields: dict[str, Any] = {} if disturbance is None else {"disturbance": disturbance}
+    fields: dict[str, Any]
+    if disturbance is None:
+        fields = {}
+    else:
+        fields = {"disturbance": disturbance}
     for name, text in options.pairs(bounds, "--bound", "mass=0.7:1.3").items():
         try:
             values = tuple(map(float, text.split(":")))
@@ -258,12 +318,21 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
             cure = "write a range as mass=0.7:1.3, a number as x0=0.2"
             raise ScenarioError(f"--bound {name}={text} cannot be read: {cure}") from None
         if name in fields:
-            raise ScenarioError(f"--bound {name}={text} bounds what --disturbance does: leave out one of them")
+            raise ScenarioError(
+                f"--bound {name}={text} bounds what --disturbance does: leave out one of them"
+            )
         constraint = known.get(name)
-        ranged = constraint is None or isinstance(getattr(constraint, "one", constraint), constraints.Range)
+        ranged = constraint is None or isinstance(
+            getattr(constraint, "one", constraint), constraints.Range
+        )
         if len(values) != 1 + ranged:
-            cure = f"the lowest and the highest, as {name}=LOW:HIGH" if ranged else f"one number, as {name}=HIGH"
-            raise ScenarioError(f"--bound {name}={text} is no {'range' if ranged else 'number'}: give {cure}")
+            if ranged:
+                cure = f"the lowest and the highest, as {name}=LOW:HIGH"
+            else:
+                cure = f"one number, as {name}=HIGH"
+            raise ScenarioError(
+                f"--bound {name}={text} is no {'range' if ranged else 'number'}: give {cure}"
+            )
         if constraint:
             fields[name] = values if ranged else values[0]
         else:
@@ -275,15 +344,23 @@ def _within(disturbance: float | None, bounds: str | None) -> "Uncertainty | Non
 def _attacked_cases(
     plant: str, law: list[str] | None, condition: str, duration: float, gains: str
 ) -> "tuple[list[str | Law], list[list[Scenario]]]":
-    """Return the laws to attack, and the scenarios of each: one on a plant, one for each parameter set of a rig."""
+    """Return the laws to attack, and the scenarios of each: one on a plant, one for each parameter
+    set of a rig.
+    """
     from smc_mujoco.common import annexes
     from smc_mujoco.control import gain_sets
     from smc_mujoco.mechanisms.named import as_plant
     from smc_mujoco.simulation.grid import case
 
-    rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig") if annexes.installed("evidence") else None
+    if annexes.installed("evidence"):
+        rigs = annexes.module("smc_mujoco.evidence.rigs.rig", "a rig")
+    else:
+        rigs = None
     if rigs and plant in rigs.rigs():
-        rig, ensemble = rigs.rig(plant), annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig")
+        rig, ensemble = (
+            rigs.rig(plant),
+            annexes.module("smc_mujoco.evidence.rigs.ensemble", "a rig"),
+        )
         gain_set = "default" if gains == "tuned" else gains  # the laws of a rig have gains for it
         chosen = options.laws(law, of_rig=rig.laws) or rig.laws
         cases = [ensemble.runs(rig, [attacked], 1, gain_set, duration) for attacked in chosen]
@@ -295,7 +372,9 @@ def _attacked_cases(
 def basin(
     plant: options.PlantName,
     law: options.OneLaw = "observer_free",
-    points: Annotated[int, typer.Option(min=2, help="Number of positions, and of velocities.")] = 50,
+    points: Annotated[
+        int, typer.Option(min=2, help="Number of positions, and of velocities.")
+    ] = 50,
     gains: options.Gains = "tuned",
     duration: Annotated[float, typer.Option(help="Duration of the longest runs, s.")] = 10.0,
     out: Annotated[Path | None, options.picture("the map")] = None,
@@ -303,11 +382,13 @@ def basin(
     condition: options.Condition = "nominal",
     threads: options.Threads = None,
 ) -> None:
-    """Map a region of attraction: run a grid of initial positions and velocities, and show which come to rest.
+    """Map a region of attraction: run a grid of initial positions and velocities, and show which
+    come to rest.
 
-    Positions reach half a turn to either side; on a rail, twice as far as the plant's start. The largest velocity is
-    three times the largest position, per second. All channels of a network have the same start. A run ends as soon as
-    its outcome is decided, by the rule in smc_mujoco.analysis.region_of_attraction.
+    Positions reach half a turn to either side; on a rail, twice as far as the plant's start. The
+    largest velocity is three times the largest position, per second. All channels of a network have
+    the same start. A run ends as soon as its outcome is decided, by the rule in
+    smc_mujoco.analysis.region_of_attraction.
 
     Example: smc-mujoco basin inverted_pendulum --law classical --out classical.png
     """
@@ -322,13 +403,25 @@ def basin(
     options.check_files(json, *pictures)
     with bar(f"{law} on {plant}") as progress:
         region = search(
-            plant, chosen, (points, points), gains=gains, duration=duration, threads=threads,
-            report=progress.reached, condition=condition,
-        )  # fmt: skip
-    terminal.note(f"{region.law} on {region.plant}: {100 * region.share:.3g} % of the states converge")
-    yes, no, undecided = (int((region.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED))
+            plant,
+            chosen,
+            (points, points),
+            gains=gains,
+            duration=duration,
+            threads=threads,
+            report=progress.reached,
+            condition=condition,
+        )
+    terminal.note(
+        f"{region.law} on {region.plant}: {100 * region.share:.3g} % of the states converge"
+    )
+    yes, no, undecided = (
+        int((region.outcome == kind).sum()) for kind in (CONVERGES, DOES_NOT, UNDECIDED)
+    )
     counts = f"{yes} converge, {no} do not, {undecided} undecided after {duration:g} s"
-    terminal.note(f"{counts}; {options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s", "dim")
+    terminal.note(
+        f"{counts}; {options.gains_used([chosen], gains)}, {terminal.seconds:.0f} s", "dim"
+    )
     if json:
         terminal.wrote(region.save(json))
     if pictures:
@@ -341,25 +434,33 @@ def chatter(
     law: options.Laws = None,
     actuator: Annotated[
         str | None,
-        typer.Option(metavar="PART:NUMBERS", help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor."),
+        typer.Option(
+            metavar="PART:NUMBERS",
+            help="What drives the joints, as lag:0.01, ratelimit:200 or dcmotor.",
+        ),
     ] = None,
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
     channel: Annotated[int, typer.Option(min=0, help="The driven channel.")] = 0,
-    duration: Annotated[float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")] = 8.0,
+    duration: Annotated[
+        float, typer.Option(min=0.1, help="Duration of the runs that measure it, s.")
+    ] = 8.0,
     out: Annotated[Path | None, options.picture("Nyquist plots and runs")] = None,
     json: options.Json = None,
     threads: options.Threads = None,
 ) -> None:
     """Predict how much laws chatter, by harmonic balance, and measure it in runs.
 
-    If a law switches and the actuator lags, the loop oscillates without end, where the law's describing function N and
-    the response L of the linearised mechanism have N L = 1. The column "±" is how far the prediction may be off. A star
-    marks a run that changes by more than 5 % from a start moved by 1e-9 of itself, or at half the physics step (2.5 %
-    without RK4). The column "third" is the third harmonic over the first. With several driven channels, "coupling" is
-    how far this channel's command moves another one, over how far it moves this one: if large, the prediction fails.
+    If a law switches and the actuator lags, the loop oscillates without end, where the law's
+    describing function N and the response L of the linearised mechanism have N L = 1. The column
+    "±" is how far the prediction may be off. A star marks a run that changes by more than 5 % from
+    a start moved by 1e-9 of itself, or at half the physics step (2.5 % without RK4). The column
+    "third" is the third harmonic over the first. With several driven channels, "coupling" is how
+    far this channel's command moves another one, over how far it moves this one: if large, the
+    prediction fails.
 
-    Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out chatter
+    Example: smc-mujoco chatter duffing --law classical,super_twisting --actuator lag:0.01 --out
+    chatter
     """
     with delay_ctrl_c():
         from smc_mujoco.analysis.chattering import chattering, save, shared_assumptions
@@ -375,7 +476,10 @@ def chatter(
 
     terminal, pictures, chosen = Terminal(), files(out), options.laws(law, gain_sets.LAWS)
     options.check_files(json, *pictures)
-    fields = {} if actuator is None else {"actuator": options.actuator(actuator)}
+    if actuator is None:
+        fields = {}
+    else:
+        fields = {"actuator": options.actuator(actuator)}
     machine = jointed(plant, "chattering")
     cases = [case(machine, law, condition, duration, gains, changes=fields) for law in chosen]
     with bar("chattering") as progress:
@@ -384,10 +488,15 @@ def chatter(
             progress.reached(done, len(cases) + 1)
             cycles.append(chattering(scenario, channel))
         traces = run(cases, threads=threads)
-        measured, changes = [channel_cycle(trace, channel) for trace in traces], step_halving(traces, channel, threads)
+        measured, changes = (
+            [channel_cycle(trace, channel) for trace in traces],
+            step_halving(traces, channel, threads),
+        )
     terminal.print(tables.chattering(cases, channel, cycles, measured, changes))
     terminal.note("assumed: " + "; ".join(shared_assumptions(cycles)), wrap=True)
-    terminal.note(f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True)
+    terminal.note(
+        f"{options.gains_used(chosen, gains)}, {terminal.seconds:.0f} s", "dim", wrap=True
+    )
     if json:
         terminal.wrote(save(cases, cycles, measured, changes, json))
     if pictures:

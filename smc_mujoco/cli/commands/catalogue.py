@@ -14,7 +14,9 @@ from smc_mujoco.common import annexes
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.common.interrupts import delay_ctrl_c
 
-ARGUMENT_AT_END = re.compile(r"\b(gains|memory|timeout|flag)s?=$")  # of law_from_c, at the end of its error sentences
+ARGUMENT_AT_END = re.compile(
+    r"\b(gains|memory|timeout|flag)s?=$"
+)  # of law_from_c, at the end of its error sentences
 
 
 def list_(
@@ -35,34 +37,51 @@ def list_(
         ),
     ] = None,
     plant: Annotated[
-        str | None, typer.Option(metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant.")
+        str | None,
+        typer.Option(
+            metavar="PLANT", autocompletion=options.PLANTS, help="Only laws that suit a plant."
+        ),
     ] = None,
     gains: Annotated[
-        str, typer.Option(metavar="NAME=VALUE,...", help="Of a law in C: its gains, in order, if the file has none.")
+        str,
+        typer.Option(
+            metavar="NAME=VALUE,...",
+            help="Of a law in C: its gains, in order, if the file has none.",
+        ),
     ] = "",
     memory: Annotated[
-        int | None, typer.Option(min=1, help="Of a law in C: numbers of its memory; default as the file says, or 8.")
+        int | None,
+        typer.Option(
+            min=1, help="Of a law in C: numbers of its memory; default as the file says, or 8."
+        ),
     ] = None,
-    symbol: Annotated[str, typer.Option(help="Of a law in C: the name of its function.")] = "smc_law",
+    symbol: Annotated[
+        str, typer.Option(help="Of a law in C: the name of its function.")
+    ] = "smc_law",
     flag: Annotated[
-        list[str] | None, typer.Option(help="Of a law in C: a compiler flag, as --flag=-Iinclude; may be repeated.")
+        list[str] | None,
+        typer.Option(help="Of a law in C: a compiler flag, as --flag=-Iinclude; may be repeated."),
     ] = None,
     timeout: Annotated[
         float, typer.Option(help="Of a law in C: s that compiler, set-up and trial may take, each.")
     ] = 10.0,
 ) -> None:
-    """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in full.
+    """List plants, laws, surfaces, velocity estimators, scenes and conditions, or show a law in
+    full.
 
-    The line about an entry of another installed package ends with the name of that package, in brackets. A law is shown
-    with its gains and source. The command "smc-mujoco which" compares laws that suit a plant, and advises one.
+    The line about an entry of another installed package ends with the name of that package, in
+    brackets. A law is shown with its gains and source. The command "smc-mujoco which" compares laws
+    that suit a plant, and advises one.
 
-    FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong with it. The trial
-    runs the law on a double integrator under noise, with and without model and surface, for 10 s. It also calls the law
-    at later times and with very large errors. It finds crashes, endless loops, NaN, writes beyond the law's memory,
-    state kept elsewhere (such as static data), and a changed rounding mode or flush-to-zero. It then runs a .c file
-    with the compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2. smc_law.h describes
-    the signature; it is at the top of every file that `smc-mujoco export` writes. The process is not a sandbox: the law
-    can open files and connections, like any program that you start.
+    FILE.c (or .so) is compiled and tried in a separate process, and one sentence says what is wrong
+    with it. The trial runs the law on a double integrator under noise, with and without model and
+    surface, for 10 s. It also calls the law at later times and with very large errors. It finds
+    crashes, endless loops, NaN, writes beyond the law's memory, state kept elsewhere (such as
+    static data), and a changed rounding mode or flush-to-zero. It then runs a .c file with the
+    compiler's address and undefined-behaviour sanitizers. Any finding ends in exit code 2.
+    smc_law.h describes the signature; it is at the top of every file that `smc-mujoco export`
+    writes. The process is not a sandbox: the law can open files and connections, like any program
+    that you start.
 
     Example: smc-mujoco list super_twisting
 
@@ -71,7 +90,9 @@ def list_(
     Example: smc-mujoco list my_law.c --gains lam=6,k1=3
     """
     in_c = name is not None and Path(name).suffix in (".c", ".so")
-    options.only_for(ctx, ("gains", "memory", "symbol", "flag", "timeout"), in_c, "a law in C, FILE.c")
+    options.only_for(
+        ctx, ("gains", "memory", "symbol", "flag", "timeout"), in_c, "a law in C, FILE.c"
+    )
     options.only_for(ctx, ("needs", "plant"), name is None, "lists: leave out NAME")
     if in_c:
         _check_c(Path(str(name)), gains, memory, symbol, flag or [], timeout)
@@ -96,27 +117,37 @@ def _print_all(terminal: Terminal) -> None:
         from smc_mujoco.studies import scene
 
     lists = {
-        "Plants": tables.listed(plants(), lambda plant: getattr(inspect.getmodule(plant.build), "__doc__", "")),
+        "Plants": tables.listed(
+            plants(), lambda plant: getattr(inspect.getmodule(plant.build), "__doc__", "")
+        ),
         **law_pages.lists(),
         "Scenes, for smc-mujoco run": tables.listed(scene.scenes(), scene.question),
     }
     machine = plants()["inverted_pendulum"]  # it has stops, and numbers for jumps
     lists["Conditions, on inverted_pendulum for 10 s"] = [
-        (name, condition.brief(machine, DURATION) or "the scenario's defaults") for name, condition in NAMED.items()
+        (name, condition.brief(machine, DURATION) or "the scenario's defaults")
+        for name, condition in NAMED.items()
     ]
     for title, rows in lists.items():
         terminal.print(tables.catalogue(title, rows), "")
     page, some = ("smc-mujoco list NAME", "cyan"), ("--needs one-gain,continuous", "cyan")
-    terminal.print(Text.assemble(page, " shows a law or a plant in full, ", some, " the laws that have both"))
+    terminal.print(
+        Text.assemble(page, " shows a law or a plant in full, ", some, " the laws that have both")
+    )
 
 
-def _check_c(file: Path, gains: str, memory: int | None, symbol: str, flags: list[str], timeout: float) -> None:
+def _check_c(
+    file: Path, gains: str, memory: int | None, symbol: str, flags: list[str], timeout: float
+) -> None:
     """Try a law in C, and print what was found out about it."""
     with delay_ctrl_c():
         from smc_mujoco.control.from_text import parsed_gains
 
         check = annexes.module("smc_mujoco.exchange.c.load", f"a law in C, {file.name},").check
-    values = parsed_gains(gains, "--gains") if gains else None
+    if gains:
+        values = parsed_gains(gains, "--gains")
+    else:
+        values = None
     try:
         for line in check(file, values, memory, symbol, flags, timeout):
             print(line)

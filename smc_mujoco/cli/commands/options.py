@@ -26,12 +26,15 @@ GAINS_HELP = "With your own gains: pid(kp=50, ki=1). From a file: my_law.py, or 
 def picture(contents: str) -> Any:
     """Return an option for the file of a figure that shows `contents`."""
     return typer.Option(
-        metavar="PICTURE", help=f"Also draw {contents}, as PICTURE.svg and PICTURE.png, or PICTURE.pdf."
+        metavar="PICTURE",
+        help=f"Also draw {contents}, as PICTURE.svg and PICTURE.png, or PICTURE.pdf.",
     )
 
 
 def _completing(module: str, name: str) -> Callable[[str], list[str]]:
-    """Return a function that completes a text such as "a,b" or "a+b" in a shell, with names from a module."""
+    """Return a function that completes a text such as "a,b" or "a+b" in a shell, with names from a
+    module.
+    """
 
     def complete(incomplete: str) -> list[str]:
         names = getattr(importlib.import_module(f"smc_mujoco.{module}"), name)
@@ -43,11 +46,17 @@ def _completing(module: str, name: str) -> Callable[[str], list[str]]:
 
 
 PLANTS, LAWS = _completing("mechanisms.plant", "plants"), _completing("control.law", "known_laws")
-CONDITIONS, SCENES = _completing("simulation.conditions", "NAMED"), _completing("studies.scene", "scenes")
+CONDITIONS, SCENES = (
+    _completing("simulation.conditions", "NAMED"),
+    _completing("studies.scene", "scenes"),
+)
 
 Columns = Annotated[
     str | None,
-    typer.Option(metavar="NAME=COLUMN,...", help="Columns whose names differ from the rig's, as theta=arm_angle."),
+    typer.Option(
+        metavar="NAME=COLUMN,...",
+        help="Columns whose names differ from the rig's, as theta=arm_angle.",
+    ),
 ]
 Conditions = Annotated[
     list[str] | None,
@@ -69,23 +78,41 @@ Condition = Annotated[
         help='The condition of all runs, as encoder, noise+encoder or "worn gear: friction=Coulomb(0.05)".',
     ),
 ]
-Defaults = Annotated[bool, typer.Option("--defaults", help="Name a winner also over laws with default gains.")]
-Disturbance = Annotated[
-    float | None, typer.Option(min=0.0, help="Bound on |d|, N or N m; default that of the plant or the condition.")
+Defaults = Annotated[
+    bool, typer.Option("--defaults", help="Name a winner also over laws with default gains.")
 ]
-Folder = Annotated[Path, typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there.")]
+Disturbance = Annotated[
+    float | None,
+    typer.Option(
+        min=0.0, help="Bound on |d|, N or N m; default that of the plant or the condition."
+    ),
+]
+Folder = Annotated[
+    Path,
+    typer.Option(metavar="FOLDER", help="For gains and runs; the same command continues there."),
+]
 GainValues = Annotated[
-    str, typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults.")
+    str,
+    typer.Option(metavar="NAME=VALUE,...", help="Gains; those left out have the law's defaults."),
 ]
 Gains = Annotated[str, typer.Option(help="Set of gains: tuned, study, tracking or default.")]
 Joints = Annotated[
-    int | None, typer.Option(help="Number of joints of a law of many joints; default that of the values of a gain.")
+    int | None,
+    typer.Option(
+        help="Number of joints of a law of many joints; default that of the values of a gain."
+    ),
 ]
-Json = Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the result to a file.")]
+Json = Annotated[
+    Path | None, typer.Option(metavar="FILE.json", help="Also write the result to a file.")
+]
 OneLaw = Annotated[str, typer.Option("--law", autocompletion=LAWS, help=f"A law. {GAINS_HELP}")]
 LawText = Annotated[
     str,
-    typer.Argument(metavar="LAW|FILE", autocompletion=LAWS, help="As pid or pid(kp=50, ki=1), or a file with a law."),
+    typer.Argument(
+        metavar="LAW|FILE",
+        autocompletion=LAWS,
+        help="As pid or pid(kp=50, ki=1), or a file with a law.",
+    ),
 ]
 Laws = Annotated[
     list[str] | None,
@@ -115,20 +142,35 @@ PlantName = Annotated[
         'may be "joint(motor,partner=pole,u_max=9,x0=0.2)".',
     ),
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Less of everything: a first answer in a minute or two.")
+]
 Relevant = Annotated[
-    float, typer.Option("--relevant", help="Least relevant difference, as a share of the larger value.")
+    float,
+    typer.Option("--relevant", help="Least relevant difference, as a share of the larger value."),
 ]
 SceneName = Annotated[
-    str, typer.Argument(metavar="SCENE", autocompletion=SCENES, help="A scene from `smc-mujoco list`, or a scene file.")
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        autocompletion=SCENES,
+        help="A scene from `smc-mujoco list`, or a scene file.",
+    ),
 ]
-Threads = Annotated[int | None, typer.Option(min=1, help="Simulations at once; default one per core.")]
-X0 = Annotated[float | None, typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start.")]
+Threads = Annotated[
+    int | None, typer.Option(min=1, help="Simulations at once; default one per core.")
+]
+X0 = Annotated[
+    float | None,
+    typer.Option("--x0", help="Where runs start, rad or m; default the plant's own start."),
+]
 
 
 @contextlib.contextmanager
 def as_options(words: Mapping[str, str]) -> Iterator[None]:
-    """Write arguments of Python as options in sentences of errors; `words` is pattern -> what takes its place."""
+    """Write arguments of Python as options in sentences of errors; `words` is pattern -> what takes
+    its place.
+    """
     try:
         yield
     except ScenarioError as error:
@@ -159,7 +201,9 @@ def check_files(json: Path | None, *others: Path | None) -> None:
 
 
 def pairs(text: str | None, option: str, example: str) -> dict[str, str]:
-    """Return name -> value from the text of an option, such as "theta=arm_angle,t=time"; {} for None."""
+    """Return name -> value from the text of an option, such as "theta=arm_angle,t=time"; {} for
+    None.
+    """
     values = {}
     for pair in names(text):
         name, _, value = (part.strip() for part in pair.partition("="))
@@ -178,18 +222,25 @@ def numbers(text: str | None, option: str, example: str) -> dict[str, float]:
         try:
             values[name] = float(value)
         except ValueError:
-            raise ScenarioError(f"{option} {name}={value} is no number: write it as {example}") from None
+            raise ScenarioError(
+                f"{option} {name}={value} is no number: write it as {example}"
+            ) from None
     return values
 
 
 def laws(
     texts: str | Sequence[str] | None, default: Sequence[str] = (), of_rig: "Sequence[Law]" = ()
 ) -> "list[str | Law]":
-    """Return the laws in texts, see `control.from_text`. Those of a rig come before others of their names."""
+    """Return the laws in texts, see `control.from_text`.
+
+    Those of a rig come before others of their names.
+    """
     from smc_mujoco.control import from_text
 
     known = {law.name: [law] for law in of_rig}
-    return [made for text in names(texts, default) for made in known.get(text) or from_text.laws(text)]
+    return [
+        made for text in names(texts, default) for made in known.get(text) or from_text.laws(text)
+    ]
 
 
 def law(text: str) -> "str | Law":
@@ -197,40 +248,65 @@ def law(text: str) -> "str | Law":
     from smc_mujoco.control import from_text
 
     laws_of_text = from_text.laws(text)
-    return laws_of_text[0] if len(laws_of_text) == 1 else from_text.law(text)
+    if len(laws_of_text) == 1:
+        return laws_of_text[0]
+    return from_text.law(text)
 
 
 def gains_used(laws: "Sequence[str | Law]", gains: str) -> str:
     """Return where the laws' gains come from, in words. Laws given by name have the set `gains`."""
     from smc_mujoco.control import source
 
-    of_set = source.Source(kind={"default": source.DEFAULT, "study": source.STUDY}.get(gains, source.SHIPPED))
+    of_set = source.Source(
+        kind={"default": source.DEFAULT, "study": source.STUDY}.get(gains, source.SHIPPED)
+    )
     named = {law: [of_set] for law in laws if isinstance(law, str)}
-    words = source.in_words(named | {law.name: [law.source] for law in laws if not isinstance(law, str)})
-    return f"{words or 'no gains'}, set {gains!r}" if named else words or "no gains"
+    words = source.in_words(
+        named | {law.name: [law.source] for law in laws if not isinstance(law, str)}
+    )
+    if named:
+        return f"{words or 'no gains'}, set {gains!r}"
+    return words or "no gains"
 
 
 def conditions(texts: Sequence[str] | None) -> "list[named.Condition]":
-    """Return the conditions of the option --condition: names and files, as a,b, or a text with a colon."""
+    """Return the conditions of the option --condition: names and files, as a,b, or a text with a
+    colon.
+    """
     from smc_mujoco.simulation.conditions import find_condition, from_file
 
     chosen, parts = [], [[text] if ":" in text else names(text) for text in texts or ()]
     for text in itertools.chain(*parts):
-        if ":" not in text and (Path(text).name != text or Path(text).suffix) and not os.path.exists(text):
-            raise ScenarioError(f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)")
-        chosen += from_file(Path(text)) if os.path.exists(text) else [find_condition(text)]
+        if (
+            ":" not in text
+            and (Path(text).name != text or Path(text).suffix)
+            and not os.path.exists(text)
+        ):
+            raise ScenarioError(
+                f"no file {text!r}: give a file of conditions, or one as worn: friction=Coulomb(0.05)"
+            )
+        if os.path.exists(text):
+            chosen += from_file(Path(text))
+        else:
+            chosen += [find_condition(text)]
     return chosen
 
 
-def compared_laws(texts: Sequence[str] | None, plants: Sequence[str], gains: str) -> "Sequence[str | Law] | None":
-    """Return the laws of the option --law of `compare`; None if it is not given; all general ones for "all"."""
+def compared_laws(
+    texts: Sequence[str] | None, plants: Sequence[str], gains: str
+) -> "Sequence[str | Law] | None":
+    """Return the laws of the option --law of `compare`; None if it is not given; all general ones
+    for "all".
+    """
     from smc_mujoco.control import gain_sets
     from smc_mujoco.simulation.conditions import PLANTS
 
     if texts is None:
         return None
     if list(texts) == ["all"]:
-        return gain_sets.general() if gains == "tuned" else gain_sets.general_laws(plants or PLANTS, gains)
+        if gains == "tuned":
+            return gain_sets.general()
+        return gain_sets.general_laws(plants or PLANTS, gains)
     return laws(texts)
 
 
@@ -242,12 +318,16 @@ def starts(x0: float | None) -> "Starts | None":
 
 
 def actuator(text: str) -> "tuple[Actuator, ...]":
-    """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01"; numbers are in the fields' order."""
+    """Return a drive or gear from "lag:0.01", or several from "dcmotor+lag:0.01"; numbers are in
+    the fields' order.
+    """
     from smc_mujoco.common.catalogue import subclasses
     from smc_mujoco.mechanisms.hardware import backlash, drives  # noqa: F401
     from smc_mujoco.mechanisms.hardware.part import Actuator
 
-    known: dict[str, type[Actuator]] = {kind.__name__.lower(): kind for kind in subclasses(Actuator)}
+    known: dict[str, type[Actuator]] = {
+        kind.__name__.lower(): kind for kind in subclasses(Actuator)
+    }
     parts = []
     for part in text.split("+"):
         name, _, numbers = part.partition(":")
@@ -255,13 +335,19 @@ def actuator(text: str) -> "tuple[Actuator, ...]":
         try:
             parts.append(kind(*map(float, filter(None, numbers.split(",")))))
         except (TypeError, ValueError):
-            raise ScenarioError(f"actuator {shown(part)} cannot be read: write it as lag:0.01") from None
+            raise ScenarioError(
+                f"actuator {shown(part)} cannot be read: write it as lag:0.01"
+            ) from None
     return tuple(parts)
 
 
 def only_for(ctx: typer.Context, names: Iterable[str], allowed: bool, kind: str) -> None:
-    """Raise ScenarioError if one of these options, which are only for a kind of call, was given where not `allowed`."""
+    """Raise ScenarioError if one of these options, which are only for a kind of call, was given
+    where not `allowed`.
+    """
     for name in () if allowed else names:
         if str(ctx.get_parameter_source(name)).endswith("COMMANDLINE"):
-            flags = next(parameter.opts for parameter in ctx.command.params if parameter.name == name)
+            flags = next(
+                parameter.opts for parameter in ctx.command.params if parameter.name == name
+            )
             raise ScenarioError(f"{flags[0]} is for {kind}")

@@ -14,24 +14,38 @@ from smc_mujoco.common.interrupts import delay_ctrl_c
 def run(
     name: options.SceneName,
     out: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="For results; each scene has a folder of its name in it.")
+        Path,
+        typer.Option(
+            metavar="FOLDER", help="For results; each scene has a folder of its name in it."
+        ),
     ] = Path("videos"),
     film: Annotated[bool, typer.Option(help="Whether to film the machines.")] = True,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of all random numbers; default the scene's.")
+    ] = None,
     threads: options.Threads = None,
     export: Annotated[
         str | None,
-        typer.Option(metavar="FORMAT,...", help="Also write each trace as csv, mat, mcap or parquet, beside its .npz."),
+        typer.Option(
+            metavar="FORMAT,...",
+            help="Also write each trace as csv, mat, mcap or parquet, beside its .npz.",
+        ),
     ] = None,
     repeat: Annotated[
-        bool, typer.Option(help="Whether to repeat runs at half the physics step, to mark what depends on it.")
+        bool,
+        typer.Option(
+            help="Whether to repeat runs at half the physics step, to mark what depends on it."
+        ),
     ] = True,
-    timing: Annotated[bool, typer.Option("--timing", help="Print how long each part took.")] = False,
+    timing: Annotated[
+        bool, typer.Option("--timing", help="Print how long each part took.")
+    ] = False,
 ) -> None:
     """Run a scene: print its question, scores and answer; write its traces, figures and film.
 
-    Each run is repeated at half the physics step, and from a start moved by 1e-9 of itself. A score that changes by
-    more than 5 % is marked (without RK4 2.5 % at half the step), and an answer that says something else is printed.
+    Each run is repeated at half the physics step, and from a start moved by 1e-9 of itself. A score
+    that changes by more than 5 % is marked (without RK4 2.5 % at half the step), and an answer that
+    says something else is printed.
 
     Exported traces have every number to the last bit, and its unit.
 
@@ -55,10 +69,16 @@ def run(
 
 
 def show(
-    trace: Annotated[Path, typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save.")],
+    trace: Annotated[
+        Path,
+        typer.Argument(metavar="TRACE", help="A .npz file from `smc-mujoco run` or Trace.save."),
+    ],
     figure: Annotated[Path | None, options.picture("it")] = None,
     export: Annotated[
-        str | None, typer.Option(metavar="FORMAT,...", help="Also write it as csv, mat, mcap or parquet, beside TRACE.")
+        str | None,
+        typer.Option(
+            metavar="FORMAT,...", help="Also write it as csv, mat, mcap or parquet, beside TRACE."
+        ),
     ] = None,
 ) -> None:
     """Show a trace: what was run, how it went, and its scores.
@@ -81,7 +101,11 @@ def show(
         draw([loaded], figure)
         written += drawn(figure)
     s = loaded.scenario
-    plant, law, times = (s.plant.name, "bold"), (str(s.law), "bold"), f", {s.duration:g} s at {s.control_period:g} s"
+    plant, law, times = (
+        (s.plant.name, "bold"),
+        (str(s.law), "bold"),
+        f", {s.duration:g} s at {s.control_period:g} s",
+    )
     terminal.print(Text.assemble(plant, " under ", law, times, f", gains: {s.law.source}"))
     if loaded.failure:
         terminal.note(f"failed: {loaded.failure}", "red", wrap=True)
@@ -104,14 +128,18 @@ def view(
         ),
     ],
     law: options.Laws = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: the first free one from 8080 on.")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Of the page; 0: the first free one from 8080 on.")
+    ] = 0,
     browser: Annotated[bool, typer.Option(help="Whether to open the browser's tab.")] = True,
 ) -> None:
-    """Watch a machine under one law or two in a browser tab, in MuJoCo's Studio; change, push and save what you see.
+    """Watch a machine under one law or two in a browser tab, in MuJoCo's Studio; change, push and
+    save what you see.
 
-    The panel "Laws" has the laws, their gains, mass, delay, noise and friction, each of which starts the runs again; u,
-    s and e; the model's keyframes; and "save as scene", which writes view.py: `smc-mujoco run view.py` repeats the runs
-    to the bit. The second law's machine is the transparent one.
+    The panel "Laws" has the laws, their gains, mass, delay, noise and friction, each of which
+    starts the runs again; u, s and e; the model's keyframes; and "save as scene", which writes
+    view.py: `smc-mujoco run view.py` repeats the runs to the bit. The second law's machine is the
+    transparent one.
 
     Push a body: double-click it, hold Ctrl, drag with the right mouse button, and let go.
 

@@ -30,8 +30,12 @@ def which(
     condition: options.Conditions = None,
     law: options.Laws = None,
     quick: options.Quick = False,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of a law in each condition, each from another start.")] = 24,
-    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")] = None,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Runs of a law in each condition, each from another start.")
+    ] = 24,
+    duration: Annotated[
+        float | None, typer.Option(help="Duration of a run, s; default 5, with --quick 3.")
+    ] = None,
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
     out: options.Folder = Path("which"),
@@ -39,16 +43,19 @@ def which(
     disturbance: options.Disturbance = None,
     threads: options.Threads = None,
 ) -> None:
-    """Advise a law for a plant: which to use, with which gains, why, the second choice, and how sure that is.
+    """Advise a law for a plant: which to use, with which gains, why, the second choice, and how
+    sure that is.
 
-    All laws that suit the plant are compared by the rules of `compare`, with gains of the package or tuned now. On a
-    model of your own that takes minutes for each law: --quick takes a sixteenth of it, --law fewer laws. If no law is
-    better than another, the answer says so. If you stop the command, it continues when you start it again. For the need
-    robust, an adversary attacks each law within --disturbance, see `smc-mujoco worst`.
+    All laws that suit the plant are compared by the rules of `compare`, with gains of the package
+    or tuned now. On a model of your own that takes minutes for each law: --quick takes a sixteenth
+    of it, --law fewer laws. If no law is better than another, the answer says so. If you stop the
+    command, it continues when you start it again. For the need robust, an adversary attacks each
+    law within --disturbance, see `smc-mujoco worst`.
 
     Example: smc-mujoco which duffing --condition noise,coulomb --needs calm,fast
 
-    Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn: sensor=Encoder(counts=4096)" --needs accurate
+    Example: smc-mujoco which arm.xml:shoulder --x0 0.5 --condition "worn:
+    sensor=Encoder(counts=4096)" --needs accurate
     """
     with delay_ctrl_c():
         from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
@@ -56,10 +63,21 @@ def which(
 
     terminal, tested, start = Terminal(), options.conditions(condition) or None, options.starts(x0)
     advice = advise(
-        plant, tested, options.names(needs), options.laws(law) or None, seeds, duration, start, out,
-        quick, threads, progress=True, defaults=defaults, relevant=relevant,
+        plant,
+        tested,
+        options.names(needs),
+        options.laws(law) or None,
+        seeds,
+        duration,
+        start,
+        out,
+        quick,
+        threads,
+        progress=True,
+        defaults=defaults,
+        relevant=relevant,
         within=None if disturbance is None else Uncertainty(disturbance=disturbance),
-    )  # fmt: skip
+    )
     terminal.print(advice)
     runs = f"{len(advice.table)} runs are in {printable(str(out / 'results.parquet'))}"
     terminal.note(f"{runs}; {terminal.seconds:.0f} s", "dim")
@@ -69,37 +87,60 @@ def compare(
     plants: options.Plants = None,
     law: options.Laws = None,
     condition: options.Conditions = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")] = 12,
-    tune: Annotated[bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")] = True,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Runs of a law on each plant in each condition.")
+    ] = 12,
+    tune: Annotated[
+        bool, typer.Option(help="Whether to tune laws that have no gains for a plant.")
+    ] = True,
     searches: Annotated[
         int | None,
-        typer.Option(min=1, help="How many searches tune a law; default 12. With --rig no law is tuned without it."),
+        typer.Option(
+            min=1,
+            help="How many searches tune a law; default 12. With --rig no law is tuned without it.",
+        ),
     ] = None,
-    worst: Annotated[bool, typer.Option("--worst", help="Also search the worst case of each law.")] = False,
+    worst: Annotated[
+        bool, typer.Option("--worst", help="Also search the worst case of each law.")
+    ] = False,
     quick: options.Quick = False,
     gains: options.Gains = "tuned",
-    duration: Annotated[float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Duration of a run, s; default 10, --quick 3.")
+    ] = None,
     x0: options.X0 = None,
     relevant: options.Relevant = RELEVANT,
     defaults: options.Defaults = False,
     out: options.Folder = Path("compared"),
     figure: Annotated[Path | None, options.picture("the medians")] = None,
-    latex: Annotated[Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")] = None,
-    executor: Annotated[str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")] = "local",
-    rig: Annotated[str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")] = None,
-    traces: Annotated[str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")] = "none",
+    latex: Annotated[
+        Path | None, typer.Option(metavar="FILE.tex", help="Also write the tables as LaTeX.")
+    ] = None,
+    executor: Annotated[
+        str, typer.Option(help="local, or dask://HOST:PORT of a scheduler.")
+    ] = "local",
+    rig: Annotated[
+        str | None, typer.Option(help="A rig: its parameter sets replace plants and conditions.")
+    ] = None,
+    traces: Annotated[
+        str, typer.Option(help="Traces to save: none, all, or the worst of each condition.")
+    ] = "none",
     threads: options.Threads = None,
 ) -> None:
-    """Compare laws on plants in conditions: tune what has no gains, run, and say which law is better, and how sure.
+    """Compare laws on plants in conditions: tune what has no gains, run, and say which law is
+    better, and how sure.
 
-    A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of the package for the
-    plant, or is tuned by the same rule, seconds to minutes for each law on each plant. If you stop the command, it
-    continues when you start it again. --law all compares every general law. With --rig laws have the gains of the
-    machine, or those of --searches on its parameter sets, and a line for each metric says if one law wins on all sets.
+    A law with gains in brackets keeps them. Any other law, also that of your file, has the gains of
+    the package for the plant, or is tuned by the same rule, seconds to minutes for each law on each
+    plant. If you stop the command, it continues when you start it again. --law all compares every
+    general law. With --rig laws have the gains of the machine, or those of --searches on its
+    parameter sets, and a line for each metric says if one law wins on all sets.
 
-    Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition friction,encoder
+    Example: smc-mujoco compare duffing,inverted_pendulum --law pid,my_law.py --condition
+    friction,encoder
 
-    Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex arm.tex
+    Example: smc-mujoco compare arm.xml:shoulder --x0 0.5 --law pid,classical --figure arm --latex
+    arm.tex
     """
     with delay_ctrl_c():
         from smc_mujoco.common.files import with_ending
@@ -110,20 +151,46 @@ def compare(
     if rig is not None:
         if plants or condition or gains != "tuned" or worst or figure or latex or traces != "none":
             others = "the plants, --condition, --gains, --worst, --figure, --latex and --traces"
-            raise ScenarioError(f"--rig brings its own plant, parameter sets and gains: leave out {others}")
+            raise ScenarioError(
+                f"--rig brings its own plant, parameter sets and gains: leave out {others}"
+            )
         _compare_on_rig(
-            rig, law, seeds, searches, duration, start, relevant, defaults, out, executor, threads,
+            rig,
+            law,
+            seeds,
+            searches,
+            duration,
+            start,
+            relevant,
+            defaults,
+            out,
+            executor,
+            threads,
             terminal,
-        )  # fmt: skip
+        )
         return
     latex = latex and with_ending(latex, ".tex")
     options.check_files(None, latex, *files(figure))
     machines = options.names(plants)
     comparison = run(
-        options.compared_laws(law, machines, gains), machines or None, options.conditions(condition) or None, seeds,
-        tune, worst, executor, out=out, duration=duration, starts=start, gains=gains, quick=quick, defaults=defaults,
-        searches=searches, relevant=relevant, traces=traces, threads=threads,
-    )  # fmt: skip
+        options.compared_laws(law, machines, gains),
+        machines or None,
+        options.conditions(condition) or None,
+        seeds,
+        tune,
+        worst,
+        executor,
+        out=out,
+        duration=duration,
+        starts=start,
+        gains=gains,
+        quick=quick,
+        defaults=defaults,
+        searches=searches,
+        relevant=relevant,
+        traces=traces,
+        threads=threads,
+    )
     terminal.print(comparison)
     if latex:
         comparison.to_latex(latex)
@@ -135,10 +202,19 @@ def compare(
 
 
 def _compare_on_rig(
-    rig: str, law: list[str] | None, seeds: int, searches: int | None, duration: float | None,
-    starts: "Starts | None", relevant: float, defaults: bool, out: Path, executor: str,
-    threads: int | None, terminal: Terminal,
-) -> None:  # fmt: skip
+    rig: str,
+    law: list[str] | None,
+    seeds: int,
+    searches: int | None,
+    duration: float | None,
+    starts: "Starts | None",
+    relevant: float,
+    defaults: bool,
+    out: Path,
+    executor: str,
+    threads: int | None,
+    terminal: Terminal,
+) -> None:
     """Compare laws over the parameter sets of a rig, and say if one law wins on all sets."""
     from smc_mujoco.common import annexes
     from smc_mujoco.studies.leaderboard import leaderboard
@@ -146,9 +222,15 @@ def _compare_on_rig(
 
     ensemble = annexes.module("smc_mujoco.evidence.rigs.ensemble", "--rig")
     machine = annexes.module("smc_mujoco.evidence.rigs.rig", "--rig").rig(rig)
-    chosen, length = options.laws(law, of_rig=machine.laws) or None, FULL.duration if duration is None else duration
+    chosen, length = (
+        options.laws(law, of_rig=machine.laws) or None,
+        FULL.duration if duration is None else duration,
+    )
     tuning = {"starts": starts, "folder": out / "searches", "threads": threads, "progress": True}
-    found = [] if searches is None else ensemble.tuned(machine, chosen, searches, **tuning)
+    if searches is None:
+        found = []
+    else:
+        found = ensemble.tuned(machine, chosen, searches, **tuning)
     scenarios = ensemble.runs(machine, found or chosen, seeds, "default", length, starts)
     table = study(scenarios, out, True, executor, threads, progress=True, half_steps=True)
     boards = leaderboard(table, defaults=defaults, relevant=relevant)

@@ -1,8 +1,9 @@
-"""Filtered backward difference of the position: v+ = a v + (1 - a) (x - x_) / dt, a = tau / (tau + dt).
+"""Filtered backward difference of the position: v+ = a v + (1 - a) (x - x_) / dt, a = tau / (tau +
+dt).
 
-This is tau v' + v = x' discretised by the backward Euler method: a first-order lag. tau = 0 gives the plain difference.
-The first estimate is 0, because there is no earlier position.
-Gains: tau, time constant of the lag [s].
+This is tau v' + v = x' discretised by the backward Euler method: a first-order lag. tau = 0 gives
+the plain difference. The first estimate is 0, because there is no earlier position. Gains: tau,
+time constant of the lag [s].
 """
 
 from smc_mujoco.control.estimator import estimator_function

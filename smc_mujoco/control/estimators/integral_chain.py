@@ -1,13 +1,14 @@
-"""Integral-chain differentiator: x1' = x2, x2' = x3, x3' = -w^3 (x1 - x) - 3 w^2 x2 - 3 w x3; gives (x2, x3).
+"""Integral-chain differentiator: x1' = x2, x2' = x3, x3' = -w^3 (x1 - x) - 3 w^2 x2 - 3 w x3; gives
+(x2, x3).
 
-The reading enters only the last of three integrators, so noise is smoothed before it reaches the velocity x2. An
-observer corrects every state by the reading instead. The price is a delay: x2 is x' filtered by w^3 / (p + w)^3, 3 / w
-late. For small w h, white noise passes to x2 with the gain sqrt(h w^3) / 4 and to x3 with sqrt(3 h w^5) / 4. All poles
-are at -w; in the source epsilon is 1 / w and the coefficients are 1, 3, 3. The discretisation is exact for readings
-joined by straight lines: the matrix exponential of a triple pole is exp(-w h) (1 + N h + N^2 h^2 / 2) with N = A + w.
-It starts from the first reading, at rest.
-Gains: w, bandwidth [1/s].
-Source: J. Liu & X. Wang, Advanced Sliding Mode Control for Mechanical Systems, Springer 2012, section 8.5, eq. 8.37.
+The reading enters only the last of three integrators, so noise is smoothed before it reaches the
+velocity x2. An observer corrects every state by the reading instead. The price is a delay: x2 is x'
+filtered by w^3 / (p + w)^3, 3 / w late. For small w h, white noise passes to x2 with the gain
+sqrt(h w^3) / 4 and to x3 with sqrt(3 h w^5) / 4. All poles are at -w; in the source epsilon is 1 /
+w and the coefficients are 1, 3, 3. The discretisation is exact for readings joined by straight
+lines: the matrix exponential of a triple pole is exp(-w h) (1 + N h + N^2 h^2 / 2) with N = A + w.
+It starts from the first reading, at rest. Gains: w, bandwidth [1/s]. Source: J. Liu & X. Wang,
+Advanced Sliding Mode Control for Mechanical Systems, Springer 2012, section 8.5, eq. 8.37.
 """
 
 import math

@@ -1,16 +1,20 @@
-"""Steady Kalman filter of x''' = white noise of density q, x read under noise of standard deviation sigma:
+"""Steady Kalman filter of x''' = white noise of density q, x read under noise of standard deviation
+sigma:
 
-    predict z = (1, h, h^2/2; 0, 1, h; 0, 0, 1) z;  z += (alpha, beta / h, 2 gamma / h^2) (x - z_1);  gives (z_2, z_3)
+    predict z = (1, h, h^2/2; 0, 1, h; 0, 0, 1) z;  z += (alpha, beta / h, 2 gamma / h^2) (x - z_1);
+    gives (z_2, z_3)
 
-This is the linear estimator of least variance for that model. Its gains have a closed form. The innovation's spectrum
-times |z-1|^6 is, up to a factor, P(z) P(1/z) = m^3 + lam (1 - m/4 + m^2/120) with m = 2 - z - 1/z and lam = q h^5 /
-sigma^2. The roots of P are the three roots inside the unit circle, and P(z) = (z-1)^3 + alpha (z-1)^2 + beta z (z-1) +
-gamma z (z+1). For small h they lie on a circle of radius (q / (sigma^2 h))^(1/6) rad/s, 100 for the defaults at 1 ms.
-Parabolas are tracked exactly once the start has decayed. The filter starts from the first reading, at rest.
-Gains: sigma, noise of the reading [m]; q, density of the jerk [(m/s^3)^2 s]. Only q / sigma^2 matters.
-Sources: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82(1):35, 1960; P.
-Kalata, "The tracking index: a generalized parameter for alpha-beta and alpha-beta-gamma target trackers", IEEE Trans.
-Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains by one index); the factorisation is worked out here.
+This is the linear estimator of least variance for that model. Its gains have a closed form. The
+innovation's spectrum times |z-1|^6 is, up to a factor, P(z) P(1/z) = m^3 + lam (1 - m/4 + m^2/120)
+with m = 2 - z - 1/z and lam = q h^5 / sigma^2. The roots of P are the three roots inside the unit
+circle, and P(z) = (z-1)^3 + alpha (z-1)^2 + beta z (z-1) + gamma z (z+1). For small h they lie on a
+circle of radius (q / (sigma^2 h))^(1/6) rad/s, 100 for the defaults at 1 ms. Parabolas are tracked
+exactly once the start has decayed. The filter starts from the first reading, at rest. Gains: sigma,
+noise of the reading [m]; q, density of the jerk [(m/s^3)^2 s]. Only q / sigma^2 matters. Sources:
+R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82(1):35,
+1960; P. Kalata, "The tracking index: a generalized parameter for alpha-beta and alpha-beta-gamma
+target trackers", IEEE Trans. Aerosp. Electron. Syst. 20(2):174, 1984 (steady gains by one index);
+the factorisation is worked out here.
 """
 
 import math
@@ -33,7 +37,10 @@ def square_root(a, b):
 
 
 @estimator_function(
-    gains={"sigma": Gain(1e-3, POSITION, positive=True), "q": Gain(1e3, Unit(position=2, time=-5), positive=True)},
+    gains={
+        "sigma": Gain(1e-3, POSITION, positive=True),
+        "q": Gain(1e3, Unit(position=2, time=-5), positive=True),
+    },
     memory=7,
 )
 def kalman(y, gains, memory):
@@ -41,10 +48,13 @@ def kalman(y, gains, memory):
     if memory[0] == 0.0:
         memory[0], memory[1] = 1.0, y.x
         lam = gains.q * h**5 / gains.sigma**2
-        # m = -c, the negative root, by Newton's method from an upper bound, where the cubic is convex
+        # m = -c, the negative root, by Newton's method from an upper bound, where the cubic is
+        # convex
         c = lam / 120.0 + (lam / 4.0) ** 0.5 + lam ** (1.0 / 3.0)
         for _ in range(20):
-            c -= (c**3 - lam * (1.0 + c / 4.0 + c * c / 120.0)) / (3.0 * c * c - lam * (0.25 + c / 60.0))
+            c -= (c**3 - lam * (1.0 + c / 4.0 + c * c / 120.0)) / (
+                3.0 * c * c - lam * (0.25 + c / 60.0)
+            )
         p = 1.0 + c / 2.0 - (c + c * c / 4.0) ** 0.5
         # the other roots: m^2 - (c - lam / 120) m + lam / c
         half = (c - lam / 120.0) / 2.0
@@ -54,7 +64,9 @@ def kalman(y, gains, memory):
         for i in range(2):
             sign = 1.0 - 2.0 * i
             m, m_i = half + sign * root, sign * root_i
-            spread, spread_i = square_root((m * m - m_i * m_i) / 4.0 - m, (m * m_i + m_i * m) / 4.0 - m_i)
+            spread, spread_i = square_root(
+                (m * m - m_i * m_i) / 4.0 - m, (m * m_i + m_i * m) / 4.0 - m_i
+            )
             z, z_i = 1.0 - m / 2.0 - spread, -m_i / 2.0 - spread_i
             if math.hypot(z, z_i) > 1.0:
                 z, z_i = 1.0 - m / 2.0 + spread, -m_i / 2.0 + spread_i

@@ -2,21 +2,23 @@
 
     v = -kq 2 sgn(q0) qv - kw we - w x wd,    Mf = H(p) A(p) torque,    wf' = p H(p) w,    A = 1 / (lag p + 1)
 
-with H a Butterworth filter of second order of `cutoff` hertz, A what the law takes for the rotors, and force, wanted
-attitude and wd those of `geometric`. It needs J but no model of the torques that act: w' = A v + (1 - A H) d, with d
-the change that anything unknown makes, if A is right. So a constant torque leaves no error. With c J in place of J, w'
-= (c A v + (1 - A H) d) / (1 - A H (1 - c)), which in slow motion, A H = 1, is still v. A yaw torque of rotors that
+with H a Butterworth filter of second order of `cutoff` hertz, A what the law takes for the rotors,
+and force, wanted attitude and wd those of `geometric`. It needs J but no model of the torques that
+act: w' = A v + (1 - A H) d, with d the change that anything unknown makes, if A is right. So a
+constant torque leaves no error. With c J in place of J, w' = (c A v + (1 - A H) d) / (1 - A H (1 -
+c)), which in slow motion, A H = 1, is still v. A yaw torque of rotors that
 speed up, M + spin M', is taken into account:
 
     dMz = (Jz (vz - wfz') + spin / dt dMz_) / (1 + spin / dt),    spin = Jr / (2 kf W c)
 
-with Jr the inertia of a rotor, kf W^2 its force at speed W, c its torque per force, and dMz_ the sample before. By
-default the rotors have no inertia. s is e' + (kx / kv) e and we + (kq / kw) 2 sgn(q0) qv: the law slides nowhere.
-Gains: kx [1/s^2] and kv [1/s], of the position; kq [1/s^2] and kw [1/s], of the attitude; cutoff [Hz], of the filters;
-lag [s], of the rotors; spin [s], of their inertia. Defaults of the Crazyflie's firmware, which runs at 500 Hz, except
-kx and kv, which are chosen.
-Source: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion for attitude control of micro
-air vehicles", J. Guidance, Control, and Dynamics 39(3):450, 2016, doi 10.2514/1.G001490; without its adaptation.
+with Jr the inertia of a rotor, kf W^2 its force at speed W, c its torque per force, and dMz_ the
+sample before. By default the rotors have no inertia. s is e' + (kx / kv) e and we + (kq / kw) 2
+sgn(q0) qv: the law slides nowhere. Gains: kx [1/s^2] and kv [1/s], of the position; kq [1/s^2] and
+kw [1/s], of the attitude; cutoff [Hz], of the filters; lag [s], of the rotors; spin [s], of their
+inertia. Defaults of the Crazyflie's firmware, which runs at 500 Hz, except kx and kv, which are
+chosen. Source: E. Smeur, Q. Chu & G. de Croon, "Adaptive incremental nonlinear dynamic inversion
+for attitude control of micro air vehicles", J. Guidance, Control, and Dynamics 39(3):450, 2016, doi
+10.2514/1.G001490; without its adaptation.
 """
 
 import math
@@ -31,10 +33,16 @@ from smc_mujoco.control.units import RATE, TIME, Gain, Unit
 
 @njit
 def _low_pass(x, i, cutoff, dt, states):
-    """Return a reading of axis i through a Butterworth filter, whose states, (6,), then hold it; by Tustin's rule."""
+    """Return a reading of axis i through a Butterworth filter, whose states, (6,), then hold it; by
+    Tustin's rule.
+    """
     k = math.tan(math.pi * cutoff * dt)
     scale = 1.0 / (1.0 + math.sqrt(2.0) * k + k * k)
-    b, a1, a2 = k * k * scale, 2.0 * (k * k - 1.0) * scale, (1.0 - math.sqrt(2.0) * k + k * k) * scale
+    b, a1, a2 = (
+        k * k * scale,
+        2.0 * (k * k - 1.0) * scale,
+        (1.0 - math.sqrt(2.0) * k + k * k) * scale,
+    )
     filtered = b * x + states[i]
     states[i] = 2.0 * b * x - a1 * filtered + states[3 + i]
     states[3 + i] = b * x - a2 * filtered
@@ -59,12 +67,15 @@ def _low_pass(x, i, cutoff, dt, states):
     accuracy={"s": 0, "e": 0},
     label="INDI attitude",
     short="IN",
-    memory=STEERING + 4,  # and states of both filters; torque of the rotors and w before; command and dMz before
+    memory=STEERING
+    + 4,  # and states of both filters; torque of the rotors and w before; command and dMz before
 )
 def indi_attitude(y, gains, memory):
     s, v, ones, started = np.zeros(6), np.zeros(3), np.ones(3), memory[0, 1]
     s[:3] = y.de[:3] + gains.kx / gains.kv * y.e[:3]
-    F, error, turning, moving = steer(y, -gains.kv * s[:3], gains.kx * ones, gains.kv * ones, memory)
+    F, error, turning, moving = steer(
+        y, -gains.kv * s[:3], gains.kx * ones, gains.kv * ones, memory
+    )
     angle, _ = shorter(error, turning)
     rotors, before, held = memory[:3, 4], memory[3:, 4], memory[:, 5]
     follow = 1.0 if gains.lag == 0.0 else -math.expm1(-y.dt / gains.lag)

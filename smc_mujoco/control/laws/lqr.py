@@ -1,14 +1,16 @@
-"""Linear quadratic regulator: u = -(k1 e + k2 de), for the least integral of q1 e^2 + q2 de^2 + r u^2.
+"""Linear quadratic regulator: u = -(k1 e + k2 de), for the least integral of q1 e^2 + q2 de^2 + r
+u^2.
 
-On e'' = a1 e + a2 de + b u, k1 = (a1 + sqrt(a1^2 + b^2 q1 / r)) / b and k2 = (a2 + sqrt(a2^2 + 2 b k1 + b^2 q2 / r)) /
-b: the closed solution of the Riccati equation for two states (derived here). The linear loop is stable, with a phase
-margin of at least 60 degrees. The default a1, a2, b are those of the double integrator; `smc.design.lqr` computes those
-of a plant. With the nominal model f and g are cancelled and the law regulates e'' = v, so a1, a2, b are 0, 0, 1. It is
-a baseline without a sliding mode: a constant disturbance leaves an error. The trace's s is k1 e + k2 de.
-Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; a1 [1/s^2], a2 [1/s] and b [1/kg], of
-the plant.
-Source: R. E. Kalman, "Contributions to the theory of optimal control", Bol. Soc. Mat. Mexicana 5:102, 1960; margins: B.
-D. O. Anderson & J. B. Moore, Optimal Control: Linear Quadratic Methods, Prentice Hall 1990, section 5.4.
+On e'' = a1 e + a2 de + b u, k1 = (a1 + sqrt(a1^2 + b^2 q1 / r)) / b and k2 = (a2 + sqrt(a2^2 + 2 b
+k1 + b^2 q2 / r)) / b: the closed solution of the Riccati equation for two states (derived here).
+The linear loop is stable, with a phase margin of at least 60 degrees. The default a1, a2, b are
+those of the double integrator; `smc.design.lqr` computes those of a plant. With the nominal model f
+and g are cancelled and the law regulates e'' = v, so a1, a2, b are 0, 0, 1. It is a baseline
+without a sliding mode: a constant disturbance leaves an error. The trace's s is k1 e + k2 de.
+Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; a1 [1/s^2], a2
+[1/s] and b [1/kg], of the plant. Source: R. E. Kalman, "Contributions to the theory of optimal
+control", Bol. Soc. Mat. Mexicana 5:102, 1960; margins: B. D. O. Anderson & J. B. Moore, Optimal
+Control: Linear Quadratic Methods, Prentice Hall 1990, section 5.4.
 """
 
 import math

@@ -1,27 +1,32 @@
-"""Model-predictive control without offset: u = v + us, the first move of the best plan of N moves of H each.
+"""Model-predictive control without offset: u = v + us, the first move of the best plan of N moves
+of H each.
 
-    minimise  sum of (q1 e^2 + q2 de^2 + r v^2) over the moves, + x' P x at the end,  with  |v + us| <= u_max
+    minimise  sum of (q1 e^2 + q2 de^2 + r v^2) over the moves, + x' P x at the end,  with  |v + us|
+    <= u_max
 
-on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of the observer of `adrc`, which knows a1 e +
-a2 de, and us = -d / b, so a constant disturbance leaves no error. P is the solution of the discrete Riccati equation,
-so that without bounds the law is the linear quadratic regulator, and cancels d. It differs from that regulator,
-clipped, only where a later move is at the bound: real gains need bounds on states or rates, or a reference known ahead.
-As long as the same moves are held at a bound, the plan is an affine function of e, de and the bounds. The law keeps
-this function, and is as fast as a regulator. Where the function may end it is checked move by move. Where it has ended,
-projected Newton steps find a new plan, from the last one, clipped, or from v = 0 where that fails, until the gradient
-of the free moves is 1e-13 of the linear term. Every plan keeps the bounds. Of 24,000 jumps to a random state 10 were
-not solved, one of them with a cost 64 % too large, the others 4 % at most. H must be long against the control period,
-and N H as long as the loop takes to come to rest. With the nominal model f and g are cancelled and the law regulates
-e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the first move.
-Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w, bandwidth of the observer [1/s]; N,
-number of moves, at most 20; H, time of a move [s]; a1 [1/s^2], a2 [1/s] and b [1/kg], by default those of the plant at
-its origin.
-Sources: D. P. Bertsekas, "Projected Newton methods for optimization problems with simple constraints", SIAM J. Control
-Optim. 20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin & C.-S. Wang, "Structure-preserving algorithms
-for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004 (doubling, for P); U. Maeder,
-F. Borrelli & M. Morari, "Linear offset-free model predictive control", Automatica 45(10):2214, 2009; J. A. De Dona, G.
-C. Goodwin & M. M. Seron, "Anti-windup and model predictive control: reflections and connections", Eur. J. Control
-6(5):467, 2000 (where it is the clipped regulator).
+on e'' = a1 e + a2 de + b u + d, sampled exactly over H. d is the estimate of the observer of
+`adrc`, which knows a1 e + a2 de, and us = -d / b, so a constant disturbance leaves no error. P is
+the solution of the discrete Riccati equation, so that without bounds the law is the linear
+quadratic regulator, and cancels d. It differs from that regulator, clipped, only where a later move
+is at the bound: real gains need bounds on states or rates, or a reference known ahead. As long as
+the same moves are held at a bound, the plan is an affine function of e, de and the bounds. The law
+keeps this function, and is as fast as a regulator. Where the function may end it is checked move by
+move. Where it has ended, projected Newton steps find a new plan, from the last one, clipped, or
+from v = 0 where that fails, until the gradient of the free moves is 1e-13 of the linear term. Every
+plan keeps the bounds. Of 24,000 jumps to a random state 10 were not solved, one of them with a cost
+64 % too large, the others 4 % at most. H must be long against the control period, and N H as long
+as the loop takes to come to rest. With the nominal model f and g are cancelled and the law
+regulates e'' = v, so a1, a2, b are 0, 0, 1. The trace's s is the slope of the cost at v = 0 in the
+first move. Gains: q1 [N^2/m^2], q2 [N^2 s^2/m^2] and r, weights of error, rate and control; w,
+bandwidth of the observer [1/s]; N, number of moves, at most 20; H, time of a move [s]; a1 [1/s^2],
+a2 [1/s] and b [1/kg], by default those of the plant at its origin. Sources: D. P. Bertsekas,
+"Projected Newton methods for optimization problems with simple constraints", SIAM J. Control Optim.
+20(2):221, 1982 (the steps); E. K.-W. Chu, H.-Y. Fan, W.-W. Lin & C.-S. Wang, "Structure-preserving
+algorithms for periodic discrete-time algebraic Riccati equations", Int. J. Control 77(8):767, 2004
+(doubling, for P); U. Maeder, F. Borrelli & M. Morari, "Linear offset-free model predictive
+control", Automatica 45(10):2214, 2009; J. A. De Dona, G. C. Goodwin & M. M. Seron, "Anti-windup and
+model predictive control: reflections and connections", Eur. J. Control 6(5):467, 2000 (where it is
+the clipped regulator).
 """
 
 import math
@@ -32,24 +37,36 @@ from smc_mujoco.control.law import command, law_function, linear_plant
 from smc_mujoco.control.laws.extended_state import corrections, observe
 from smc_mujoco.control.units import INPUT_GAIN, RATE, RATE2, TIME, Gain, Unit
 
-# The memory: 0 to 4 the observer; 5, 1 once the matrices are there; 6, the held moves of the Cholesky factor, as bits;
-# 7 to 9, the observer's corrections; 10 to 17, where the tabulated plan was last checked, see `room`; then a row for
-# each move: itself, its side (-1 held at the lower bound, 1 at the upper, 0 free), its function of e, de and the
-# bounds' middle and reach, the linear term by e and by de; the gradient, the step, what a share of it changes; and the
-# Hessian and the factor, 20 x 20, by rows.
-MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = 20, 40, 40, 40  # chosen; from no plan 34 steps were enough in 60,000 states
+# The memory: 0 to 4 the observer; 5, 1 once the matrices are there; 6, the held moves of the
+# Cholesky factor, as bits;
+# 7 to 9, the observer's corrections; 10 to 17, where the tabulated plan was last checked, see
+# `room`; then a row for each move: itself, its side (-1 held at the lower bound, 1 at the upper, 0
+# free), its function of e, de and the bounds' middle and reach, the linear term by e and by de; the
+# gradient, the step, what a share of it changes; and the Hessian and the factor, 20 x 20, by rows.
+MOVES, MOST_STEPS, MOST_HALVINGS, TERMS = (
+    20,
+    40,
+    40,
+    40,
+)  # chosen; from no plan 34 steps were enough in 60,000 states
 AT_E, AT_DE, AT_MIDDLE, AT_REACH, MOST_E, MOST_DE, MOST_MIDDLE, ROOM = range(10, 18)
 PLAN, SIDE, FROM_E, FROM_DE, FROM_MIDDLE, FROM_REACH, BY_E, BY_DE = range(18, 26)
 ROW, GRADIENT, STEP, MOVED, HESSIAN, FACTOR, SLOTS = 8, 178, 198, 218, 238, 638, 1038
 UNBOUNDED = 1e30  # in place of no bound, as 0 times infinity is no number
-ENOUGH, FAR = 1e-13, 1e-6  # gradient of free moves over the linear term: solved up to it; above it, solved from v = 0
+ENOUGH, FAR = (
+    1e-13,
+    1e-6,
+)  # gradient of free moves over the linear term: solved up to it; above it, solved from v = 0
 SUFFICIENT = 1e-4  # share of the decrease that the gradient promises, L. Armijo's
 
 
 @njit
 def sampled(a1, a2, b, H):
-    """Return the matrix A, by rows, and the vector B of e'' = a1 e + a2 de + b v over the time H, v constant."""
-    # the series of the exponential: T_k = (M H)^k / k!, A = sum of T_k, and the integral is H sum of T_k / (k + 1)
+    """Return the matrix A, by rows, and the vector B of e'' = a1 e + a2 de + b v over the time H, v
+    constant.
+    """
+    # the series of the exponential: T_k = (M H)^k / k!, A = sum of T_k, and the integral is H sum
+    # of T_k / (k + 1)
     t11, t12, t21, t22 = 1.0, 0.0, 0.0, 1.0
     A11, A12, A21, A22, B1, B2 = 1.0, 0.0, 0.0, 1.0, 0.0, b * H
     for k in range(1, TERMS):
@@ -63,7 +80,9 @@ def sampled(a1, a2, b, H):
 
 @njit
 def riccati(A11, A12, A21, A22, B1, B2, q1, q2):
-    """Return P11, P12, P22 of the discrete Riccati equation with the weights q1, q2 and 1, by doubling."""
+    """Return P11, P12, P22 of the discrete Riccati equation with the weights q1, q2 and 1, by
+    doubling.
+    """
     g11, g12, g22, p11, p12, p22 = B1 * B1, B1 * B2, B2 * B2, q1, 0.0, q2
     a11, a12, a21, a22 = A11, A12, A21, A22
     for _ in range(TERMS):
@@ -73,7 +92,12 @@ def riccati(A11, A12, A21, A22, B1, B2, q1, q2):
         det = m11 * m22 - m12 * m21
         w11, w12, w21, w22 = m22 / det, -m12 / det, -m21 / det, m11 / det
         # P grows by a' P W a, G by a W G a', and a becomes a W a
-        c11, c12, c21, c22 = w11 * a11 + w12 * a21, w11 * a12 + w12 * a22, w21 * a11 + w22 * a21, w21 * a12 + w22 * a22
+        c11, c12, c21, c22 = (
+            w11 * a11 + w12 * a21,
+            w11 * a12 + w12 * a22,
+            w21 * a11 + w22 * a21,
+            w21 * a12 + w22 * a22,
+        )
         r11, r12 = p11 * c11 + p12 * c21, p11 * c12 + p12 * c22
         r21, r22 = p12 * c11 + p22 * c21, p12 * c12 + p22 * c22
         h11, h12 = w11 * g11 + w12 * g12, w11 * g12 + w12 * g22
@@ -82,8 +106,17 @@ def riccati(A11, A12, A21, A22, B1, B2, q1, q2):
         s21, s22 = a21 * h11 + a22 * h21, a21 * h12 + a22 * h22
         more11, more12, more22 = a11 * r11 + a21 * r21, a11 * r12 + a21 * r22, a12 * r12 + a22 * r22
         p11, p12, p22 = p11 + more11, p12 + more12, p22 + more22
-        g11, g12, g22 = g11 + s11 * a11 + s12 * a12, g12 + s11 * a21 + s12 * a22, g22 + s21 * a21 + s22 * a22
-        a11, a12, a21, a22 = a11 * c11 + a12 * c21, a11 * c12 + a12 * c22, a21 * c11 + a22 * c21, a21 * c12 + a22 * c22
+        g11, g12, g22 = (
+            g11 + s11 * a11 + s12 * a12,
+            g12 + s11 * a21 + s12 * a22,
+            g22 + s21 * a21 + s22 * a22,
+        )
+        a11, a12, a21, a22 = (
+            a11 * c11 + a12 * c21,
+            a11 * c12 + a12 * c22,
+            a21 * c11 + a22 * c21,
+            a21 * c12 + a22 * c22,
+        )
         if abs(more11) + abs(more22) <= 1e-16 * (p11 + p22):
             break
     return p11, p12, p22
@@ -91,12 +124,16 @@ def riccati(A11, A12, A21, A22, B1, B2, q1, q2):
 
 @njit
 def prepare(n, a1, a2, b, H, q1, q2, memory):
-    """Write the Hessian and the linear terms of the plan's cost, halved, into the memory. Return 1."""
+    """Write the Hessian and the linear terms of the plan's cost, halved, into the memory.
+
+    Return 1.
+    """
     A11, A12, A21, A22, B1, B2 = sampled(a1, a2, b, H)
     s11, s12, s22 = riccati(A11, A12, A21, A22, B1, B2, q1, q2)
     for k in range(n):
         i = n - 1 - k
-        # B' S of the cost from move i + 1 on without control; then back through A, one move earlier each
+        # B' S of the cost from move i + 1 on without control; then back through A, one move earlier
+        # each
         v1, v2 = B1 * s11 + B2 * s12, B1 * s12 + B2 * s22
         memory[HESSIAN + MOVES * i + i] = 1.0 + v1 * B1 + v2 * B2
         for m in range(i):
@@ -105,15 +142,27 @@ def prepare(n, a1, a2, b, H, q1, q2, memory):
             memory[HESSIAN + MOVES * i + j] = v1 * B1 + v2 * B2
             memory[HESSIAN + MOVES * j + i] = v1 * B1 + v2 * B2
         memory[BY_E + ROW * i], memory[BY_DE + ROW * i] = v1 * A11 + v2 * A21, v1 * A12 + v2 * A22
-        r11, r12, r21, r22 = s11 * A11 + s12 * A21, s11 * A12 + s12 * A22, s12 * A11 + s22 * A21, s12 * A12 + s22 * A22
-        s11, s12, s22 = q1 + A11 * r11 + A21 * r21, A11 * r12 + A21 * r22, q2 + A12 * r12 + A22 * r22
+        r11, r12, r21, r22 = (
+            s11 * A11 + s12 * A21,
+            s11 * A12 + s12 * A22,
+            s12 * A11 + s22 * A21,
+            s12 * A12 + s22 * A22,
+        )
+        s11, s12, s22 = (
+            q1 + A11 * r11 + A21 * r21,
+            A11 * r12 + A21 * r22,
+            q2 + A12 * r12 + A22 * r22,
+        )
     memory[ROOM] = -1.0
     return tabulate(n, -math.inf, math.inf, memory)
 
 
 @njit
 def residual(n, e, de, low, high, memory):
-    """Write the gradient of the plan into the memory. Return the largest of the free moves, over the linear term."""
+    """Write the gradient of the plan into the memory.
+
+    Return the largest of the free moves, over the linear term.
+    """
     for i in range(n):
         memory[GRADIENT + i] = memory[BY_E + ROW * i] * e + memory[BY_DE + ROW * i] * de
     size = 0.0
@@ -139,7 +188,8 @@ def held(i, low, high, memory):
 
 @njit
 def factor(n, low, high, memory):
-    """Write the Cholesky factor of the Hessian of the free moves into the memory; held moves have the identity's rows.
+    """Write the Cholesky factor of the Hessian of the free moves into the memory; held moves have
+    the identity's rows.
 
     Return the held moves, as bits, and a bit above them.
     """
@@ -157,7 +207,9 @@ def factor(n, low, high, memory):
             total = memory[HESSIAN + MOVES * i + j] if free else (1.0 if i == j else 0.0)
             for k in range(j):
                 total -= memory[FACTOR + MOVES * i + k] * memory[FACTOR + MOVES * j + k]
-            memory[FACTOR + MOVES * i + j] = math.sqrt(total) if i == j else total / memory[FACTOR + MOVES * j + j]
+            memory[FACTOR + MOVES * i + j] = (
+                math.sqrt(total) if i == j else total / memory[FACTOR + MOVES * j + j]
+            )
     return bits
 
 
@@ -178,7 +230,10 @@ def substitute(n, memory):
 
 @njit
 def newton(n, low, high, memory):
-    """Write Newton's step of the free moves into the memory; those that are held stay. Return the whole share, 1."""
+    """Write Newton's step of the free moves into the memory; those that are held stay.
+
+    Return the whole share, 1.
+    """
     memory[6] = factor(n, low, high, memory)
     for i in range(n):
         memory[STEP + i] = 0.0 if held(i, low, high, memory) else -memory[GRADIENT + i]
@@ -187,7 +242,10 @@ def newton(n, low, high, memory):
 
 @njit
 def move(n, share, low, high, memory):
-    """Write how a share of the step changes the moves, each clipped to its bounds. Return whether none is clipped."""
+    """Write how a share of the step changes the moves, each clipped to its bounds.
+
+    Return whether none is clipped.
+    """
     whole = True
     for i in range(n):
         v, wanted = memory[PLAN + ROW * i], memory[PLAN + ROW * i] + share * memory[STEP + i]
@@ -199,16 +257,23 @@ def move(n, share, low, high, memory):
 
 @njit
 def advance(n, low, high, memory):
-    """Move the plan by a share of Newton's step that lowers the cost enough, 1 or less. Return it; 0 for none."""
+    """Move the plan by a share of Newton's step that lowers the cost enough, 1 or less.
+
+    Return it; 0 for none.
+    """
     share = newton(n, low, high, memory)
     for _ in range(MOST_HALVINGS):
-        enough = move(n, share, low, high, memory)  # a whole step that no bound clips ends at the least cost
+        enough = move(
+            n, share, low, high, memory
+        )  # a whole step that no bound clips ends at the least cost
         if not enough:
             promised, curved = 0.0, 0.0
             for i in range(n):
                 promised += memory[GRADIENT + i] * memory[MOVED + i]
                 for j in range(n):
-                    curved += memory[MOVED + i] * memory[HESSIAN + MOVES * i + j] * memory[MOVED + j]
+                    curved += (
+                        memory[MOVED + i] * memory[HESSIAN + MOVES * i + j] * memory[MOVED + j]
+                    )
             enough = promised + curved / 2.0 <= SUFFICIENT * promised
         if enough:
             for i in range(n):
@@ -235,18 +300,26 @@ def solve(n, e, de, low, high, kept, memory):
 
 @njit
 def tabulate(n, low, high, memory):
-    """Write the plan as a function of e, de and the bounds' middle and reach, as long as the same moves are held.
+    """Write the plan as a function of e, de and the bounds' middle and reach, as long as the same
+    moves are held.
 
     For a held move, write the gradient over the move's curvature instead. Return 1.
     """
     memory[6] = factor(n, low, high, memory)
     for i in range(n):
-        memory[SIDE + ROW * i] = -math.copysign(1.0, memory[GRADIENT + i]) if held(i, low, high, memory) else 0.0
+        memory[SIDE + ROW * i] = (
+            -math.copysign(1.0, memory[GRADIENT + i]) if held(i, low, high, memory) else 0.0
+        )
     for i in range(n):  # first the gradient where the free moves are 0
-        memory[FROM_E + ROW * i], memory[FROM_DE + ROW * i] = memory[BY_E + ROW * i], memory[BY_DE + ROW * i]
+        memory[FROM_E + ROW * i], memory[FROM_DE + ROW * i] = (
+            memory[BY_E + ROW * i],
+            memory[BY_DE + ROW * i],
+        )
         memory[FROM_MIDDLE + ROW * i], memory[FROM_REACH + ROW * i] = 0.0, 0.0
         for j in range(n):
-            memory[FROM_MIDDLE + ROW * i] += abs(memory[SIDE + ROW * j]) * memory[HESSIAN + MOVES * i + j]
+            memory[FROM_MIDDLE + ROW * i] += (
+                abs(memory[SIDE + ROW * j]) * memory[HESSIAN + MOVES * i + j]
+            )
             memory[FROM_REACH + ROW * i] += memory[SIDE + ROW * j] * memory[HESSIAN + MOVES * i + j]
     for k in range(4):
         column = FROM_E + k
@@ -278,9 +351,12 @@ def tabulated(i, e, de, middle, reach, memory):
 
 @njit
 def recall(n, e, de, middle, reach, memory):
-    """Write the tabulated plan, clipped, and where that was. Return how far all moves are from the function's end.
+    """Write the tabulated plan, clipped, and where that was.
 
-    At the end a free move is at a bound, or the gradient of a held one is 0; below 0, a move is beyond.
+    Return how far all moves are from the function's end.
+
+    At the end a free move is at a bound, or the gradient of a held one is 0; below 0, a move is
+    beyond.
     """
     left = UNBOUNDED
     for i in range(n):
@@ -297,7 +373,9 @@ def recall(n, e, de, middle, reach, memory):
 
 @njit
 def room(e, de, middle, reach, memory):
-    """Return the least distance of the tabulated plan from its end, by how far the state is from the last `recall`."""
+    """Return the least distance of the tabulated plan from its end, by how far the state is from
+    the last `recall`.
+    """
     if reach != memory[AT_REACH]:
         return -1.0
     spent = memory[MOST_E] * abs(e - memory[AT_E]) + memory[MOST_DE] * abs(de - memory[AT_DE])
@@ -306,11 +384,16 @@ def room(e, de, middle, reach, memory):
 
 @njit
 def planned(n, e, de, middle, reach, memory):
-    """Write the best plan: the tabulated one, or else a new one, which is then tabulated. Return its `recall`."""
+    """Write the best plan: the tabulated one, or else a new one, which is then tabulated.
+
+    Return its `recall`.
+    """
     left = recall(n, e, de, middle, reach, memory)
     if left < 0.0:
         low, high = middle - reach, middle + reach
-        if solve(n, e, de, low, high, 1.0, memory) > FAR:  # bounds cut the steps short: the state is far from the last
+        if (
+            solve(n, e, de, low, high, 1.0, memory) > FAR
+        ):  # bounds cut the steps short: the state is far from the last
             solve(n, e, de, low, high, 0.0, memory)
         tabulate(n, low, high, memory)
     return left

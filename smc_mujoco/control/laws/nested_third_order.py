@@ -1,14 +1,15 @@
-"""Nested, order 3: u = -a sgn(q2 + 2 (|q1|^3 + q0^2)^(1/6) sgn(q1 + [q0]^(2/3))), q0 = e, q1 = de/w, q2 = e''/w^2.
+"""Nested, order 3: u = -a sgn(q2 + 2 (|q1|^3 + q0^2)^(1/6) sgn(q1 + [q0]^(2/3))), q0 = e, q1 =
+de/w, q2 = e''/w^2.
 
-e, de and e'' reach 0 in finite time (3-sliding) for e''' = g u + h if a g exceeds |h| by enough for w. At w = 1 only a
-has to be tuned. A larger w converges w times as fast and needs about w^3 times the control. Sampled with exact
-derivatives, |e| = O(dt^3), |de| = O(dt^2) and |e''| = O(dt). The law is for a plant with an actuator lag and an
-estimator that gives the acceleration. If the estimator gives none, e'' counts as 0, and the law switches on de + w
-[e]^(2/3). The trace's s is e, of relative degree 3.
-Gains: a, switching gain [N]; w, speed of convergence [1/s].
-Source: A. Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control
-76(9/10):924, 2003 (law); A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE Trans. Autom. Control
-50(11):1812, 2005 (w).
+e, de and e'' reach 0 in finite time (3-sliding) for e''' = g u + h if a g exceeds |h| by enough for
+w. At w = 1 only a has to be tuned. A larger w converges w times as fast and needs about w^3 times
+the control. Sampled with exact derivatives, |e| = O(dt^3), |de| = O(dt^2) and |e''| = O(dt). The
+law is for a plant with an actuator lag and an estimator that gives the acceleration. If the
+estimator gives none, e'' counts as 0, and the law switches on de + w [e]^(2/3). The trace's s is e,
+of relative degree 3. Gains: a, switching gain [N]; w, speed of convergence [1/s]. Source: A.
+Levant, "Higher-order sliding modes, differentiation and output-feedback control", Int. J. Control
+76(9/10):924, 2003 (law); A. Levant, "Quasi-continuous high-order sliding-mode controllers", IEEE
+Trans. Autom. Control 50(11):1812, 2005 (w).
 """
 
 from smc_mujoco.control.law import command, law_function, power, sgn

@@ -1,14 +1,15 @@
-"""Proper implicit super-twisting: u = -k1 [z]^(1/2) + 2 w+ - w, w+ = w - dt k2 sgn(z) at z = s + dt (u - w+).
+"""Proper implicit super-twisting: u = -k1 [z]^(1/2) + 2 w+ - w, w+ = w - dt k2 sgn(z) at z = s + dt
+(u - w+).
 
-The equations have a closed solution. If |s| <= dt^2 k2, then z = 0 and w+ = w - s/dt. Otherwise [z]^(1/2) = r sgn(s)
-and sgn(z) = sgn(s), with r = sqrt(dt^2 k1^2/4 + |s| - dt^2 k2) - dt k1/2. Theorem for s' = u + d with |d'| <= L, k2 > L
-and k1 > sqrt(k2 + L): |s| <= L dt^2 after a finite time, without chattering. No sampled law can guarantee less. Like
-every deadbeat law it assumes s' = u + d: without the model it chatters if g is far from 1. Under saturation w winds up
-as in the explicit law.
-Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s].
-Source: R. Seeber & B. Andritsch, "Proper implicit discretization of the super-twisting controller - without and with
-actuator saturation", Automatica 173:112027, 2025, eq. 11 to 13 and theorem 3.4 (numbers of the preprint
-arXiv:2406.16094v1).
+The equations have a closed solution. If |s| <= dt^2 k2, then z = 0 and w+ = w - s/dt. Otherwise
+[z]^(1/2) = r sgn(s) and sgn(z) = sgn(s), with r = sqrt(dt^2 k1^2/4 + |s| - dt^2 k2) - dt k1/2.
+Theorem for s' = u + d with |d'| <= L, k2 > L and k1 > sqrt(k2 + L): |s| <= L dt^2 after a finite
+time, without chattering. No sampled law can guarantee less. Like every deadbeat law it assumes s' =
+u + d: without the model it chatters if g is far from 1. Under saturation w winds up as in the
+explicit law. Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of
+the surface [1/s]. Source: R. Seeber & B. Andritsch, "Proper implicit discretization of the
+super-twisting controller - without and with actuator saturation", Automatica 173:112027, 2025, eq.
+11 to 13 and theorem 3.4 (numbers of the preprint arXiv:2406.16094v1).
 """
 
 import math

@@ -1,18 +1,18 @@
 """Super-twisting: u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s), |w| <= w_max, s = de + c e.
 
-s = s' = 0 is reached in finite time (2-sliding) for s' = u + d with |d'| <= L if k1 = 1.5 sqrt(L) and k2 = 1.1 L. Any
-k2 > L with k1 > sqrt(k2 + L) suffices too (no warning asks for it, because the study's first gains miss it). Sampled
-with the explicit Euler method the residual of s is O(dt^2).
+s = s' = 0 is reached in finite time (2-sliding) for s' = u + d with |d'| <= L if k1 = 1.5 sqrt(L)
+and k2 = 1.1 L. Any k2 > L with k1 > sqrt(k2 + L) suffices too (no warning asks for it, because the
+study's first gains miss it). Sampled with the explicit Euler method the residual of s is O(dt^2).
 
-With w_max = inf, the default, the law is as published: while the actuator saturates, w winds up, and may swing the
-plant from bound to bound. With w_max at the actuator's bound, w stops there. s = 0 requires w = -d, so a constant d
-beyond w_max leaves |s| = ((|d| - w_max) / k1)^2.
-Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s]; w_max, bound on w
-[N].
-Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993 (law
-and accuracy); A. Levant, "Robust exact differentiation via sliding mode technique", Automatica 34(3):379, 1998 (these
-gains); R. Seeber & M. Horn, "Stability proof for a well-established super-twisting parameter setting", Automatica
-84:241, 2017 (the condition); the clamp is a common anti-windup, its residual derived here.
+With w_max = inf, the default, the law is as published: while the actuator saturates, w winds up,
+and may swing the plant from bound to bound. With w_max at the actuator's bound, w stops there. s =
+0 requires w = -d, so a constant d beyond w_max leaves |s| = ((|d| - w_max) / k1)^2. Gains: k1, of
+the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s]; w_max,
+bound on w [N]. Sources: A. Levant, "Sliding order and sliding accuracy in sliding mode control",
+Int. J. Control 58(6):1247, 1993 (law and accuracy); A. Levant, "Robust exact differentiation via
+sliding mode technique", Automatica 34(3):379, 1998 (these gains); R. Seeber & M. Horn, "Stability
+proof for a well-established super-twisting parameter setting", Automatica 84:241, 2017 (the
+condition); the clamp is a common anti-windup, its residual derived here.
 """
 
 import math

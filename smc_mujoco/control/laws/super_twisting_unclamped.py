@@ -1,9 +1,10 @@
-"""Super-twisting as published, its integral without a bound: u = -k1 [s]^(1/2) + w, w' = -k2 sgn(s), s = de + c e.
+"""Super-twisting as published, its integral without a bound: u = -k1 [s]^(1/2) + w, w' = -k2
+sgn(s), s = de + c e.
 
-`super_twisting` with w_max = inf, under its own name, so that a comparison can contain both. w winds up while the
-actuator saturates.
-Gains: k1, of the square root [N (s/m)^1/2]; k2, of the integral [N/s]; c, slope of the surface [1/s].
-Source: A. Levant, "Sliding order and sliding accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993.
+`super_twisting` with w_max = inf, under its own name, so that a comparison can contain both. w
+winds up while the actuator saturates. Gains: k1, of the square root [N (s/m)^1/2]; k2, of the
+integral [N/s]; c, slope of the surface [1/s]. Source: A. Levant, "Sliding order and sliding
+accuracy in sliding mode control", Int. J. Control 58(6):1247, 1993.
 """
 
 import math

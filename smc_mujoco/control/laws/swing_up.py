@@ -1,18 +1,20 @@
-"""Swing-up and catch: u = -k E sgn(x'), E = J (x'^2 / 2 + w^2 (cos x - 1)); near upright u = -q s, s = de + w e.
+"""Swing-up and catch: u = -k E sgn(x'), E = J (x'^2 / 2 + w^2 (cos x - 1)); near upright u = -q s,
+s = de + w e.
 
-E is the pendulum's energy relative to rest in the upright position. During the swing-up E' = u x' - b x'^2 has the sign
-of -E whenever k |E| exceeds the friction b |x'|, so |E| falls, however small u_max is compared with m l grav. Near
-upright s is the unstable mode, s' = w s + u / J. With |u| <= u_max it can be brought back if and only if |s| < u_max /
-(J w). u = -q s with q > J w does so from this whole set, and the remaining mode decays as exp(-w t). The catch starts
-at |s| below `part` of that bound, within 1 rad (chosen), and ends beyond it. Angles count from the nearest upright
+E is the pendulum's energy relative to rest in the upright position. During the swing-up E' = u x' -
+b x'^2 has the sign of -E whenever k |E| exceeds the friction b |x'|, so |E| falls, however small
+u_max is compared with m l grav. Near upright s is the unstable mode, s' = w s + u / J. With |u| <=
+u_max it can be brought back if and only if |s| < u_max / (J w). u = -q s with q > J w does so from
+this whole set, and the remaining mode decays as exp(-w t). The catch starts at |s| below `part` of
+that bound, within 1 rad (chosen), and ends beyond it. Angles count from the nearest upright
 position. From rest the law first pushes upwards.
 
-J = m l^2 and w = sqrt(grav / l) are gains; the defaults are those of the library's pendulum. With the nominal model J
-is 1 / g. During the swing-up the trace's s is E sgn(x').
-Gains: k, of the energy [1/rad]; q, of the catch [N m s/rad]; J, inertia [kg m^2]; w, rate of the unstable mode [1/s];
-part, of the catchable set.
-Source: K. J. Astrom & K. Furuta, "Swinging up a pendulum by energy control", Automatica 36(2):287, 2000, eq. 8, with
-the torque at the pivot in place of the pivot's acceleration; the catch is derived.
+J = m l^2 and w = sqrt(grav / l) are gains; the defaults are those of the library's pendulum. With
+the nominal model J is 1 / g. During the swing-up the trace's s is E sgn(x'). Gains: k, of the
+energy [1/rad]; q, of the catch [N m s/rad]; J, inertia [kg m^2]; w, rate of the unstable mode
+[1/s]; part, of the catchable set. Source: K. J. Astrom & K. Furuta, "Swinging up a pendulum by
+energy control", Automatica 36(2):287, 2000, eq. 8, with the torque at the pivot in place of the
+pivot's acceleration; the catch is derived.
 """
 
 import math

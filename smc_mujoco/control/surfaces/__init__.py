@@ -1,1 +1,4 @@
-"""Sliding surfaces, one per file. Every module of this package is searched for surfaces. Notation as in laws."""
+"""Sliding surfaces, one per file.
+
+Every module of this package is searched for surfaces. Notation as in laws.
+"""

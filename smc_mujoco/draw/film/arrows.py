@@ -1,11 +1,12 @@
 """Arrows in the scene: control, disturbance, and friction with contact, at each driven joint.
 
-An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows how far a control
-swings that switches faster than the film. With a drive, arrow and bar show its force, and a pale arrow the command.
-Arrows lie along a pendulum's arc, beyond the bob; or along the rail, above the cart, in the picture if it carries
-something. At a hinge of a user's model, whose links may have any shape, they bend around its axis. On a free body the
-control's are those of its actuators, at their places, and the disturbance's is one force from its middle. All are
-drawn over the picture, so that no link hides them.
+An arrow is the mean over the time of a frame. A bar behind the control's is its range, which shows
+how far a control swings that switches faster than the film. With a drive, arrow and bar show its
+force, and a pale arrow the command. Arrows lie along a pendulum's arc, beyond the bob; or along the
+rail, above the cart, in the picture if it carries something. At a hinge of a user's model, whose
+links may have any shape, they bend around its axis. On a free body the control's are those of its
+actuators, at their places, and the disturbance's is one force from its middle. All are drawn over
+the picture, so that no link hides them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,12 +25,21 @@ from smc_mujoco.simulation import model as models
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.trace import Trace
 
-HINGE_LENGTH, SLIDE_LENGTH = 0.425, 0.08  # longest arrow, as a share of the pendulum's length, and of the rail's
-RADIUS_SHARE, LENGTH_SHARE = 0.16, 0.024  # of the bob's radius and the pendulum's length, which add up to the thickness
+HINGE_LENGTH, SLIDE_LENGTH = (
+    0.425,
+    0.08,
+)  # longest arrow, as a share of the pendulum's length, and of the rail's
+RADIUS_SHARE, LENGTH_SHARE = (
+    0.16,
+    0.024,
+)  # of the bob's radius and the pendulum's length, which add up to the thickness
 LONG_PENDULUM = 0.5  # m: longer pendulums have arrows as thick as one of this length
 ARC_DISTANCE, RAIL_DISTANCE = 1.6, 2.2  # thicknesses between a body and its nearest arrow
 LAYER_DISTANCE = 2.6  # thicknesses between two arrows
-SLIDE_THICKNESS, MAX_RAIL_SHARE = 0.035, 0.008  # m, and largest share of the rail, of an arrow's thickness
+SLIDE_THICKNESS, MAX_RAIL_SHARE = (
+    0.035,
+    0.008,
+)  # m, and largest share of the rail, of an arrow's thickness
 USER_LENGTH, USER_THICKNESS = 0.25, 0.012  # at slides of a user's model, of its extent
 USER_RADIUS = 0.15  # of a bent arrow at a hinge of a user's model, of its extent
 BENT_SIZE = 0.1  # largest radius of a bent arrow, of the size of what moves
@@ -39,14 +49,22 @@ MIN_SHAFT = 8.0  # px, of a film of full size; of an arrow that is long enough
 MAX_SWEEP = 2.0  # rad, of the longest bent arrow
 BENT_WIDTH, BENT_DISTANCE = 0.2, 0.35  # of a bent arrow, and to the next one, in radii
 BENT_RAISE = 0.5  # by which the middle of a bent arrow is higher than the direction to the camera
-HEAD_WIDTH, HEAD_LENGTH = 2.25, 2.2  # of a flat arrow: half the head's width in shafts, its length in such halves
+HEAD_WIDTH, HEAD_LENGTH = (
+    2.25,
+    2.2,
+)  # of a flat arrow: half the head's width in shafts, its length in such halves
 SUPERSAMPLING = 3  # pixels of a flat arrow for each of the picture, in both directions
 NETWORK_FACTOR = 1.6  # arrows of a network are longer: they are seen from the side
 MIN_LENGTH = 0.05  # of the longest: shorter arrows are not drawn
 MAX_THICKNESS = 0.25  # of the shaft of a short arrow, of its length
 MIN_LEVER = 1e-6  # m: a body centred on its hinge has no arc for an arrow
-FLIGHT_LENGTH, FLIGHT_THICKNESS = 2.2, 0.07  # of the longest arrow on a free body, in distances of its actuators
-FLIGHT_DISTANCE = 0.6  # of the disturbance's arrow from the middle of a free body, in longest arrows
+FLIGHT_LENGTH, FLIGHT_THICKNESS = (
+    2.2,
+    0.07,
+)  # of the longest arrow on a free body, in distances of its actuators
+FLIGHT_DISTANCE = (
+    0.6  # of the disturbance's arrow from the middle of a free body, in longest arrows
+)
 COMMAND_OPACITY = 0.45  # opacity of a command's arrow beside that of the drive's force
 MIN_BAR = 0.1  # of the longest arrow: smaller ranges have no bar
 
@@ -60,38 +78,65 @@ class Arrow(NamedTuple):
     layer: int = 0  # distance from the body, in arrows
     size: float = 1.0
     head: bool = True
-    way: np.ndarray | None = None  # direction of a force on a free body, (3,), in the axes of the world
+    way: np.ndarray | None = (
+        None  # direction of a force on a free body, (3,), in the axes of the world
+    )
 
 
 class Mount(NamedTuple):
     """Place and size of the arrows at a joint of the film's scene."""
 
     joint: int
-    unit: float  # at a slide, length of the longest arrow, m; at a hinge, a factor on HINGE_LENGTH of the pendulum's
+    # at a slide, length of the longest arrow, m; at a hinge, a factor on HINGE_LENGTH of the
+    # pendulum's
+    unit: float
     thick: float  # thickness at a slide, m
-    front: np.ndarray | None  # direction to the camera, (3,), for arrows at a slide that carries something
-    beyond: bool = False  # whether on the other side of a hinge than the body: a network's pendulums pass each other
+    front: (
+        np.ndarray | None
+    )  # direction to the camera, (3,), for arrows at a slide that carries something
+    # whether on the other side of a hinge than the body: a network's pendulums pass each other
+    beyond: bool = False
     radius: float = 0.0  # of bent arrows, m; 0 for straight ones
-    # Of an actuator of a free body: its place, m, and the direction of its force, in the axes of the body
+    # Of an actuator of a free body: its place, m, and the direction of its force, in the axes of
+    # the body
     place: np.ndarray | None = None
     way: np.ndarray | None = None
 
 
 def mounts(
-    scenario: Scenario, joints: Sequence[int], slides: Sequence[bool], rail: float, front: np.ndarray
+    scenario: Scenario,
+    joints: Sequence[int],
+    slides: Sequence[bool],
+    rail: float,
+    front: np.ndarray,
 ) -> list[Mount]:
-    """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points to the camera."""
+    """Return the Mount of each joint of a machine on a `rail` of that length in m; `front` points
+    to the camera.
+    """
     plant, is_users = scenario.plant, not scenario.plant.on_stage
     if plant.pose:
         return flying_mounts(scenario, joints)
-    extent = float(models.compile_model(scenario).stat.extent) if is_users else 0.0
+    if is_users:
+        extent = float(models.compile_model(scenario).stat.extent)
+    else:
+        extent = 0.0
     length, thick = SLIDE_LENGTH * rail, min(SLIDE_THICKNESS, MAX_RAIL_SHARE * rail)
     if is_users:
         length, thick = USER_LENGTH * extent, USER_THICKNESS * extent
     beyond = plant.network and not is_users
-    turning = NETWORK_FACTOR if plant.n > 1 and not is_users else 1.0
-    if plant.n == 1 and not is_users and "l" in plant.parameters and (usual := catalogue().get(plant.name)):
-        turning = max(1.0, usual.parameters["l"] / plant.parameters["l"])  # no smaller on a short rod
+    if plant.n > 1 and not is_users:
+        turning = NETWORK_FACTOR
+    else:
+        turning = 1.0
+    if (
+        plant.n == 1
+        and not is_users
+        and "l" in plant.parameters
+        and (usual := catalogue().get(plant.name))
+    ):
+        turning = max(
+            1.0, usual.parameters["l"] / plant.parameters["l"]
+        )  # no smaller on a short rod
     before, radius = front if is_users or plant.free else None, USER_RADIUS * extent
     return [
         Mount(j, length if slide else turning, thick, before, beyond, 0.0 if slide else radius)
@@ -111,27 +156,40 @@ def flying_mounts(scenario: Scenario, joints: Sequence[int]) -> list[Mount]:
     ways[: len(drives)] = exerted(model, joint, drives.tolist())[:, :3]
     arm = float(np.linalg.norm(places, axis=1).max()) or USER_LENGTH * float(model.stat.extent)
     sized = {"unit": FLIGHT_LENGTH * arm, "thick": FLIGHT_THICKNESS * arm, "front": None}
-    return [Mount(j, **sized, place=place, way=way) for j, place, way in zip(joints, places, ways, strict=True)]
+    return [
+        Mount(j, **sized, place=place, way=way)
+        for j, place, way in zip(joints, places, ways, strict=True)
+    ]
 
 
 def loads(trace: Trace, edges: np.ndarray) -> dict[str, Envelope]:
-    """Return ranges and means of forces and torques on a machine between consecutive edges, s, by their names."""
-    signals = {"control": trace.applied, "disturbance": trace.d, "reaction": trace.reaction, "force": trace.force}
+    """Return ranges and means of forces and torques on a machine between consecutive edges, s, by
+    their names.
+    """
+    signals = {
+        "control": trace.applied,
+        "disturbance": trace.d,
+        "reaction": trace.reaction,
+        "force": trace.force,
+    }
     return {name: windows(trace.t, y, edges) for name, y in signals.items()}
 
 
 class Scale(NamedTuple):
-    """Values of the longest arrows, in the units of u and of a force: the largest of the runs that lasted.
+    """Values of the longest arrows, in the units of u and of a force: the largest of the runs that
+    lasted.
 
-    Short peaks do not count, such as that of an estimator at the start. Blows are far larger than what drives the
-    machine, so the reaction's longest arrow is not longer than the control's.
+    Short peaks do not count, such as that of an estimator at the start. Blows are far larger than
+    what drives the machine, so the reaction's longest arrow is not longer than the control's.
     """
 
     control: float
     disturbance: float
     reaction: float = 0.0
     exceeded: tuple[str, ...] = ()  # names of those above whose values exceed their longest arrow
-    drive: bool = False  # whether the control passes a drive, such as a motor, whose force is then shown
+    drive: bool = (
+        False  # whether the control passes a drive, such as a motor, whose force is then shown
+    )
 
 
 def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
@@ -144,8 +202,13 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
             continue
         same = group.effort == EFFORT[group.unit]  # else the control is a voltage
         drive = same and any(part.drives for trace in traces for part in trace.scenario.actuator)
-        control, force, push, reaction = (_sizes(parts, name) for name in ("applied", "force", "d", "reaction"))
-        longest = min(reaction[0], control[1]) if control[1] and same else reaction[0]
+        control, force, push, reaction = (
+            _sizes(parts, name) for name in ("applied", "force", "d", "reaction")
+        )
+        if control[1] and same:
+            longest = min(reaction[0], control[1])
+        else:
+            longest = reaction[0]
         if drive:
             control = max(control[0], force[0]), max(control[1], force[1])
         sizes = {"control": control, "disturbance": push, "reaction": (reaction[0], longest)}
@@ -155,20 +218,34 @@ def scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
 
 
 def flying_scales(traces: Sequence[Trace]) -> dict[Group, Scale]:
-    """Return the scale of the arrows of free bodies, all with the position: its actuators are not its channels."""
+    """Return the scale of the arrows of free bodies, all with the position: its actuators are not
+    its channels.
+    """
     lasting = [np.isfinite(trace.x).all(axis=1) for trace in traces]
-    control = max(float(np.abs(trace.applied[k]).max(initial=0.0)) for trace, k in zip(traces, lasting, strict=True))
-    pushes = (np.linalg.norm(trace.d[k, :3], axis=1) for trace, k in zip(traces, lasting, strict=True))
+    control = max(
+        float(np.abs(trace.applied[k]).max(initial=0.0))
+        for trace, k in zip(traces, lasting, strict=True)
+    )
+    pushes = (
+        np.linalg.norm(trace.d[k, :3], axis=1) for trace, k in zip(traces, lasting, strict=True)
+    )
     scale = Scale(control, max(float(push.max(initial=0.0)) for push in pushes))
     return {group: scale if group.unit == "m" else Scale(0.0, 0.0) for group in style.split(traces)}
 
 
-def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str) -> list[tuple[int, Arrow]]:
-    """Return the arrows of a free body in one frame, each with its channel: of actuators and of the disturbance."""
+def flying(
+    loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str
+) -> list[tuple[int, Arrow]]:
+    """Return the arrows of a free body in one frame, each with its channel: of actuators and of the
+    disturbance.
+    """
     law, grey = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE))
     forces, push = loads["control"].mean[frame], loads["disturbance"].mean[frame, :3]
     size = float(np.linalg.norm(push))
-    parts = forces / scale.control if scale.control else 0.0 * forces
+    if scale.control:
+        parts = forces / scale.control
+    else:
+        parts = 0.0 * forces
     drawn = [(i, Arrow(0.0, float(part), (*law, 1.0))) for i, part in enumerate(parts)]
     if size and scale.disturbance:
         drawn.append((0, Arrow(0.0, size / scale.disturbance, (*grey, 1.0), way=push / size)))
@@ -176,26 +253,39 @@ def flying(loads: Mapping[str, Envelope], frame: int, scale: Scale, colour: str)
 
 
 def _sizes(traces: Sequence[Trace], name: str) -> tuple[float, float]:
-    """Return the largest magnitude of a quantity in runs that last, and the one without brief values of over twice it.
+    """Return the largest magnitude of a quantity in runs that last, and the one without brief
+    values of over twice it.
 
     A brief value takes at most 1 - LASTING_QUANTILE of the time.
     """
     peak = max(map(abs, panels.span(traces, name)))
     runs = panels.lasting(traces, name)
-    usual = max((float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs), default=0.0)
+    usual = max(
+        (float(np.quantile(np.abs(y), panels.LASTING_QUANTILE, axis=0).max()) for y in runs),
+        default=0.0,
+    )
     return peak, usual if peak > 2.0 * usual > 0.0 else peak
 
 
 def scales_by_channel(trace: Trace, scales: Mapping[Group, Scale]) -> list[Scale]:
     """Return the scale of the arrows of each of a trace's driven channels."""
     driven = [group for group in groups(trace.scenario) if group.driven]
-    of_channel = {i: scale for group, scale in zip(driven, scales.values(), strict=True) for i in group.channels}
+    of_channel = {}
+    for group, scale in zip(driven, scales.values(), strict=True):
+        for i in group.channels:
+            of_channel[i] = scale
     return [of_channel[i] for i in sorted(of_channel)]
 
 
-def arrows(loads: Mapping[str, Envelope], frame: int, channel: int, scale: Scale, colour: str) -> list[Arrow]:
-    """Return the arrows of one channel in one frame, the control's nearest to the body, with its range behind it."""
-    law, grey, violet = (tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE, style.REACTION))
+def arrows(
+    loads: Mapping[str, Envelope], frame: int, channel: int, scale: Scale, colour: str
+) -> list[Arrow]:
+    """Return the arrows of one channel in one frame, the control's nearest to the body, with its
+    range behind it.
+    """
+    law, grey, violet = (
+        tuple(np.array(style.rgb(c)) / 255) for c in (colour, style.DISTURBANCE, style.REACTION)
+    )
     others = [
         ("control", scale.control * scale.drive, (*law, COMMAND_OPACITY), 0.65),
         ("disturbance", scale.disturbance, (*grey, 1.0), 0.65),
@@ -203,7 +293,9 @@ def arrows(loads: Mapping[str, Envelope], frame: int, channel: int, scale: Scale
     ]
     first = ("force" if scale.drive else "control", scale.control, (*law, 1.0), 1.0)
     drawn = []
-    for layer, (name, longest, rgba, size) in enumerate([first, *(other for other in others if other[1])]):
+    for layer, (name, longest, rgba, size) in enumerate(
+        [first, *(other for other in others if other[1])]
+    ):
         if longest:
             low, mean, high = (float(part[frame, channel]) / longest for part in loads[name][1:])
             drawn.append(Arrow(0.0, mean, rgba, layer, size))
@@ -212,14 +304,21 @@ def arrows(loads: Mapping[str, Envelope], frame: int, channel: int, scale: Scale
     return [arrow for arrow in drawn if abs(arrow.high - arrow.low) > MIN_LENGTH]
 
 
-def path(model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow) -> tuple[np.ndarray, float] | None:
-    """Return the line of an arrow, (m, 3) m, and the width of its shaft, m; None where it has no place."""
+def path(
+    model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow
+) -> tuple[np.ndarray, float] | None:
+    """Return the line of an arrow, (m, 3) m, and the width of its shaft, m; None where it has no
+    place.
+    """
     axis, anchor = data.xaxis[mount.joint], data.xanchor[mount.joint]
     low, high = arrow.size * np.clip((arrow.low, arrow.high), -1.0, 1.0)
     along = np.linspace(low, high, 40)[:, None]  # of the longest
     if mount.place is not None and mount.way is not None:
         body, way = model.jnt_bodyid[mount.joint], arrow.way
-        turn, start = data.xmat[body].reshape(3, 3), mount.unit * FLIGHT_DISTANCE * (way if way is not None else 0.0)
+        turn, start = (
+            data.xmat[body].reshape(3, 3),
+            mount.unit * FLIGHT_DISTANCE * (way if way is not None else 0.0),
+        )
         if way is None:
             way, start = turn @ mount.way, turn @ mount.place
         return data.xpos[body] + start + mount.unit * along * way, mount.thick
@@ -229,7 +328,9 @@ def path(model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow)
             return None
         right /= np.linalg.norm(right)
         out = np.cos(MAX_SWEEP * along) * np.cross(right, axis) + np.sin(MAX_SWEEP * along) * right
-        return anchor + mount.radius * (1.0 + BENT_DISTANCE * arrow.layer) * out, arrow.size * BENT_WIDTH * mount.radius
+        return anchor + mount.radius * (
+            1.0 + BENT_DISTANCE * arrow.layer
+        ) * out, arrow.size * BENT_WIDTH * mount.radius
     body = arrow_geom(model, model.jnt_bodyid[mount.joint])
     if body < 0:
         return None
@@ -252,29 +353,44 @@ def path(model: mujoco.MjModel, data: mujoco.MjData, mount: Mount, arrow: Arrow)
             if np.linalg.norm(across) >= 0.1:  # else it slides to the camera
                 out = across / np.linalg.norm(across) * (1.0 if across[2] >= 0.0 else -1.0)
         turned, aabb = out @ data.geom_xmat[body].reshape(3, 3), model.geom_aabb[body]
-        start = aabb[:3] @ turned + aabb[3:] @ np.abs(turned) + RAIL_DISTANCE * width  # beyond the geom's box
-    return place + (start + LAYER_DISTANCE * width * arrow.layer) * out + reach * along * way, arrow.size * width
+        start = (
+            aabb[:3] @ turned + aabb[3:] @ np.abs(turned) + RAIL_DISTANCE * width
+        )  # beyond the geom's box
+    return place + (
+        start + LAYER_DISTANCE * width * arrow.layer
+    ) * out + reach * along * way, arrow.size * width
 
 
 def outline(line: np.ndarray, width: float, head: bool = True) -> np.ndarray:
-    """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width` px wide."""
+    """Return the outline, (points, 2) px, of an arrow along a line (m, 2) px whose shaft is `width`
+    px wide.
+    """
     way = np.append(0.0, np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum())
     width = min(width, MAX_THICKNESS * way[-1])
     long = min(HEAD_LENGTH * HEAD_WIDTH * width, 0.7 * way[-1]) * head
-    shaft = np.column_stack([np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T])
+    shaft = np.column_stack(
+        [np.interp(np.linspace(0.0, way[-1] - long, len(line)), way, part) for part in line.T]
+    )
     ahead, behind = np.concatenate([shaft[1:], shaft[-1:]]), np.concatenate([shaft[:1], shaft[:-1]])
     along = ahead - behind
     across = 0.5 * width * along[:, ::-1] * (-1, 1) / np.linalg.norm(along, axis=1)[:, None]
     wing = long / HEAD_LENGTH / (0.5 * width) * across[-1]
-    return np.concatenate([shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]])
+    return np.concatenate(
+        [shaft + across, [shaft[-1] + wing, line[-1], shaft[-1] - wing], (shaft - across)[::-1]]
+    )
 
 
 def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int = 0) -> None:
     """Fill an outline, (points, 2) px, with smooth edges, and a rim of paper around it, px."""
-    corner, far = np.floor(edge.min(axis=0)).astype(int) - rim, np.ceil(edge.max(axis=0)).astype(int) + 1 + rim
+    corner, far = (
+        np.floor(edge.min(axis=0)).astype(int) - rim,
+        np.ceil(edge.max(axis=0)).astype(int) + 1 + rim,
+    )
     size = tuple((far - corner).tolist())
     mask = Image.new("L", tuple(SUPERSAMPLING * side for side in size))
-    ImageDraw.Draw(mask).polygon([tuple(SUPERSAMPLING * point) for point in edge - corner], round(255 * rgba[3]))
+    ImageDraw.Draw(mask).polygon(
+        [tuple(SUPERSAMPLING * point) for point in edge - corner], round(255 * rgba[3])
+    )
     if rim:
         wide = mask.resize(size, Image.Resampling.BOX).filter(ImageFilter.MaxFilter(2 * rim + 1))
         image.paste(style.rgb(style.PAPER), tuple(corner.tolist()), wide)
@@ -283,7 +399,9 @@ def paint(image: Image.Image, edge: np.ndarray, rgba: Sequence[float], rim: int 
 
 
 def arrow_geom(model: mujoco.MjModel, body: int) -> int:
-    """Return the geom of a body that carries its arrows: the first in the accent's material, else the first, or -1."""
+    """Return the geom of a body that carries its arrows: the first in the accent's material, else
+    the first, or -1.
+    """
     geoms = range(model.body_geomadr[body], model.body_geomadr[body] + model.body_geomnum[body])
     named = (g for g in geoms if model.geom_matid[g] >= 0)
     first = geoms[0] if geoms else -1

@@ -1,4 +1,5 @@
-"""Geometry of a camera: the place from which it sees given points, and where they are in its picture.
+"""Geometry of a camera: the place from which it sees given points, and where they are in its
+picture.
 
 A `turn` is a camera's frame as MuJoCo keeps it, (3, 3): its columns point right, up and backwards.
 """
@@ -32,13 +33,16 @@ def checked(chosen: Camera | None) -> Camera | None:
         raise ScenarioError(
             f"camera is {shown(chosen)}: give the name of a camera of the model, or (azimuth, elevation) in degrees"
         )
-    return number("camera's azimuth", parts[0]), number("camera's elevation", parts[1], low=-90.0, high=90.0)
+    return number("camera's azimuth", parts[0]), number(
+        "camera's elevation", parts[1], low=-90.0, high=90.0
+    )
 
 
 def turn(azimuth: float, elevation: float) -> np.ndarray:
     """Return the turn of a camera that looks as MuJoCo's free camera does.
 
-    The azimuth, degrees, is 0 along x and 90 along y; at an elevation, degrees, below 0 it looks down.
+    The azimuth, degrees, is 0 along x and 90 along y; at an elevation, degrees, below 0 it looks
+    down.
     """
     a, e = np.radians([azimuth, elevation])
     ahead = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -47,15 +51,19 @@ def turn(azimuth: float, elevation: float) -> np.ndarray:
 
 
 def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room) -> np.ndarray:
-    """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a picture of `size` px.
+    """Return the nearest place, (3,) m, from which points (m, 3) are all within the room of a
+    picture of `size` px.
 
-    With p and z a point's place across and along the view, a camera at c across and at distance D sees it between
-    the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c from both sides, for the picture's
-    width and for its height; D is the least at which both leave room.
+    With p and z a point's place across and along the view, a camera at c across and at distance D
+    sees it between the tangents a and b if a (z + D) <= p - c <= b (z + D). So every point bounds c
+    from both sides, for the picture's width and for its height; D is the least at which both leave
+    room.
     """
     across, up, z = points @ turn[:, 0], points @ turn[:, 1], -points @ turn[:, 2]
     x, y = size[0] / 2, size[1] / 2
-    left, right, low, high = np.array([room.left - x, room.right - x, y - room.bottom, y - room.top]) * pixel(size)
+    left, right, low, high = np.array(
+        [room.left - x, room.right - x, y - room.bottom, y - room.top]
+    ) * pixel(size)
     sides = [(across, left, right), (up, low, high)]
     bounds = [(np.max(p - b * z), np.min(p - a * z), a, b) for p, a, b in sides]
     distance = max((low - high) / (b - a) for low, high, a, b in bounds)
@@ -63,8 +71,12 @@ def fit(points: np.ndarray, turn: np.ndarray, size: tuple[int, int], room: Room)
     return turn @ np.array([*centre, distance])
 
 
-def project(points: np.ndarray, turn: np.ndarray, place: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Return where points (m, 3) are in the picture of a camera at `place`: (m, 2) px from the top left."""
+def project(
+    points: np.ndarray, turn: np.ndarray, place: np.ndarray, size: tuple[int, int]
+) -> np.ndarray:
+    """Return where points (m, 3) are in the picture of a camera at `place`: (m, 2) px from the top
+    left.
+    """
     seen = (points - place) @ turn
     return np.array(size) / 2 + seen[:, :2] / -seen[:, 2:] / pixel(size) * (1, -1)
 

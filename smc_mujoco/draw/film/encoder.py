@@ -15,10 +15,15 @@ from smc_mujoco.common.errors import ScenarioError
 
 # Ending of a film -> codec, its quality and arguments of ffmpeg. All are chosen.
 CODECS = {
-    # Clean on a slide at about 1 MB for 10 s; half the time of x264's default preset, and no larger files.
+    # Clean on a slide at about 1 MB for 10 s; half the time of x264's default preset, and no larger
+    # files.
     ".mp4": {"codec": "h264", "crf": 21, "ffmpeg_args": "-preset veryfast -movflags +faststart"},
     # Letters stay clean at 100 to 200 kB for 5 s. Every browser plays VP9, and no patent covers it.
-    ".webm": {"codec": "vp9", "crf": 34, "ffmpeg_args": "-b:v 0 -deadline good -cpu-used 4 -row-mt 1 -g 60"},
+    ".webm": {
+        "codec": "vp9",
+        "crf": 34,
+        "ffmpeg_args": "-b:v 0 -deadline good -cpu-used 4 -row-mt 1 -g 60",
+    },
 }
 MAX_WAITING = 8  # pictures before the encoder; chosen, 22 MB at 1280 x 720
 Write = Callable[[np.ndarray], None]
@@ -26,11 +31,16 @@ Write = Callable[[np.ndarray], None]
 
 @contextlib.contextmanager
 def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
-    """Yield a function that adds a picture (height, width, 3) to a film, .mp4 or .webm. The film is whole afterwards.
+    """Yield a function that adds a picture (height, width, 3) to a film, .mp4 or .webm.
 
-    Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end first.
+    The film is whole afterwards.
+
+    Ctrl-C raises KeyboardInterrupt here. The terminal sends it to ffmpeg too, which must not end
+    first.
     """
-    writer = mediapy().VideoWriter(path, shape, encoded_format="yuv420p", fps=fps, **CODECS[path.suffix])
+    writer = mediapy().VideoWriter(
+        path, shape, encoded_format="yuv420p", fps=fps, **CODECS[path.suffix]
+    )
     try:
         with sigint_blocked():
             writer.__enter__()
@@ -39,7 +49,9 @@ def encoder(path: Path, shape: tuple[int, int], fps: float) -> Iterator[Write]:
     except (OSError, RuntimeError) as error:
         if isinstance(error.__context__, KeyboardInterrupt):  # ffmpeg complains of half a picture
             raise KeyboardInterrupt from None
-        raise ScenarioError(f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}") from error
+        raise ScenarioError(
+            f"cannot write {path.suffix[1:]}: {' '.join(str(error).split())}"
+        ) from error
 
 
 def mediapy() -> ModuleType:
@@ -56,8 +68,8 @@ def mediapy() -> ModuleType:
 def in_thread(write: Write) -> Iterator[Write]:
     """Yield a function that passes its pictures, in order, to `write` in another thread.
 
-    It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by a later call, or at the
-    end. After an error, here or there, pictures that still wait are dropped.
+    It waits while MAX_WAITING pictures are not written yet. What `write` raises is raised by a
+    later call, or at the end. After an error, here or there, pictures that still wait are dropped.
     """
     thread, waiting = futures.ThreadPoolExecutor(1, "encoder"), collections.deque[futures.Future]()
 
@@ -76,7 +88,9 @@ def in_thread(write: Write) -> Iterator[Write]:
 
 @contextlib.contextmanager
 def sigint_blocked() -> Iterator[None]:
-    """Block SIGINT: a process started meanwhile never receives it, and this one receives it afterwards."""
+    """Block SIGINT: a process started meanwhile never receives it, and this one receives it
+    afterwards.
+    """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return

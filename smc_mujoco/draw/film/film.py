@@ -1,9 +1,9 @@
 """Films: the machines of all traces side by side in MuJoCo, above charts that grow with the clock.
 
-In order: pace.py sets the speed; act.py says what each run does at each frame; caption.py has the text, charts.py the
-charts; scene.py composes the model, puppet.py poses a machine, stage.py all of them with the arrows of arrows.py, and
-canvas.py renders; arm.py draws over arms; encoder.py writes. Frames are made and written one by one, so that memory
-does not grow with a film's length.
+In order: pace.py sets the speed; act.py says what each run does at each frame; caption.py has the
+text, charts.py the charts; scene.py composes the model, puppet.py poses a machine, stage.py all of
+them with the arrows of arrows.py, and canvas.py renders; arm.py draws over arms; encoder.py writes.
+Frames are made and written one by one, so that memory does not grow with a film's length.
 """
 
 import contextlib
@@ -48,10 +48,13 @@ LAST_FRAME_TIME = 1200  # ms for which a clip's last picture stays before the cl
 
 @dataclasses.dataclass(repr=False, eq=False)
 class Frames:
-    """Pictures of a film, each (height, width, 3) uint8. They are made while you iterate, as often as you do.
+    """Pictures of a film, each (height, width, 3) uint8.
 
-    `mediapy.show_video` and `mediapy.write_video` take them as they are; `numpy.stack(list(frames))` is an array.
-    `clock` has the times of the run at each picture, s. Arguments: as `film`.
+    They are made while you iterate, as often as you do.
+
+    `mediapy.show_video` and `mediapy.write_video` take them as they are;
+    `numpy.stack(list(frames))` is an array. `clock` has the times of the run at each picture, s.
+    Arguments: as `film`.
 
     Raises:
       ScenarioError: as `film`; those of size and OpenGL are raised at the first picture.
@@ -71,7 +74,9 @@ class Frames:
         self.camera = checked(self.camera)
         if self.at is not None:
             end = max(float(trace.t[-1]) for trace in style.same_plant(self.traces))
-            self.clock = Clock(np.array([number("at", self.at, low=0.0, high=end + 1e-9)]), np.ones(1))
+            self.clock = Clock(
+                np.array([number("at", self.at, low=0.0, high=end + 1e-9)]), np.ones(1)
+            )
         else:
             self.clock = pace.clock(self.traces, self.fps, self.speed)
         if self.span is not None:
@@ -80,7 +85,9 @@ class Frames:
             start, stop = (number("span", end) for end in ends)
             self.clock = self.clock.part(start, stop)
             if not len(self):
-                raise ScenarioError(f"a film of {start:g} .. {stop:g} s has no frames: give a span within the runs")
+                raise ScenarioError(
+                    f"a film of {start:g} .. {stop:g} s has no frames: give a span within the runs"
+                )
 
     def __len__(self) -> int:
         return len(self.clock.times)
@@ -93,7 +100,10 @@ class Frames:
 
     @property
     def metadata(self) -> "VideoMetadata":
-        """The playback speed, which mediapy reads here. It also gets the ffmpeg of imageio_ffmpeg."""
+        """The playback speed, which mediapy reads here.
+
+        It also gets the ffmpeg of imageio_ffmpeg.
+        """
         width, height = self.size
         return mediapy().VideoMetadata(len(self), (height, width), self.fps, None)
 
@@ -143,34 +153,47 @@ def film(
     at: float | None = None,
     span: tuple[float, float] | None = None,
 ) -> Path | Frames:
-    """Film traces of one plant, from t = 0 to the end of the longest, and return the path of the file.
+    """Film traces of one plant, from t = 0 to the end of the longest, and return the path of the
+    file.
 
-    Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the speed.
+    Fast motion and blows are shown in slow motion, and rest is shown faster. The clock tells the
+    speed.
 
     Args:
       traces: several, or a single one.
-      path: its ending tells what is written: .mp4, a film; .webp, an animated picture that web pages show as an image;
-        .png, the picture at the time `at`. None writes nothing, and returns the pictures for other packages, `Frames`.
+      path: its ending tells what is written: .mp4, a film; .webp, an animated picture that web
+        pages show as an image; .png, the picture at the time `at`. None writes nothing, and returns
+        the pictures for other packages, `Frames`.
       labels: one a trace; default: the laws' labels.
       title: default: the plant's name, and the condition if all traces have one.
       size: width and height in px, even. Default: 1280 x 720, and 800 x 450 for .webp and `Frames`.
       fps: frames a second; default: 30, and 20 for .webp.
-      speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see pace.py.
-      camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free camera. It gives
-        the direction of the view, and the camera is as near as it can see all machines. Default: the plant's own
-        `look`; for your own model the first camera that does not move.
+      speed: of playback, such as 1 for real time or 0.25; default: what suits the motion, see
+        pace.py.
+      camera: name of a camera of the model, or (azimuth, elevation) in degrees as of MuJoCo's free
+        camera. It gives the direction of the view, and the camera is as near as it can see all
+        machines. Default: the plant's own `look`; for your own model the first camera that does not
+        move.
       at: the time of a single picture, s.
-      span: the part of the runs that is shown, (start, stop) in s; default: all, and the first 4 s for .webp.
+      span: the part of the runs that is shown, (start, stop) in s; default: all, and the first 4 s
+        for .webp.
 
     Raises:
-      ScenarioError: nothing to show, a size that is odd or too small or large, another ending, or no OpenGL to render
-        with.
+      ScenarioError: nothing to show, a size that is odd or too small or large, another ending, or
+        no OpenGL to render with.
     """
-    ending = None if path is None else with_ending(path, *WRITERS).suffix
+    if path is None:
+        ending = None
+    else:
+        ending = with_ending(path, *WRITERS).suffix
     if (at is None) if ending == ".png" else (ending is not None and at is not None):
-        raise ScenarioError("the picture at a time is a .png: give at, in s, with a path that ends in .png")
+        raise ScenarioError(
+            "the picture at a time is a .png: give at, in s, with a path that ends in .png"
+        )
     if at is not None and span is not None:
-        raise ScenarioError("at and span exclude each other: give at for a picture, or span for a film")
+        raise ScenarioError(
+            "at and span exclude each other: give at for a picture, or span for a film"
+        )
     small = ending in (None, ".webp")
     frames = Frames(
         traces,
@@ -183,7 +206,9 @@ def film(
         at,
         (0.0, 4.0) if ending == ".webp" and span is None else span,
     )
-    return frames if path is None else write(frames, Path(path))
+    if path is None:
+        return frames
+    return write(frames, Path(path))
 
 
 def write(frames: Frames, path: Path) -> Path:
@@ -210,10 +235,14 @@ def _write_mp4(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
 def _write_webp(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
     count = len(frames)
     if count > MAX_WEBP_FRAMES:
-        raise ScenarioError(f"a .webp of {count} frames: give a span with at most {MAX_WEBP_FRAMES}, or an .mp4")
+        raise ScenarioError(
+            f"a .webp of {count} frames: give a span with at most {MAX_WEBP_FRAMES}, or an .mp4"
+        )
     images = [Image.fromarray(picture) for picture in made]
     ends = [round(1000 / frames.fps)] * (count - 1) + [LAST_FRAME_TIME]
-    images[0].save(part, save_all=True, append_images=images[1:], duration=ends, loop=0, quality=60, method=4)
+    images[0].save(
+        part, save_all=True, append_images=images[1:], duration=ends, loop=0, quality=60, method=4
+    )
 
 
 def _write_png(frames: Frames, made: Iterator[np.ndarray], part: Path) -> None:
@@ -232,16 +261,23 @@ def _checked_size(size: Iterable[int]) -> tuple[int, int]:
     """Return width and height of a film; refuse odd ones, and those out of range."""
     sides = items_of("size", size)
     limits = zip(sides, MIN_SIZE, MAX_SIZE, strict=False)
-    fit = [isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0 for side, low, high in limits]
+    fit = []
+    for side, low, high in limits:
+        fit.append(isinstance(side, int | np.integer) and low <= side <= high and side % 2 == 0)
     if fit != [True, True] or len(sides) != 2:
-        raise ScenarioError(f"a film of {errors.shown(size)} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}")
+        raise ScenarioError(
+            f"a film of {errors.shown(size)} px: give two even numbers from {MIN_SIZE} to {MAX_SIZE}"
+        )
     return int(sides[0]), int(sides[1])
 
 
 def pictures(frames: Frames) -> Generator[np.ndarray]:
     """Yield the pictures of a film at the times of its clock, each (height, width, 3) uint8."""
     traces, shown, chosen = style.same_plant(frames.traces), frames.clock, frames.camera
-    names, colours = style.labels(traces, frames.labels), style.law_colours([trace.scenario.law for trace in traces])
+    names, colours = (
+        style.labels(traces, frames.labels),
+        style.law_colours([trace.scenario.law for trace in traces]),
+    )
     if len(traces) > MAX_MACHINES:
         raise ScenarioError(f"{len(traces)} machines in one film: show at most {MAX_MACHINES}")
     size = _checked_size(frames.size)
@@ -254,17 +290,32 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
     edges = np.append(times[0] - (times[1] - times[0] if len(times) > 1 else 1 / FPS), times)
     traces = [finite(trace) for trace in traces]
     scales, arms = arrows.scales(traces), scene.are_arms([trace.scenario for trace in traces])
-    grid = np.linspace(0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1)  # also for a still
-    acts = [Act(trace, colour, edges, grid, scales, arms) for trace, colour in zip(traces, colours, strict=True)]
+    grid = np.linspace(
+        0.0, end(traces), min(MAX_GRID, max(1, round(FPS * end(traces)))) + 1
+    )  # also for a still
+    acts = []
+    for trace, colour in zip(traces, colours, strict=True):
+        acts.append(Act(trace, colour, edges, grid, scales, arms))
     row = scene.in_a_row(traces[0].scenario, scene.turn(traces[0].scenario, chosen))
-    below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces)) if arms else (None, None)
+    if arms:
+        below, words = (arm.room(traces, size[0] / len(traces) / scale), arm.key(traces))
+    else:
+        below, words = (None, None)
     told = [act.told for act in acts]
-    caption = Caption(traces, names, colours, frames.title, above, scale, scales, told, row, below, words)
+    caption = Caption(
+        traces, names, colours, frames.title, above, scale, scales, told, row, below, words
+    )
     charts = Charts(traces, names, colours, (size[0], low), scale)
     with framed(acts, above, caption.room, chosen, caption.apart, scale) as stage:
         caption.place(stage.boxes)
-        over = arm.Overlay(traces, colours, stage, edges, caption.badges) if arms else None
-        flights = arm.Paths(traces, colours, stage) if traces[0].scenario.plant.pose else None
+        if arms:
+            over = arm.Overlay(traces, colours, stage, edges, caption.badges)
+        else:
+            over = None
+        if traces[0].scenario.plant.pose:
+            flights = arm.Paths(traces, colours, stage)
+        else:
+            flights = None
         for frame, time in enumerate(times.tolist()):
             failed = tuple(act.failed(time) for act in acts)
             drawn = []
@@ -274,12 +325,17 @@ def pictures(frames: Frames) -> Generator[np.ndarray]:
                 lost = over is None or over.errors[k][frame] > arm.MAX_TIP_ERROR
                 stage.aim(k, act.r[frame] if lost and not failed[k] else None)
                 stage.set_colour(k, style.FAILED if failed[k] else act.colour)
-                drawn += [] if failed[k] else [(k, *each) for each in act.drawn[frame].arrows]
+                if failed[k]:
+                    drawn += []
+                else:
+                    drawn += [(k, *each) for each in act.drawn[frame].arrows]
             picture = stage.render(drawn)
             if over:
                 picture = over.over(picture, frame)
             if flights:
                 picture = flights.over(picture, time)
             moods = tuple(act.states[frame] for act in acts)
-            picture = caption.over(picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame]))
+            picture = caption.over(
+                picture, time, failed, moods, float(shown.speeds[frame]), float(shown.shown[frame])
+            )
             yield np.concatenate([picture, charts.at(time)])

@@ -1,7 +1,8 @@
-"""The stage of a film: poses and renders the machines of all traces under one camera that sees them all.
+"""The stage of a film: poses and renders the machines of all traces under one camera that sees them
+all.
 
-The camera stands at the nearest place from which every machine stays inside the room that the page leaves, wherever
-its trace takes it.
+The camera stands at the nearest place from which every machine stays inside the room that the page
+leaves, wherever its trace takes it.
 """
 
 import itertools
@@ -24,7 +25,9 @@ from smc_mujoco.simulation.trace import Trace
 
 ROW_SHARE = 0.95  # of the width, which the places of machines in a row take at least; chosen
 DISTANCE_ROUNDING = 1e-9  # of a camera's distance
-LAW_SHARE = 0.75  # of the law's colour in that of a user's model, where several laws are shown; chosen
+LAW_SHARE = (
+    0.75  # of the law's colour in that of a user's model, where several laws are shown; chosen
+)
 DEFAULT_RGBA = np.array([0.5, 0.5, 0.5, 1.0], np.float32)  # MuJoCo's colour of geoms
 COLOUR_TOLERANCE = 8  # of 255: colours that differ by less are one; chosen
 MIN_PICTURE_SHARE = 2e-4  # of a picture that shows something, such as 120 px of 1280 x 460; chosen
@@ -38,7 +41,8 @@ OTHER = mujoco.mjtObj.mjOBJ_UNKNOWN
 class Stage:
     """The compiled scene and its renderer: a context, which closes the renderer.
 
-    The machines are at `where`, (machines, 3) m, in the picture at `boxes`, (machines, 4) px: left, top, right, bottom.
+    The machines are at `where`, (machines, 3) m, in the picture at `boxes`, (machines, 4) px: left,
+    top, right, bottom.
     """
 
     def __init__(
@@ -54,13 +58,18 @@ class Stage:
     ):
         self.puppets = [Puppet(trace.scenario) for trace in traces]
         scenarios = [puppet.scenario for puppet in self.puppets]
-        self.shown, self.is_users = [puppet.shown for puppet in self.puppets], not scenarios[0].plant.on_stage
+        self.shown, self.is_users = (
+            [puppet.shown for puppet in self.puppets],
+            not scenarios[0].plant.on_stage,
+        )
         turn = scene.turn(scenarios[0], chosen)
         self.motions = [act.motion for act in acts] or [None] * len(traces)
         drawn = [act.framing for act in acts] or [()] * len(traces)
         cut = scene.in_a_row(scenarios[0], turn)
         for puppet in self.puppets:
-            puppet.mounts = arrows.mounts(puppet.scenario, puppet.ids, puppet.slides, puppet.rail, turn[:, 2])
+            puppet.mounts = arrows.mounts(
+                puppet.scenario, puppet.ids, puppet.slides, puppet.rail, turn[:, 2]
+            )
         runs = zip(self.puppets, traces, self.motions, drawn, strict=True)
         reaches = [puppet.reach(trace, motion, its, cut) for puppet, trace, motion, its in runs]
         where, seen, place = placed(self.puppets, reaches, turn, size, room, apart)
@@ -76,22 +85,41 @@ class Stage:
         ends = np.cumsum([0, *(puppet.shapes[0].model.nq for puppet in self.puppets)]).tolist()
         self.blocks = [slice(*pair) for pair in itertools.pairwise(ends)]
         material = self.model.geom_matid
-        self.paint = np.where((material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba)
+        self.paint = np.where(
+            (material >= 0)[:, None], self.model.mat_rgba[material], self.model.geom_rgba
+        )
         names = [[joint.name for joint in joints(models.spec(scenario))] for scenario in scenarios]
-        self.joints = [[self.model.joint(f"m{k}/{name}").id for name in its] for k, its in enumerate(names)]
+        self.joints = [
+            [self.model.joint(f"m{k}/{name}").id for name in its] for k, its in enumerate(names)
+        ]
         visible = (self.model.geom_group < GROUPS) & (self.paint[:, 3] > 0.0)
-        moved = [moved_bodies(self.model, its) for its in self.joints]  # by joints: bodies without one may be fused
-        self.links = [np.flatnonzero(np.isin(self.model.geom_bodyid, its) & visible) for its in moved]
+        moved = [
+            moved_bodies(self.model, its) for its in self.joints
+        ]  # by joints: bodies without one may be fused
+        self.links = [
+            np.flatnonzero(np.isin(self.model.geom_bodyid, its) & visible) for its in moved
+        ]
         self.shape, self.colours, self.changed = [-1] * len(scenarios), [""] * len(scenarios), True
         for k, colour in enumerate(colours):
             self.set_shape(k, 0.0)
             self.set_colour(k, colour)
             self.pose(k, traces[k].x[0, : self.shown[k]])
-        layers = [arrow.layer for its in drawn for one in its for _, arrow in one.arrows]
-        most = arrows.MAX_BENT_SHARE * size[1] / (1.0 + arrows.BENT_DISTANCE * max(layers, default=0))  # px
-        most *= camera.pixel(size) * float((place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2])  # m
+        layers = []
+        for its in drawn:
+            for one in its:
+                for _, arrow in one.arrows:
+                    layers.append(arrow.layer)
+        most = (
+            arrows.MAX_BENT_SHARE * size[1] / (1.0 + arrows.BENT_DISTANCE * max(layers, default=0))
+        )  # px
+        most *= camera.pixel(size) * float(
+            (place - np.concatenate(seen).mean(axis=0)) @ turn[:, 2]
+        )  # m
         self.mounts = [
-            [mount._replace(joint=i, radius=min(mount.radius, most)) for i, mount in zip(ids, its.mounts, strict=True)]
+            [
+                mount._replace(joint=i, radius=min(mount.radius, most))
+                for i, mount in zip(ids, its.mounts, strict=True)
+            ]
             for ids, its in zip(self.joints, self.puppets, strict=True)
         ]
         self.scale = scale
@@ -120,10 +148,14 @@ class Stage:
         self.model.geom_group[links] = scene.HIDDEN_GROUP
         bare = self.canvas.draw(whole=True)
         self.canvas.casts, self.model.geom_group[links] = casts, groups
-        return bool((np.abs(picture - bare).max(axis=2) > COLOUR_TOLERANCE).mean() > MIN_PICTURE_SHARE)
+        return bool(
+            (np.abs(picture - bare).max(axis=2) > COLOUR_TOLERANCE).mean() > MIN_PICTURE_SHARE
+        )
 
     def set_shape(self, k: int, time: float) -> None:
-        """Give machine k its shape at a time, s: its rod may be longer than the plant's, and may change in a jump."""
+        """Give machine k its shape at a time, s: its rod may be longer than the plant's, and may
+        change in a jump.
+        """
         now = self.puppets[k].shape(time)
         if now == self.shape[k]:
             return
@@ -138,7 +170,10 @@ class Stage:
         self.changed = True
 
     def set_colour(self, k: int, colour: str) -> None:
-        """Colour the accent of machine k. A user's model has none: colour its links, those unpainted if it is alone."""
+        """Colour the accent of machine k.
+
+        A user's model has none: colour its links, those unpainted if it is alone.
+        """
         if self.colours[k] == colour:
             return
         rgb, links = np.array(style.rgb(colour)) / 255, self.links[k]
@@ -148,28 +183,40 @@ class Stage:
             if len(links):
                 self.model.geom_matid[links] = -1
                 self.model.geom_rgba[links] = self.paint[links]
-                self.model.geom_rgba[links, :3] = LAW_SHARE * rgb + (1.0 - LAW_SHARE) * self.paint[links, :3]
+                self.model.geom_rgba[links, :3] = (
+                    LAW_SHARE * rgb + (1.0 - LAW_SHARE) * self.paint[links, :3]
+                )
         else:
             self.model.mat(f"m{k}/accent").rgba[:3] = rgb
         self.colours[k], self.changed = colour, True
 
     def aim(self, k: int, r: np.ndarray | None) -> None:
-        """Show where the reference r, (shown,) rad or m, wants machine k, as a ghost; None: show no ghost."""
+        """Show where the reference r, (shown,) rad or m, wants machine k, as a ghost; None: show no
+        ghost.
+        """
         self.aimed[k] = r is not None
         if r is not None:
             self.goal.qpos[self.blocks[k]] = self.puppets[k].qpos(r, rest=self.rest[k])
 
-    def pose(self, k: int, x: np.ndarray, ahead: np.ndarray | None = None, time: float = 0.0) -> None:
-        """Put machine k's channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over their joints.
+    def pose(
+        self, k: int, x: np.ndarray, ahead: np.ndarray | None = None, time: float = 0.0
+    ) -> None:
+        """Put machine k's channels at x, (shown,) rad or m; `ahead` is the lead of the rotors over
+        their joints.
 
         Joints without a channel are where they were at that time, s.
         """
         motion = self.motions[k]
-        self.rest[k] = None if motion is None else motion.at(time)
+        if motion is None:
+            self.rest[k] = None
+        else:
+            self.rest[k] = motion.at(time)
         self.data.qpos[self.blocks[k]] = self.puppets[k].qpos(x, ahead, self.rest[k])
 
     def render(self, drawn: Sequence[tuple[int, int, arrows.Arrow]] = ()) -> np.ndarray:
-        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel, arrow); read-only."""
+        """Return the picture, (height, width, 3) uint8, with arrows given as (machine, channel,
+        arrow); read-only.
+        """
         scene.forward(self.model, self.data)
         scene.forward(self.model, self.goal)
 
@@ -185,16 +232,26 @@ class Stage:
         for k, i, arrow in sorted(drawn, key=lambda one: one[2].head):  # bars are behind arrows
             if found := arrows.path(self.model, self.data, self.mounts[k][i], arrow):
                 points, width = found
-                line, sizes = map(self.project, (points, np.array([points[0], points[0] + width * self.turn[:, 1]])))
+                line, sizes = map(
+                    self.project,
+                    (points, np.array([points[0], points[0] + width * self.turn[:, 1]])),
+                )
                 if np.ptp(line, axis=0).max() > 1.0:  # else it points at the camera
                     if self.mounts[k][i].radius:
                         anchor = self.project(self.data.xanchor[self.mounts[k][i].joint][None])[0]
                         leader = [tuple(point.tolist()) for point in (anchor, line[0])]
                         ImageDraw.Draw(image).line(leader, style.INK, max(1, round(self.scale)))
                     least = arrows.MIN_SHAFT * self.scale * arrow.size
-                    outline = arrows.outline(line, max(float(np.ptp(sizes[:, 1])), least), arrow.head)
+                    outline = arrows.outline(
+                        line, max(float(np.ptp(sizes[:, 1])), least), arrow.head
+                    )
                     bent = self.mounts[k][i].radius > 0.0  # it lies over a link of its colour
-                    arrows.paint(image, outline, arrow.rgba, rim=round(arrows.RIM * self.scale) if bent else 0)
+                    arrows.paint(
+                        image,
+                        outline,
+                        arrow.rgba,
+                        rim=round(arrows.RIM * self.scale) if bent else 0,
+                    )
         return np.asarray(image)
 
     def project(self, points: np.ndarray) -> np.ndarray:
@@ -212,7 +269,9 @@ class Stage:
         model, goal = self.model, self.goal
         for i in links[: shown.maxgeom - shown.ngeom].tolist():
             shape, size = shown.geoms[shown.ngeom], GHOST_SIZE * model.geom_size[i]
-            mujoco.mjv_initGeom(shape, model.geom_type[i], size, goal.geom_xpos[i], goal.geom_xmat[i], GHOST_RGBA)
+            mujoco.mjv_initGeom(
+                shape, model.geom_type[i], size, goal.geom_xpos[i], goal.geom_xmat[i], GHOST_RGBA
+            )
             shape.dataid, shape.objtype, shape.transparent = 2 * model.geom_dataid[i], OTHER, 1
             shape.specular = 0.0
             shown.ngeom += 1
@@ -226,9 +285,11 @@ def placed(
     room: camera.Room,
     apart: float,
 ) -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Return the places of the machines, (machines, 3) m, their points there, and the place of the camera, (3,) m.
+    """Return the places of the machines, (machines, 3) m, their points there, and the place of the
+    camera, (3,) m.
 
-    Machines in a row are at least `apart` px apart, and fill ROW_SHARE of the room if that makes them no smaller.
+    Machines in a row are at least `apart` px apart, and fill ROW_SHARE of the room if that makes
+    them no smaller.
     """
     where = standing_places(puppets, reaches, turn)
     if scene.are_arms([puppet.scenario for puppet in puppets]):  # the floor hides what is below it
@@ -240,7 +301,10 @@ def placed(
         return where, seen, camera.fit(np.concatenate(seen), turn, size, room)
 
     fit = fitted(where)
-    step = np.diff(camera.project(where, turn, fit[2], size)[:, 0]).mean() if len(where) > 1 else 0.0
+    if len(where) > 1:
+        step = np.diff(camera.project(where, turn, fit[2], size)[:, 0]).mean()
+    else:
+        step = 0.0
     pitch = ROW_SHARE * (room.right - room.left) / len(where)
     if 0.0 < step < apart:  # else labels would not be below their machines
         fit = fitted(where * (apart / step, apart / step, 1.0))
@@ -251,7 +315,9 @@ def placed(
     return fit
 
 
-def standing_places(puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray) -> np.ndarray:
+def standing_places(
+    puppets: Sequence[Puppet], reaches: Sequence[np.ndarray], turn: np.ndarray
+) -> np.ndarray:
     """Return where the machines stand, (machines, 3) m: side by side, on the floor."""
     scenarios = [puppet.scenario for puppet in puppets]
     step = scene.lane(scenarios, reaches, turn)
@@ -270,10 +336,11 @@ def framed(
     apart: float,
     scale: float,
 ) -> Stage:
-    """Return the stage from the chosen view or, if that shows nothing, from the first of others that shows something.
+    """Return the stage from the chosen view or, if that shows nothing, from the first of others
+    that shows something.
 
-    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`. A warning tells if
-    the chosen view, or every view, shows nothing.
+    The library's own machines are in sight unless a view is chosen. Arguments are those of `Stage`.
+    A warning tells if the chosen view, or every view, shows nothing.
     """
     traces, colours = [act.trace for act in acts], [act.colour for act in acts]
     name = traces[0].scenario.plant.name
@@ -281,11 +348,15 @@ def framed(
         stage = Stage(traces, colours, size, room, view, acts, apart, scale)
         if (chosen is None and not stage.is_users) or stage.shows():
             if view != chosen is not None:
-                fact = f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
+                fact = (
+                    f"camera {chosen!r} shows nothing of {name}: the picture is from camera={view}"
+                )
                 warnings.warn(fact, ScenarioWarning, users_stacklevel())
             return stage
         if not any(len(links) for links in stage.links):
-            fact = "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
+            fact = (
+                "shows no part that moves: give it geoms in groups 0 to 2 that are not transparent"
+            )
             break
         stage.canvas.close()
     else:

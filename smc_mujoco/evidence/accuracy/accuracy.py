@@ -4,15 +4,17 @@
     print(table)                                  # the most accurate law first
     table[0].e.order, table[0].e.theory           # exponent of the control period, measured and promised
 
-Runs have no noise. The error of a run is the largest |e|, or |s|, at the control samples of its last 20 %, over all
-driven channels. That is an ultimate bound, as the theorems on accuracy state it: |e| <= C h^r for a control period h.
-`scaling` determines the exponent r and says which errors do not count. The file of a law states the order that
-theory promises, see `law_function`. Theory promises no order if there is a drive, a delay, a sensor or an estimate of
-the velocity between law and mechanism.
+Runs have no noise. The error of a run is the largest |e|, or |s|, at the control samples of its
+last 20 %, over all driven channels. That is an ultimate bound, as the theorems on accuracy state
+it: |e| <= C h^r for a control period h. `scaling` determines the exponent r and says which errors
+do not count. The file of a law states the order that theory promises, see `law_function`. Theory
+promises no order if there is a drive, a delay, a sensor or an estimate of the velocity between law
+and mechanism.
 
-A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control period, so that the
-error of the first-order integrator does not count. The run of the shortest period is repeated with half the step. RK4,
-for plain equations and exact friction, keeps the scenario's step.
+A mechanism with friction, contacts or other parts takes at least 16 physics steps in each control
+period, so that the error of the first-order integrator does not count. The run of the shortest
+period is repeated with half the step. RK4, for plain equations and exact friction, keeps the
+scenario's step.
 """
 
 import dataclasses
@@ -52,11 +54,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 PERIODS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)  # s
-DEFAULT_CONDITION = "constant"  # chosen: a disturbance that every law can bear, and that leaves smooth laws an error
+# chosen: a disturbance that every law can bear, and that leaves smooth laws an error
+DEFAULT_CONDITION = "constant"
 DEFAULT_SEEDS = 3  # initial states of each law at each period; chosen
-MIN_STEPS = 16  # physics steps in a control period of a mechanism with friction, contacts or other parts
+MIN_STEPS = (
+    16  # physics steps in a control period of a mechanism with friction, contacts or other parts
+)
 RESOLUTION = 1e-11  # of the initial error; chosen, above rounding and the creep of stuck joints
-MIN_SATURATED = 0.05  # share of the last samples at the bound on u; it is remarked from there on; chosen
+MIN_SATURATED = (
+    0.05  # share of the last samples at the bound on u; it is remarked from there on; chosen
+)
 PARTS = 3  # of a run, each as long as its last part, in which errors are compared
 MAX_SEEDS = 10_000
 FULL_SHARE = 1.0 - 1e-9  # of the bound on u: a larger |u| is saturated
@@ -69,7 +76,9 @@ KEY = (
 
 
 class AccuracyTable(Tables, list[Accuracy]):
-    """Accuracies of laws, shown as tables; for each plant and condition the most accurate law is first."""
+    """Accuracies of laws, shown as tables; for each plant and condition the most accurate law is
+    first.
+    """
 
     @property
     def groups(self) -> dict[str, list[Accuracy]]:
@@ -82,11 +91,18 @@ class AccuracyTable(Tables, list[Accuracy]):
     @property
     def tables(self) -> list[Tabular]:
         """A table for each plant and condition, with remarks on its laws."""
-        tables = [_table(f"{title}: |e| in {rows[0].unit}", rows) for title, rows in self.groups.items()]
-        return [*tables[:-1], *(dataclasses.replace(last, notes=[*last.notes, KEY]) for last in tables[-1:])]
+        tables = []
+        for title, rows in self.groups.items():
+            tables.append(_table(f"{title}: |e| in {rows[0].unit}", rows))
+        return [
+            *tables[:-1],
+            *(dataclasses.replace(last, notes=[*last.notes, KEY]) for last in tables[-1:]),
+        ]
 
     def plot(self, path: str | os.PathLike | None = None, **options: Any) -> "Figure | SubFigure":
-        """Draw error over control period, both logarithmic; title, size, format and fig are as in `smc.figure`."""
+        """Draw error over control period, both logarithmic; title, size, format and fig are as in
+        `smc.figure`.
+        """
         from smc_mujoco.evidence.accuracy.orders import orders
 
         return orders(self, path, **options)
@@ -98,31 +114,48 @@ class AccuracyTable(Tables, list[Accuracy]):
 
 def load(path: str | os.PathLike) -> AccuracyTable:
     """Read the table that `AccuracyTable.save` wrote."""
-    with reading(path, "file of accuracies", "give a .json file that AccuracyTable.save wrote") as file:
+    with reading(
+        path, "file of accuracies", "give a .json file that AccuracyTable.save wrote"
+    ) as file:
         rows = [_with_tuples(entry) for entry in read_json(file)]
-        return AccuracyTable(Accuracy(**row | {name: Scaling(**row[name]) for name in QUANTITIES}) for row in rows)
+        return AccuracyTable(
+            Accuracy(**row | {name: Scaling(**row[name]) for name in QUANTITIES}) for row in rows
+        )
 
 
 def _with_tuples(data: Any) -> Any:
     """Return the data of a file with tuples for its lists."""
     if isinstance(data, dict):
         return {name: _with_tuples(value) for name, value in data.items()}
-    return tuple(map(_with_tuples, data)) if isinstance(data, list) else data
+    if isinstance(data, list):
+        return tuple(map(_with_tuples, data))
+    return data
 
 
 def _table(title: str, rows: Sequence[Accuracy]) -> Tabular:
-    """Return the table of rows that share plant and condition. Its title also says where the laws' gains come from."""
+    """Return the table of rows that share plant and condition.
+
+    Its title also says where the laws' gains come from.
+    """
     first, *_, last = rows[0].periods
     gains = {row.law: row.gains for row in rows}
-    cells = [
-        [
-            Cell(row.law + "*" * bool(row.why), colour=law_colour(row.law)),
-            *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
-        ]
-        for row in rows
-    ]
+    cells = []
+    for row in rows:
+        cells.append(
+            [
+                Cell(row.law + "*" * bool(row.why), colour=law_colour(row.law)),
+                *(row.error(0), row.error(-1), str(row.e), str(row.s), row.theory),
+            ]
+        )
     return Tabular(
-        headings=["law", f"{1e3 * first:g} ms", f"{1e3 * last:g} ms", "order of e", "order of s", "theory"],
+        headings=[
+            "law",
+            f"{1e3 * first:g} ms",
+            f"{1e3 * last:g} ms",
+            "order of e",
+            "order of s",
+            "theory",
+        ],
         rows=cells,
         title=", ".join(filter(None, [title, by_words(gains)])),
         notes=[*(f"* {row.law}: {row.why}" for row in rows if row.why), *untuned_laws(gains)],
@@ -142,57 +175,83 @@ def accuracy(
     threads: int | None = None,
     report: Report = lambda done, whole: None,
 ) -> AccuracyTable:
-    """Measure how the errors of laws fall with the control period: the order of accuracy, beside theory's.
+    """Measure how the errors of laws fall with the control period: the order of accuracy, beside
+    theory's.
 
     Args:
       laws, plants: names, or your own laws and plants, one or several.
       periods: control periods, s; two or more, and three or more for an interval.
-      conditions: names, such as "coulomb" or "constant + sine", or your own conditions. Theory promises an order under
-        a disturbance. The default, "constant", is a constant force of 0.2 N or N m.
-      seeds: a number of seeds, or the seeds: initial states, and gains where a law was tuned several times.
-      gains: set of gains for laws given by name, see `gain_sets`. A law without gains in the set for a plant gets its
-        defaults, as the table's title says.
+      conditions: names, such as "coulomb" or "constant + sine", or your own conditions. Theory
+        promises an order under a disturbance. The default, "constant", is a constant force of 0.2 N
+        or N m.
+      seeds: a number of seeds, or the seeds: initial states, and gains where a law was tuned
+        several times.
+      gains: set of gains for laws given by name, see `gain_sets`. A law without gains in the set
+        for a plant gets its defaults, as the table's title says.
       duration: of each run, s.
       starts: initial states, see `smc.starts`. Default: within 20 % of the plant's own x0.
       threads: as in `run`.
       report: called with the work done and the whole work, in simulated steps.
 
     Returns:
-      An `AccuracyTable`, a list of `Accuracy`. For each plant and condition laws whose runs all succeed come first, and
-      of these the one with the smallest error at the shortest period.
+      An `AccuracyTable`, a list of `Accuracy`. For each plant and condition laws whose runs all
+      succeed come first, and of these the one with the smallest error at the shortest period.
 
     Raises:
-      ScenarioError: fewer than two periods, a condition that sets the period, a plant whose driven channels have
-        different units, or as `grid`.
+      ScenarioError: fewer than two periods, a condition that sets the period, a plant whose driven
+        channels have different units, or as `grid`.
     """
     descending = _longest_first(periods)
-    numbers = listed("seeds", seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)))
-    setups = [
-        _setup(as_plant(plant), find_condition(condition), law, descending, numbers, gains, duration, starts)
-        for plant in listed("plants", plants)
-        for condition in listed("conditions", conditions)
-        for law in listed_laws(laws)
-    ]
+    numbers = listed(
+        "seeds",
+        seeds if isinstance(seeds, Iterable) else range(whole("seeds", seeds, 1, MAX_SEEDS)),
+    )
+    setups = []
+    for plant in listed("plants", plants):
+        for condition in listed("conditions", conditions):
+            for law in listed_laws(laws):
+                setups.append(
+                    _setup(
+                        as_plant(plant),
+                        find_condition(condition),
+                        law,
+                        descending,
+                        numbers,
+                        gains,
+                        duration,
+                        starts,
+                    )
+                )
     scenarios = [scenario for setup in setups for scenario in setup.scenarios]
     counted = summed(report, 0.0, sum(scenario.work for scenario in scenarios))
     runs = {k: _measured(trace) for k, trace in stream(scenarios, threads, counted)}
     in_order = iter([runs[k] for k in range(len(scenarios))])
-    rows = AccuracyTable(_row(setup, list(itertools.islice(in_order, len(setup.scenarios)))) for setup in setups)
-    return AccuracyTable(row for group in rows.groups.values() for row in sorted(group, key=lambda row: row.place))
+    rows = AccuracyTable(
+        _row(setup, list(itertools.islice(in_order, len(setup.scenarios)))) for setup in setups
+    )
+    return AccuracyTable(
+        row for group in rows.groups.values() for row in sorted(group, key=lambda row: row.place)
+    )
 
 
 def _longest_first(periods: Sequence[float]) -> tuple[float, ...]:
-    """Return the control periods in descending order; refuse fewer than two, equal ones, and what is no period."""
+    """Return the control periods in descending order; refuse fewer than two, equal ones, and what
+    is no period.
+    """
     numbers = [number("a period", h, above=0.0, low=MIN_TIME) for h in items_of("periods", periods)]
     if len(numbers) < 2 or len(set(numbers)) < len(numbers):
-        raise ScenarioError(f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}")
+        raise ScenarioError(
+            f"periods is {shown(periods)}: give two or more different ones in s, such as {PERIODS}"
+        )
     return tuple(sorted(numbers, reverse=True))
 
 
 class Run(NamedTuple):
     """The numbers of a run that its row needs."""
 
-    parts: Mapping[str, Sequence[float]]  # "e" and "s" -> largest magnitude in each of its last parts; inf if it failed
+    parts: Mapping[
+        str, Sequence[float]
+    ]  # "e" and "s" -> largest magnitude in each of its last parts; inf if it failed
     saturated: float = 0.0  # share of the samples of the last part at which u is at its bound
     failure: str | None = None  # how it failed
 
@@ -207,15 +266,26 @@ def _measured(trace: Trace) -> Run:
     driven = slice(trace.scenario.plant.driven)
     end = last_part(trace)
     count = len(trace.t) - end.start
-    sizes = {"e": np.abs(trace.x - trace.r)[-PARTS * count :, driven], "s": np.abs(trace.s)[-PARTS * count :, driven]}
-    parts = {name: [float(part.max()) for part in np.array_split(size, PARTS)] for name, size in sizes.items()}
-    return Run(parts, float((np.abs(trace.u[end, driven]) >= FULL_SHARE * np.array(trace.scenario.limits)).mean()))
+    sizes = {
+        "e": np.abs(trace.x - trace.r)[-PARTS * count :, driven],
+        "s": np.abs(trace.s)[-PARTS * count :, driven],
+    }
+    parts = {}
+    for name, size in sizes.items():
+        parts[name] = [float(part.max()) for part in np.array_split(size, PARTS)]
+    return Run(
+        parts,
+        float(
+            (np.abs(trace.u[end, driven]) >= FULL_SHARE * np.array(trace.scenario.limits)).mean()
+        ),
+    )
 
 
 class Setup(NamedTuple):
     """A law on a plant in a condition."""
 
-    # For each start one for each period; then the first start at the shortest period, with half the physics step.
+    # For each start one for each period; then the first start at the shortest period, with half the
+    # physics step.
     scenarios: list[Scenario]
     periods: tuple[float, ...]  # s, longest first
     starts: int  # their number
@@ -231,18 +301,34 @@ def _setup(
     duration: float,
     starts: Starts | None,
 ) -> Setup:
-    """Return the runs of a law on a plant in a condition. A law without gains in the set has its defaults."""
+    """Return the runs of a law on a plant in a condition.
+
+    A law without gains in the set has its defaults.
+    """
     fields = condition.on(plant, duration)
     if "control_period" in fields:
-        raise ScenarioError(f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out")
+        raise ScenarioError(
+            f"condition {condition.name!r} sets control_period, which accuracy varies: leave it out"
+        )
     if len(units := set(plant.units[: plant.driven])) > 1:
-        raise ScenarioError(f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit")
-    gain_set = gains if not isinstance(law, str) or sets.in_set(plant, law, gains) else "default"
+        raise ScenarioError(
+            f"{plant.name} has driven channels in {joined(sorted(units))}: give a plant with one unit"
+        )
+    if not isinstance(law, str) or sets.in_set(plant, law, gains):
+        gain_set = gains
+    else:
+        gain_set = "default"
 
     def scenario(seed: int, h: float, divisor: int = 1) -> Scenario:
         made = case(plant, law, condition, duration, gain_set, seed, starts, {"control_period": h})
-        steps = made.steps if made.resolved.integrator == "RK4" else max(made.steps, MIN_STEPS)
-        step = fields["physics_step"] / divisor if "physics_step" in fields else h / (steps * divisor)
+        if made.resolved.integrator == "RK4":
+            steps = made.steps
+        else:
+            steps = max(made.steps, MIN_STEPS)
+        if "physics_step" in fields:
+            step = fields["physics_step"] / divisor
+        else:
+            step = h / (steps * divisor)
         return dataclasses.replace(made, physics_step=step).named(made.condition)
 
     runs = [scenario(seed, h) for seed in seeds for h in periods]
@@ -256,14 +342,24 @@ def _row(setup: Setup, runs: Sequence[Run]) -> Accuracy:
     shape = setup.starts, len(setup.periods), PARTS
     floor = RESOLUTION * (max(map(abs, base.resolved.x0)) or 1.0)
     no_promise = _why_no_promise(base)
-    failed = f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}" if failures else ""
-    reasons = dict(_reasons(setup, counted)) | {"always": "; ".join(filter(None, [failed, no_promise]))}
+    if failures:
+        failed = (
+            f"{len(failures)} of {len(counted)} runs failed, the first: {one_line(failures[0])}"
+        )
+    else:
+        failed = ""
+    reasons = dict(_reasons(setup, counted)) | {
+        "always": "; ".join(filter(None, [failed, no_promise]))
+    }
     law = base.law
     scalings = {}
     for name in QUANTITIES:
         parts = np.reshape([run.parts[name] for run in counted], shape)
         change = {"step": _step_change(parts[0, -1, -1], halved.parts[name][-1], floor)}
-        theory = None if no_promise or law.template is None else law.template.order(name, law.gains)
+        if no_promise or law.template is None:
+            theory = None
+        else:
+            theory = law.template.order(name, law.gains)
         given = {reason: words for reason, words in (reasons | change).items() if words}
         scalings[name] = scaling(parts, setup.periods, theory, floor, given)
     return Accuracy(
@@ -298,7 +394,11 @@ def _why_no_promise(scenario: Scenario) -> str:
 def _reasons(setup: Setup, runs: Sequence[Run]) -> Iterator[tuple[str, str]]:
     """Yield name and words of what may keep a law from the order that theory promises."""
     laws = [scenario.law for scenario in setup.scenarios]
-    unmet = {words for law in laws if law.template for words in law.template.unmet(law.gains)}
+    unmet = set()
+    for law in laws:
+        if law.template:
+            for words in law.template.unmet(law.gains):
+                unmet.add(words)
     if unmet:
         yield "conditions", f"the gains violate {joined(sorted(unmet))}"
     saturated = max((run.saturated for run in runs), default=0.0)
@@ -311,4 +411,6 @@ def _step_change(error: float, halved: float, floor: float) -> str:
     if not (math.isfinite(error) and math.isfinite(halved)) or max(error, halved) <= floor:
         return ""
     change = halved / max(error, floor) - 1.0
-    return f"with half the physics step it is {100 * change:+.0f} %" if apart((error, halved), floor) else ""
+    if apart((error, halved), floor):
+        return f"with half the physics step it is {100 * change:+.0f} %"
+    return ""

@@ -1,8 +1,9 @@
 """Error over control period, both logarithmic: a panel for e and one for s, a colour for each law.
 
-Marks are the means over the starts, with their range. Filled ones are in the fit, hollow ones are not. The solid line
-is the fit, with its order at its end; the dashed one has theory's slope. There is no line where the order's interval
-holds 0 and 2: it tells nothing, from no gain at all to a quarter of the error at half the period.
+Marks are the means over the starts, with their range. Filled ones are in the fit, hollow ones are
+not. The solid line is the fit, with its order at its end; the dashed one has theory's slope. There
+is no line where the order's interval holds 0 and 2: it tells nothing, from no gain at all to a
+quarter of the error at half the period.
 """
 
 import itertools
@@ -35,7 +36,9 @@ def orders(
     format: str | None = None,
     fig: Figure | SubFigure | None = None,
 ) -> Figure | SubFigure:
-    """Draw how the errors of laws fall with the control period, panels for each plant and condition, as `figure`."""
+    """Draw how the errors of laws fall with the control period, panels for each plant and
+    condition, as `figure`.
+    """
     groups: dict[str, list[Accuracy]] = {}
     for row in rows:
         plant = style.plant_name(row.plant, short=True)
@@ -45,7 +48,13 @@ def orders(
     paths = pages.files(path, format)
     width, height = pages.measure(size, fig)
     laws = list(dict.fromkeys(row.law for row in rows))
-    looks = dict(zip(laws, zip(style.law_colours(laws), itertools.cycle(style.MARKS), strict=False), strict=True))
+    looks = dict(
+        zip(
+            laws,
+            zip(style.law_colours(laws), itertools.cycle(style.MARKS), strict=False),
+            strict=True,
+        )
+    )
     with style.page(width):
         narrow = width < pages.NARROW
         down = len(groups) * (len(QUANTITIES) if narrow else 1)
@@ -59,8 +68,16 @@ def orders(
                 end = _draw(ax, row.periods, its, *looks[row.law])
                 if end and (words := _order(its)):
                     ends.append((*end, looks[row.law][0], words))
-            unit = group[0].unit if quantity == "e" else "unit of s"
-            ax.set(xscale="log", yscale="log", ylabel=f"{AXIS_NAMES[quantity]} ({unit})", xlabel="control period (ms)")
+            if quantity == "e":
+                unit = group[0].unit
+            else:
+                unit = "unit of s"
+            ax.set(
+                xscale="log",
+                yscale="log",
+                ylabel=f"{AXIS_NAMES[quantity]} ({unit})",
+                xlabel="control period (ms)",
+            )
             ax.set_xticks([1e3 * h for h in group[0].periods])
             ax.minorticks_off()
             _write_orders(ax, 1e3 * group[0].periods[0], ends)
@@ -68,10 +85,17 @@ def orders(
             ax.xaxis.set_major_formatter("{x:g}")
             ax.set_title(name if len(groups) > 1 else "")
         common = {"xdata": [], "ydata": [], "lw": style.points(2.0)}
-        handles = [Line2D(**common, color=c, marker=mark, label=style.label(law)) for law, (c, mark) in looks.items()]
+        handles = []
+        for law, (c, mark) in looks.items():
+            handles.append(Line2D(**common, color=c, marker=mark, label=style.label(law)))
         handles.append(Line2D([], [], color=style.MUTED, ls="--", label="theory's slope"))
-        whole = "Accuracy" if len(groups) > 1 else f"Accuracy: {next(iter(groups))}"
-        pages.set_head(page, width, title or whole, handles, by_words({row.law: row.gains for row in rows}))
+        if len(groups) > 1:
+            whole = "Accuracy"
+        else:
+            whole = f"Accuracy: {next(iter(groups))}"
+        pages.set_head(
+            page, width, title or whole, handles, by_words({row.law: row.gains for row in rows})
+        )
         pages.write(page, paths)
     return page
 
@@ -83,12 +107,17 @@ def _tells(scaling: Scaling) -> bool:
 
 def _order(scaling: Scaling) -> str:
     """Return an order with its interval, and theory's in brackets; "" where neither is known."""
-    promised = "" if scaling.theory is None else f" ({scaling.theory:.2g})"
+    if scaling.theory is None:
+        promised = ""
+    else:
+        promised = f" ({scaling.theory:.2g})"
     return f"{scaling if _tells(scaling) else 'untold' * bool(promised)}{promised}"
 
 
 def _write_orders(ax: Axes, last: float, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write orders right of the longest period `last`, ms: (error, period, colour, words) of each law, moved apart."""
+    """Write orders right of the longest period `last`, ms: (error, period, colour, words) of each
+    law, moved apart.
+    """
     ends, size = sorted(ends), style.points(9.5)
     room = max((style.width(words, size) for *_, words in ends), default=0.0) + 2.0 * size
     box, dots = ax.get_window_extent(), 72 / ax.figure.dpi
@@ -96,12 +125,18 @@ def _write_orders(ax: Axes, last: float, ends: Sequence[tuple[float, float, str,
     ax.set_xlim(left, left * (last / left) ** (1.0 / (1.0 - share)))
     low, high = np.log(ax.get_ylim())
     ends_at = (np.log([error for error, *_ in ends]) - low) / (high - low)
-    for (error, period, colour, words), y in zip(ends, _apart(ends_at, 1.3 * size / (dots * box.height)), strict=True):
+    for (error, period, colour, words), y in zip(
+        ends, _apart(ends_at, 1.3 * size / (dots * box.height)), strict=True
+    ):
         place = (1.0 - share + 1.5 * size / (dots * box.width), y)
         line = {
-            "arrowstyle": "-", "color": colour, "ls": ":", "lw": style.points(0.8), "shrinkA": 0.0,
+            "arrowstyle": "-",
+            "color": colour,
+            "ls": ":",
+            "lw": style.points(0.8),
+            "shrinkA": 0.0,
             "shrinkB": style.points(4),
-        }  # fmt: skip
+        }
         look = {"fontsize": size, "va": "center", "annotation_clip": False}
         ax.annotate(words, (period, error), place, "data", "axes fraction", arrowprops=line, **look)
 
@@ -113,15 +148,33 @@ def _apart(places: np.ndarray, gap: float) -> np.ndarray:
     return np.minimum(up, 1.0 - gap - steps[::-1])
 
 
-def _draw(ax: Axes, periods: Sequence[float], scaling: Scaling, colour: str, mark: str) -> tuple[float, float] | None:
-    """Draw the errors of one law, its fit and theory's slope. Return where they end, error and period in ms."""
+def _draw(
+    ax: Axes, periods: Sequence[float], scaling: Scaling, colour: str, mark: str
+) -> tuple[float, float] | None:
+    """Draw the errors of one law, its fit and theory's slope.
+
+    Return where they end, error and period in ms.
+    """
     h, errors, end = 1e3 * np.array(periods), np.array(scaling.errors), None
     with np.errstate(divide="ignore"):
         means = np.exp(np.log(errors).mean(axis=0))
     for k in np.flatnonzero(np.isfinite(means) & (means > 0.0)).tolist():
         counted = periods[k] in scaling.used
-        ax.plot([h[k]] * 2, [errors[:, k].min(), errors[:, k].max()], color=colour, lw=style.points(1.0), alpha=0.6)
-        ax.plot(h[k], means[k], mark, color=colour, ms=style.points(6.0), mfc=colour if counted else "none")
+        ax.plot(
+            [h[k]] * 2,
+            [errors[:, k].min(), errors[:, k].max()],
+            color=colour,
+            lw=style.points(1.0),
+            alpha=0.6,
+        )
+        ax.plot(
+            h[k],
+            means[k],
+            mark,
+            color=colour,
+            ms=style.points(6.0),
+            mfc=colour if counted else "none",
+        )
         end = end or (float(means[k]), float(h[k]))
     if not _tells(scaling):
         return end

@@ -1,10 +1,13 @@
-"""Orders of accuracy: the exponent with which an error falls with the control period, its interval, and remarks.
+"""Orders of accuracy: the exponent with which an error falls with the control period, its interval,
+and remarks.
 
-The order is the slope of a line through the logarithms of error and period. Its variance is the sum of two: that of the
-slope through the means of the starts, from their distance to the line, and that of the starts' own slopes.
+The order is the slope of a line through the logarithms of error and period. Its variance is the sum
+of two: that of the slope through the means of the starts, from their distance to the line, and that
+of the starts' own slopes.
 
-A period counts only if its errors are ultimate bounds of the law. So no run fails there, all errors are above rounding,
-and no run's error still falls or grows: by more than a factor of 1.5 from each of the last three parts to the next.
+A period counts only if its errors are ultimate bounds of the law. So no run fails there, all errors
+are above rounding, and no run's error still falls or grows: by more than a factor of 1.5 from each
+of the last three parts to the next.
 """
 
 import dataclasses
@@ -13,9 +16,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-TREND = 1.5  # ratio of the errors in one part of a run and the next above which they fall or grow; chosen
+# ratio of the errors in one part of a run and the next above which they fall or grow; chosen
+TREND = 1.5
 ORDER_BAND = 0.2  # difference of two orders up to which they agree
-LEVEL = 0.5  # how far the local order at the shortest periods lies below theory's where an error levels off; chosen
+# how far the local order at the shortest periods lies below theory's where an error levels off;
+# chosen
+LEVEL = 0.5
 CONFIDENCE = 0.95  # of intervals
 QUANTITIES = ("e", "s")
 UNTOLD = "the order cannot be told"
@@ -23,15 +29,22 @@ UNTOLD = "the order cannot be told"
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Scaling:
-    """The order with which the error of one quantity falls with the control period, and its 95 % interval."""
+    """The order with which the error of one quantity falls with the control period, and its 95 %
+    interval.
+    """
 
-    errors: tuple[tuple[float, ...], ...]  # of each run: for each start, for each period; inf if it failed
+    errors: tuple[
+        tuple[float, ...], ...
+    ]  # of each run: for each start, for each period; inf if it failed
     used: tuple[float, ...]  # the periods in the fit, s
     order: float  # exponent of the period; NaN with fewer than two periods
     low: float  # with `high` its interval; NaN with fewer than three periods
     high: float
-    theory: float | None  # the order that the law's theorem promises, at least; None if it promises none here
-    why: str  # why periods were left out, and why the order is not theory's where the runs show a reason
+    theory: (
+        float | None
+    )  # the order that the law's theorem promises, at least; None if it promises none here
+    # why periods were left out, and why the order is not theory's where the runs show a reason
+    why: str
 
     @property
     def largest(self) -> tuple[float, ...]:
@@ -46,7 +59,9 @@ class Scaling:
     def __str__(self) -> str:
         if math.isnan(self.order):
             return "none"
-        return f"{self.order:z.2f}" + ("" if math.isnan(self.low) else f" ±{self.high - self.order:.2f}")
+        return f"{self.order:z.2f}" + (
+            "" if math.isnan(self.low) else f" ±{self.high - self.order:.2f}"
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -67,19 +82,27 @@ class Accuracy:
 
     @property
     def place(self) -> tuple[float, ...]:
-        """What sorts laws: the number of failed runs, then the largest |e| at each period, from the shortest on."""
+        """What sorts laws: the number of failed runs, then the largest |e| at each period, from the
+        shortest on.
+        """
         return self.failed, *(max(error, self.floor) for error in reversed(self.e.largest))
 
     @property
     def why(self) -> str:
-        """The remarks on e and on s in one text, which tells them apart where they differ; "" for none."""
+        """The remarks on e and on s in one text, which tells them apart where they differ; "" for
+        none.
+        """
         if self.e.why == self.s.why:
             return self.e.why
-        return "; ".join(f"for {name}, {remark}" for name in QUANTITIES if (remark := getattr(self, name).why))
+        return "; ".join(
+            f"for {name}, {remark}" for name in QUANTITIES if (remark := getattr(self, name).why)
+        )
 
     @property
     def theory(self) -> str:
-        """The orders of e and s that theory promises, as text: one number if they are the same, "" for none."""
+        """The orders of e and s that theory promises, as text: one number if they are the same, ""
+        for none.
+        """
         promised = ["" if one.theory is None else f"{one.theory:.2g}" for one in (self.e, self.s)]
         return ", ".join(dict.fromkeys(promised))
 
@@ -88,19 +111,26 @@ class Accuracy:
         value = self.e.largest[k]
         if not math.isfinite(value):
             return "failed"
-        return f"<{self.floor:.0e}" if value <= self.floor else f"{value:.1e}"
+        if value <= self.floor:
+            return f"<{self.floor:.0e}"
+        return f"{value:.1e}"
 
 
 def scaling(
-    parts: np.ndarray, periods: Sequence[float], theory: float | None, floor: float, reasons: Mapping[str, str]
+    parts: np.ndarray,
+    periods: Sequence[float],
+    theory: float | None,
+    floor: float,
+    reasons: Mapping[str, str],
 ) -> Scaling:
-    """Return how errors depend on the control period; periods (s, longest first), theory and floor as of the classes.
+    """Return how errors depend on the control period; periods (s, longest first), theory and floor
+    as of the classes.
 
     Args:
-      parts: largest magnitudes in the last three parts of each run, (starts, periods, 3), in order of time; inf for a
-        failed run. The last one is the error.
-      reasons: what may keep the order from theory's, known without the errors: "always" is said in any case, all others
-        only where the order is lower than promised, or there is none.
+      parts: largest magnitudes in the last three parts of each run, (starts, periods, 3), in order
+        of time; inf for a failed run. The last one is the error.
+      reasons: what may keep the order from theory's, known without the errors: "always" is said in
+        any case, all others only where the order is lower than promised, or there is none.
     """
     errors = parts[..., -1]
     failed = ~np.isfinite(errors).all(axis=0)
@@ -112,7 +142,10 @@ def scaling(
     used = ~(failed | rounded | falling | growing)
     h = np.array(periods)[used]
     order, low, high = fit(h, errors[:, used])
-    said = [reasons["always"]] if "always" in reasons else []
+    if "always" in reasons:
+        said = [reasons["always"]]
+    else:
+        said = []
     for mask, words in (
         (rounded, f"up to {floor:.0e}, which is rounding"),
         (falling, "still falling at the end of the run"),
@@ -122,11 +155,21 @@ def scaling(
             said.append(f"{_periods(periods, mask)} {words}")
     said += _difference(errors[:, used], h, order, (low, high), theory, reasons)
     every, counted = tuple(map(tuple, errors.tolist())), tuple(h.tolist())
-    return Scaling(errors=every, used=counted, order=order, low=low, high=high, theory=theory, why="; ".join(said))
+    return Scaling(
+        errors=every,
+        used=counted,
+        order=order,
+        low=low,
+        high=high,
+        theory=theory,
+        why="; ".join(said),
+    )
 
 
 def fit(periods: np.ndarray, errors: np.ndarray) -> tuple[float, float, float]:
-    """Return the exponent of periods (P,), s, in positive errors (starts, P), and its interval; NaN for too few."""
+    """Return the exponent of periods (P,), s, in positive errors (starts, P), and its interval; NaN
+    for too few.
+    """
     if len(periods) < 2:
         return math.nan, math.nan, math.nan
     x, y = np.log(periods), np.log(errors)
@@ -156,13 +199,19 @@ def _difference(
     theory: float | None,
     reasons: Mapping[str, str],
 ) -> list[str]:
-    """Return why the order is not the promised one, as far as is seen; [] where it is, or nothing was promised."""
+    """Return why the order is not the promised one, as far as is seen; [] where it is, or nothing
+    was promised.
+    """
     if theory is None:
         return []
     told = not interval[0] <= 0.0 < theory <= interval[1]
-    contained = "its interval contains " + ("the promised order" if told else f"0 and {theory:.2g}: {UNTOLD}")
+    contained = "its interval contains " + (
+        "the promised order" if told else f"0 and {theory:.2g}: {UNTOLD}"
+    )
     if order >= theory - ORDER_BAND:
-        return [] if told and order <= theory + ORDER_BAND else ["falls faster than promised" if told else contained]
+        if told and order <= theory + ORDER_BAND:
+            return []
+        return ["falls faster than promised" if told else contained]
     seen = [text for name, text in reasons.items() if name != "always"]
     if interval[0] <= theory <= interval[1]:
         seen.append(contained)
@@ -171,7 +220,8 @@ def _difference(
         local = float((fine[1] - fine[0]) / math.log(periods[-1] / periods[-2]))
         if local < theory - LEVEL:
             seen.insert(
-                0, f"levels off (order {local:.2g} at the shortest periods): these gains, not sampling, limit it"
+                0,
+                f"levels off (order {local:.2g} at the shortest periods): these gains, not sampling, limit it",
             )
     return seen or ([] if math.isnan(order) else ["no reason seen"])
 
@@ -180,4 +230,8 @@ def _periods(periods: Sequence[float], mask: np.ndarray) -> str:
     """Return the marked periods in words."""
     if mask.all():
         return "all periods:"
-    return "at " + ", ".join(f"{1e3 * h:g}" for h, marked in zip(periods, mask, strict=True) if marked) + " ms"
+    return (
+        "at "
+        + ", ".join(f"{1e3 * h:g}" for h, marked in zip(periods, mask, strict=True) if marked)
+        + " ms"
+    )

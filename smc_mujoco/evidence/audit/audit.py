@@ -4,8 +4,8 @@
     result.claims[0].verdict
     result.save("evidence.json")                   # claim -> runs -> numbers -> threshold -> verdict
 
-Thresholds are written into the paper's file before its first run; the file says what was changed after it. `verdict`
-says how checks become verdicts.
+Thresholds are written into the paper's file before its first run; the file says what was changed
+after it. `verdict` says how checks become verdicts.
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ class Audit:
     paper: Paper
     claims: Claims  # with their verdicts, in the order of the paper's file
     quick: bool  # whether less was measured, as each claim says
-    used: Mapping[str, Mapping[str, Mapping[str, Used]]]  # claim -> set of gains -> run's key -> run that it used
+    used: Mapping[
+        str, Mapping[str, Mapping[str, Used]]
+    ]  # claim -> set of gains -> run's key -> run that it used
     sealable: bool  # whether all runs were made here, none taken from a table
 
     @property
@@ -48,11 +50,13 @@ class Audit:
         return self.paper.name + ", quick audit" * self.quick
 
     def save(self, path: str | Path) -> Path:
-        """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict, sealed by a hash.
+        """Write the evidence to a .json file: claim -> runs -> numbers -> threshold -> verdict,
+        sealed by a hash.
 
-        With the same package versions and the same arithmetic of the machine, a second audit in a clean process writes
-        the same file, to the last bit. The file holds no times, no paths and nothing about the machine. It leaves out
-        numbers that differ from audit to audit, such as timings, and says so.
+        With the same package versions and the same arithmetic of the machine, a second audit in a
+        clean process writes the same file, to the last bit. The file holds no times, no paths and
+        nothing about the machine. It leaves out numbers that differ from audit to audit, such as
+        timings, and says so.
 
         Raises:
           ScenarioError: the name does not end in .json, or runs were taken from a table.
@@ -68,10 +72,14 @@ class Audit:
         return save_badge(self.name, self.claims, path)
 
     def figure(self, path: str | Path | None = None, **options: Any) -> Figure | SubFigure:
-        """Draw every check as a multiple of its threshold, a row for each claim; options as of `smc.figure`."""
+        """Draw every check as a multiple of its threshold, a row for each claim; options as of
+        `smc.figure`.
+        """
         from smc_mujoco.evidence.audit.figure import figure
 
-        return figure(self.claims, f"Claims of {self.paper.authors}: {self.paper.title}", path, **options)
+        return figure(
+            self.claims, f"Claims of {self.paper.authors}: {self.paper.title}", path, **options
+        )
 
     def _repr_html_(self) -> str:
         return self.claims._repr_html_()
@@ -87,25 +95,32 @@ def audit(
     table: Table | None = None,
     report: Callable[[int, int], None] = lambda done, whole: None,
 ) -> Audit:
-    """Audit a paper: measure each claim against its threshold, and keep what every verdict rests on.
+    """Audit a paper: measure each claim against its threshold, and keep what every verdict rests
+    on.
 
         smc.audit("./my_paper").save("evidence.json")
 
     Args:
       paper: a name of `smc-mujoco claims --papers`, or a folder.
       only: ids of the claims wanted; None for all.
-      gains: names of the paper's sets of gains; None for all of them, or for its quick sets if `quick`.
+      gains: names of the paper's sets of gains; None for all of them, or for its quick sets if
+        `quick`.
       quick: whether to measure less, as each claim says: coarser grids, shorter runs.
       threads: simulations at once; None for one per available core.
       table: a study's table, whose runs are not made again.
-      report: called with how many claims are done and how many there are; each counts once per set of gains.
+      report: called with how many claims are done and how many there are; each counts once per set
+        of gains.
 
     Raises:
-      ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the paper.
+      ScenarioError: an unknown paper, id or set of gains, or something is wrong with a file of the
+        paper.
     """
     from smc_mujoco.evidence.audit.runs import Runs, of_table
 
-    audited = paper if isinstance(paper, Paper) else find_paper(paper)
+    if isinstance(paper, Paper):
+        audited = paper
+    else:
+        audited = find_paper(paper)
     rows = {} if table is None else of_table(table)
     shared: dict[str, Result] = {}
     entries, names = wanted(audited, only), sets(audited, gains, quick)
@@ -120,8 +135,13 @@ def audit(
             used[entry.id][name] = its_runs.used
             report(done, len(entries) * len(names))
     if quick:
-        instead = {entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries}
-        entries = [dataclasses.replace(entry, measured=entry.measured + instead[entry.id]) for entry in entries]
+        instead = {
+            entry.id: f"; here, quickly, {entry.quick}" if entry.quick else "" for entry in entries
+        }
+        entries = [
+            dataclasses.replace(entry, measured=entry.measured + instead[entry.id])
+            for entry in entries
+        ]
     verdicts = Claims(judged(entry, evidence[entry.id]) for entry in entries)
     return Audit(audited, verdicts, quick, used, table is None)
 
@@ -134,16 +154,22 @@ def claims(
     threads: int | None = None,
     paper: str | Path | Paper = DEFAULT_PAPER,
 ) -> Claims:
-    """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors as of `audit`."""
+    """Return the verdicts on a paper's claims, with the numbers behind them; arguments and errors
+    as of `audit`.
+    """
     return audit(paper, only, gains, quick, threads, table=table).claims
 
 
 def wanted(paper: Paper, only: Iterable[str | int] | None) -> list[Entry]:
-    """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown id."""
+    """Return the claims of some ids, or all for None, in the order of the file; refuse an unknown
+    id.
+    """
     known = paper.claims
     if only is None:
         return list(known.values())
-    ids = {str(i) if isinstance(i, int) else i if isinstance(i, str) else shown(i) for i in items_of("only", only)}
+    ids = set()
+    for i in items_of("only", only):
+        ids.add(str(i) if isinstance(i, int) else i if isinstance(i, str) else shown(i))
     for id in sorted(ids - set(known)):
         raise unknown("claim", id, known)
     return [entry for entry in known.values() if entry.id in ids]
@@ -153,7 +179,10 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
     """Return the sets of gains that `audit` takes for these arguments; refuse an unknown one."""
     if gains is None:
         return list(paper.quick_sets if quick else paper.sets)
-    names = [gains] if isinstance(gains, str) else items_of("gains", gains)
+    if isinstance(gains, str):
+        names = [gains]
+    else:
+        names = items_of("gains", gains)
     for name in names:
         find("set of gains", name, paper.sets)
     if not names:
@@ -163,14 +192,17 @@ def sets(paper: Paper, gains: str | Sequence[str] | None, quick: bool) -> list[s
 
 def document(claims: Sequence[Claim]) -> str:
     """Return claims as one JSON document: {"smc_mujoco": version, "claims": [...]}."""
-    return to_json({"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]}, indent=1)
+    return to_json(
+        {"smc_mujoco": __version__, "claims": [dataclasses.asdict(claim) for claim in claims]},
+        indent=1,
+    )
 
 
 def measure(entry: Entry, runs: Runs) -> Evidence:
     """Return the checks of a claim under one set of gains, and the numbers beside them.
 
-    A claim about all or some of the allowed gains is measured at the gains that decide it, unless other laws have the
-    gains of another set in its search.
+    A claim about all or some of the allowed gains is measured at the gains that decide it, unless
+    other laws have the gains of another set in its search.
     """
     if entry.over and entry.rivals in ("", runs.gains):
         from smc_mujoco.evidence.audit import search
@@ -192,24 +224,34 @@ def _measured(entry: Entry, runs: Runs) -> list[Check | Beside]:
 
 
 def _evidence(entry: Entry, returned: Any, checked: Collection[str]) -> Iterator[Check | Beside]:
-    """Yield checks and numbers from what a claim's function returned; `checked`: measures whose thresholds it used."""
+    """Yield checks and numbers from what a claim's function returned; `checked`: measures whose
+    thresholds it used.
+    """
     if not isinstance(returned, Mapping):
-        checks = isinstance(returned, Sequence) and all(isinstance(one, Check | Beside) for one in returned)
+        checks = isinstance(returned, Sequence) and all(
+            isinstance(one, Check | Beside) for one in returned
+        )
         if not checks:
             raise ScenarioError(f"it returns {shown(returned)}: {CURE}")
         for threshold in entry.thresholds:
             if threshold.measure not in checked:
                 cure = "return numbers, or checks from runs.check"
-                raise ScenarioError(f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}")
+                raise ScenarioError(
+                    f"it returns checks, and none for {threshold.measure!r} of holds_if: {cure}"
+                )
         yield from returned
         return
     if not entry.thresholds:
-        raise ScenarioError('it returns numbers, and holds_if is a text: write a table, as { "exponent" = ">= 1.9" }')
+        raise ScenarioError(
+            'it returns numbers, and holds_if is a text: write a table, as { "exponent" = ">= 1.9" }'
+        )
     values = {measure: dict(_cases(measure, one)) for measure, one in returned.items()}
     for threshold in entry.thresholds:
         if not values.get(threshold.measure):
             cure = f"its measures are {', '.join(str(one) for one, cases in values.items() if cases) or 'none'}"
-            raise ScenarioError(f"it returns no {threshold.measure!r}, of which holds_if is: {cure}")
+            raise ScenarioError(
+                f"it returns no {threshold.measure!r}, of which holds_if is: {cure}"
+            )
         yield from threshold.evidence(values.pop(threshold.measure))
     for measure, cases in values.items():
         for case, value in cases.items():
@@ -222,5 +264,8 @@ def _cases(measure: object, values: Any) -> Iterator[tuple[str, float]]:
         try:
             yield str(case), float(value)
         except (TypeError, ValueError):
-            where = f"{measure!r}, {case!r}" if case else repr(measure)
+            if case:
+                where = f"{measure!r}, {case!r}"
+            else:
+                where = repr(measure)
             raise ScenarioError(f"it returns {shown(value)} for {where}: {CURE}") from None

@@ -3,9 +3,10 @@
     audit("gaber").save("evidence.json")
     check("evidence.json")                    # raises if the file was changed after it was written
 
-It leads from each claim to its runs, their numbers, the threshold and the verdict. A run is named by a hash of its
-scenario, and has a hash of what the claim took from it: its scores or its trace. There are hashes of the paper's own
-files. The seal is a hash of all the rest. There are no times, no paths and nothing about the machine.
+It leads from each claim to its runs, their numbers, the threshold and the verdict. A run is named
+by a hash of its scenario, and has a hash of what the claim took from it: its scores or its trace.
+There are hashes of the paper's own files. The seal is a hash of all the rest. There are no times,
+no paths and nothing about the machine.
 """
 
 import hashlib
@@ -26,7 +27,18 @@ from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.studies.run_key import condition, portable_key
 
 FORMAT = "smc-mujoco evidence 1"
-CLAIM_FIELDS = ("id", "text", "where", "whose", "how", "read", "measured", "holds_if", "quantifier", "over")
+CLAIM_FIELDS = (
+    "id",
+    "text",
+    "where",
+    "whose",
+    "how",
+    "read",
+    "measured",
+    "holds_if",
+    "quantifier",
+    "over",
+)
 HASHED_SUFFIXES = (".py", ".toml", ".xml")  # of a paper's files that are hashed
 
 
@@ -36,11 +48,17 @@ def document(audit: Any) -> dict[str, Any]:
         raise ScenarioError("evidence is of runs that the audit made itself: leave out the table")
     names: dict[str, str] = {}  # key of a run -> its name in the file
     runs: dict[str, Any] = {}
-    for key, run in (item for sets in audit.used.values() for used in sets.values() for item in used.items()):
+    for key, run in (
+        item for sets in audit.used.values() for used in sets.values() for item in used.items()
+    ):
         name = names[key] = names.get(key) or portable_key(run.scenario)
         if name not in runs:
             runs[name] = _run(run.scenario)
-        runs[name] |= {what: hashed for what, hashed in (("scores", run.scores), ("trace", run.trace)) if hashed}
+        runs[name] |= {
+            what: hashed
+            for what, hashed in (("scores", run.scores), ("trace", run.trace))
+            if hashed
+        }
     sealed = [claim for claim in audit.claims if not audit.paper.claims[claim.id].varies]
     data = {
         "format": FORMAT,
@@ -53,7 +71,9 @@ def document(audit: Any) -> dict[str, Any]:
             "smc_mujoco": __version__,
             **{name: version(name) for name in ("mujoco", "numba", "numpy")},
             "python": f"{sys.version_info.major}.{sys.version_info.minor}",
-            "code": fingerprint.package("testing", "draw", *(f"evidence/papers/{name}" for name in shipped())),
+            "code": fingerprint.package(
+                "testing", "draw", *(f"evidence/papers/{name}" for name in shipped())
+            ),
         },
         "quick": audit.quick,
         "left_out": [id for id in audit.paper.claims if id not in audit.used],
@@ -72,10 +92,14 @@ def seal(data: Mapping[str, Any]) -> str:
 
 def check(path: str | Path) -> dict[str, Any]:
     """Return the evidence in a file, or raise ScenarioError if its seal is broken."""
-    with reading(path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote") as file:
+    with reading(
+        path, "file of evidence", "give one that `smc-mujoco claims --evidence FILE.json` wrote"
+    ) as file:
         data = read_json(file)
         if data["format"] != FORMAT:
-            raise ScenarioError(f"its format is {data['format']!r}, and this version reads {FORMAT!r}")
+            raise ScenarioError(
+                f"its format is {data['format']!r}, and this version reads {FORMAT!r}"
+            )
         if data["seal"] != seal(data):
             raise ScenarioError("its seal is broken: it was changed after it was written")
     return data
@@ -83,8 +107,14 @@ def check(path: str | Path) -> dict[str, Any]:
 
 def files(paper: Paper) -> dict[str, str]:
     """Return file -> hash of a paper's files, the same for every kind of line ending."""
-    paths = sorted(path for path in paper.folder.rglob("*") if path.suffix in HASHED_SUFFIXES and path.is_file())
-    texts = {path.relative_to(paper.folder).as_posix(): path.read_bytes().replace(b"\r\n", b"\n") for path in paths}
+    paths = sorted(
+        path
+        for path in paper.folder.rglob("*")
+        if path.suffix in HASHED_SUFFIXES and path.is_file()
+    )
+    texts = {}
+    for path in paths:
+        texts[path.relative_to(paper.folder).as_posix()] = path.read_bytes().replace(b"\r\n", b"\n")
     return {name: hashlib.sha256(text).hexdigest() for name, text in texts.items()}
 
 
@@ -96,20 +126,26 @@ def _claim(audit: Any, claim: Any, names: Mapping[str, str]) -> dict[str, Any]:
         sealed["immune"] = entry.immune
     if entry.varies:
         return sealed | {"not_sealed": f"its numbers differ from audit to audit: {entry.varies}"}
-    runs = {name: sorted({names[key] for key in used}) for name, used in audit.used[claim.id].items()}
-    judged = {name: getattr(claim, name) for name in ("numbers", "beside", "verdicts", "verdict", "flips", "note")}
+    runs = {
+        name: sorted({names[key] for key in used}) for name, used in audit.used[claim.id].items()
+    }
+    judged = {}
+    for name in ("numbers", "beside", "verdicts", "verdict", "flips", "note"):
+        judged[name] = getattr(claim, name)
     return sealed | {"runs": runs} | judged
 
 
 def _run(scenario: Scenario) -> dict[str, Any]:
     """Return a short description of a run. Its name is a hash of the whole scenario."""
     plant, suite = scenario.plant, plants().get(scenario.plant.name)
-    changed = {
-        name: value for name, value in plant.parameters.items() if not suite or suite.parameters.get(name) != value
-    }
+    changed = {}
+    for name, value in plant.parameters.items():
+        if not suite or suite.parameters.get(name) != value:
+            changed[name] = value
     return {
         "plant": plant.name,
-        "parameters": changed | ({"n": plant.n} if not suite or plant.n != suite.n else {}),  # other than the suite's
+        "parameters": changed
+        | ({"n": plant.n} if not suite or plant.n != suite.n else {}),  # other than the suite's
         "law": scenario.law.name,
         "gains": dict(scenario.law.gains),
         "condition": condition(scenario),

@@ -1,11 +1,13 @@
-"""The figure of an audit, and its badge, an SVG file with the number of the paper's own sentences by verdict.
+"""The figure of an audit, and its badge, an SVG file with the number of the paper's own sentences
+by verdict.
 
 The figure shows how far every check is from its threshold, a row for each claim.
 
     audit("levant_1993").figure("checks.pdf")
 
-A check is a dot at value / limit, or at limit / value if the value must be larger. Left of 1 the check holds, and its
-dot is filled. Where the ratio tells nothing, as with a limit of 0, the dot is at the edge.
+A check is a dot at value / limit, or at limit / value if the value must be larger. Left of 1 the
+check holds, and its dot is filled. Where the ratio tells nothing, as with a limit of 0, the dot is
+at the edge.
 """
 
 import math
@@ -53,8 +55,12 @@ def figure(
     width, height = pages.measure(size, fig)
     kinds = [kind for kind in COLOURS if any(claim.verdict == kind for claim in claims)]
     with style.page(width):
-        handles = [Line2D([], [], color=COLOURS[kind], marker="o", ls="", label=kind) for kind in kinds]
-        whole = pages.head_height(width, handles) + style.points(ROW_HEIGHT * (len(claims) + 2.5)) / 72
+        handles = []
+        for kind in kinds:
+            handles.append(Line2D([], [], color=COLOURS[kind], marker="o", ls="", label=kind))
+        whole = (
+            pages.head_height(width, handles) + style.points(ROW_HEIGHT * (len(claims) + 2.5)) / 72
+        )
         page = pages.blank(width, height or whole, fig)
         ax = page.subplots()
         for row, claim in enumerate(claims):
@@ -64,15 +70,24 @@ def figure(
         ax.axvline(0.0, color=style.INK, lw=style.points(1.2))
         ax.set(xlim=(-1.08 * MAX_DECADES, 1.08 * MAX_DECADES), ylim=(len(claims) - 0.5, -0.5))
         sets = list(claims[0].verdicts)
-        order = f"; from above, gains {', '.join(sets)}" if len(sets) > 1 else ""
+        if len(sets) > 1:
+            order = f"; from above, gains {', '.join(sets)}"
+        else:
+            order = ""
         words = f"measured / asked: left of 1 it holds, and is filled{order}"
         letters, room = style.points(9.5), TEXT_SHARE * 72 * width
         ax.set_xlabel(style.wrapped(words, 2 * room, letters, lines=2), fontsize=letters)
         narrow = width < pages.NARROW
         ends = {-MAX_DECADES: f"≤ {10**-MAX_DECADES:g}", MAX_DECADES: f"≥ {10**MAX_DECADES:g}"}
-        ticks = [float(k) for k in range(-round(MAX_DECADES), round(MAX_DECADES) + 1) if not narrow or k % 2 == 0]
+        ticks = []
+        for k in range(-round(MAX_DECADES), round(MAX_DECADES) + 1):
+            if not narrow or k % 2 == 0:
+                ticks.append(float(k))
         ax.set_xticks(ticks, [ends.get(k, f"{10.0**k:g}") for k in ticks])
-        names = [style.cropped(f"{MARKS[claim.verdict]} {claim.id}  {claim.text}", room, letters) for claim in claims]
+        names = [
+            style.cropped(f"{MARKS[claim.verdict]} {claim.id}  {claim.text}", room, letters)
+            for claim in claims
+        ]
         ax.set_yticks(range(len(claims)), names, fontsize=letters)
         for label, claim in zip(ax.get_yticklabels(), claims, strict=True):
             label.set_color(COLOURS[claim.verdict])
@@ -87,7 +102,14 @@ def figure(
 def draw(ax: Axes, row: int, claim: Claim) -> None:
     """Draw the checks of a claim: a line of dots for each set of gains."""
     colour, sets = COLOURS[claim.verdict], list(claim.verdicts)
-    dot = {"marker": "o", "ls": "", "ms": style.points(5.5), "mec": colour, "mew": style.points(1.1), "clip_on": False}
+    dot = {
+        "marker": "o",
+        "ls": "",
+        "ms": style.points(5.5),
+        "mec": colour,
+        "mew": style.points(1.1),
+        "clip_on": False,
+    }
     for k, name in enumerate(sets):
         y = row + SETS_SHARE * ((k + 0.5) / len(sets) - 0.5)
         for check in claim.checks(name):
@@ -95,8 +117,13 @@ def draw(ax: Axes, row: int, claim: Claim) -> None:
 
 
 def place(check: Check) -> float:
-    """Return where a check's dot is: log10 of value / limit or limit / value, at most MAX_DECADES from 0."""
-    over, under = (check.value, check.limit) if check.relation in ("<", "<=") else (check.limit, check.value)
+    """Return where a check's dot is: log10 of value / limit or limit / value, at most MAX_DECADES
+    from 0.
+    """
+    if check.relation in ("<", "<="):
+        over, under = (check.value, check.limit)
+    else:
+        over, under = (check.limit, check.value)
     edge = -MAX_DECADES if check.holds else MAX_DECADES
     if not (0.0 < over < math.inf and 0.0 < under < math.inf):
         return edge
@@ -112,7 +139,9 @@ def save_badge(name: str, claims: Sequence[Claim], path: str | Path) -> Path:
 
 
 def badge(name: str, claims: Sequence[Claim]) -> str:
-    """Return the badge: the paper's name, and a field for each verdict that some sentence of the paper has."""
+    """Return the badge: the paper's name, and a field for each verdict that some sentence of the
+    paper has.
+    """
     fields = [(f"claims of {name}", LABEL_COLOUR)]
     for verdict, count in totals(claims).items():
         fields.append((f"{count} {verdict.removesuffix(' supported')}", COLOURS[verdict]))

@@ -2,9 +2,9 @@
 
     assert survivors("./my_paper") == {}      # in a test: each claim that holds is lost by some mutant of its first law
 
-A mutant is the law that a claim is about with the wrong sign, without gain, without memory, or as a relay. A paper does
-not write about such a law, so a claim that holds under every mutant measures something else. If no mutant can lose a
-claim, the claim's field `immune` says why.
+A mutant is the law that a claim is about with the wrong sign, without gain, without memory, or as a
+relay. A paper does not write about such a law, so a claim that holds under every mutant measures
+something else. If no mutant can lose a claim, the claim's field `immune` says why.
 """
 
 import functools
@@ -31,24 +31,37 @@ def survivors(
     threads: int | None = None,
     report: Callable[[int, int], None] = lambda done, whole: None,
 ) -> dict[str, str]:
-    """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses. There should be none.
+    """Return claim -> KEPT or BLIND, for the claims that no mutant of their first law loses.
 
-    A mutant loses a claim if a sentence of the claim holds under the law itself and not under the mutant, or if the
-    claim's function cannot measure the mutant. A claim of which no sentence holds has nothing to lose: there the
-    numbers must change. Claims with `immune` are skipped.
+    There should be none.
+
+    A mutant loses a claim if a sentence of the claim holds under the law itself and not under the
+    mutant, or if the claim's function cannot measure the mutant. A claim of which no sentence holds
+    has nothing to lose: there the numbers must change. Claims with `immune` are skipped.
 
     Args:
       paper, only, gains, quick, threads: as of `smc.audit`.
-      report: called with how many rounds are done and how many there are: the law itself is one, each mutant another.
+      report: called with how many rounds are done and how many there are: the law itself is one,
+        each mutant another.
     """
-    audited = paper if isinstance(paper, Paper) else find_paper(paper)
+    if isinstance(paper, Paper):
+        audited = paper
+    else:
+        audited = find_paper(paper)
     kept = {entry.id: entry for entry in wanted(audited, only) if not entry.immune}
     names = sets(audited, gains, quick)
 
-    def measured(entries: Iterable[Entry], law: str, mutant: str) -> Iterator[tuple[str, str, Evidence | None]]:
-        """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot measure a mutant."""
+    def measured(
+        entries: Iterable[Entry], law: str, mutant: str
+    ) -> Iterator[tuple[str, str, Evidence | None]]:
+        """Yield claim, set of gains, and evidence; None as evidence if the claim's function cannot
+        measure a mutant.
+        """
         shared: dict[str, Result] = {}
-        replaced = {law: functools.partial(variant, name=mutant)} if mutant else {}
+        if mutant:
+            replaced = {law: functools.partial(variant, name=mutant)}
+        else:
+            replaced = {}
         for name in names:
             runs = Runs(audited, name, quick, replaced, threads, {}, shared)
             for entry in sorted(entries, key=lambda entry: entry.late):
@@ -77,15 +90,24 @@ def survivors(
 def first_law(entry: Entry) -> str:
     """Return the law that mutants of a claim replace."""
     if not entry.laws:
-        raise ScenarioError(f"claim {entry.id} names no law: write laws, first the one that it is about, or immune")
+        raise ScenarioError(
+            f"claim {entry.id} names no law: write laws, first the one that it is about, or immune"
+        )
     return entry.laws[0]
 
 
 def lost(entry: Entry, intact: Evidence, mutant: Evidence | None, holding: bool) -> bool:
-    """Return whether a mutant loses a claim. `mutant`: its evidence; None if it cannot be measured."""
+    """Return whether a mutant loses a claim.
+
+    `mutant`: its evidence; None if it cannot be measured.
+    """
     if mutant is None:
         return True
     if holding:
         still = sentences(mutant, entry.quantifier)
-        return any(held and not still.get(one) for one, held in sentences(intact, entry.quantifier).items())
-    return [repr(item.value) for item in mutant] != [repr(item.value) for item in intact]  # repr: NaN equals NaN
+        return any(
+            held and not still.get(one) for one, held in sentences(intact, entry.quantifier).items()
+        )
+    return [repr(item.value) for item in mutant] != [
+        repr(item.value) for item in intact
+    ]  # repr: NaN equals NaN

@@ -1,10 +1,11 @@
-"""A paper as data: a folder with paper.toml, its claims and thresholds, and claims.py, a function for each claim.
+"""A paper as data: a folder with paper.toml, its claims and thresholds, and claims.py, a function
+for each claim.
 
     paper("levant_1993")            # one that ships
     paper("./my_paper")             # your own folder
 
-docs/audit_a_paper.md shows how to write one, and lists the fields. A folder that is broken is refused with one
-sentence, which says what is wrong with which file.
+docs/audit_a_paper.md shows how to write one, and lists the fields. A folder that is broken is
+refused with one sentence, which says what is wrong with which file.
 """
 
 import contextlib
@@ -31,7 +32,14 @@ from smc_mujoco.control import gain_sets
 from smc_mujoco.control.component import Component, Template
 from smc_mujoco.control.law import catalogue as laws_known
 from smc_mujoco.control.source import STUDY
-from smc_mujoco.evidence.audit.verdict import DERIVED, OURS, QUANTIFIERS, WHOSE_WORDS, Statement, Threshold
+from smc_mujoco.evidence.audit.verdict import (
+    DERIVED,
+    OURS,
+    QUANTIFIERS,
+    WHOSE_WORDS,
+    Statement,
+    Threshold,
+)
 from smc_mujoco.mechanisms.named import from_text
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.mechanisms.plant import catalogue as plants_known
@@ -45,39 +53,68 @@ SHIPPED_PACKAGE = "smc_mujoco.evidence.papers"
 KINDS_OF_CLAIM = {"paper": "of its sentences", "derived": "derived", "ours": "beside it"}
 NO_FIELDS: Mapping[str, Any] = frozen({})
 # How much of a paper was read.
-READ_PARTS: dict[str, None] = dict.fromkeys(("full text", "abstract", "textbook", "second hand", "nothing"))
+READ_PARTS: dict[str, None] = dict.fromkeys(
+    ("full text", "abstract", "textbook", "second hand", "nothing")
+)
 TEXT_FIELDS = ("title", "authors", "source", "read", "access", "note")  # of a paper
-SPREAD_SETS, NEAR_SETS = 6, 3  # sets of gains that a search tries over the bounds, and around the best of them
-A_TEXT, A_LIST, FIELDS_CURE = (str, "a text"), (list, "a list of names"), 'fields of a scenario, as "duration=5.0"'
+SPREAD_SETS, NEAR_SETS = (
+    6,
+    3,
+)  # sets of gains that a search tries over the bounds, and around the best of them
+A_TEXT, A_LIST, FIELDS_CURE = (
+    (str, "a text"),
+    (list, "a list of names"),
+    'fields of a scenario, as "duration=5.0"',
+)
 PAPER_FIELDS = {  # field of a paper -> its type and what to write
     **dict.fromkeys(TEXT_FIELDS, A_TEXT),
     "claim": (list, "tables, each under a line [[claim]]"),
     "runs": (str, FIELDS_CURE),
     **dict.fromkeys(("sets", "quick_sets"), A_LIST),
-    **{name: (dict, f"a table, under a line [{name}]") for name in ("plants", "conditions", "gains", "allowed")},
+    **{
+        name: (dict, f"a table, under a line [{name}]")
+        for name in ("plants", "conditions", "gains", "allowed")
+    },
 }
 CLAIM_FIELDS = {  # the same of a claim
-    "id": A_TEXT, "text": A_TEXT,
-    "whose": (str, '"paper" for a sentence of the paper, "derived" for what follows from one, "ours" for a question'),
-    "where": A_TEXT, "function": (str, "the name of a function"),
+    "id": A_TEXT,
+    "text": A_TEXT,
+    "whose": (
+        str,
+        '"paper" for a sentence of the paper, "derived" for what follows from one, "ours" for a question',
+    ),
+    "where": A_TEXT,
+    "function": (str, "the name of a function"),
     "holds_if": (dict | str, 'a table, as { "settling time, s" = "< 2" }'),
     "how": (str, "a text: how it is derived, or why it is asked"),
     "over": (str, '"all" or "some" of the gains in [allowed.LAW]'),
     "searched": (str, "the law of these gains; without it the claim's first"),
-    "rivals": (str, "a set of gains: that of the other laws in the search; what other sets give is told beside it"),
+    "rivals": (
+        str,
+        "a set of gains: that of the other laws in the search; what other sets give is told beside it",
+    ),
     "late": (bool, "true or false"),
-    **dict.fromkeys(("read", "words", "measured", "note", "instead", "shown_by", "quantifier"), A_TEXT),
-    **dict.fromkeys(("quick", "varies", "immune"), A_TEXT), **dict.fromkeys(("plants", "laws", "conditions"), A_LIST),
-    "runs": (str, FIELDS_CURE), "values": (dict, "a table of numbers"),
-}  # fmt: skip
-REQUIRED_FIELDS = ("title", "authors", "source", "read", "claim"), tuple(CLAIM_FIELDS)[:6]  # of a paper, of a claim
+    **dict.fromkeys(
+        ("read", "words", "measured", "note", "instead", "shown_by", "quantifier"), A_TEXT
+    ),
+    **dict.fromkeys(("quick", "varies", "immune"), A_TEXT),
+    **dict.fromkeys(("plants", "laws", "conditions"), A_LIST),
+    "runs": (str, FIELDS_CURE),
+    "values": (dict, "a table of numbers"),
+}
+REQUIRED_FIELDS = (
+    ("title", "authors", "source", "read", "claim"),
+    tuple(CLAIM_FIELDS)[:6],
+)  # of a paper, of a claim
 
 
 class Allowed(NamedTuple):
     """The gains of a law that a paper allows, within the bounds of the search."""
 
     bounds: Mapping[str, tuple[float, float]]  # gain -> lowest and highest value, both positive
-    margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = None  # gains -> {condition: margin}
+    margins: Callable[[Mapping[str, float]], Mapping[str, float]] | None = (
+        None  # gains -> {condition: margin}
+    )
     spread: int = SPREAD_SETS  # sets of gains that a search tries over the whole bounds
     near: int = NEAR_SETS  # and around the best of them
 
@@ -86,12 +123,16 @@ class Allowed(NamedTuple):
 class Entry(Statement):
     """A claim of a paper, with what measures it."""
 
-    evidence: Callable[[Any], Any]  # from runs under one set of gains to numbers, or to checks and numbers beside them
+    evidence: Callable[
+        [Any], Any
+    ]  # from runs under one set of gains to numbers, or to checks and numbers beside them
     thresholds: tuple[Threshold, ...] = ()  # empty if the function returns checks with limits
     quick: str = ""  # what a quick audit measures instead, if that is less
     late: bool = False  # whether it looks at the runs of all other claims, and so comes after them
     searched: str = ""  # the law whose gains are searched; the first of `laws` without it
-    varies: str = ""  # why its numbers, such as timings, differ from audit to audit; they are not sealed
+    varies: str = (
+        ""  # why its numbers, such as timings, differ from audit to audit; they are not sealed
+    )
     immune: str = ""  # why no mutant of the law loses the claim, if none can
     plants: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()  # the first is the one that mutants replace
@@ -112,7 +153,9 @@ class Paper:
     read: str  # how much of it was read, one of READ_PARTS
     access: str = ""  # where it was read, and what could not be read
     note: str = ""  # what a reader of the audit should know
-    sets: Mapping[str, Mapping[str, Mapping[str, Mapping[str, float]]] | None]  # plant ("" for all) -> law -> gains
+    sets: Mapping[
+        str, Mapping[str, Mapping[str, Mapping[str, float]]] | None
+    ]  # plant ("" for all) -> law -> gains
     quick_sets: tuple[str, ...]
     plants: Mapping[str, Plant]  # its own, like the conditions and laws below
     conditions: Mapping[str, Condition]
@@ -125,13 +168,18 @@ class Paper:
     def contents(self) -> str:
         """How many claims of each kind it has, and what of the paper was read, in a few words."""
         kinds = [claim.whose for claim in self.claims.values()]
-        counts = [f"{kinds.count(kind)} {word}" for kind, word in KINDS_OF_CLAIM.items() if kind in kinds]
+        counts = []
+        for kind, word in KINDS_OF_CLAIM.items():
+            if kind in kinds:
+                counts.append(f"{kinds.count(kind)} {word}")
         return f"{', '.join(counts)}; {self.read} read"
 
     def plant(self, plant: str) -> Plant:
         """Return a plant by the paper's name or the suite's."""
         find("plant", plant, plants_known() | self.plants)
-        return self.plants[plant] if plant in self.plants else find_plant(plant)
+        if plant in self.plants:
+            return self.plants[plant]
+        return find_plant(plant)
 
     def condition(self, text: str | Condition) -> Condition:
         """Return a condition by the paper's name, the suite's, or from its text."""
@@ -140,7 +188,10 @@ class Paper:
         return find_condition(text)
 
     def law(self, plant: str, law: str, gains: str) -> Component:
-        """Return a law with the gains that a set has for a plant. A law of the paper's folder keeps its defaults."""
+        """Return a law with the gains that a set has for a plant.
+
+        A law of the paper's folder keeps its defaults.
+        """
         of_set = find("set of gains", gains, self.sets)
         if of_set is None:
             if law in self.laws:
@@ -149,8 +200,14 @@ class Paper:
             return gain_sets.law(self.plant(plant), law, gains if known else "default")
         values = {**of_set.get("", {}).get(law, {}), **of_set.get(plant, {}).get(law, {})}
         made = self.bound(law, values)
-        known = {} if law in self.laws else find("law", law, laws_known()).gains
-        lacking = [f"{gain} = {one.default:g}" for gain, one in known.items() if not one.held and gain not in values]
+        if law in self.laws:
+            known = {}
+        else:
+            known = find("law", law, laws_known()).gains
+        lacking = []
+        for gain, one in known.items():
+            if not one.held and gain not in values:
+                lacking.append(f"{gain} = {one.default:g}")
         if lacking:
             raise ScenarioError(
                 f"the gains {gains!r} of {law} lack some, whose defaults are not the paper's: write in [gains.{gains}] "
@@ -164,7 +221,10 @@ class Paper:
         if isinstance(base, Component):
             base, defaults = base.template or base, base.gains
         values = {**defaults, **gains}
-        made = base.bind(values) if isinstance(base, Template) else dataclasses.replace(base, gains=values)
+        if isinstance(base, Template):
+            made = base.bind(values)
+        else:
+            made = dataclasses.replace(base, gains=values)
         return made.sourced(STUDY) if gains else made
 
 
@@ -201,12 +261,16 @@ def paper(which: str | Path) -> Paper:
     if not os.path.isdir(folder):
         if isinstance(which, str) and not set("/\\.") & set(which):
             raise unknown("paper", which, known)
-        raise ScenarioError(f"no folder {str(which)!r} with a {PAPER_FILE}: give one, or a name of {', '.join(known)}")
+        raise ScenarioError(
+            f"no folder {str(which)!r} with a {PAPER_FILE}: give one, or a name of {', '.join(known)}"
+        )
     return _read(folder, _package(folder))
 
 
 def papers() -> dict[str, Paper]:
-    """Return every paper that ships, or comes with another package, by its name, in alphabetical order."""
+    """Return every paper that ships, or comes with another package, by its name, in alphabetical
+    order.
+    """
     known: dict[str, Paper] = {}
     for key, home in catalogue().items():
         try:
@@ -225,7 +289,10 @@ def new(folder: Path) -> list[Path]:
     written = [folder / PAPER_FILE, folder / CODE_FILE]
     for file in written:
         with replacing(file) as part:
-            part.write_text((Path(__file__).parent / "template" / file.name).read_text(encoding="utf-8"), "utf-8")
+            part.write_text(
+                (Path(__file__).parent / "template" / file.name).read_text(encoding="utf-8"),
+                "utf-8",
+            )
     return written
 
 
@@ -251,7 +318,9 @@ def _about(what: object) -> Iterator[None]:
 
 def _read(folder: Path, package: str) -> Paper:
     """Return the paper in a folder, whose code is imported under a package's name."""
-    with reading(folder / PAPER_FILE, "paper", "make one with `smc-mujoco claims --new FOLDER`") as file:
+    with reading(
+        folder / PAPER_FILE, "paper", "make one with `smc-mujoco claims --new FOLDER`"
+    ) as file:
         text = file.read_text(encoding="utf-8")
     try:
         data = tomllib.loads(text)
@@ -268,8 +337,13 @@ _read_once = functools.cache(_read)  # for installed papers only: a user's folde
 def _module(folder: Path, package: str) -> ModuleType:
     """Return the module claims.py with a paper's functions."""
     if not (folder / CODE_FILE).is_file():
-        raise ScenarioError(f"no {CODE_FILE} in {folder}: write one, with a function for each claim of {PAPER_FILE}")
-    before, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # a user's folder stays as it is
+        raise ScenarioError(
+            f"no {CODE_FILE} in {folder}: write one, with a function for each claim of {PAPER_FILE}"
+        )
+    before, sys.dont_write_bytecode = (
+        sys.dont_write_bytecode,
+        True,
+    )  # a user's folder stays as it is
     try:
         with _about(folder / CODE_FILE):
             return importlib.import_module(f"{package}.claims")
@@ -285,8 +359,13 @@ def _module(folder: Path, package: str) -> ModuleType:
 
 def _place(error: BaseException, folder: Path) -> str:
     """Return the file and line of a paper's folder at which an exception was raised."""
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename).is_relative_to(folder.resolve())]
-    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else str(folder / CODE_FILE)
+    frames = []
+    for f in traceback.extract_tb(error.__traceback__):
+        if Path(f.filename).is_relative_to(folder.resolve()):
+            frames.append(f)
+    if frames:
+        return f"{frames[-1].filename}, line {frames[-1].lineno}"
+    return str(folder / CODE_FILE)
 
 
 def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
@@ -297,8 +376,12 @@ def failed(paper: Paper, entry: Entry, error: BaseException) -> ScenarioError:
     return ScenarioError(f"{_place(error, paper.folder)}: {called} raised {words(error)}")
 
 
-def _values(data: Mapping[str, Any], fields: Mapping[str, tuple[Any, str]], required: tuple[str, ...]) -> dict:
-    """Return the values of a table, texts with single spaces; refuse unknown fields, wrong types and missing fields."""
+def _values(
+    data: Mapping[str, Any], fields: Mapping[str, tuple[Any, str]], required: tuple[str, ...]
+) -> dict:
+    """Return the values of a table, texts with single spaces; refuse unknown fields, wrong types
+    and missing fields.
+    """
     for field in data:
         find("field", field, fields)
     values = {field: _typed(field, value, *fields[field]) for field, value in data.items()}
@@ -309,10 +392,14 @@ def _values(data: Mapping[str, Any], fields: Mapping[str, tuple[Any, str]], requ
 
 
 def _typed(field: str, value: Any, kind: Any, cure: str) -> Any:
-    """Return a value of this type, a text with single spaces, or raise ScenarioError naming the field."""
+    """Return a value of this type, a text with single spaces, or raise ScenarioError naming the
+    field.
+    """
     if not isinstance(value, kind):
         raise ScenarioError(f"{field} is {shown(value)}: write {cure}")
-    return " ".join(value.split()) if isinstance(value, str) else value
+    if isinstance(value, str):
+        return " ".join(value.split())
+    return value
 
 
 def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
@@ -329,7 +416,10 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
         **{field: values[field] for field in TEXT_FIELDS if field in values},
         sets=sets,
         quick_sets=quick_sets,
-        plants={key: _plant(f"plants.{key}", one, folder) for key, one in values.get("plants", {}).items()},
+        plants={
+            key: _plant(f"plants.{key}", one, folder)
+            for key, one in values.get("plants", {}).items()
+        },
         conditions={
             key: condition(key, **_fields(f"conditions.{key}", text))
             for key, text in values.get("conditions", {}).items()
@@ -340,10 +430,14 @@ def _checked(folder: Path, data: Mapping[str, Any], code: ModuleType) -> Paper:
         claims={},
     )
     functions = {key: value for key, value in vars(code).items() if inspect.isfunction(value)}
-    allowed = {law: _allowed(law, one, functions, paper) for law, one in values.get("allowed", {}).items()}
+    allowed = {
+        law: _allowed(law, one, functions, paper) for law, one in values.get("allowed", {}).items()
+    }
     paper, entries = dataclasses.replace(paper, allowed=allowed), {}
     for number, one in enumerate(values["claim"], 1):
-        with _about(f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"):
+        with _about(
+            f"claim {one.get('id', f'number {number}') if isinstance(one, dict) else number}"
+        ):
             entry = _entry(_typed("it", one, dict, "a table"), functions, paper)
             if entry.id in entries:
                 raise ScenarioError("it is there twice: give one another id")
@@ -356,11 +450,19 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
     values: dict[str, Any] = {"read": paper.read} | _values(data, CLAIM_FIELDS, REQUIRED_FIELDS[1])
     function = find(f"function of {CODE_FILE}", values.pop("function"), functions)
     asked = values.pop("holds_if")
-    thresholds = () if isinstance(asked, str) else tuple(_thresholds(asked))
-    values["holds_if"] = values.pop("words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds)))
+    if isinstance(asked, str):
+        thresholds = ()
+    else:
+        thresholds = tuple(_thresholds(asked))
+    values["holds_if"] = values.pop(
+        "words", asked if isinstance(asked, str) else ", ".join(map(str, thresholds))
+    )
     values["quantifier"] = find("quantifier", values.get("quantifier", "named"), QUANTIFIERS)
     values |= {field: tuple(values.get(field, ())) for field in ("plants", "laws", "conditions")}
-    values.setdefault("measured", " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip("."))
+    values.setdefault(
+        "measured",
+        " ".join((inspect.getdoc(function) or "").partition("\n\n")[0].split()).rstrip("."),
+    )
     fields = _fields("runs", values.pop("runs", ""))
     entry = Entry(**values, evidence=function, thresholds=thresholds, fields=fields)
     _check(entry, paper)
@@ -368,13 +470,17 @@ def _entry(data: Mapping[str, Any], functions: Mapping[str, Callable], paper: Pa
 
 
 def _check(entry: Entry, paper: Paper) -> None:
-    """Raise ScenarioError if a claim has an unknown name, or does not say whose it is, how derived or over what."""
+    """Raise ScenarioError if a claim has an unknown name, or does not say whose it is, how derived
+    or over what.
+    """
     find("origin in whose", entry.whose, WHOSE_WORDS)
     find("part in read", entry.read, READ_PARTS)
     if entry.whose == DERIVED and not entry.how:
         raise ScenarioError("it is derived, and does not say how: write how, a text")
     if entry.whose != OURS and entry.read == "nothing":
-        raise ScenarioError(f'nothing of the paper was read, and it is {entry.whose!r}: write whose = "ours"')
+        raise ScenarioError(
+            f'nothing of the paper was read, and it is {entry.whose!r}: write whose = "ours"'
+        )
     for one in entry.plants:
         paper.plant(one)
     for one in entry.conditions:
@@ -389,7 +495,9 @@ def _check(entry: Entry, paper: Paper) -> None:
         if entry.rivals:
             find("set of gains in rivals", entry.rivals, paper.sets)
         if (law := entry.searched or next(iter(entry.laws), "LAW")) not in paper.allowed:
-            raise ScenarioError(f"it is about {entry.over} gains, and there is no table [allowed.{law}]: write one")
+            raise ScenarioError(
+                f"it is about {entry.over} gains, and there is no table [allowed.{law}]: write one"
+            )
 
 
 def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: Paper) -> Allowed:
@@ -399,23 +507,39 @@ def _allowed(law: str, data: object, functions: Mapping[str, Callable], paper: P
     margins = table.pop("margins", None)
     if margins is not None:
         margins = find(f"function of {CODE_FILE} in allowed.{law}", margins, functions)
-    spread, near = _typed("tried", table.pop("tried", [SPREAD_SETS, NEAR_SETS]), list, "two numbers, as [64, 24]")
+    spread, near = _typed(
+        "tried", table.pop("tried", [SPREAD_SETS, NEAR_SETS]), list, "two numbers, as [64, 24]"
+    )
     bounds = {}
     for gain, ends in table.items():
         find(f"gain of {law} in allowed", gain, paper.bound(law, {}).gains)
-        pair = [end for end in ends if isinstance(end, int | float)] if isinstance(ends, list) else []
+        if isinstance(ends, list):
+            pair = [end for end in ends if isinstance(end, int | float)]
+        else:
+            pair = []
         if len(pair) != 2 or not 0.0 < pair[0] < pair[1]:
-            raise ScenarioError(f"allowed.{law}.{gain} is {shown(ends)}: write two positive numbers, the lower first")
+            raise ScenarioError(
+                f"allowed.{law}.{gain} is {shown(ends)}: write two positive numbers, the lower first"
+            )
         bounds[gain] = (float(pair[0]), float(pair[1]))
-    return Allowed(bounds, margins, whole("tried", spread, 1, MAX_ITEMS), whole("tried", near, 0, MAX_ITEMS))
+    return Allowed(
+        bounds, margins, whole("tried", spread, 1, MAX_ITEMS), whole("tried", near, 0, MAX_ITEMS)
+    )
 
 
 def _thresholds(conditions: Mapping[str, Any]) -> Iterator[Threshold]:
     """Yield the thresholds in a table: measure -> text, or {asked, sentence}."""
     for measure, threshold in conditions.items():
-        parts = threshold if isinstance(threshold, dict) else {"asked": threshold}
+        if isinstance(threshold, dict):
+            parts = threshold
+        else:
+            parts = {"asked": threshold}
         for field in parts:
-            find(f"field of the threshold of {measure!r}", field, dict.fromkeys(("asked", "sentence")))
+            find(
+                f"field of the threshold of {measure!r}",
+                field,
+                dict.fromkeys(("asked", "sentence")),
+            )
         yield Threshold.read(measure, parts.get("asked"), str(parts.get("sentence", "")))
 
 
@@ -423,7 +547,9 @@ def _sets(tables: Mapping[str, Any], listed: list[str]) -> dict[str, Any]:
     """Return set of gains -> plant -> law -> gains; None for a set of the suite."""
     for key in tables:
         if key in gain_sets.KNOWN_SETS:
-            raise ScenarioError(f"gains.{key} is a set of the suite: give yours another name, such as gains.paper")
+            raise ScenarioError(
+                f"gains.{key} is a set of the suite: give yours another name, such as gains.paper"
+            )
     sets: dict[str, Any] = {}
     for key in listed or list(tables) or ["default"]:
         sets[key] = find("set of gains in sets", key, {**tables, **gain_sets.KNOWN_SETS})
@@ -458,15 +584,23 @@ def _fields(what: str, text: object) -> dict[str, Any]:
         except SyntaxError:
             raise ScenarioError(f"it is {shown(text)}: write {FIELDS_CURE}") from None
     for field in fields:
-        find(f"field of a scenario in {what}", field, dict.fromkeys(set(Scenario.fields()) - {"plant", "law"}))
+        find(
+            f"field of a scenario in {what}",
+            field,
+            dict.fromkeys(set(Scenario.fields()) - {"plant", "law"}),
+        )
     return fields
 
 
 def _laws(code: ModuleType) -> Iterator[tuple[str, Template | Component]]:
-    """Yield name, law of every law in a paper's module; refuse one with the name of another law of the library."""
+    """Yield name, law of every law in a paper's module; refuse one with the name of another law of
+    the library.
+    """
     for value in vars(code).values():
         if isinstance(value, Template | Component) and value.kind == "law":
             known = laws_known().get(value.name)
             if known and known.function is not value.function:
-                raise ScenarioError(f"law {value.name!r} of {CODE_FILE} is a name of the library's: rename it")
+                raise ScenarioError(
+                    f"law {value.name!r} of {CODE_FILE} is a name of the library's: rename it"
+                )
             yield value.name, value

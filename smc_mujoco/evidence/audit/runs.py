@@ -3,9 +3,11 @@
     def settles(runs):
         scenarios = runs.grid()                        # (plant, law, condition) -> Scenario, of the claim's names
         scores = runs.scores(scenarios.values())       # every metric of each, in order
-        return {"settling time, s": {plant: one["settling_time"] for (plant, *_), one in zip(scenarios, scores)}}
+        return {"settling time, s": {plant: one["settling_time"] for (plant, *_), one in
+        zip(scenarios, scores)}}
 
-A run is made once: scores are kept by the scenario's key. Runs in a study's table are taken from it.
+A run is made once: scores are kept by the scenario's key. Runs in a study's table are taken from
+it.
 """
 
 import copy
@@ -37,7 +39,9 @@ if TYPE_CHECKING:
 Scores = dict[str, float]
 Name = TypeVar("Name")
 Value = TypeVar("Value")
-Substitute = Mapping[str, Callable[[Component], Component]]  # law's name -> function from the law to its mutant
+Substitute = Mapping[
+    str, Callable[[Component], Component]
+]  # law's name -> function from the law to its mutant
 
 
 class Result(NamedTuple):
@@ -53,11 +57,17 @@ class Result(NamedTuple):
         names = [m.name for m in metrics()]
         if outcome["failure"] is not None:
             return cls(law, gains, dict.fromkeys(names, math.inf))
-        return cls(law, gains, {name: float(outcome[name]) for name in names if outcome.get(name) is not None})
+        return cls(
+            law,
+            gains,
+            {name: float(outcome[name]) for name in names if outcome.get(name) is not None},
+        )
 
 
 class Used(NamedTuple):
-    """A run that a claim has used: its scenario, and hashes of the scores and of the trace that it read."""
+    """A run that a claim has used: its scenario, and hashes of the scores and of the trace that it
+    read.
+    """
 
     scenario: Scenario
     scores: str = ""
@@ -66,18 +76,30 @@ class Used(NamedTuple):
 
 @dataclasses.dataclass(eq=False)
 class Runs:
-    """Runs of a paper under one set of gains, made when they are needed and kept by their scenario's key."""
+    """Runs of a paper under one set of gains, made when they are needed and kept by their
+    scenario's key.
+    """
 
     paper: Paper
     gains: str
     quick: bool = False  # whether a claim measures less: coarser grids, shorter runs
     substitute: Substitute = dataclasses.field(default_factory=dict)
     threads: int | None = None
-    table: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run that is not made again
-    shared: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run, for the Runs of all sets
-    used: dict[str, Used] = dataclasses.field(default_factory=dict)  # key -> run that the claim has used
-    checked: set[str] = dataclasses.field(default_factory=set)  # measures whose thresholds the claim has asked for
-    scored: dict[str, Result] = dataclasses.field(default_factory=dict)  # key -> run whose scores any claim has used
+    table: dict[str, Result] = dataclasses.field(
+        default_factory=dict
+    )  # key -> run that is not made again
+    shared: dict[str, Result] = dataclasses.field(
+        default_factory=dict
+    )  # key -> run, for the Runs of all sets
+    used: dict[str, Used] = dataclasses.field(
+        default_factory=dict
+    )  # key -> run that the claim has used
+    checked: set[str] = dataclasses.field(
+        default_factory=set
+    )  # measures whose thresholds the claim has asked for
+    scored: dict[str, Result] = dataclasses.field(
+        default_factory=dict
+    )  # key -> run whose scores any claim has used
     plants: tuple[str, ...] = ()  # names of the claim's plants; below, of its laws and conditions
     laws: tuple[str, ...] = ()
     conditions: tuple[str, ...] = ("nominal",)
@@ -90,13 +112,19 @@ class Runs:
         """Return these runs as a claim sees them: with its names and fields, and none used yet."""
         runs = copy.copy(self)
         runs.used, runs.checked = {}, set()
-        runs.plants, runs.laws, runs.conditions = entry.plants, entry.laws, entry.conditions or ("nominal",)
+        runs.plants, runs.laws, runs.conditions = (
+            entry.plants,
+            entry.laws,
+            entry.conditions or ("nominal",),
+        )
         runs.values, runs.fields = entry.values, entry.fields
         runs.thresholds = {threshold.measure: threshold for threshold in entry.thresholds}
         return runs
 
     def at(self, law: str, gains: Mapping[str, float], quick: bool) -> "Runs":
-        """Return the claim's runs with some gains of a law in place of the set's; they count as used by the claim."""
+        """Return the claim's runs with some gains of a law in place of the set's; they count as
+        used by the claim.
+        """
         runs = copy.copy(self)
         runs.searched, runs.quick = {law: dict(gains)}, quick
         return runs
@@ -112,18 +140,26 @@ class Runs:
         """Name of the plant of a claim that has one."""
         return self.plants[0]
 
-    def check(self, measure: str, what: str, value: float, times: float = 1.0, sentence: str = "") -> Check:
-        """Return the check of what was measured against the threshold of a measure, `holds_if` in the paper's file.
+    def check(
+        self, measure: str, what: str, value: float, times: float = 1.0, sentence: str = ""
+    ) -> Check:
+        """Return the check of what was measured against the threshold of a measure, `holds_if` in
+        the paper's file.
 
-        A function returns checks instead of numbers if a limit depends on runs, or if it has a name for each number.
-        The limit is multiplied by `times`: with a rival's time, "<= 1.1" asks for at most 1.1 times that time.
+        A function returns checks instead of numbers if a limit depends on runs, or if it has a name
+        for each number. The limit is multiplied by `times`: with a rival's time, "<= 1.1" asks for
+        at most 1.1 times that time.
         """
         threshold = find("threshold", measure, self.thresholds)
         self.checked.add(measure)
-        return check(what, value, threshold.relation, threshold.limit * times, sentence or threshold.sentence)
+        return check(
+            what, value, threshold.relation, threshold.limit * times, sentence or threshold.sentence
+        )
 
     def law(self, plant: str, name: str, **gains: float) -> Component:
-        """Return a law, or its mutant in this audit, with the set's gains for a plant and some of them changed."""
+        """Return a law, or its mutant in this audit, with the set's gains for a plant and some of
+        them changed.
+        """
         law = self.paper.law(plant, name, self.gains)
         gains = {**self.searched.get(name, {}), **gains}
         for gain in gains:
@@ -131,17 +167,23 @@ class Runs:
         return self.mutated(dataclasses.replace(law, gains={**law.gains, **gains}))
 
     def mutated(self, law: Component) -> Component:
-        """Return the law, or its mutant in this audit, which keeps the law's name so that claims find its runs."""
+        """Return the law, or its mutant in this audit, which keeps the law's name so that claims
+        find its runs.
+        """
         mutant = self.substitute.get(law.name)
-        return dataclasses.replace(mutant(law), name=law.name) if mutant else law
+        if mutant:
+            return dataclasses.replace(mutant(law), name=law.name)
+        return law
 
     def scenario(
         self, plant: str, law_name: str, /, condition: str | Condition = "nominal", **changes: Any
     ) -> Scenario:
-        """Return the scenario of a plant under a law in a condition, with some of its fields changed.
+        """Return the scenario of a plant under a law in a condition, with some of its fields
+        changed.
 
-        Fields come from the paper, the condition, the claim and the changes; the later replace the earlier. A changed
-        `plant` may have other parameters or another size. The gains stay those of the named plant.
+        Fields come from the paper, the condition, the claim and the changes; the later replace the
+        earlier. A changed `plant` may have other parameters or another size. The gains stay those
+        of the named plant.
         """
         paper, its = self.paper, self.fields
         machine = paper.plant(plant)
@@ -154,16 +196,22 @@ class Runs:
         return scenario.named(condition if isinstance(condition, str) else condition.name)
 
     def only(self, **changes: Any) -> Scenario:
-        """Return the scenario of the claim's first plant, law and condition, with some of its fields changed."""
+        """Return the scenario of the claim's first plant, law and condition, with some of its
+        fields changed.
+        """
         return self.scenario(self.plants[0], self.laws[0], self.conditions[0], **changes)
 
     def grid(self, **changes: Any) -> dict[tuple[str, str, str], Scenario]:
-        """Return (plant, law, condition) -> scenario for all that the claim names, with some fields changed."""
+        """Return (plant, law, condition) -> scenario for all that the claim names, with some fields
+        changed.
+        """
         cells = itertools.product(self.plants, self.laws, self.conditions)
         return {cell: self.scenario(*cell, **changes) for cell in cells}
 
     def scores(self, scenarios: Iterable[Scenario]) -> list[Scores]:
-        """Return every metric of every scenario, in order; a run that fails has inf in every metric."""
+        """Return every metric of every scenario, in order; a run that fails has inf in every
+        metric.
+        """
         wanted, known = self._keyed(scenarios), ChainMap(self.shared, self.table)
         new = {name: scenario for name, scenario in wanted if name not in known}
         names = list(new)
@@ -172,8 +220,12 @@ class Runs:
             known[names[index]] = Result.of(law.name, law.gains, result_columns(trace))
         for name, scenario in wanted:
             self.scored[name] = result = known[name]
-            text = ",".join(f"{metric}={float(value).hex()}" for metric, value in sorted(result.scores.items()))
-            self.used[name] = self.used.get(name, Used(scenario))._replace(scores=_hash(text.encode()))
+            text = ",".join(
+                f"{metric}={float(value).hex()}" for metric, value in sorted(result.scores.items())
+            )
+            self.used[name] = self.used.get(name, Used(scenario))._replace(
+                scores=_hash(text.encode())
+            )
         return [known[name].scores for name, _ in wanted]
 
     def score(self, plant: str, law_name: str, condition: str = "nominal") -> Scores:
@@ -190,7 +242,9 @@ class Runs:
         return [traces[i] for i in range(len(wanted))]
 
     def _keyed(self, scenarios: Iterable[Scenario]) -> list[tuple[str, Scenario]]:
-        """Return scenarios with their keys, without the name of their condition, which changes nothing in a run."""
+        """Return scenarios with their keys, without the name of their condition, which changes
+        nothing in a run.
+        """
         plants: Hashes = {}
         return [(key(scenario.named(None), plants=plants), scenario) for scenario in scenarios]
 
@@ -198,7 +252,9 @@ class Runs:
         """Return name -> trace of named scenarios, such as those of `grid`."""
         return dict(zip(scenarios, self.traces(scenarios.values()), strict=True))
 
-    def measured(self, scenarios: Mapping[Name, Scenario], measure: Callable[[Trace], Value]) -> dict[Name, Value]:
+    def measured(
+        self, scenarios: Mapping[Name, Scenario], measure: Callable[[Trace], Value]
+    ) -> dict[Name, Value]:
         """Return name -> what is measured on the trace of a named scenario."""
         return {name: measure(trace) for name, trace in self.traced(scenarios).items()}
 
@@ -209,7 +265,9 @@ class Runs:
 
 def of_table(table: "Table") -> dict[str, Result]:
     """Return the runs that a study's table holds, by key."""
-    return {row["hash"]: Result.of(row["law"], from_json(row["gains"]), row) for row in table.rows()}
+    return {
+        row["hash"]: Result.of(row["law"], from_json(row["gains"]), row) for row in table.rows()
+    }
 
 
 def _hash(*parts: bytes) -> str:

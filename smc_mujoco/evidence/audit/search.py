@@ -1,9 +1,9 @@
 """A search over the gains that a paper allows, for a claim about all of them or about some.
 
-A claim about all gains is refuted by one counter-example, and a claim about some is supported by one example: the
-search stops there. It tries the gains of the set first, then points spread over the bounds, then points around the best
-of them. It measures these points as a quick audit does, and the one that decides in full. Nothing is random, so a
-second audit finds the same gains.
+A claim about all gains is refuted by one counter-example, and a claim about some is supported by
+one example: the search stops there. It tries the gains of the set first, then points spread over
+the bounds, then points around the best of them. It measures these points as a quick audit does, and
+the one that decides in full. Nothing is random, so a second audit finds the same gains.
 """
 
 import dataclasses
@@ -37,21 +37,30 @@ class Tried(NamedTuple):
     def rank(self) -> tuple[bool, float]:
         """Key that orders gains: whether all checks hold, then the least slack."""
         checks = [check for check in self.evidence if isinstance(check, Check)]
-        return all(check.holds for check in checks), min((check.slack for check in checks), default=math.inf)
+        return all(check.holds for check in checks), min(
+            (check.slack for check in checks), default=math.inf
+        )
 
 
 def decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence]) -> Evidence:
     """Return the evidence at the gains that decide, with these gains and their margins beside.
 
-    A claim about some gains is decided for each plant by itself, because plants may need different gains.
+    A claim about some gains is decided for each plant by itself, because plants may need different
+    gains.
     """
     if entry.over == "all" or len(entry.plants) == 1:
         return _decisive(entry, runs, measure, "")
     entries = {plant: dataclasses.replace(entry, plants=(plant,)) for plant in entry.plants}
-    return [check for p, claim in entries.items() for check in _decisive(claim, runs.on(p), measure, f"{p}: ")]
+    return [
+        check
+        for p, claim in entries.items()
+        for check in _decisive(claim, runs.on(p), measure, f"{p}: ")
+    ]
 
 
-def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str) -> Evidence:
+def _decisive(
+    entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], prefix: str
+) -> Evidence:
     """Return the evidence at the gains that decide on all plants of a claim."""
     law, best = entry.searched or entry.laws[0], min if entry.over == "all" else max
     theorem = Theorem(entry, runs)
@@ -59,15 +68,18 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
     quickly: list[Tried] = []
 
     def decides(gains: Gains, quick: bool) -> bool:
-        """Try gains, and return whether they decide: a counter-example to "all", or an example of "some"."""
+        """Try gains, and return whether they decide: a counter-example to "all", or an example of
+        "some".
+        """
         tried = Tried(gains, measure(runs.at(law, gains, quick or runs.quick)))
         (quickly if quick else in_full).append(tried)
         return tried.rank[0] != (entry.over == "all")
 
     def search() -> None:
-        spread, near = (
-            (QUICK_SPREAD_SETS, QUICK_NEAR_SETS) if runs.quick else (theorem.allowed.spread, theorem.allowed.near)
-        )
+        if runs.quick:
+            spread, near = (QUICK_SPREAD_SETS, QUICK_NEAR_SETS)
+        else:
+            spread, near = (theorem.allowed.spread, theorem.allowed.near)
         if any(decides(gains, True) for gains in theorem.points(theorem.allowed.bounds, spread)):
             return
         centre = best(quickly, key=lambda tried: tried.rank).gains
@@ -79,7 +91,10 @@ def _decisive(entry: Entry, runs: Runs, measure: Callable[[Runs], Evidence], pre
         decides(best(quickly, key=lambda tried: tried.rank).gains, False)
     last = best(in_full, key=lambda tried: tried.rank)
     beside = [Beside(f"{prefix}decided at {gain}", value) for gain, value in last.gains.items()]
-    beside += [Beside(f"{prefix}margin of {name}", value) for name, value in theorem.margins(last.gains).items()]
+    beside += [
+        Beside(f"{prefix}margin of {name}", value)
+        for name, value in theorem.margins(last.gains).items()
+    ]
     return [*last.evidence, *beside, Beside(f"{prefix}sets of gains tried", len(quickly) + 1)]
 
 
@@ -89,20 +104,29 @@ class Theorem:
     def __init__(self, entry: Entry, runs: Runs):
         law = entry.searched or entry.laws[0]
         self.allowed: Allowed = runs.paper.allowed[law]
-        self.rest: Mapping[str, float] = runs.paper.law(entry.plants[0], law, runs.gains).gains  # of the set
+        self.rest: Mapping[str, float] = runs.paper.law(
+            entry.plants[0], law, runs.gains
+        ).gains  # of the set
         self._failed = lambda error: failed(runs.paper, entry, error)
 
     def points(self, bounds: Bounds, count: int) -> Iterator[Gains]:
-        """Yield gain sets within bounds that meet the conditions, spread over the logarithms (Halton's points)."""
+        """Yield gain sets within bounds that meet the conditions, spread over the logarithms
+        (Halton's points).
+        """
         from scipy.stats import qmc
 
         low, high = np.log(list(bounds.values())).T
         drawn = qmc.Halton(len(bounds), scramble=False).random(DRAWN_POINTS)[1:]
-        sets = (dict(zip(bounds, np.exp(low + (high - low) * point).tolist(), strict=True)) for point in drawn)
+        sets = (
+            dict(zip(bounds, np.exp(low + (high - low) * point).tolist(), strict=True))
+            for point in drawn
+        )
         met = (gains for gains in sets if self.smallest(gains) > 0.0)
         first = next(met, None)
         if first is None:
-            raise self._failed(ScenarioError("no gains in [allowed] meet the conditions: widen its bounds"))
+            raise self._failed(
+                ScenarioError("no gains in [allowed] meet the conditions: widen its bounds")
+            )
         return itertools.islice(itertools.chain([first], met), count)
 
     def around(self, gains: Gains) -> Bounds:
@@ -118,7 +142,10 @@ class Theorem:
         if self.allowed.margins is None:
             return {}
         try:
-            return {name: float(value) for name, value in self.allowed.margins({**self.rest, **gains}).items()}
+            return {
+                name: float(value)
+                for name, value in self.allowed.margins({**self.rest, **gains}).items()
+            }
         except Exception as error:  # whatever a user's function raises
             raise self._failed(error) from error
 

@@ -1,10 +1,12 @@
-"""Variants of laws: a reversed command, command 0, a relay, no memory, or an input gain that varies with x.
+"""Variants of laws: a reversed command, command 0, a relay, no memory, or an input gain that varies
+with x.
 
     variant(law, "squeezed")
 
-A channel's input gain g(x) multiplies the actuator's output. To run a law on a plant with that gain, which the library
-lacks, clip its command to the actuator's bound and multiply it by g at each sample. This is exact if |g| <= 1, except
-that g changes within a control period, during which the command is held.
+A channel's input gain g(x) multiplies the actuator's output. To run a law on a plant with that
+gain, which the library lacks, clip its command to the actuator's bound and multiply it by g at each
+sample. This is exact if |g| <= 1, except that g changes within a control period, during which the
+command is held.
 """
 
 import dataclasses
@@ -17,7 +19,9 @@ from smc_mujoco.control.component import Component
 
 
 def _times(gain: Callable[[float], float]) -> Callable[[Callable], Callable]:
-    """Return a wrapper that clips a law's command to the actuator's bound and multiplies it by gain(x), x rad or m."""
+    """Return a wrapper that clips a law's command to the actuator's bound and multiplies it by
+    gain(x), x rad or m.
+    """
     factor = njit(gain)
 
     def multiply(body):
@@ -50,7 +54,8 @@ VARIANTS: dict[str, Callable[[Callable], Callable]] = {
     "reversed": _times(lambda x: -1.0),
     "zero": _times(lambda x: 0.0),
     "squeezed": _times(lambda x: 1.0 / (1.0 + x * x)),
-    "forgetful": _without_memory,  # memory is 0 at every sample; a law that uses none stays as it is
+    # memory is 0 at every sample; a law that uses none stays as it is
+    "forgetful": _without_memory,
     "relay": _relay,  # the actuator's bound with the sign of the command
 }
 
@@ -64,7 +69,9 @@ def variant(law: Component, name: str) -> Component:
 def _varied(function: Callable, name: str) -> Callable:
     """Return the variant of a law's function; compiled once."""
     varied = VARIANTS[name](njit(function))
-    varied.__qualname__ = f"{function.__module__}.{function.__qualname__}.{name}"  # numba's cache names files so
+    varied.__qualname__ = (
+        f"{function.__module__}.{function.__qualname__}.{name}"  # numba's cache names files so
+    )
     return varied
 
 

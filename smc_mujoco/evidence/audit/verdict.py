@@ -1,16 +1,19 @@
-"""From checks to verdicts: a measured number against its limit, a claim under one set of gains, and over several.
+"""From checks to verdicts: a measured number against its limit, a claim under one set of gains, and
+over several.
 
-A claim consists of one sentence or several. A sentence holds if all its checks hold; an existential one ("may",
-"there is") if one does. Under one set of gains a claim is supported if all its sentences hold, refuted if none does,
-and else partly supported; without checks it is not testable. A claim about some gains or cases is supported by one
-example. Without an example it is not refuted but "not shown".
+A claim consists of one sentence or several. A sentence holds if all its checks hold; an existential
+one ("may", "there is") if one does. Under one set of gains a claim is supported if all its
+sentences hold, refuted if none does, and else partly supported; without checks it is not testable.
+A claim about some gains or cases is supported by one example. Without an example it is not refuted
+but "not shown".
 
-A verdict is about what the paper says, or what follows from it. A question beside the paper gets an answer instead,
-"yes" for "supported". `totals` counts the paper's own sentences alone.
+A verdict is about what the paper says, or what follows from it. A question beside the paper gets an
+answer instead, "yes" for "supported". `totals` counts the paper's own sentences alone.
 
-If all sets of gains give the same verdict, that is the verdict of the claim. If they differ, the claim is partly
-supported, and flips. A universal claim ("every", "any", "by construction") and one over all gains are refuted by a
-counter-example under one set. An existential one and one over some gains are supported by an example under one.
+If all sets of gains give the same verdict, that is the verdict of the claim. If they differ, the
+claim is partly supported, and flips. A universal claim ("every", "any", "by construction") and one
+over all gains are refuted by a counter-example under one set. An existential one and one over some
+gains are supported by an example under one.
 """
 
 import dataclasses
@@ -26,7 +29,9 @@ from smc_mujoco.common.errors import ScenarioError, find, shown
 SUPPORTED, PARTLY, REFUTED = "supported", "partly supported", "refuted"
 NOT_SHOWN, NOT_TESTABLE = "not shown", "not testable"
 VERDICTS: tuple[str, ...] = (SUPPORTED, PARTLY, REFUTED, NOT_SHOWN, NOT_TESTABLE)
-ANSWERS: dict[str, str] = dict(zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True))
+ANSWERS: dict[str, str] = dict(
+    zip(VERDICTS, ("yes", "in part", "no", "no example", "no answer"), strict=True)
+)
 MARKS = dict(zip((*VERDICTS, *ANSWERS.values()), "●◐○◌–■◧□◇–", strict=True))
 
 PAPER, DERIVED, OURS = "paper", "derived", "ours"  # whose a claim is
@@ -34,7 +39,11 @@ WHOSE_WORDS = {PAPER: "the paper's", DERIVED: "derived", OURS: "a question"}
 
 DISTANCE_WORDS = ", distance from "  # in a range check's name, between number and range
 UNIVERSAL, NAMED, EXISTENTIAL = "universal", "of what it names", "existential"
-QUANTIFIERS = {"universal": UNIVERSAL, "existential": EXISTENTIAL, "named": NAMED}  # as a paper's file names them
+QUANTIFIERS = {
+    "universal": UNIVERSAL,
+    "existential": EXISTENTIAL,
+    "named": NAMED,
+}  # as a paper's file names them
 
 NUMBER_PATTERN = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|inf)\s*"
 LIMIT_PATTERN = re.compile(rf"\s*(<=|>=|<|>){NUMBER_PATTERN}")
@@ -60,15 +69,24 @@ class Check(NamedTuple):
 
     @property
     def slack(self) -> float:
-        """The distance to the limit as a share of it, or of 1 if it is 0; negative if the check fails."""
-        room = self.limit - self.value if self.relation in ("<", "<=") else self.value - self.limit
+        """The distance to the limit as a share of it, or of 1 if it is 0; negative if the check
+        fails.
+        """
+        if self.relation in ("<", "<="):
+            room = self.limit - self.value
+        else:
+            room = self.value - self.limit
         if math.isnan(room):
             return -math.inf
-        return room / (abs(self.limit) or 1.0) if math.isfinite(self.limit) else room
+        if math.isfinite(self.limit):
+            return room / (abs(self.limit) or 1.0)
+        return room
 
 
 class Beside(NamedTuple):
-    """A number without a threshold, such as a prediction, or the score of a law that the paper lacks."""
+    """A number without a threshold, such as a prediction, or the score of a law that the paper
+    lacks.
+    """
 
     what: str
     value: float
@@ -77,25 +95,32 @@ class Beside(NamedTuple):
 def check(what: str, value: float, relation: str, limit: float, sentence: str = "") -> Check:
     """Return the check of a value against its limit.
 
-    NaN never holds. Nor does infinity against infinity: of two laws that never settle, neither is faster.
+    NaN never holds. Nor does infinity against infinity: of two laws that never settle, neither is
+    faster.
     """
     compare = find("relation", relation, RELATIONS)
     value, limit = float(value), float(limit)
     undecided = math.isinf(value) and value == limit
-    return Check(what, value, relation, limit, bool(compare(value, limit)) and not undecided, sentence)
+    return Check(
+        what, value, relation, limit, bool(compare(value, limit)) and not undecided, sentence
+    )
 
 
 def measured(value: float, what: str) -> str:
     """Return three significant digits; "none" for NaN, and "never" for an infinite time."""
     if math.isnan(value):
         return "none"
-    return "never" if value == math.inf and "time" in what else f"{value:.3g}"
+    if value == math.inf and "time" in what:
+        return "never"
+    return f"{value:.3g}"
 
 
 def ratio(value: float, reference: float) -> float:
     """Return value / reference; x / 0 is infinite, 0 / 0 and inf / inf are NaN."""
     if reference == 0.0:
-        return math.nan if value == 0.0 else math.copysign(math.inf, value)
+        if value == 0.0:
+            return math.nan
+        return math.copysign(math.inf, value)
     return value / reference
 
 
@@ -103,19 +128,23 @@ Evidence = Sequence[Check | Beside]
 
 
 class Threshold(NamedTuple):
-    """What a measure must be, as a paper's file states it: "< 1", "<= 1", "> 1", ">= 1", "2 +- 0.1" or "2 to 15".
+    """What a measure must be, as a paper's file states it: "< 1", "<= 1", "> 1", ">= 1", "2 +- 0.1"
+    or "2 to 15".
 
         Threshold.read("exponent", "2 +- 0.1").evidence({"duffing": 1.97})
 
-    It is `relation limit`, or a distance from `low` .. `high` that is at most `limit`. The measure is a number that the
-    claim's function returns, or several numbers of one kind: one for each plant, law or level.
+    It is `relation limit`, or a distance from `low` .. `high` that is at most `limit`. The measure
+    is a number that the claim's function returns, or several numbers of one kind: one for each
+    plant, law or level.
     """
 
     measure: str
     text: str  # as it was written
     relation: str
     limit: float
-    low: float = math.nan  # `low` .. `high` is the range: 2 .. 2 for "2 +- 0.1", NaN for a limit such as "< 1"
+    low: float = (
+        math.nan
+    )  # `low` .. `high` is the range: 2 .. 2 for "2 +- 0.1", NaN for a limit such as "< 1"
     high: float = math.nan
     sentence: str = ""  # the sentence of the claim that it is about
 
@@ -134,11 +163,15 @@ class Threshold(NamedTuple):
         return cls(measure, words, "<=", 0.0, float(match[1]), float(match[2]), sentence)
 
     def __str__(self) -> str:
-        return f"{self.measure} {self.text}" if math.isnan(self.low) else f"{self.measure} is {self.text}"
+        if math.isnan(self.low):
+            return f"{self.measure} {self.text}"
+        return f"{self.measure} is {self.text}"
 
     def distance(self, value: float) -> float:
         """Return how far a number is from the range; NaN for NaN."""
-        return math.nan if math.isnan(value) else max(self.low - value, value - self.high, 0.0)
+        if math.isnan(value):
+            return math.nan
+        return max(self.low - value, value - self.high, 0.0)
 
     def evidence(self, values: Mapping[str, float]) -> Iterator[Check | Beside]:
         """Yield a check for each case -> number; "" for a number without a case.
@@ -146,12 +179,24 @@ class Threshold(NamedTuple):
         For a range the check is of the distance from it, and the number stands beside.
         """
         for case, value in values.items():
-            what = f"{case}: {self.measure}" if case else self.measure
+            if case:
+                what = f"{case}: {self.measure}"
+            else:
+                what = self.measure
             if math.isnan(self.low):
                 yield check(what, value, self.relation, self.limit, self.sentence)
                 continue
-            of = f"{self.low:g}" if self.low == self.high else f"{self.low:g} to {self.high:g}"
-            yield check(f"{what}{DISTANCE_WORDS}{of}", self.distance(value), self.relation, self.limit, self.sentence)
+            if self.low == self.high:
+                of = f"{self.low:g}"
+            else:
+                of = f"{self.low:g} to {self.high:g}"
+            yield check(
+                f"{what}{DISTANCE_WORDS}{of}",
+                self.distance(value),
+                self.relation,
+                self.limit,
+                self.sentence,
+            )
             yield Beside(what, value)
 
 
@@ -165,19 +210,28 @@ class Statement:
     measured: str  # what is run, and what is measured on it
     holds_if: str  # the threshold, in words
     note: str = ""  # what a reader must know to judge the numbers
-    quantifier: str = NAMED  # UNIVERSAL, EXISTENTIAL, or NAMED: about only the plants and conditions that it names
-    whose: str = PAPER  # PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it
+    # UNIVERSAL, EXISTENTIAL, or NAMED: about only the plants and conditions that it names
+    quantifier: str = NAMED
+    whose: str = (
+        PAPER  # PAPER, a sentence of the paper; DERIVED from one; or OURS, a question beside it
+    )
     how: str = ""  # how it was derived, or why it is asked
     read: str = ""  # how much was read of the place where it stands, one of `paper.READ_PARTS`
-    over: str = ""  # "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter
-    rivals: str = ""  # the set of gains of other laws with which a search over gains decides; "" for each set by itself
-    instead: str = ""  # what the author may claim instead, where it does not hold: a theorem or a measured bound
+    # "all" or "some" gains that the paper allows; "" if the paper's gains are known, or none matter
+    over: str = ""
+    # the set of gains of other laws with which a search over gains decides; "" for each set by
+    # itself
+    rivals: str = ""
+    # what the author may claim instead, where it does not hold: a theorem or a measured bound
+    instead: str = ""
     shown_by: str = ""  # the command that shows that
 
     @property
     def source(self) -> str:
         """Whose the claim is and what was read, in a few words."""
-        return WHOSE_WORDS[self.whose] + (f", {self.read}" if self.read and self.whose != OURS else "")
+        return WHOSE_WORDS[self.whose] + (
+            f", {self.read}" if self.read and self.whose != OURS else ""
+        )
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -185,8 +239,12 @@ class Claim(Statement):
     """A claim and its verdict."""
 
     verdict: str  # over all sets of gains, one of VERDICTS; of a question one of ANSWERS
-    numbers: dict[str, dict[str, dict[str, Any]]]  # set of gains -> what was measured -> fields of a Check
-    beside: dict[str, dict[str, float]]  # set of gains -> what else was measured -> its value, which decides nothing
+    numbers: dict[
+        str, dict[str, dict[str, Any]]
+    ]  # set of gains -> what was measured -> fields of a Check
+    beside: dict[
+        str, dict[str, float]
+    ]  # set of gains -> what else was measured -> its value, which decides nothing
     verdicts: dict[str, str]  # set of gains -> verdict
     flips: bool  # whether the verdict depends on the set
 
@@ -195,11 +253,15 @@ class Claim(Statement):
         return [Check(what, **numbers) for what, numbers in self.numbers[gains].items()]
 
     def decisive(self, gains: str) -> Check | None:
-        """Return the check that fails by most, else the one nearest to its limit; None without checks."""
+        """Return the check that fails by most, else the one nearest to its limit; None without
+        checks.
+        """
         return min(self.checks(gains), key=lambda check: (check.holds, check.slack), default=None)
 
     def decided(self, gains: str) -> str:
-        """Return the decisive check in a line, with the number instead of its distance; the note without checks."""
+        """Return the decisive check in a line, with the number instead of its distance; the note
+        without checks.
+        """
         if not (check := self.decisive(gains)):
             return self.note
         what, apart, middle = check.what.partition(DISTANCE_WORDS)
@@ -213,10 +275,27 @@ class Claim(Statement):
         for name in self.verdicts:
             for check in self.checks(name):
                 value, limit = (measured(size, check.what) for size in (check.value, check.limit))
-                lines.append((name, "✓" if check.holds else "✗", check.what, value, f"{check.relation} {limit}"))
+                lines.append(
+                    (
+                        name,
+                        "✓" if check.holds else "✗",
+                        check.what,
+                        value,
+                        f"{check.relation} {limit}",
+                    )
+                )
         about = f"{self.id}: {self.text} ({self.where}): {self.verdict}{', flips with the gains' * self.flips}"
-        note = ". ".join(filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note)))
-        return html.table(("gains", "", "measured", "value", "asked"), lines, about, note, range(3, 5), max_rows=24)
+        note = ". ".join(
+            filter(None, (self.source, self.measured, f"It holds if: {self.holds_if}", self.note))
+        )
+        return html.table(
+            ("gains", "", "measured", "value", "asked"),
+            lines,
+            about,
+            note,
+            range(3, 5),
+            max_rows=24,
+        )
 
 
 class Claims(list[Claim]):
@@ -225,7 +304,10 @@ class Claims(list[Claim]):
     def _repr_html_(self) -> str:
         rows = []
         for claim in self:
-            decided = claim.decided(list(claim.verdicts)[-1]) if claim.verdicts else claim.note
+            if claim.verdicts:
+                decided = claim.decided(list(claim.verdicts)[-1])
+            else:
+                decided = claim.note
             words = f"{MARKS[claim.verdict]} {claim.verdict}{', flips' * claim.flips}"
             rows.append((claim.id, claim.text, claim.source, html.strong(words), decided))
         heads = ("id", "claim", "whose, read", "verdict", "decided by")
@@ -239,13 +321,21 @@ def totals(claims: Sequence[Claim]) -> dict[str, int]:
 
 
 def summary(claims: Sequence[Claim]) -> str:
-    """Return a line: the totals of the paper's own sentences and what was read, then the verdicts on the rest."""
-    read = ", ".join(dict.fromkeys(claim.read for claim in claims if claim.whose == PAPER and claim.read))
-    parts = [f"the paper's own sentences{f' ({read} read)' if read else ''}: {_marked(totals(claims))}"]
+    """Return a line: the totals of the paper's own sentences and what was read, then the verdicts
+    on the rest.
+    """
+    read = ", ".join(
+        dict.fromkeys(claim.read for claim in claims if claim.whose == PAPER and claim.read)
+    )
+    parts = [
+        f"the paper's own sentences{f' ({read} read)' if read else ''}: {_marked(totals(claims))}"
+    ]
     for whose, words in ((DERIVED, "derived from it"), (OURS, "questions beside it")):
         rest = [claim.verdict for claim in claims if claim.whose == whose]
         if rest:
-            parts.append(f"{words}: {_marked({kind: rest.count(kind) for kind in dict.fromkeys(rest)})}")
+            parts.append(
+                f"{words}: {_marked({kind: rest.count(kind) for kind in dict.fromkeys(rest)})}"
+            )
     return "; ".join(parts)
 
 
@@ -255,13 +345,18 @@ def _marked(counts: Mapping[str, int]) -> str:
 
 
 def verdict(evidence: Evidence, quantifier: str = NAMED, over: str = "") -> str:
-    """Return the verdict under one set of gains. `over`: "all" or "some" if the claim is about allowed gains."""
+    """Return the verdict under one set of gains.
+
+    `over`: "all" or "some" if the claim is about allowed gains.
+    """
     hold = sentences(evidence, quantifier).values()
     if not hold:
         return NOT_TESTABLE
     if any(hold):
         return SUPPORTED if all(hold) else PARTLY
-    return NOT_SHOWN if quantifier == EXISTENTIAL or over == "some" else REFUTED
+    if quantifier == EXISTENTIAL or over == "some":
+        return NOT_SHOWN
+    return REFUTED
 
 
 def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
@@ -275,45 +370,80 @@ def sentences(evidence: Evidence, quantifier: str = NAMED) -> dict[str, bool]:
 
 
 def combined(
-    verdicts: Mapping[str, str], quantifier: str = NAMED, answers: Mapping[str, str] | None = None, over: str = ""
+    verdicts: Mapping[str, str],
+    quantifier: str = NAMED,
+    answers: Mapping[str, str] | None = None,
+    over: str = "",
 ) -> tuple[str, bool, str]:
-    """Return the verdict over all sets of gains, whether it flips, and a sentence on that, in `answers` if given."""
+    """Return the verdict over all sets of gains, whether it flips, and a sentence on that, in
+    `answers` if given.
+    """
     kinds = set(verdicts.values())
     if len(kinds) == 1:
         return kinds.pop(), False, ""
-    by_set = ", ".join(f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items())
+    by_set = ", ".join(
+        f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items()
+    )
     some = quantifier == EXISTENTIAL or over == "some"
-    decisive = SUPPORTED if some else REFUTED if quantifier == UNIVERSAL or over == "all" else None
+    if some:
+        decisive = SUPPORTED
+    elif quantifier == UNIVERSAL or over == "all":
+        decisive = REFUTED
+    else:
+        decisive = None
     if decisive in kinds:
         about = f"of {over} gains" if over else quantifier
-        return str(decisive), True, f"The claim is {about}, so that one set of gains decides: {by_set}."
+        return (
+            str(decisive),
+            True,
+            f"The claim is {about}, so that one set of gains decides: {by_set}.",
+        )
     return PARTLY, True, f"The verdict depends on the gains: {by_set}."
 
 
 def judged(statement: Statement, evidence: Mapping[str, Evidence]) -> Claim:
     """Return a claim with its verdict, from set of gains -> checks and the numbers beside them."""
     searched = {name: statement.over if statement.rivals in ("", name) else "" for name in evidence}
-    verdicts = {name: verdict(some, statement.quantifier, searched[name]) for name, some in evidence.items()}
+    verdicts = {
+        name: verdict(some, statement.quantifier, searched[name]) for name, some in evidence.items()
+    }
     answers = ANSWERS if statement.whose == OURS else None
     if statement.rivals in verdicts:
-        rest = [f"{(answers or {}).get(kind, kind)} with {name} gains" for name, kind in verdicts.items()]
-        others = ", ".join(words for words in rest if not words.endswith(f"with {statement.rivals} gains"))
+        rest = [
+            f"{(answers or {}).get(kind, kind)} with {name} gains"
+            for name, kind in verdicts.items()
+        ]
+        others = ", ".join(
+            words for words in rest if not words.endswith(f"with {statement.rivals} gains")
+        )
         overall, flips = verdicts[statement.rivals], False
         sentence = f"Decided by a search over the law's gains, with {statement.rivals} gains of the other laws"
-        sentence += f"; for one set of gains each: {others}." if others else "."
+        if others:
+            sentence += f"; for one set of gains each: {others}."
+        else:
+            sentence += "."
     else:
         overall, flips, sentence = combined(verdicts, statement.quantifier, answers, statement.over)
     if answers:
-        overall, verdicts = answers[overall], {name: answers[kind] for name, kind in verdicts.items()}
+        overall, verdicts = (
+            answers[overall],
+            {name: answers[kind] for name, kind in verdicts.items()},
+        )
     numbers: dict[str, dict[str, dict[str, Any]]] = {name: {} for name in evidence}
     beside: dict[str, dict[str, float]] = {name: {} for name in evidence}
-    for name, what, one in ((name, one.what, one) for name, some in evidence.items() for one in some):
+    for name, what, one in (
+        (name, one.what, one) for name, some in evidence.items() for one in some
+    ):
         if what in numbers[name] or what in beside[name]:
             raise ScenarioError(f"a claim measures {what!r} twice: name the two apart")
         if isinstance(one, Beside):
             beside[name][what] = float(one.value)
         else:
-            numbers[name][what] = {field: value for field, value in one._asdict().items() if field != "what"}
+            numbers[name][what] = {
+                field: value for field, value in one._asdict().items() if field != "what"
+            }
     shared = {field.name: getattr(statement, field.name) for field in dataclasses.fields(Statement)}
     shared["note"] = " ".join(filter(None, (statement.note, sentence)))
-    return Claim(**shared, verdict=overall, numbers=numbers, beside=beside, verdicts=verdicts, flips=flips)
+    return Claim(
+        **shared, verdict=overall, numbers=numbers, beside=beside, verdicts=verdicts, flips=flips
+    )

@@ -1,4 +1,6 @@
-"""What is proven of a law on a plant, as data: theorems, their conditions with margins, regions and bounds."""
+"""What is proven of a law on a plant, as data: theorems, their conditions with margins, regions and
+bounds.
+"""
 
 import copy
 import dataclasses
@@ -23,12 +25,21 @@ from smc_mujoco.mechanisms.plant import EFFORT
 if TYPE_CHECKING:
     from smc_mujoco.simulation.trace import Trace
 
-# Condition -> unit of its margin (x: unit of position, F: of force), what it asks, and what it means where it fails.
+# Condition -> unit of its margin (x: unit of position, F: of force), what it asks, and what it
+# means where it fails.
 CONDITIONS = {
     "damping": ("F s/x", "D(x) >= 0 for every x", "the plant itself feeds the motion"),
-    "restoring": ("", "sigma(c x) > phi(x) for every x > 0", "the plant pulls harder than the law pushes"),
+    "restoring": (
+        "",
+        "sigma(c x) > phi(x) for every x > 0",
+        "the plant pulls harder than the law pushes",
+    ),
     "actuator": ("F", "|u| <= u_max", "the law asks for more than the actuator gives"),
-    "coupling": ("F/x", "the coupling is a spring that pulls together", "the coupling can push apart"),
+    "coupling": (
+        "F/x",
+        "the coupling is a spring that pulls together",
+        "the coupling can push apart",
+    ),
     "local": ("F/x", "sigma'(0) c > phi'(0)", "the law is too soft near 0"),
     "start": ("", "the scenario's start lies in the region", "the start lies outside of it"),
     "reaching": ("F", "k > |phi + (M c - D) v| + d0", "k does not exceed d and the plant together"),
@@ -55,30 +66,46 @@ class Condition(NamedTuple):
 
 
 def holds(name: str, margin: float) -> bool:
-    """Return whether a condition holds with a margin. A margin of 0 is enough for all but "reaching"."""
+    """Return whether a condition holds with a margin.
+
+    A margin of 0 is enough for all but "reaching".
+    """
     return margin > 0.0 or (margin == 0.0 and name != "reaching")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Certificate:
-    """What is proven of a law on a plant. `smc.certify` makes it, and a separate checker has accepted it.
+    """What is proven of a law on a plant.
+
+    `smc.certify` makes it, and a separate checker has accepted it.
 
     Attributes:
-      data: all of it, as in its file: plant, law, bounds of the disturbance, theorems with their conditions and what
-        proves them (polynomials, boxes, numbers), what is left out, and a seal.
+      data: all of it, as in its file: plant, law, bounds of the disturbance, theorems with their
+        conditions and what proves them (polynomials, boxes, numbers), what is left out, and a seal.
     """
 
     data: Mapping[str, Any]
 
     def __repr__(self) -> str:
-        return printable(f"<Certificate of {self.law} on {self.plant}: {'; '.join(self.sentences[:-1])}>")
+        return printable(
+            f"<Certificate of {self.law} on {self.plant}: {'; '.join(self.sentences[:-1])}>"
+        )
 
     def _repr_html_(self) -> str:
-        rows = [
-            (row.theorem, row.name, "yes" if row.holds else "no", f"{number(row.margin)} {row.unit}", row.words)
-            for row in self.conditions
-        ]
-        return html.table(("theorem", "condition", "holds", "margin", ""), rows, note=". ".join(self.sentences))
+        rows = []
+        for row in self.conditions:
+            rows.append(
+                (
+                    row.theorem,
+                    row.name,
+                    "yes" if row.holds else "no",
+                    f"{number(row.margin)} {row.unit}",
+                    row.words,
+                )
+            )
+        return html.table(
+            ("theorem", "condition", "holds", "margin", ""), rows, note=". ".join(self.sentences)
+        )
 
     @property
     def plant(self) -> str:
@@ -98,11 +125,15 @@ class Certificate:
     @property
     def theorem(self) -> str:
         """The first theorem that holds, or the first that was tried."""
-        return next((part["theorem"] for part in self.data["parts"] if part["holds"]), self.theorems[0])
+        return next(
+            (part["theorem"] for part in self.data["parts"] if part["holds"]), self.theorems[0]
+        )
 
     @property
     def holds(self) -> bool:
-        """Whether the scenario's start provably comes to rest or into the bound, apart from what `leaves_out` names."""
+        """Whether the scenario's start provably comes to rest or into the bound, apart from what
+        `leaves_out` names.
+        """
         return self.bound is not None
 
     @property
@@ -112,7 +143,9 @@ class Certificate:
 
     @property
     def bound(self) -> float | None:
-        """The largest |x| in the end, m or rad, from the scenario's start under every d within its bound, or None."""
+        """The largest |x| in the end, m or rad, from the scenario's start under every d within its
+        bound, or None.
+        """
         if not self.data["disturbance"] and self.stable:
             return 0.0
         part = self._part("level sets", holding=True)
@@ -122,7 +155,9 @@ class Certificate:
 
     @property
     def rests(self) -> bool:
-        """Whether runs that begin in the level sets come to rest: without a disturbance, or if the law switches."""
+        """Whether runs that begin in the level sets come to rest: without a disturbance, or if the
+        law switches.
+        """
         return not self.data["disturbance"] or loops.loop_of(self.data)[0].switches
 
     @property
@@ -133,44 +168,74 @@ class Certificate:
             for name, margin in ((row["name"], row["margin"]) for row in part["conditions"]):
                 unit, asks, fails = CONDITIONS[name]
                 unit, held = unit.replace("x", x).replace("F", EFFORT[x]), holds(name, margin)
-                made.append(Condition(part["theorem"], name, margin, unit, asks if held else fails, held))
+                made.append(
+                    Condition(part["theorem"], name, margin, unit, asks if held else fails, held)
+                )
         return tuple(made)
 
     @property
     def leaves_out(self) -> Mapping[str, str]:
-        """What no theorem here is about -> what the scenario has of it, such as "Lag(tau=0.01)"; "" for nothing."""
+        """What no theorem here is about -> what the scenario has of it, such as "Lag(tau=0.01)"; ""
+        for nothing.
+        """
 
         def said(word: str, numbers: Mapping[str, float]) -> str:
-            return f"{word}({', '.join(f'{name}={value:g}' for name, value in numbers.items())})" if numbers else word
+            if numbers:
+                return (
+                    f"{word}({', '.join(f'{name}={value:g}' for name, value in numbers.items())})"
+                )
+            return word
 
-        return {what: ", ".join(starmap(said, its.items())) for what, its in self.data["leaves_out"].items()}
+        return {
+            what: ", ".join(starmap(said, its.items()))
+            for what, its in self.data["leaves_out"].items()
+        }
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What is proven: a sentence for each theorem, one if none is about d, and one on what all leave out."""
+        """What is proven: a sentence for each theorem, one if none is about d, and one on what all
+        leave out.
+        """
         here = "; ".join(f"{name} ({what})" for name, what in self.leaves_out.items() if what)
         absent = ", ".join(name for name, what in self.leaves_out.items() if not what)
-        left_out = f"no theorem here is about {here}" + f"; nor about what is not here: {absent}" * bool(absent)
+        left_out = (
+            f"no theorem here is about {here}"
+            + f"; nor about what is not here: {absent}" * bool(absent)
+        )
         d0, unit = self.data["disturbance"], EFFORT[self.data["unit"]]
         silent = d0 > 0.0 and self.theorems == ("saturated PD",)
         nothing = (f"nothing is proven under every |d| <= {d0:g} {unit}",) * silent
         return *(self._sentence(part) for part in self.data["parts"]), *nothing, left_out
 
     def _sentence(self, part: Mapping[str, Any]) -> str:
-        """Return what a theorem says of this plant, or which of its conditions fail and by how much."""
+        """Return what a theorem says of this plant, or which of its conditions fail and by how
+        much.
+        """
         theorem, x, d0 = part["theorem"], self.data["unit"], self.data["disturbance"]
-        under = f"under every |d| <= {d0:g} {EFFORT[x]}" if d0 else "without d"
+        if d0:
+            under = f"under every |d| <= {d0:g} {EFFORT[x]}"
+        else:
+            under = "without d"
         failing = [row for row in self.conditions if row.theorem == theorem and not row.holds]
         if theorem == "level sets":
             wide = f"starts up to |x| = {number(self._widest(part))} {x} at rest"
-            ends = "come to rest" if self.rests else f"end in |x| <= {number(part['bound'])} {x}"
+            if self.rests:
+                ends = "come to rest"
+            else:
+                ends = f"end in |x| <= {number(part['bound'])} {x}"
             outside = "; the scenario's start is not among them" * bool(failing)
             return f"proven by level sets: {wide} {ends} {under}{outside}"
         if failing:
-            margins = [f"{row.name} {number(row.margin)} {row.unit}".strip() + f" ({row.words})" for row in failing]
+            margins = []
+            for row in failing:
+                margins.append(
+                    f"{row.name} {number(row.margin)} {row.unit}".strip() + f" ({row.words})"
+                )
             return f"not proven by {theorem}: {', '.join(margins)}"
         if theorem == "saturated PD":
-            near = ", exponentially in the end" * any(row.name == "local" for row in self.conditions)
+            near = ", exponentially in the end" * any(
+                row.name == "local" for row in self.conditions
+            )
             return f"proven by saturated PD: without d every start comes to rest at 0{near}"
         if theorem == "reaching":
             where = f"|x| <= {number(part['X'])} {x}"
@@ -179,7 +244,9 @@ class Certificate:
                 return f"proven by reaching: from {where} s = 0 is reached and kept, and x decays, {under}"
             gains = self.data["law"]["gains"]
             after = part["X"] ** (1.0 - gains["p"]) / (gains["b"] * (1.0 - gains["p"]))
-            return f"proven by reaching: on s = 0 in {where} x is 0 after {number(after)} s, {under}"
+            return (
+                f"proven by reaching: on s = 0 in {where} x is 0 after {number(after)} s, {under}"
+            )
         rate = f" and |d'| <= {self.data['slope']:g} {EFFORT[x]}/s" * bool(self.data["slope"])
         where = f"|x| <= {number(part['X'])} {x}"
         return f"proven by super-twisting: from a set in {where} s = 0 is reached, {under}{rate}"
@@ -188,24 +255,32 @@ class Certificate:
         """Return the largest x up to which all states at rest lie in the level sets."""
         x = np.linspace(0.0, part["x"][-1], 2001)
         outside = self.level(x, np.zeros_like(x)) > part["outer"]
-        return float(x[max(int(np.argmax(outside)) - 1, 0)]) if outside.any() else float(x[-1])
+        if outside.any():
+            return float(x[max(int(np.argmax(outside)) - 1, 0)])
+        return float(x[-1])
 
     def contains(self, x: Any, v: Any) -> np.ndarray:
-        """Return whether each state lies in the region from which all come to rest or into the bound.
+        """Return whether each state lies in the region from which all come to rest or into the
+        bound.
 
         Args:
-          x, v: positions and velocities, arrays of one shape, rad or m and per second; w of super_twisting is 0.
+          x, v: positions and velocities, arrays of one shape, rad or m and per second; w of
+            super_twisting is 0.
         """
         x, v = np.asarray(x, float), np.asarray(v, float)
         inside = np.full(x.shape, self.stable and not self.data["disturbance"])
         if part := self._part("level sets"):
             inside |= self.level(x, v) <= part["outer"]
         if (part := self._part("reaching", holding=True)) and part["S"]:
-            inside |= (np.abs(x) <= part["X"]) & (np.abs(v + self.data["law"]["gains"]["c"] * x) <= part["S"])
+            inside |= (np.abs(x) <= part["X"]) & (
+                np.abs(v + self.data["law"]["gains"]["c"] * x) <= part["S"]
+            )
         return inside
 
     def level(self, x: Any, v: Any) -> np.ndarray:
-        """Return W of "level sets" at states, 1 outside of its grid; see `contains` for the arguments."""
+        """Return W of "level sets" at states, 1 outside of its grid; see `contains` for the
+        arguments.
+        """
         part = self._part("level sets")
         if part is None:
             raise ScenarioError(f"the certificate of {self.law} on {self.plant} has no level sets")
@@ -216,7 +291,9 @@ class Certificate:
         i = np.clip(np.searchsorted(xs, px, side="right") - 1, 0, xs.size - 2)
         j = np.clip(np.searchsorted(ss, ps, side="right") - 1, 0, ss.size - 2)
         f, g = (px - xs[i]) / (xs[i + 1] - xs[i]), (ps - ss[j]) / (ss[j + 1] - ss[j])
-        W = (1 - f) * ((1 - g) * W[i, j] + g * W[i, j + 1]) + f * ((1 - g) * W[i + 1, j] + g * W[i + 1, j + 1])
+        W = (1 - f) * ((1 - g) * W[i, j] + g * W[i, j + 1]) + f * (
+            (1 - g) * W[i + 1, j] + g * W[i + 1, j + 1]
+        )
         return np.where((px < xs[-1]) & (np.abs(ps) < ss[-1]), W, 1.0)
 
     @property
@@ -225,7 +302,10 @@ class Certificate:
         return loops.loop_of(self.data)[0].c
 
     def _part(self, theorem: str, holding: bool = False) -> Mapping[str, Any] | None:
-        parts = [part for part in self.data["parts"] if part["theorem"] == theorem and (part["holds"] or not holding)]
+        parts = []
+        for part in self.data["parts"]:
+            if part["theorem"] == theorem and (part["holds"] or not holding):
+                parts.append(part)
         return parts[0] if parts else None
 
     def check(self) -> None:
@@ -260,7 +340,12 @@ class Certificate:
             made.sentences  # noqa: B018  # raises if the file is no certificate
             return made
 
-    def figure(self, path: str | os.PathLike[str] | None = None, traces: "Sequence[Trace]" = (), worst_of: int = 0):
+    def figure(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        traces: "Sequence[Trace]" = (),
+        worst_of: int = 0,
+    ):
         """Draw the state plane: region, level sets, bound, and runs, such as the worst found.
 
         Args:
@@ -269,7 +354,8 @@ class Certificate:
           worst_of: of how many runs they are the worst found; 0: of none.
 
         Raises:
-          ScenarioError: an unknown kind of file, or a network, whose states do not fit into a plane.
+          ScenarioError: an unknown kind of file, or a network, whose states do not fit into a
+            plane.
         """
         from smc_mujoco.evidence.certificates.figure import draw
 

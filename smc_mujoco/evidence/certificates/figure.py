@@ -27,15 +27,22 @@ LEVELS = 7  # lines between the inner and the outer level, or of V: chosen
 
 
 def draw(
-    certificate: Any, traces: Sequence[Trace] = (), path: str | os.PathLike[str] | None = None, worst_of: int = 0
+    certificate: Any,
+    traces: Sequence[Trace] = (),
+    path: str | os.PathLike[str] | None = None,
+    worst_of: int = 0,
 ) -> Any:
     """Draw a certificate's state plane; see `Certificate.figure`."""
     data, unit = certificate.data, certificate.data["unit"]
     if data["plant"]["n"] > 1:
-        raise ScenarioError(f"the states of {data['plant']['n']} pendulums do not fit into a plane: draw a single one")
+        raise ScenarioError(
+            f"the states of {data['plant']['n']} pendulums do not fit into a plane: draw a single one"
+        )
     part = next((one for one in data["parts"] if one["theorem"] == "level sets"), None)
     if part is None and not certificate.stable:
-        raise ScenarioError(f"the certificate of {certificate.law} on {certificate.plant} has no region to draw")
+        raise ScenarioError(
+            f"the certificate of {certificate.law} on {certificate.plant} has no region to draw"
+        )
     paths = pages.files(path)
     law = style.law_colour(certificate.law)
     shades = style.ramp(law, 3, LIGHTEST)
@@ -45,7 +52,9 @@ def draw(
         page = pages.blank(width, height, None)
         axes = page.subplots(1, 2 if bounded else 1, squeeze=False).ravel()
         x, v = _plane(certificate, part, traces)
-        for ax, zoom in zip(axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False):
+        for ax, zoom in zip(
+            axes, (1.0, ZOOM_BOUNDS * (part["bound"] if part else 0.0) / x[-1]), strict=False
+        ):
             X, V = np.meshgrid(x * zoom, v * zoom ** (0.5 if zoom < 1.0 else 1.0))
             if part is None:
                 _energy(ax, certificate, X, V, style.ramp(law, LEVELS))
@@ -53,22 +62,39 @@ def draw(
                 _region(ax, certificate, part, X, V, shades)
             for trace in traces:
                 ax.plot(trace.x[:, 0], trace.v[:, 0], color=law, linewidth=style.points(1.8))
-                ax.plot(trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5))
-            ax.set(xlim=X[0, [0, -1]], ylim=V[[0, -1], 0], xlabel=f"position ({unit})", ylabel=f"velocity ({unit}/s)")
-        under = f", |d| ≤ {data['disturbance']:g} {EFFORT[unit]}" if data["disturbance"] else ""
+                ax.plot(
+                    trace.x[0, 0], trace.v[0, 0], "o", color=style.INK, markersize=style.points(5)
+                )
+            ax.set(
+                xlim=X[0, [0, -1]],
+                ylim=V[[0, -1], 0],
+                xlabel=f"position ({unit})",
+                ylabel=f"velocity ({unit}/s)",
+            )
+        if data["disturbance"]:
+            under = f", |d| ≤ {data['disturbance']:g} {EFFORT[unit]}"
+        else:
+            under = ""
         plant = style.plant_name(as_plant(certificate.plant), short=True)
         if bounded:
             axes[1].set_title("around the bound")
         handles = _key(certificate, part, shades)
-        handles += [Line2D([], [], color=law, label=_run_words(trace, unit, worst_of)) for trace in traces]
-        pages.set_head(page, width, f"Certificate: {style.law_name(certificate.law)}, {plant}{under}", handles)
+        handles += [
+            Line2D([], [], color=law, label=_run_words(trace, unit, worst_of)) for trace in traces
+        ]
+        pages.set_head(
+            page, width, f"Certificate: {style.law_name(certificate.law)}, {plant}{under}", handles
+        )
         pages.write(page, paths)
     return page
 
 
 def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and velocities around the region, or around the runs."""
-    ends = [(np.abs(trace.x).max(), np.abs(trace.v).max()) for trace in traces if np.isfinite(trace.x).all()]
+    ends = []
+    for trace in traces:
+        if np.isfinite(trace.x).all():
+            ends.append((np.abs(trace.x).max(), np.abs(trace.v).max()))
     far_x, far_v = np.max([(1e-3, 1e-3), *ends], axis=0)
     if part is not None:
         X, S = np.meshgrid(np.array(part["x"]), np.array(part["s"]), indexing="ij")
@@ -77,10 +103,14 @@ def _plane(certificate: Any, part: Any, traces: Sequence[Trace]) -> tuple[np.nda
         far_v = max(far_v, np.abs(S - certificate.surface * X)[inside].max())
     elif not ends:
         far_x, far_v = 2.0, 6.0
-    return np.linspace(-1.08 * far_x, 1.08 * far_x, AXIS_POINTS), np.linspace(-1.08 * far_v, 1.08 * far_v, AXIS_POINTS)
+    return np.linspace(-1.08 * far_x, 1.08 * far_x, AXIS_POINTS), np.linspace(
+        -1.08 * far_v, 1.08 * far_v, AXIS_POINTS
+    )
 
 
-def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray, shades: Sequence[str]) -> None:
+def _region(
+    ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray, shades: Sequence[str]
+) -> None:
     """Fill the region, and draw its levels and the bound."""
     W, (light, middle, dark) = certificate.level(X, V), shades
     levels = np.linspace(part["inner"], part["outer"], LEVELS)
@@ -90,14 +120,28 @@ def _region(ax: Any, certificate: Any, part: Any, X: np.ndarray, V: np.ndarray, 
     ax.contourf(X, V, W, [-1.0, part["inner"]], colors=[light], antialiased=True)
     ax.contour(X, V, W, levels[:1], colors=[dark], linewidths=style.points(1.0))
     for side in () if certificate.rests else (-1.0, 1.0):
-        ax.axvline(side * part["bound"], color=style.INK, linewidth=style.points(0.8), linestyle=(0, (4, 3)))
+        ax.axvline(
+            side * part["bound"],
+            color=style.INK,
+            linewidth=style.points(0.8),
+            linestyle=(0, (4, 3)),
+        )
 
 
 def _energy(ax: Any, certificate: Any, X: np.ndarray, V: np.ndarray, shades: Sequence[str]) -> None:
     """Draw level sets of V, darker from which the runs come sooner: from the outer ones."""
     value = loops.energy(certificate.data, X, V)
-    top = float(loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0])  # the energy at rest at the edge
-    ax.contour(X, V, value, top * np.linspace(0.15, 1.0, LEVELS) ** 2, colors=shades, linewidths=style.points(1.2))
+    top = float(
+        loops.energy(certificate.data, X[:1, -1:], 0.0 * X[:1, -1:])[0, 0]
+    )  # the energy at rest at the edge
+    ax.contour(
+        X,
+        V,
+        value,
+        top * np.linspace(0.15, 1.0, LEVELS) ** 2,
+        colors=shades,
+        linewidths=style.points(1.2),
+    )
 
 
 def _key(certificate: Any, part: Any, shades: Sequence[str]) -> list[pages.Handle]:
@@ -119,6 +163,12 @@ def _key(certificate: Any, part: Any, shades: Sequence[str]) -> list[pages.Handl
 def _run_words(trace: Trace, unit: str, worst_of: int) -> str:
     """Return what a run is, with the range of its disturbance."""
     low, high = trace.d.min(), trace.d.max()
-    drawn = f"d from {low:.3g} to {high:.3g}" if low < high else f"d = {low:.3g}"
-    what = f"the worst of {worst_of} runs" if worst_of else "run"
+    if low < high:
+        drawn = f"d from {low:.3g} to {high:.3g}"
+    else:
+        drawn = f"d = {low:.3g}"
+    if worst_of:
+        what = f"the worst of {worst_of} runs"
+    else:
+        what = "run"
     return f"{what}, {drawn} {EFFORT[unit]}".replace("-", "−")

@@ -45,19 +45,28 @@ class Loop:
         force = self.phi(x) - self.D(x) * v + self.M * self.c * v + d
         law = self.sigma(s)
         if self.switches:
-            law = np.where(s == 0.0, np.clip(force, -self.sigma(np.ones(())), self.sigma(np.ones(()))), law)
+            law = np.where(
+                s == 0.0, np.clip(force, -self.sigma(np.ones(())), self.sigma(np.ones(()))), law
+            )
         return (force - law) / self.M
 
 
 def loop_of(data: Mapping[str, Any]) -> tuple[Loop, list[float], SimpleNamespace]:
-    """Return the loop of a certificate's data, A, B, C, E, F of its plant, and the law's name and gains."""
+    """Return the loop of a certificate's data, A, B, C, E, F of its plant, and the law's name and
+    gains.
+    """
     law = SimpleNamespace(name=data["law"]["name"], **data["law"]["gains"])
-    M, *terms = ONE_JOINT_TERMS[data["plant"]["name"]](SimpleNamespace(**data["plant"]["parameters"]))
+    M, *terms = ONE_JOINT_TERMS[data["plant"]["name"]](
+        SimpleNamespace(**data["plant"]["parameters"])
+    )
     return _loop(M, terms, law, data["u_max"], data["disturbance"]), terms, law
 
 
 def energy(data: Mapping[str, Any], x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V of "saturated PD" at states of one pendulum or cart: M v^2 / 2 + int_0^x (sigma(c y) - phi(y)) dy."""
+    """Return V of "saturated PD" at states of one pendulum or cart:
+
+    M v^2 / 2 + int_0^x (sigma(c y) - phi(y)) dy.
+    """
     loop, _, _ = loop_of(data)
     y = np.linspace(0.0, float(np.abs(x).max()), 20001)
     push = loop.sigma(loop.c * np.maximum(y, 1e-12)) - loop.phi(y)
@@ -65,7 +74,9 @@ def energy(data: Mapping[str, Any], x: np.ndarray, v: np.ndarray) -> np.ndarray:
     return 0.5 * loop.M * v * v + np.interp(np.abs(x), y, W)
 
 
-def _loop(M: float, terms: list[float], law: SimpleNamespace, u_max: float | None, d0: float) -> Loop:
+def _loop(
+    M: float, terms: list[float], law: SimpleNamespace, u_max: float | None, d0: float
+) -> Loop:
     """Return a loop as functions of arrays."""
     A, B, C, E, F = terms
     top = math.inf if u_max is None else u_max
@@ -76,7 +87,8 @@ def _loop(M: float, terms: list[float], law: SimpleNamespace, u_max: float | Non
         sigma, steep, c = (lambda s: k * np.sign(s)), math.inf, getattr(law, "c", 1.0)
     else:
         kp, kd = linear_gains(law)
-        top = min(law.k, top) if law.name == "boundary_layer" else top
+        if law.name == "boundary_layer":
+            top = min(law.k, top)
         sigma, steep, c = (lambda s: np.clip(kd * s, -top, top)), kd, kp / kd
     phi, D = (lambda x: A * np.sin(x) + x * (B + C * x * x)), (lambda x: E + F * x * x)
     return Loop(M=M, c=c, d0=d0, phi=phi, D=D, sigma=sigma, steep=steep)
@@ -89,4 +101,6 @@ def linear_gains(law: SimpleNamespace) -> tuple[float, float]:
     if law.name == "pid":
         return law.kp, law.kd
     kp = (law.a1 + math.sqrt(law.a1**2 + law.b**2 * law.q1 / law.r)) / law.b
-    return kp, (law.a2 + math.sqrt(law.a2**2 + 2.0 * law.b * kp + law.b**2 * law.q2 / law.r)) / law.b
+    return kp, (
+        law.a2 + math.sqrt(law.a2**2 + 2.0 * law.b * kp + law.b**2 * law.q2 / law.r)
+    ) / law.b

@@ -1,12 +1,13 @@
-"""Certificates of laws on plants: which theorem holds, by which margins, from where, and how far d can push.
+"""Certificates of laws on plants: which theorem holds, by which margins, from where, and how far d
+can push.
 
     scenario = smc.Scenario(plant="duffing", law="observer_free")
     certificate = smc.certify(scenario, within=smc.Uncertainty(disturbance=1.0))
     certificate.bound                               # |x| in the end, m, under every |d| <= 1 N
     certificate.save("duffing.json")                # smc-mujoco certify --check duffing.json proves it again
 
-The plant is its equation M x'' = phi(x) - D(x) x' + u + d, integrated exactly, and the law acts at every instant. What
-else a machine does is in `Certificate.leaves_out`.
+The plant is its equation M x'' = phi(x) - D(x) x' + u + d, integrated exactly, and the law acts at
+every instant. What else a machine does is in `Certificate.leaves_out`.
 """
 
 import dataclasses
@@ -29,31 +30,52 @@ from smc_mujoco.evidence.certificates.loops import Loop, loop_of
 from smc_mujoco.simulation.scenario import Scenario
 from smc_mujoco.simulation.signals import Constant, bounds_of
 
-GRID_REACH = {"rad": lambda plant: math.pi, "m": lambda plant: 3.0 * max(map(abs, plant.x0))}  # largest x: chosen
+GRID_REACH = {
+    "rad": lambda plant: math.pi,
+    "m": lambda plant: 3.0 * max(map(abs, plant.x0)),
+}  # largest x: chosen
 MARGIN_SHARE = 1e-4  # share by which a margin is stated below the true one
 BOX_COUNTS = (64, 256, 1024, 4096)  # tried in turn
 SET_FACTOR = 0.98  # factor on the largest set that a condition allows: chosen
 SIZE_HALVINGS = 40  # of a set's size, in search of the largest
-POSITIVE_GAINS = "lam", "k", "k1", "c", "phi", "kp", "kd", "q1"  # where a law has them, its theorems need them > 0
+POSITIVE_GAINS = (
+    "lam",
+    "k",
+    "k1",
+    "c",
+    "phi",
+    "kp",
+    "kd",
+    "q1",
+)  # where a law has them, its theorems need them > 0
 LAWS = ("observer_free", "boundary_layer", "lqr", "pid", "classical", "terminal", "super_twisting")
-Judge = Callable[[str, dict], dict[str, Any] | None]  # theorem, its data -> its margins, None where it is refused
-PLANTS = ("inverted_pendulum", "duffing", "van_der_pol", "pendulum_network", "inverted_pendulum_network")
+Judge = Callable[
+    [str, dict], dict[str, Any] | None
+]  # theorem, its data -> its margins, None where it is refused
+PLANTS = (
+    "inverted_pendulum",
+    "duffing",
+    "van_der_pol",
+    "pendulum_network",
+    "inverted_pendulum_network",
+)
 
 
 def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificate:
     """Return what is proven of a scenario's law on its plant, checked in ball arithmetic.
 
-    Laws: observer_free, boundary_layer, lqr and pid (without an integral), classical, terminal, super_twisting; all
-    without the nominal model or a separate surface. Plants: the pendulums and their networks, duffing and
-    van_der_pol, with any parameters and mismatch, and with 0 as the goal.
+    Laws: observer_free, boundary_layer, lqr and pid (without an integral), classical, terminal,
+    super_twisting; all without the nominal model or a separate surface. Plants: the pendulums and
+    their networks, duffing and van_der_pol, with any parameters and mismatch, and with 0 as the
+    goal.
 
     Args:
-      within: disturbances in addition to the scenario's own, as of `worst_case`: bounds of |d| and, for
-        super_twisting, of |d'|. None: the scenario's own disturbance and no other.
+      within: disturbances in addition to the scenario's own, as of `worst_case`: bounds of |d| and,
+        for super_twisting, of |d'|. None: the scenario's own disturbance and no other.
 
     Raises:
-      ScenarioError: a pair for which there is no theorem, a disturbance without a bound, or a class with more than
-        disturbances.
+      ScenarioError: a pair for which there is no theorem, a disturbance without a bound, or a class
+        with more than disturbances.
       MissingPackageError: python-flint is not installed.
     """
     with extra("proof", "smc.certify"):
@@ -61,7 +83,9 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
 
         from smc_mujoco.evidence.certificates import checker
     if not isinstance(scenario, Scenario):
-        raise ScenarioError(f"certify is about a Scenario, not {shown(scenario)}: give smc.Scenario(...)")
+        raise ScenarioError(
+            f"certify is about a Scenario, not {shown(scenario)}: give smc.Scenario(...)"
+        )
     _check(scenario)
     plant, law = scenario.plant, scenario.law
     d0, rate = (bound + more for bound, more in zip(_bounds(scenario), _class(within), strict=True))
@@ -69,11 +93,22 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
     values = {name: float(value) for name, value in vars(plant.values(scenario.mismatch)).items()}
     document: dict[str, Any] = {
         "format": checker.FORMAT,
-        "plant": {"name": plant.name, "n": plant.n, "parameters": values, "mechanism": scenario.mechanism},
-        "law": {"name": law.name, "gains": {name: finite(value) for name, value in law.gains.items()}},
-        "u_max": finite(u_max), "unit": plant.unit, "disturbance": d0, "slope": finite(rate),
+        "plant": {
+            "name": plant.name,
+            "n": plant.n,
+            "parameters": values,
+            "mechanism": scenario.mechanism,
+        },
+        "law": {
+            "name": law.name,
+            "gains": {name: finite(value) for name, value in law.gains.items()},
+        },
+        "u_max": finite(u_max),
+        "unit": plant.unit,
+        "disturbance": d0,
+        "slope": finite(rate),
         "leaves_out": left_out(scenario),
-    }  # fmt: skip
+    }
     document["parts"] = _parts(document, scenario, checker)
     document["seal"] = checker.seal(document)
     certificate = Certificate(data=document)
@@ -82,21 +117,38 @@ def certify(scenario: Scenario, within: Uncertainty | None = None) -> Certificat
 
 
 def left_out(scenario: Scenario) -> dict[str, dict[str, dict[str, float]]]:
-    """Return what the theorems leave out -> what this scenario has of it: words, each with its numbers in SI units."""
+    """Return what the theorems leave out -> what this scenario has of it: words, each with its
+    numbers in SI units.
+    """
     s = scenario.resolved
-    noise = {name: value for name, value in (("position", s.noise.position), ("velocity", s.noise.velocity)) if value}
+    noise = {}
+    for name, value in (("position", s.noise.position), ("velocity", s.noise.velocity)):
+        if value:
+            noise[name] = value
     measured = {"noise": noise} if noise else {}
-    measured |= {"chosen_errors": {}} if any(s.noise.errors) else {}
-    measured |= {s.velocity.name: {}} if s.velocity.name != "measured" else {}
-    jump = {"time": s.jump.time} | dict(s.jump.factors) if s.jump else {}
+    if any(s.noise.errors):
+        measured |= {"chosen_errors": {}}
+    else:
+        measured |= {}
+    if s.velocity.name != "measured":
+        measured |= {s.velocity.name: {}}
+    else:
+        measured |= {}
+    if s.jump:
+        jump = {"time": s.jump.time} | dict(s.jump.factors)
+    else:
+        jump = {}
     clock = {"period": s.control_period, "jitter": s.clock.jitter, "missed": s.clock.missed}
     return {
         "sampling": {"samples": {name: value for name, value in clock.items() if value}},
         "delay": {"input_delay": {"time": s.input_delay}} if s.input_delay else {},
-        "noise": measured | _numbers([s.sensor] if s.sensor else []), "dry friction": _numbers(s.friction),
-        "contact": {} if s.contact.kind == "none" else {s.contact.kind: {}}, "drive": _numbers(s.actuator),
-        "other parameters": {"jump": jump} if jump else {}, "rounding": {s.integrator: {"step": s.physics_step}},
-    }  # fmt: skip
+        "noise": measured | _numbers([s.sensor] if s.sensor else []),
+        "dry friction": _numbers(s.friction),
+        "contact": {} if s.contact.kind == "none" else {s.contact.kind: {}},
+        "drive": _numbers(s.actuator),
+        "other parameters": {"jump": jump} if jump else {},
+        "rounding": {s.integrator: {"step": s.physics_step}},
+    }
 
 
 def _numbers(parts: Sequence[Any]) -> dict[str, dict[str, float]]:
@@ -106,7 +158,11 @@ def _numbers(parts: Sequence[Any]) -> dict[str, dict[str, float]]:
         values = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
         kind = type(part).__name__
         kind += f"_{len(found) + 1}" * (kind in found)
-        found[kind] = {n: float(v) for n, v in values.items() if isinstance(v, int | float) and math.isfinite(v)}
+        found[kind] = {
+            n: float(v)
+            for n, v in values.items()
+            if isinstance(v, int | float) and math.isfinite(v)
+        }
     return found
 
 
@@ -121,7 +177,8 @@ def _check(scenario: Scenario) -> None:
     zero = [name for name in POSITIVE_GAINS if law.uniform and law.gains.get(name, 1.0) <= 0.0]
     refused = {
         f"{law.name} with {' and '.join(zero)} not above 0": zero,
-        f"super_twisting on the {plant.n} pendulums of a network": law.name == "super_twisting" and plant.n > 1,
+        f"super_twisting on the {plant.n} pendulums of a network": law.name == "super_twisting"
+        and plant.n > 1,
         "model='nominal'": scenario.resolved.model != "none",
         "a surface": scenario.surface is not None,
         "a feedforward": scenario.feedforward is not None,
@@ -154,9 +211,13 @@ def _class(within: Uncertainty | None) -> tuple[float, float]:
     if within is None:
         return 0.0, 0.0
     if not isinstance(within, Uncertainty):
-        raise ScenarioError(f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)")
+        raise ScenarioError(
+            f"within is {shown(within)}: give a class, such as smc.Uncertainty(disturbance=2.0)"
+        )
     if within != Uncertainty(disturbance=within.disturbance, slope=within.slope):
-        raise ScenarioError("a certificate is about disturbances alone: give a class with disturbance and slope only")
+        raise ScenarioError(
+            "a certificate is about disturbances alone: give a class with disturbance and slope only"
+        )
     return within.disturbance, math.inf if within.slope is None else within.slope
 
 
@@ -208,32 +269,52 @@ def _told(margins: dict[str, Any]) -> list[dict]:
 
 def _judged(theorem: str, data: dict, judge: Judge) -> dict:
     """Return a theorem with the margins that the checker derives from its data."""
-    return _part(theorem, _told(judge(theorem, data) or {}), **data)  # data refused here is refused again in the end
+    return _part(
+        theorem, _told(judge(theorem, data) or {}), **data
+    )  # data refused here is refused again in the end
 
 
 def _saturated(document: dict, loop: Loop, terms: list[float], judge: Judge) -> dict:
     """Return the theorem of a saturated PD law: V and its conditions."""
     A, B, C, _, _ = terms
-    V = {"v^2": loop.M / 2.0, "sigma": 1.0 / loop.c, "cos x - 1": A, "x^2": -B / 2.0, "x^4": -C / 4.0}
+    V = {
+        "v^2": loop.M / 2.0,
+        "sigma": 1.0 / loop.c,
+        "cos x - 1": A,
+        "x^2": -B / 2.0,
+        "x^4": -C / 4.0,
+    }
     V["springs"] = document["plant"]["parameters"].get("kc", 0.0) / 2.0
     for told in _restoring(loop, terms):
         if margins := judge("saturated PD", {"V": V, "conditions": [None, told]}):
             derived = _told(margins | {"restoring": told["margin"]})
             conditions = [told if one["name"] == "restoring" else one for one in derived]
             return _part("saturated PD", conditions, V=V)
-    raise ScenarioError("found no boxes that prove that the law is stronger than the plant: give other gains")
+    raise ScenarioError(
+        "found no boxes that prove that the law is stronger than the plant: give other gains"
+    )
 
 
 def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
-    """Yield the condition that the law's force exceeds the plant's, with ever more boxes from 0 to infinity."""
+    """Yield the condition that the law's force exceeds the plant's, with ever more boxes from 0 to
+    infinity.
+    """
     A, B, C, _, _ = terms
-    tail = math.sqrt(max(B, 0.0) / -C) * 1.01 + 0.1 if C < 0.0 else 1.0
+    if C < 0.0:
+        tail = math.sqrt(max(B, 0.0) / -C) * 1.01 + 0.1
+    else:
+        tail = 1.0
     tail = max(tail, 2.0 * math.pi if A else 0.0)
     x = np.linspace(0.0, 2.0 * tail, 20001)[1:]
     share = 1.0 - loop.phi(x) / loop.sigma(loop.c * x)
-    smallest = min(1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c))
+    smallest = min(
+        1.0, float(share.min()), 1.0 if loop.switches else 1.0 - (A + B) / (loop.steep * loop.c)
+    )
     if smallest < 0.0 or C > 0.0 or (C == 0.0 and B > 0.0):
-        at = float(x[share.argmin()]) if share.min() < 0.0 else _far(loop)
+        if share.min() < 0.0:
+            at = float(x[share.argmin()])
+        else:
+            at = _far(loop)
         yield {"name": "restoring", "margin": _share(loop, at), "at": at}
         return
     margin = smallest - MARGIN_SHARE * max(abs(smallest), 0.1) * (smallest < 1.0)
@@ -244,7 +325,9 @@ def _restoring(loop: Loop, terms: list[float]) -> Iterator[dict]:
 
 
 def _far(loop: Loop) -> float:
-    """Return an x where the plant's force is larger than the law's, for a plant whose force grows without bound."""
+    """Return an x where the plant's force is larger than the law's, for a plant whose force grows
+    without bound.
+    """
     x = 1.0
     while _share(loop, x) >= 0.0:
         x *= 2.0
@@ -256,11 +339,16 @@ def _share(loop: Loop, x: float) -> float:
 
 
 def _reaching(lean: float, reach: float, judge: Judge) -> dict:
-    """Return the largest set |x| <= X, |s| <= lean X where s = 0 is surely reached; X = 0 if there is none."""
+    """Return the largest set |x| <= X, |s| <= lean X where s = 0 is surely reached; X = 0 if there
+    is none.
+    """
     low, high = 0.0, reach
     for _ in range(SIZE_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if judge("reaching", {"X": middle, "S": lean * middle}) else (low, middle)
+        if judge("reaching", {"X": middle, "S": lean * middle}):
+            low, high = (middle, high)
+        else:
+            low, high = (low, middle)
     return _judged("reaching", {"X": SET_FACTOR * low, "S": SET_FACTOR * lean * low}, judge)
 
 
@@ -270,12 +358,18 @@ def _start(scenario: Scenario, loop: Loop) -> tuple[float, float]:
     return x, v + loop.c * x
 
 
-def _levels(room: float, levels: search.Levels, scenario: Scenario, start: tuple[float, float]) -> dict:
+def _levels(
+    room: float, levels: search.Levels, scenario: Scenario, start: tuple[float, float]
+) -> dict:
     """Return the levels of W as data."""
     conditions = _told({"actuator": room, "start": levels.outer - _cell(levels, *start)})
     data = {"x": levels.x.tolist(), "s": levels.s.tolist(), "W": levels.W.tolist()}
-    data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | ({"P": list(levels.P)} if levels.P else {})
-    return _part("level sets", conditions, **data, inner=levels.inner, outer=levels.outer, bound=levels.bound)
+    data |= {"start": [scenario.resolved.x0[0], scenario.resolved.v0[0]]} | (
+        {"P": list(levels.P)} if levels.P else {}
+    )
+    return _part(
+        "level sets", conditions, **data, inner=levels.inner, outer=levels.outer, bound=levels.bound
+    )
 
 
 def _cell(levels: search.Levels, x: float, s: float) -> float:
@@ -283,7 +377,10 @@ def _cell(levels: search.Levels, x: float, s: float) -> float:
     x, s = (x, s) if x >= 0.0 else (-x, -s)
     if x >= levels.x[-1] or abs(s) >= levels.s[-1]:
         return 1.0
-    i, j = (int(np.searchsorted(edges, at, side="right")) - 1 for edges, at in ((levels.x, x), (levels.s, s)))
+    i, j = (
+        int(np.searchsorted(edges, at, side="right")) - 1
+        for edges, at in ((levels.x, x), (levels.s, s))
+    )
     return float(levels.W[i : i + 2, j : j + 2].max())
 
 
@@ -299,13 +396,19 @@ def _super_twisting(document: dict, loop: Loop, law: SimpleNamespace, judge: Jud
         return margins is not None and min(map(float, margins.values())) > 0.0
 
     for L in law.k2 * np.linspace(0.05, 0.95, 19):
-        P = _form(law.k1 / loop.M, law.k2, L, loop.M) if slope < L else None
+        if slope < L:
+            P = _form(law.k1 / loop.M, law.k2, L, loop.M)
+        else:
+            P = None
         if P is None:
             continue
         low, high = 1e-12, 1e6
         for _ in range(SIZE_HALVINGS):
             middle = math.sqrt(low * high)
-            low, high = (middle, high) if proven(_ellipse(P, L, middle, loop.c)) else (low, middle)
+            if proven(_ellipse(P, L, middle, loop.c)):
+                low, high = (middle, high)
+            else:
+                low, high = (low, middle)
         data = _ellipse(P, L, SET_FACTOR * low, loop.c)
         if proven(data) and (best is None or best["X"] < data["X"]):
             best = data
@@ -336,6 +439,12 @@ def _form(k1: float, k2: float, L: float, M: float) -> np.ndarray | None:
         rates = [np.linalg.eigvalsh(scale @ (A.T @ P + P @ A) @ scale).max() for A in ends]
         return max(*rates, -np.linalg.eigvalsh(P).min())
 
-    starts = [np.array([math.log(2.0 * k2 * M + 0.5 * (k1 * M) ** 2), -k1 * M / 2.0 * share]) for share in (0.3, 1.0)]
+    starts = []
+    for share in (0.3, 1.0):
+        starts.append(
+            np.array([math.log(2.0 * k2 * M + 0.5 * (k1 * M) ** 2), -k1 * M / 2.0 * share])
+        )
     best = min((minimize(worst, z, method="Nelder-Mead") for z in starts), key=lambda one: one.fun)
-    return shape(best.x) if best.fun < 0.0 and np.linalg.det(shape(best.x)) > 0.0 else None
+    if best.fun < 0.0 and np.linalg.det(shape(best.x)) > 0.0:
+        return shape(best.x)
+    return None

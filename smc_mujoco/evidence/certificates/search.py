@@ -1,13 +1,16 @@
-"""Search for a function W whose levels the loop cannot leave: worst-case times to a set around rest, on a grid.
+"""Search for a function W whose levels the loop cannot leave: worst-case times to a set around
+rest, on a grid.
 
-The loop is M x'' = phi(x) - D(x) x' - sigma(s) + d with |d| <= d0 and s = x' + c x, in the coordinates x and s, which
-separate its fast from its slow motion. W = 1 - exp(-T), where T is the time until a target around rest is reached while
-d delays it as long as it can: the value of a game of pursuit and evasion. It is computed by a semi-Lagrangian scheme
-and swept in four orders until it settles. W is bilinear between the nodes. The search proves nothing: the checker does.
+The loop is M x'' = phi(x) - D(x) x' - sigma(s) + d with |d| <= d0 and s = x' + c x, in the
+coordinates x and s, which separate its fast from its slow motion. W = 1 - exp(-T), where T is the
+time until a target around rest is reached while d delays it as long as it can: the value of a game
+of pursuit and evasion. It is computed by a semi-Lagrangian scheme and swept in four orders until it
+settles. W is bilinear between the nodes. The search proves nothing: the checker does.
 
-Source: M. Bardi and I. Capuzzo-Dolcetta, Optimal Control and Viscosity Solutions of Hamilton-Jacobi-Bellman Equations,
-Birkhauser 1997 (the game, and 1 - exp(-T)); P. Giesl and S. Hafstein, "Review on computational methods for Lyapunov
-functions", Discrete Contin. Dyn. Syst. B 20(8):2291, 2015 (functions on grids that a computer verifies).
+Source: M. Bardi and I. Capuzzo-Dolcetta, Optimal Control and Viscosity Solutions of
+Hamilton-Jacobi-Bellman Equations, Birkhauser 1997 (the game, and 1 - exp(-T)); P. Giesl and S.
+Hafstein, "Review on computational methods for Lyapunov functions", Discrete Contin. Dyn. Syst. B
+20(8):2291, 2015 (functions on grids that a computer verifies).
 """
 
 import dataclasses
@@ -21,22 +24,37 @@ from scipy.optimize import brentq
 from smc_mujoco.evidence.certificates.loops import Loop
 from smc_mujoco.simulation.cfunctions import cached
 
-# Says of a cell (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls there.
+# Says of a cell (x0, x1, s0, s1), and of W at its corners 00, 10, 01, 11, whether W surely falls
+# there.
 Proven = Callable[[tuple[float, ...], tuple[float, ...]], bool]
-Attracts = Callable[[np.ndarray], bool]  # says of P whether z' P z surely falls where it is at most 1
-CELLS, TARGET_CELLS = 110, 8.0  # cells on each side of 0, in x and in s; cells in half a target: chosen
+Attracts = Callable[
+    [np.ndarray], bool
+]  # says of P whether z' P z surely falls where it is at most 1
+CELLS, TARGET_CELLS = (
+    110,
+    8.0,
+)  # cells on each side of 0, in x and in s; cells in half a target: chosen
 SWEEPS, SWEEP_TOLERANCE = 500, 1e-9  # of a solution
 SMOOTHING_COUNTS = (2, 8, 24)  # how often W is smoothed, which blunts its edges: chosen
-SPEED_RATIO = 3.0  # 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
+# 1/s, largest velocity of the grid over its largest position: chosen, as of a map of `basin`
+SPEED_RATIO = 3.0
 MIN_FALL_SHARE = 0.01  # least fall in a cell, as a share of the range of W' in it: chosen
 MIN_RANGE = 0.02  # range of levels that is worth a certificate: chosen
 RAMP_SHARE = 0.5  # of the target's size, over which the cost of time rises from 0 to 1: chosen
 CELL_SAMPLES = 5  # of a cell, in both directions
-TARGET_SCALES = (1.0, 1.05, 1.1, 1.2, 1.35)  # of the target around the linear loop's worst case: chosen
+TARGET_SCALES = (
+    1.0,
+    1.05,
+    1.1,
+    1.2,
+    1.35,
+)  # of the target around the linear loop's worst case: chosen
 
 
 def rest(loop: Loop, reach: float) -> float:
-    """Return where the loop rests under d = d0, the first such |x|; NaN if there is none up to `reach`."""
+    """Return where the loop rests under d = d0, the first such |x|; NaN if there is none up to
+    `reach`.
+    """
     x = np.linspace(0.0, reach, 4001)[1:]
     left = loop.sigma(loop.c * x) - loop.phi(x) - loop.d0
     if not (left > 0.0).any():
@@ -44,12 +62,17 @@ def rest(loop: Loop, reach: float) -> float:
     i = int(np.argmax(left > 0.0))
     low = 0.0 if i == 0 else x[i - 1]
     at = lambda z: float(loop.sigma(np.array(loop.c * z)) - loop.phi(np.array(z)) - loop.d0)  # noqa: E731
-    root: Any = low if at(low) >= 0.0 else brentq(at, low, x[i])
+    root: Any
+    if at(low) >= 0.0:
+        root = low
+    else:
+        root = brentq(at, low, x[i])
     return float(root)
 
 
 def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
-    """Return P of a set z' P z <= 1, z = (x, s), around all worst cases of the loop that is linear between its rests.
+    """Return P of a set z' P z <= 1, z = (x, s), around all worst cases of the loop that is linear
+    between its rests.
 
     None if there are none. Without a disturbance it is a set where the form falls.
     """
@@ -63,7 +86,12 @@ def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
     K = loop.d0 / at
     gain = float(loop.sigma(np.array(loop.c * at))) / (loop.c * at)
     damping = gain + float(loop.D(np.zeros(())))  # of the loop
-    A = np.array([[-loop.c, 1.0], [loop.c * damping / loop.M - K / loop.M - loop.c**2, loop.c - damping / loop.M]])
+    A = np.array(
+        [
+            [-loop.c, 1.0],
+            [loop.c * damping / loop.M - K / loop.M - loop.c**2, loop.c - damping / loop.M],
+        ]
+    )
     slow, best, push = -max(np.linalg.eigvals(A).real), None, np.array([0.0, loop.d0 / loop.M])
     for rate in np.linspace(0.02, 1.98, 99) * slow if slow > 0.0 else ():
         Q = solve_continuous_lyapunov(A + rate / 2.0 * np.eye(2), -np.outer(push, push) / rate)
@@ -73,7 +101,9 @@ def form(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
 
 
 def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | None:
-    """Return P of the largest set z' P z <= 1 on which the form of the loop's linearisation surely falls; or None."""
+    """Return P of the largest set z' P z <= 1 on which the form of the loop's linearisation surely
+    falls; or None.
+    """
     h = 1e-6 * reach
     push, D0 = float(loop.phi(np.array(h))) / h, float(loop.D(np.zeros(())))
     A = np.array([[-loop.c, 1.0], [0.0, loop.c - (D0 + loop.steep) / loop.M]])
@@ -84,13 +114,21 @@ def _attracted(loop: Loop, reach: float, attracts: Attracts) -> np.ndarray | Non
     low, high = 1e-9, (0.9 * reach) ** 2
     for _ in range(60):
         middle = (low * high) ** 0.5
-        low, high = (middle, high) if attracts(P / middle) else (low, middle)
-    return P / (0.9 * low) if attracts(P / (0.9 * low)) else None
+        if attracts(P / middle):
+            low, high = (middle, high)
+        else:
+            low, high = (low, middle)
+    if attracts(P / (0.9 * low)):
+        return P / (0.9 * low)
+    return None
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
 class Levels:
-    """A bilinear W on nodes (x, s), x >= 0: W(-x, -s) = W(x, s). It falls between its levels inner and outer."""
+    """A bilinear W on nodes (x, s), x >= 0:
+
+    W(-x, -s) = W(x, s). It falls between its levels inner and outer.
+    """
 
     x: np.ndarray  # (n,)
     s: np.ndarray  # (2 n - 1,)
@@ -98,7 +136,9 @@ class Levels:
     inner: float  # level
     outer: float  # level
     bound: float  # the largest |x| in cells that the inner level reaches
-    P: tuple[float, float, float] | None  # of z' P z = P0 x^2 + 2 P1 x s + P2 s^2 on the inner set without disturbance
+    P: (
+        tuple[float, float, float] | None
+    )  # of z' P z = P0 x^2 + 2 P1 x s + P2 s^2 on the inner set without disturbance
 
 
 def levels(
@@ -109,16 +149,23 @@ def levels(
     attracts: Attracts,
     target: tuple[float, float] | None = None,
 ) -> Levels | None:
-    """Return the levels with the smallest bound, or the largest region without disturbance; None if the search fails.
+    """Return the levels with the smallest bound, or the largest region without disturbance; None if
+    the search fails.
 
-    Levels that contain the start are preferred. `target`: half-widths in x and s of a box to reach, for a law that
-    switches.
+    Levels that contain the start are preferred. `target`: half-widths in x and s of a box to reach,
+    for a law that switches.
     """
     P = form(loop, reach, attracts)
     if P is None and (target is None or not min(target)):
         return None
-    small = np.array(target) if P is None else np.sqrt(np.diag(np.linalg.inv(P)))
-    x, s = axis(reach, small[0] / TARGET_CELLS), axis((loop.c + SPEED_RATIO) * reach, small[1] / TARGET_CELLS)
+    if P is None:
+        small = np.array(target)
+    else:
+        small = np.sqrt(np.diag(np.linalg.inv(P)))
+    x, s = (
+        axis(reach, small[0] / TARGET_CELLS),
+        axis((loop.c + SPEED_RATIO) * reach, small[1] / TARGET_CELLS),
+    )
     X, S = np.meshgrid(x, s, indexing="ij")
     size = np.maximum(np.abs(X) / small[0], np.abs(S) / small[1])
     if P is not None:
@@ -132,7 +179,10 @@ def levels(
             tried.append((grid, grid.window()))
     for grid, window in sorted(tried, key=lambda pair: pair[0].worth(pair[1], start)):
         if window and grid.bound(window) and (window := grid.surely(window, proven)):
-            numbers = None if loop.d0 or P is None else (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
+            if loop.d0 or P is None:
+                numbers = None
+            else:
+                numbers = (float(P[0, 0]), float(P[0, 1]), float(P[1, 1]))
             outer = float(f"{window[1] - 2e-6:.6f}")
             inner, bound = _inner(window), grid.bound(window)
             return Levels(x=grid.x, s=s, W=grid.W, inner=inner, outer=outer, bound=bound, P=numbers)
@@ -147,11 +197,15 @@ def _inner(window: tuple[float, float]) -> float:
 class _Grid:
     """W on the nodes with x >= 0, and the cells where it does not fall."""
 
-    def __init__(self, loop: Loop, x: np.ndarray, s: np.ndarray, W: np.ndarray, size: np.ndarray | None):
+    def __init__(
+        self, loop: Loop, x: np.ndarray, s: np.ndarray, W: np.ndarray, size: np.ndarray | None
+    ):
         n, self.loop = x.size // 2, loop
         self.x, self.s, self.W = x[n:], s, W[n:]
         self.W[0] = np.maximum(self.W[0], self.W[0, ::-1])
-        self.corners = np.stack([self.W[:-1, :-1], self.W[1:, :-1], self.W[:-1, 1:], self.W[1:, 1:]])
+        self.corners = np.stack(
+            [self.W[:-1, :-1], self.W[1:, :-1], self.W[:-1, 1:], self.W[1:, 1:]]
+        )
         self.low, self.high = self.corners.min(0), self.corners.max(0)
         lowest, highest = falls(loop, self.x, s, self.corners)
         self.bad = highest >= -MIN_FALL_SHARE * (highest - lowest) - 1e-7
@@ -167,27 +221,45 @@ class _Grid:
 
     def window(self) -> tuple[float, float] | None:
         """Return the widest range of levels that no cell spoils, or None."""
-        spans = sorted([*zip(self.low[self.bad], self.high[self.bad], strict=True), (self.border, 2.0)])
+        spans = sorted(
+            [*zip(self.low[self.bad], self.high[self.bad], strict=True), (self.border, 2.0)]
+        )
         covered, widest = 0.0, (0.0, MIN_RANGE)
         for low, high in spans:
             if covered < self.limit - 1e-5 and low - covered > widest[1] - widest[0]:
                 widest = covered, low
             covered = max(covered, high)
-        return widest if widest[0] > 0.0 or widest[1] > MIN_RANGE else None
+        if widest[0] > 0.0 or widest[1] > MIN_RANGE:
+            return widest
+        return None
 
     def bound(self, window: tuple[float, float] | None) -> float:
         """Return the largest |x| of the cells that reach the inner level."""
         if window is None:
             return np.inf
-        return float(np.broadcast_to(self.x[1:, None], self.low.shape)[self.low <= _inner(window)].max(initial=0.0))
+        return float(
+            np.broadcast_to(self.x[1:, None], self.low.shape)[self.low <= _inner(window)].max(
+                initial=0.0
+            )
+        )
 
-    def worth(self, window: tuple[float, float] | None, start: tuple[float, float]) -> tuple[bool, float]:
+    def worth(
+        self, window: tuple[float, float] | None, start: tuple[float, float]
+    ) -> tuple[bool, float]:
         """Return a key that is smaller for better levels."""
         if window is None or not self.bound(window):
             return True, np.inf
-        x, s = start if start[0] >= 0.0 else (-start[0], -start[1])
-        i, j = np.searchsorted(self.x, x, side="right") - 1, np.searchsorted(self.s, s, side="right") - 1
-        within = i < self.high.shape[0] and 0 <= j < self.high.shape[1] and self.high[i, j] < window[1]
+        if start[0] >= 0.0:
+            x, s = start
+        else:
+            x, s = (-start[0], -start[1])
+        i, j = (
+            np.searchsorted(self.x, x, side="right") - 1,
+            np.searchsorted(self.s, s, side="right") - 1,
+        )
+        within = (
+            i < self.high.shape[0] and 0 <= j < self.high.shape[1] and self.high[i, j] < window[1]
+        )
         area = float((np.diff(self.x)[:, None] * np.diff(self.s))[self.high < window[1]].sum())
         return not within, self.bound(window) if self.loop.d0 else -area
 
@@ -216,11 +288,15 @@ def axis(reach: float, step: float) -> np.ndarray:
 
 
 def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndarray:
-    """Return 1 - exp(-T) on the nodes, T the largest integral of the cost under |d| <= d0; 1 where the grid is left."""
+    """Return 1 - exp(-T) on the nodes, T the largest integral of the cost under |d| <= d0; 1 where
+    the grid is left.
+    """
     X, S = np.meshgrid(x, s, indexing="ij")
     hx, hs, cells, shares = np.gradient(x)[:, None], np.gradient(s)[None, :], [], []
     ends = (-loop.d0, loop.d0)
-    fastest = [np.maximum(np.abs(S - loop.c * X) / hx, np.abs(loop.fall(X, S, d)) / hs) for d in ends]
+    fastest = [
+        np.maximum(np.abs(S - loop.c * X) / hx, np.abs(loop.fall(X, S, d)) / hs) for d in ends
+    ]
     step = 1.0 / (0.1 + np.maximum.reduce(fastest))
     for d in ends:  # midpoint rule
         mx, ms = X + 0.5 * step * (S - loop.c * X), S + 0.5 * step * loop.fall(X, S, d)
@@ -243,11 +319,16 @@ def times(loop: Loop, x: np.ndarray, s: np.ndarray, cost: np.ndarray) -> np.ndar
 
 
 def _smooth(W: np.ndarray, count: int, switches: bool) -> np.ndarray:
-    """Return W averaged over neighbours; W' at a node is convex in the gradient of W, so it falls nearly as before."""
+    """Return W averaged over neighbours; W' at a node is convex in the gradient of W, so it falls
+    nearly as before.
+    """
     for _ in range(count):
         padded = np.pad(W, 1, mode="edge")
         W = (padded[:-2] + 2.0 * padded[1:-1] + padded[2:]) / 4.0
-        W = W[:, 1:-1] if switches else (W[:, :-2] + 2.0 * W[:, 1:-1] + W[:, 2:]) / 4.0
+        if switches:
+            W = W[:, 1:-1]
+        else:
+            W = (W[:, :-2] + 2.0 * W[:, 1:-1] + W[:, 2:]) / 4.0
     return W
 
 
@@ -270,7 +351,9 @@ def _sweep(W, open_, cells, shares, decay):
                     if p >= 0:
                         f, g = shares[k, 0, i, j], shares[k, 1, i, j]
                         low = (1.0 - g) * W[p, q] + g * W[p, q + 1]
-                        value = (1.0 - f) * low + f * ((1.0 - g) * W[p + 1, q] + g * W[p + 1, q + 1])
+                        value = (1.0 - f) * low + f * (
+                            (1.0 - g) * W[p + 1, q] + g * W[p + 1, q + 1]
+                        )
                     worst = max(worst, value)
                 new = 1.0 - decay[i, j] * (1.0 - worst)
                 change = max(change, abs(new - W[i, j]))
@@ -278,8 +361,12 @@ def _sweep(W, open_, cells, shares, decay):
     return change
 
 
-def falls(loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and the largest W' at samples of each cell under the worst d, two arrays of (n, 2 n)."""
+def falls(
+    loop: Loop, x: np.ndarray, s: np.ndarray, corners: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest W' at samples of each cell under the worst d, two arrays of
+    (n, 2 n).
+    """
     hx, hs, values = np.diff(x)[:, None], np.diff(s)[None, :], []
     w00, w10, w01, w11 = corners
     for a in np.linspace(0.0, 1.0, CELL_SAMPLES):

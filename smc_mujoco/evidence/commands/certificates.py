@@ -22,30 +22,43 @@ METRIC = "ultimate_bound"  # largest |x| in the last fifth of a run
 def certify(
     plant: Annotated[
         str | None,
-        typer.Argument(metavar="PLANT", autocompletion=options.PLANTS, help="A plant from `smc-mujoco list`."),
+        typer.Argument(
+            metavar="PLANT", autocompletion=options.PLANTS, help="A plant from `smc-mujoco list`."
+        ),
     ] = None,
     law: options.OneLaw = "observer_free",
     disturbance: options.Disturbance = None,
-    slope: Annotated[float | None, typer.Option(min=0.0, help="Bound on |d'|, per s; default: d may jump.")] = None,
+    slope: Annotated[
+        float | None, typer.Option(min=0.0, help="Bound on |d'|, per s; default: d may jump.")
+    ] = None,
     condition: options.Condition = "nominal",
     gains: options.Gains = "tuned",
-    out: Annotated[Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")] = None,
-    figure: Annotated[
-        Path | None, options.picture("the state plane, with the worst run found within --disturbance")
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Also write the certificate to a file.")
     ] = None,
-    worst: Annotated[bool, typer.Option("--worst", help="Also find the worst d, as for a figure.")] = False,
+    figure: Annotated[
+        Path | None,
+        options.picture("the state plane, with the worst run found within --disturbance"),
+    ] = None,
+    worst: Annotated[
+        bool, typer.Option("--worst", help="Also find the worst d, as for a figure.")
+    ] = False,
     check: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again.")
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Instead, prove the certificate in a file again."),
     ] = None,
 ) -> None:
-    """Prove what a law does on a plant: from where it comes to rest, and how far a bounded disturbance pushes it.
+    """Prove what a law does on a plant: from where it comes to rest, and how far a bounded
+    disturbance pushes it.
 
-    The plant is its equation, integrated exactly, and the law acts at every instant. The command prints each theorem
-    with its conditions and their margins, also where they fail, and what it leaves out of your machine: the sampling,
-    delay, noise, dry friction. A separate checker proves it in ball arithmetic before it is shown; --check runs that
-    checker again, with exit code 2 if a statement is not proven.
+    The plant is its equation, integrated exactly, and the law acts at every instant. The command
+    prints each theorem with its conditions and their margins, also where they fail, and what it
+    leaves out of your machine: the sampling, delay, noise, dry friction. A separate checker proves
+    it in ball arithmetic before it is shown; --check runs that checker again, with exit code 2 if a
+    statement is not proven.
 
-    Example: smc-mujoco certify duffing --law observer_free --disturbance 2 --out duffing.json --figure duffing.png
+    Example: smc-mujoco certify duffing --law observer_free --disturbance 2 --out duffing.json
+    --figure duffing.png
 
     Example: smc-mujoco certify --check duffing.json
     """
@@ -65,7 +78,9 @@ def certify(
         made.check()
         terminal.note(f"{check}: every statement is proven", "bold")
     elif plant:
-        scenario, made, worst_run = _certified(plant, law, condition, gains, disturbance, slope, worst, bool(figure))
+        scenario, made, worst_run = _certified(
+            plant, law, condition, gains, disturbance, slope, worst, bool(figure)
+        )
     else:
         raise ScenarioError("give a plant, such as duffing, or --check FILE.json")
     terminal.print(tables.certificate(made))
@@ -78,7 +93,10 @@ def certify(
         terminal.wrote(made.save(out))
     if figure:
         shown = worst_run.scenario if worst_run else scenario
-        traces = run([shown]) if shown and shown.plant.n == 1 else ()
+        if shown and shown.plant.n == 1:
+            traces = run([shown])
+        else:
+            traces = ()
         made.figure(figure, traces, worst_run.tried if worst_run else 0)
         terminal.wrote(*pictures)
 
@@ -93,7 +111,9 @@ def _certified(
     worst: bool,
     drawn: bool,
 ) -> "tuple[Scenario, Certificate, WorstCase | None]":
-    """Return a scenario, its certificate and, if `worst` or `drawn`, the worst case within its bounds."""
+    """Return a scenario, its certificate and, if `worst` or `drawn`, the worst case within its
+    bounds.
+    """
     from smc_mujoco.analysis.worst_case.uncertainty import Uncertainty
     from smc_mujoco.control import gain_sets
     from smc_mujoco.evidence.certificates.maker import certify as make
@@ -103,9 +123,14 @@ def _certified(
 
     machine, chosen = jointed(plant, "a theorem"), options.law(law)
     if isinstance(chosen, str) and gain_sets.in_set(machine, chosen, gains):
-        chosen = gain_sets.law(machine, chosen, gains)  # the best of the searches, where run i has those of search i
+        chosen = gain_sets.law(
+            machine, chosen, gains
+        )  # the best of the searches, where run i has those of search i
     scenario = case(machine, chosen, condition, gains=gains)
-    within = Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
+    if disturbance:
+        within = Uncertainty(disturbance=disturbance, slope=slope)
+    else:
+        within = None
     if worst and within is None:
         raise ScenarioError("--worst needs a bound to search within: give --disturbance")
     made = make(scenario, within)

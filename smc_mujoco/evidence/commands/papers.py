@@ -17,38 +17,58 @@ if TYPE_CHECKING:
 def claims(
     ctx: typer.Context,
     ids: Annotated[
-        list[str] | None, typer.Argument(metavar="ID", help="Of claims, as 3 18; by default all.", show_default=False)
+        list[str] | None,
+        typer.Argument(
+            metavar="ID", help="Of claims, as 3 18; by default all.", show_default=False
+        ),
     ] = None,
-    gains: Annotated[str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")] = False,
+    gains: Annotated[
+        str | None, typer.Option(help="Sets of gains, as a,b; default all of the paper's.")
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Coarser grids and shorter runs; one set of gains.")
+    ] = False,
     paper: Annotated[
-        str | None, typer.Option(metavar="NAME|FOLDER", help="A paper of --papers; default Gaber's.")
+        str | None,
+        typer.Option(metavar="NAME|FOLDER", help="A paper of --papers; default Gaber's."),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead of tables.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Print one JSON document instead of tables.")
+    ] = False,
     evidence: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed.")
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Also write runs, numbers and verdicts, sealed."),
     ] = None,
-    badge: Annotated[Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge of the verdicts.")] = None,
-    mutants: Annotated[bool, typer.Option("--mutants", help="List claims that no broken law loses.")] = False,
+    badge: Annotated[
+        Path | None, typer.Option(metavar="FILE.svg", help="Also write a badge of the verdicts.")
+    ] = None,
+    mutants: Annotated[
+        bool, typer.Option("--mutants", help="List claims that no broken law loses.")
+    ] = False,
     threads: options.Threads = None,
     papers: Annotated[bool, typer.Option("--papers", help="List the papers instead.")] = False,
     new: Annotated[
-        Path | None, typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper instead.")
+        Path | None,
+        typer.Option("--new", metavar="FOLDER", help="Write a template of your own paper instead."),
     ] = None,
     check: Annotated[
-        Path | None, typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead.")
+        Path | None,
+        typer.Option(metavar="FILE.json", help="Check the seal of a file of --evidence instead."),
     ] = None,
 ) -> None:
-    """Audit a paper's claims: measure each against the threshold that was fixed for it before any run.
+    """Audit a paper's claims: measure each against the threshold that was fixed for it before any
+    run.
 
-    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function for each claim.
+    A paper is a folder with paper.toml, its claims and their thresholds, and claims.py, a function
+    for each claim.
 
-    Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and partly supported
-    otherwise. One counter-example refutes a universal claim. A claim about some gains is "not shown" if a search finds
-    no example. Claims that you name are shown in full. All of Gaber's, the default, take minutes.
+    Under a set of gains a claim is supported if all its sentences hold, refuted if none does, and
+    partly supported otherwise. One counter-example refutes a universal claim. A claim about some
+    gains is "not shown" if a search finds no example. Claims that you name are shown in full. All
+    of Gaber's, the default, take minutes.
 
-    A second audit with the same versions writes the same file of --evidence, to the last bit. With --mutants the exit
-    code is 1 if an audit of some claim cannot fail.
+    A second audit with the same versions writes the same file of --evidence, to the last bit. With
+    --mutants the exit code is 1 if an audit of some claim cannot fail.
 
     Example: smc-mujoco claims 3 18 --gains tuned
 
@@ -57,7 +77,17 @@ def claims(
     Example: smc-mujoco claims --paper ./my_paper --evidence evidence.json --badge badge.svg
     """
     if papers or new or check:
-        audited = "ids", "gains", "quick", "paper", "json", "evidence", "badge", "mutants", "threads"
+        audited = (
+            "ids",
+            "gains",
+            "quick",
+            "paper",
+            "json",
+            "evidence",
+            "badge",
+            "mutants",
+            "threads",
+        )
         options.only_for(ctx, audited, False, "audits: leave out --papers, --new and --check")
         _papers(papers, new, check)
         return
@@ -77,14 +107,20 @@ def claims(
     asked = about, ids or None, sets, quick, threads
     with bar("claims", counted=True) as drawn:
         done = audit(*asked, report=drawn.reached)
-    written = [path for path in (evidence and done.save(evidence), badge and done.badge(badge)) if path]
+    written = []
+    for path in (evidence and done.save(evidence), badge and done.badge(badge)):
+        if path:
+            written.append(path)
     if json:
         print(document(done.claims))
         return
     tables.print_claims(done.claims, terminal, full=bool(ids))
     kept = mutants and _kept(done, asked, terminal)
     one = len({name for claim in done.claims for name in claim.verdicts}) == 1 < len(about.sets)
-    less = "quick: coarser grids than the claims say" + f", and one set of gains of {len(about.sets)}" * one
+    less = (
+        "quick: coarser grids than the claims say"
+        + f", and one set of gains of {len(about.sets)}" * one
+    )
     notes = [f"{terminal.seconds:.0f} s", less * quick]
     notes.append(f"wrote {printable(', '.join(map(str, written)))}" if written else "")
     terminal.note("; ".join(filter(None, notes)), "dim")
@@ -93,7 +129,8 @@ def claims(
 
 
 def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
-    """Print the claims that no mutant loses, and those that cannot be lost; return whether any is in the first list.
+    """Print the claims that no mutant loses, and those that cannot be lost; return whether any is
+    in the first list.
 
     `asked`: the first arguments of `survivors`.
     """
@@ -103,7 +140,9 @@ def _kept(done: "Audit", asked: tuple, terminal: Terminal) -> bool:
     with bar("mutants", counted=True) as drawn:
         kept = survivors(*asked, report=drawn.reached)
     lines = [f"claim {id} is {why}" for id, why in kept.items()]
-    terminal.note("\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be.")
+    terminal.note(
+        "\n".join(lines) or "Every claim is lost by a mutant of its law, or says why it cannot be."
+    )
     for entry in [done.paper.claims[claim.id] for claim in done.claims]:
         if entry.immune:
             terminal.note(f"claim {entry.id} cannot be lost: {entry.immune}", wrap=True)
@@ -127,6 +166,11 @@ def _papers(listed: bool, new: Path | None, check: Path | None) -> None:
         terminal.note(f"the seal is whole: {about}: {counts}{quick}", wrap=True)
     if not listed:
         return
-    lines = {name: f"{known.authors}: {known.title} ({known.contents})" for name, known in paper.papers().items()}
-    rows = [(name, tables.with_package(line, paper.catalogue().package(name))) for name, line in lines.items()]
+    lines = {
+        name: f"{known.authors}: {known.title} ({known.contents})"
+        for name, known in paper.papers().items()
+    }
+    rows = []
+    for name, line in lines.items():
+        rows.append((name, tables.with_package(line, paper.catalogue().package(name))))
     terminal.print(tables.catalogue("Papers, for smc-mujoco claims --paper", rows))

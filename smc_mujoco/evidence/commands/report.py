@@ -21,7 +21,9 @@ def report(
     ] = None,
     records: Annotated[
         Path | None,
-        typer.Option(help="Folder with records of rigs, CSV or npz, shown beside their twins; see `smc-mujoco rig`."),
+        typer.Option(
+            help="Folder with records of rigs, CSV or npz, shown beside their twins; see `smc-mujoco rig`."
+        ),
     ] = None,
     law: Annotated[
         list[str] | None,
@@ -33,20 +35,23 @@ def report(
     paper: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME|FOLDER", help="Instead of the study, audit a paper of `smc-mujoco claims --papers`."
+            metavar="NAME|FOLDER",
+            help="Instead of the study, audit a paper of `smc-mujoco claims --papers`.",
         ),
     ] = None,
     relevant: options.Relevant = RELEVANT,
     threads: options.Threads = None,
 ) -> None:
-    """Compute the whole study, in about 20 minutes, and write it as one HTML file: which controller, where, how sure.
+    """Compute the whole study, in about 20 minutes, and write it as one HTML file: which
+    controller, where, how sure.
 
-    The report has the grid of plants, laws, conditions and seeds; the paper's claims; margins; regions of attraction;
-    real machines; films. The file OUT/report.html needs no network and no other file; the data are in the same folder.
-    You can stop the command at any time, and continue by starting it again.
+    The report has the grid of plants, laws, conditions and seeds; the paper's claims; margins;
+    regions of attraction; real machines; films. The file OUT/report.html needs no network and no
+    other file; the data are in the same folder. You can stop the command at any time, and continue
+    by starting it again.
 
-    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html, evidence.json, badge.svg
-    and checks.svg.
+    With --paper it is the audit of a paper, and takes seconds or minutes: OUT has report.html,
+    evidence.json, badge.svg and checks.svg.
 
     Example: smc-mujoco report --quick --out look
 
@@ -58,11 +63,22 @@ def report(
         from smc_mujoco.evidence.report import report as make
 
     if paper and (seeds or records or law or relevant != RELEVANT):
-        raise ScenarioError("--seeds, --law, --records and --relevant belong to the study: leave them out with --paper")
+        raise ScenarioError(
+            "--seeds, --law, --records and --relevant belong to the study: leave them out with --paper"
+        )
     if paper:
         path = of_paper.report(paper, out, quick, threads, progress=True)
     else:
         path = make(
-            out, quick, seeds, threads, progress=True, records=records, laws=options.names(law), relevant=relevant
+            out,
+            quick,
+            seeds,
+            threads,
+            progress=True,
+            records=records,
+            laws=options.names(law),
+            relevant=relevant,
         )
-    print(f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser")
+    print(
+        f"wrote {printable(str(path))} ({path.stat().st_size / 1e6:.1f} MB): open it in a browser"
+    )

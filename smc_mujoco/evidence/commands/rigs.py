@@ -1,4 +1,6 @@
-"""smc-mujoco rig: records of a real machine beside its twin, and a machine's quantities from its records."""
+"""smc-mujoco rig: records of a real machine beside its twin, and a machine's quantities from its
+records.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -35,45 +37,70 @@ def rig(
     columns: options.Columns = None,
     figure: Annotated[Path | None, options.picture("the (first) record and its residuals")] = None,
     sets: Annotated[
-        str | None, typer.Option(help="Published parameter sets whose twins are shown too, as a,b; default none.")
+        str | None,
+        typer.Option(
+            help="Published parameter sets whose twins are shown too, as a,b; default none."
+        ),
     ] = None,
     start: Annotated[
-        float | None, typer.Option(min=0.0, help="Where the film starts, s of the record; default the rig's own start.")
+        float | None,
+        typer.Option(
+            min=0.0, help="Where the film starts, s of the record; default the rig's own start."
+        ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Duration of the film, s; default to the end of the record.")
+        float | None,
+        typer.Option(help="Duration of the film, s; default to the end of the record."),
     ] = None,
-    film: Annotated[Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")] = None,
-    fit: Annotated[bool, typer.Option("--fit", help="Fit quantities (mass, friction, motor) to the records.")] = False,
+    film: Annotated[
+        Path | None, typer.Option(help="Also film machine and twins side by side, to a .mp4 file.")
+    ] = None,
+    fit: Annotated[
+        bool, typer.Option("--fit", help="Fit quantities (mass, friction, motor) to the records.")
+    ] = False,
     quantities: Annotated[
         str | None,
-        typer.Option(help="Fit: quantities to find, as a,b; default those that the rig's records determine."),
+        typer.Option(
+            help="Fit: quantities to find, as a,b; default those that the rig's records determine."
+        ),
     ] = None,
     given: Annotated[
         str | None,
-        typer.Option("--set", metavar="NAME=VALUE,...", help="Fit: where the search starts, SI units: M=5,b=8."),
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE,...",
+            help="Fit: where the search starts, SI units: M=5,b=8.",
+        ),
     ] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Fit: how many sets the search may start from.")] = 4,
+    starts: Annotated[
+        int, typer.Option(min=1, help="Fit: how many sets the search may start from.")
+    ] = 4,
     seed: Annotated[int, typer.Option(min=0, help="Fit: seed of these starts.")] = 0,
     json: Annotated[
         Path | None, typer.Option(metavar="FILE.json", help="Fit: also write the result to a file.")
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Predictions: runs of each law on each parameter set.")] = 4,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Predictions: runs of each law on each parameter set.")
+    ] = 4,
 ) -> None:
-    """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to records.
+    """Repeat a record of a real machine by its twin, side by side, or fit the twin's quantities to
+    records.
 
-    The twin starts from the measured state. If the machine's controller is known, the loop is closed and only the
-    references are those of the record; else the twin repeats the recorded command. The table has the fit of the whole
-    record, 100 (1 - |y - yhat| / |y - mean y|) percent, and that of a machine that does nothing.
+    The twin starts from the measured state. If the machine's controller is known, the loop is
+    closed and only the references are those of the record; else the twin repeats the recorded
+    command. The table has the fit of the whole record, 100 (1 - |y - yhat| / |y - mean y|) percent,
+    and that of a machine that does nothing.
 
-    With --fit the quantities are chosen that give the least sum of squared residuals. They are printed with their
-    standard errors, with what the records cannot tell, and with the fit of each record before and after.
+    With --fit the quantities are chosen that give the least sum of squared residuals. They are
+    printed with their standard errors, with what the records cannot tell, and with the fit of each
+    record before and after.
 
-    A record has a column for each signal, sampled at the rate of the rig's controller, angles in rad and time in s. The
-    first line of a CSV file has the names of the columns.
+    A record has a column for each signal, sampled at the rate of the rig's controller, angles in
+    rad and time in s. The first line of a CSV file has the names of the columns.
 
-    Without a file: what the twin said of each public record, and what the machine did. A bursty machine never repeats a
-    record. This simulates each law again, on the twin and on the twin without some of its parts. It takes minutes.
+    Without a file: what the twin said of each public record, and what the machine did. A bursty
+    machine never repeats a record. This simulates each law again, on the twin and on the twin
+    without some of its parts. It takes minutes.
 
     Example: smc-mujoco rig
 
@@ -83,7 +110,12 @@ def rig(
 
     Example: smc-mujoco rig servo_axis run.csv --fit --set M=5,b=8 --columns x=position,u=force
     """
-    options.only_for(ctx, ("sets", "start", "duration", "film"), not fit, "a record beside its twin: leave out --fit")
+    options.only_for(
+        ctx,
+        ("sets", "start", "duration", "film"),
+        not fit,
+        "a record beside its twin: leave out --fit",
+    )
     options.only_for(ctx, ("quantities", "given", "starts", "seed", "json"), fit, "--fit")
     options.only_for(ctx, ("seeds",), not files, "predictions: leave the file out")
     if name is None or (not files and not fit):
@@ -102,7 +134,9 @@ def rig(
 
 
 def _tell(name: str, seeds: int, figure: Path | None) -> None:
-    """Show what twins said of public records, of one machine or of all; of a bursty one, what is predicted."""
+    """Show what twins said of public records, of one machine or of all; of a bursty one, what is
+    predicted.
+    """
     with delay_ctrl_c():
         from smc_mujoco.common.files import writable
         from smc_mujoco.evidence.commands import tables
@@ -114,7 +148,9 @@ def _tell(name: str, seeds: int, figure: Path | None) -> None:
     terminal, rows = Terminal(), twin_figures.rows(name)
     twin = find_rig(name) if name else None
     if twin is not None and not rows:
-        raise ScenarioError(f"no public record of {name} is known here: give one, a CSV or npz file")
+        raise ScenarioError(
+            f"no public record of {name} is known here: give one, a CSV or npz file"
+        )
     if figure:
         terminal.wrote(*twins_figure(rows, figure))
     if twin is None:
@@ -134,13 +170,18 @@ def _predict(twin: "Rig", seeds: int, terminal: Terminal) -> None:
     from smc_mujoco.evidence.commands import tables
     from smc_mujoco.evidence.rigs.predictions import predicted
 
-    batches = len(twin.members()) * (1 + len(twin.prediction.left_out)) if twin.prediction else 1
+    if twin.prediction:
+        batches = len(twin.members()) * (1 + len(twin.prediction.left_out))
+    else:
+        batches = 1
     with bar(twin.name, batches) as shown:
         told = predicted(twin, seeds, report=lambda count: shown.advance(1.0))
     for table in tables.predicted(told):
         terminal.print(table)
     terminal.note(told.prediction.about, wrap=True)
-    terminal.note(f"{len(twin.members())} parameter sets, {seeds} seeds each, {terminal.seconds:.0f} s")
+    terminal.note(
+        f"{len(twin.members())} parameter sets, {seeds} seeds each, {terminal.seconds:.0f} s"
+    )
 
 
 def _fit(
@@ -209,7 +250,9 @@ def _repeat(
     writable(figure, film and with_ending(film, ".mp4"))
     record = load(file, columns)
     if isinstance(record, Trace):
-        raise ScenarioError(f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}")
+        raise ScenarioError(
+            f"{file} is a trace: give a record, with columns {', '.join(twin.needed)}"
+        )
     twins = {"twin": twin} | {name: twin.set(name) for name in sets}
     fits = {"twin": twin.fit(record)}
     fits |= {name: shown.fits([record])[0] for name, shown in twins.items() if name != "twin"}

@@ -23,7 +23,8 @@ from smc_mujoco.evidence.rigs.identify import Identified
 from smc_mujoco.evidence.rigs.predictions import Told, percentiles
 from smc_mujoco.evidence.rigs.twin_figures import Order, TwinFigure
 
-# Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to questions have their own.
+# Verdicts have a colour beside their mark, from a palette for the colour-blind; answers to
+# questions have their own.
 COLOURS = dict(zip(verdicts.VERDICTS, ("blue", "yellow", "red", "dim", "dim"), strict=True))
 COLOURS |= dict.fromkeys(verdicts.ANSWERS.values(), "cyan")
 MARKS = {verdict: Text(mark, style=COLOURS[verdict]) for verdict, mark in verdicts.MARKS.items()}
@@ -36,49 +37,80 @@ def certificate(made: Certificate) -> Table:
     seen = ""
     for row in made.conditions:
         theorem, seen = row.theorem if row.theorem != seen else "", row.theorem
-        mark = Text("yes", style="blue") if row.holds else Text("no", style="red")
-        table.add_row(theorem, row.name, mark, f"{number(row.margin)} {row.unit}".strip(), row.words)
+        if row.holds:
+            mark = Text("yes", style="blue")
+        else:
+            mark = Text("no", style="red")
+        table.add_row(
+            theorem, row.name, mark, f"{number(row.margin)} {row.unit}".strip(), row.words
+        )
     return table
 
 
 def print_claims(claims: Sequence[Claim], console: Console, full: bool) -> None:
-    """Print a table of claims with their verdicts, or each in full; then the totals of the paper's own sentences."""
+    """Print a table of claims with their verdicts, or each in full; then the totals of the paper's
+    own sentences.
+    """
     if full:
         for claim in claims:
             _print_claim(claim, console)
     else:
         console.print(_claims_overview(claims))
     flips = sum(claim.flips for claim in claims)
-    depend = f" ({flips} of all depend{'s' * (flips == 1)} on the gains)" if flips else ""
+    if flips:
+        depend = f" ({flips} of all depend{'s' * (flips == 1)} on the gains)"
+    else:
+        depend = ""
     console.print(Text(capital(verdicts.summary(claims)) + depend), highlight=False)
 
 
 def _claims_overview(claims: Sequence[Claim]) -> Table:
-    """Return a table of claims: verdicts by set of gains, the words, and the check that decides for the last set."""
+    """Return a table of claims: verdicts by set of gains, the words, and the check that decides for
+    the last set.
+    """
     sets = list(claims[0].verdicts) if claims else []
     shown = sets if len(sets) > 1 else []
-    words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains" if sets else "claim"
-    columns = [Column("id", justify="right", style="cyan"), *(Column(name, justify="center") for name in shown), words]
+    if sets:
+        words = f"claim, verdict, whose (what was read)\ndecided by, {sets[-1]} gains"
+    else:
+        words = "claim"
+    columns = [
+        Column("id", justify="right", style="cyan"),
+        *(Column(name, justify="center") for name in shown),
+        words,
+    ]
     table = titled("", *columns, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
     for claim in claims:
         marks = [MARKS[claim.verdicts[name]] for name in shown]
         verdict = f"{claim.verdict}{', flips' * claim.flips}", COLOURS[claim.verdict]
-        lines = Text.assemble((claim.text, "bold"), "\n", MARKS[claim.verdict], " ", verdict, f"; {claim.source}\n")
+        lines = Text.assemble(
+            (claim.text, "bold"), "\n", MARKS[claim.verdict], " ", verdict, f"; {claim.source}\n"
+        )
         table.add_row(claim.id, *marks, lines.append(claim.decided(sets[-1]), "dim"))
     return table
 
 
 def _print_claim(claim: Claim, console: Console) -> None:
-    """Print one claim in full, then a table for each set of gains: its checks, and the numbers beside them."""
-    console.print(Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim")))
+    """Print one claim in full, then a table for each set of gains: its checks, and the numbers
+    beside them.
+    """
+    console.print(
+        Text.assemble((claim.id, "bold cyan"), f"  {claim.text}", (f"  {claim.where}", "dim"))
+    )
     about, lost = plain(Column(style="dim"), ""), claim.verdict != verdicts.SUPPORTED
     parts = {
-        "whose": claim.source + (f": {claim.how}" if claim.how else ""), "kind": claim.quantifier,
-        "gains": f"{claim.over} gains that the paper allows" if claim.over else "", "measured": claim.measured,
-        "holds if": claim.holds_if, "note": claim.note,
+        "whose": claim.source + (f": {claim.how}" if claim.how else ""),
+        "kind": claim.quantifier,
+        "gains": f"{claim.over} gains that the paper allows" if claim.over else "",
+        "measured": claim.measured,
+        "holds if": claim.holds_if,
+        "note": claim.note,
         "instead": f"{claim.instead} ({claim.shown_by})" if lost and claim.instead else "",
-        "verdict": Text(f"{claim.verdict}{', flips with the gains' * claim.flips}", f"bold {COLOURS[claim.verdict]}"),
-    }  # fmt: skip
+        "verdict": Text(
+            f"{claim.verdict}{', flips with the gains' * claim.flips}",
+            f"bold {COLOURS[claim.verdict]}",
+        ),
+    }
     for label, text in parts.items():
         if text:
             about.add_row(label, Text(text) if isinstance(text, str) else text)
@@ -88,34 +120,55 @@ def _print_claim(claim: Claim, console: Console) -> None:
         title = Text(f"{name} gains: {verdict}", style=COLOURS[verdict])
         table = plain(*columns, title=title, title_justify="left")
         for check in claim.checks(name):
-            mark = Text("✓", COLOURS[verdicts.SUPPORTED]) if check.holds else Text("✗", COLOURS[verdicts.REFUTED])
+            if check.holds:
+                mark = Text("✓", COLOURS[verdicts.SUPPORTED])
+            else:
+                mark = Text("✗", COLOURS[verdicts.REFUTED])
             limit = f"{check.relation} {verdicts.measured(check.limit, check.what)}"
             table.add_row(mark, Text(check.what), verdicts.measured(check.value, check.what), limit)
         for what, value in claim.beside[name].items():
-            table.add_row("", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), "")
+            table.add_row(
+                "", Text(what, style="dim"), Text(verdicts.measured(value, what), style="dim"), ""
+            )
         console.print(Padding(table, (0, 0, 1, 2)))
 
 
 def fits(title: str, by_name: Mapping[str, Mapping[str, float]]) -> Table:
     """Return the fit of each twin of a record, %, or when it falls."""
-    table = titled(f"{title}: fit, %", "", *(Column(head, justify="right") for head in next(iter(by_name.values()))))
+    table = titled(
+        f"{title}: fit, %",
+        "",
+        *(Column(head, justify="right") for head in next(iter(by_name.values()))),
+    )
     for name, fit in by_name.items():
         table.add_row(name, *(f"{value:z.1f}" for value in fit.values()))
     return table
 
 
 def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table]:
-    """Return a table of how far twins are from their machines, by what their records were used for, and the orders."""
+    """Return a table of how far twins are from their machines, by what their records were used for,
+    and the orders.
+    """
     right = functools.partial(Column, justify="right", no_wrap=True)
-    named = functools.partial(Column, "machine", no_wrap=True)  # a column keeps the cells of its table
-    heads = [right(head) for head in ("\nrows", "median\n%", "largest\n%", "within\nrange", "public\n%")]
+    named = functools.partial(
+        Column, "machine", no_wrap=True
+    )  # a column keeps the cells of its table
+    heads = []
+    for head in ("\nrows", "median\n%", "largest\n%", "within\nrange", "public\n%"):
+        heads.append(right(head))
     table = titled(
-        "How far the twin is from the machine", named(), Column("records\nare", no_wrap=True), *heads, pad_edge=False
+        "How far the twin is from the machine",
+        named(),
+        Column("records\nare", no_wrap=True),
+        *heads,
+        pad_edge=False,
     )
     for group in twin_figures.summaries(rows):
         table.add_row(*group.cells)
     ends = right("sets in the\nmachine's order"), right("tau")
-    orders = titled("Laws in the machine's order", named(), "condition", "twin", *ends, pad_edge=False)
+    orders = titled(
+        "Laws in the machine's order", named(), "condition", "twin", *ends, pad_edge=False
+    )
     for one in by_laws:
         counts = f"{one.ordered} of {one.sets}", f"{one.tau:z.2f}"
         orders.add_row(one.rig, one.condition, one.variant or "whole", *counts)
@@ -123,7 +176,9 @@ def machines(rows: Sequence[TwinFigure], by_laws: Sequence[Order]) -> list[Table
 
 
 def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:
-    """Return a machine's figures beside those of its twin: below each record, and each variant of the twin, its own."""
+    """Return a machine's figures beside those of its twin: below each record, and each variant of
+    the twin, its own.
+    """
     right = functools.partial(Column, justify="right", no_wrap=True)
     heads = [right("machine"), right("twin"), right("range"), right("fit, %"), right("public")]
     table, before = titled(label, "record", *heads, pad_edge=False), ("", "")
@@ -132,24 +187,43 @@ def figures_of_twin(label: str, rows: Sequence[TwinFigure]) -> Table:
             before = row.record, row.variant
             law = "" if row.law == "none" else f", {row.law}"
             about = row.variant or row.use
-            table.add_row(Text.assemble(f"{row.record}{law}: ", (about, "" if row.variant else "bold")))
-        ends = "" if row.low == row.high else f"{_told(row.low)}…{_told(row.high)}"
-        fit = "" if math.isnan(row.fit) or math.isinf(row.fit) else f"{row.fit:z.1f}"
+            table.add_row(
+                Text.assemble(f"{row.record}{law}: ", (about, "" if row.variant else "bold"))
+            )
+        if row.low == row.high:
+            ends = ""
+        else:
+            ends = f"{_told(row.low)}…{_told(row.high)}"
+        if math.isnan(row.fit) or math.isinf(row.fit):
+            fit = ""
+        else:
+            fit = f"{row.fit:z.1f}"
         cells = _told(row.machine), _told(row.twin), ends, fit, _told(row.published)
         table.add_row(f"  {row.figure}, {row.unit}".removesuffix(", "), *cells)
     return table
 
 
 def _told(value: float) -> str:
-    return "" if math.isnan(value) else "falls" if math.isinf(value) else f"{value:.4g}"
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "falls"
+    return f"{value:.4g}"
 
 
 def predicted(told: Told) -> list[Table]:
-    """Return three tables of predictions: what was fitted on, what is predicted, and which parts decide the order."""
+    """Return three tables of predictions: what was fitted on, what is predicted, and which parts
+    decide the order.
+    """
     about = told.prediction
     right = functools.partial(Column, justify="right")
     heads = [right(f"{name},\n{who}") for name in about.recorded for who in ("machine", "twin")]
-    fitted = titled(f"Fitted on: {about.fitted_on}; median, and 5 to 95 % of seeds and sets", "figure", *heads, "unit")
+    fitted = titled(
+        f"Fitted on: {about.fitted_on}; median, and 5 to 95 % of seeds and sets",
+        "figure",
+        *heads,
+        "unit",
+    )
     for figure in about.recorded[next(iter(about.recorded))]:
         cells = [
             cell
@@ -158,13 +232,18 @@ def predicted(told: Told) -> list[Table]:
         ]
         fitted.add_row(figure.replace("_", " "), *cells, about.units[figure])
     words = [figure.replace("_", " ").replace("acceleration", "accel.") for figure in about.shown]
-    shown = [right(f"{name}\n{about.units[figure]}") for name, figure in zip(words, about.shown, strict=True)]
+    shown = [
+        right(f"{name}\n{about.units[figure]}")
+        for name, figure in zip(words, about.shown, strict=True)
+    ]
     heads = [Column("law", no_wrap=True), "", *shown, right("falls\n%")]
     laws = titled("Predicted, but for the law fitted on", *heads, pad_edge=False)
     for law in about.order:
         for name in about.conditions:
             cells = [_spread(told.of(law, name, figure)) for figure in about.shown]
-            laws.add_row(law.replace("_", " "), name, *cells, f"{100.0 * told.falls(law, name):.0f}")
+            laws.add_row(
+                law.replace("_", " "), name, *cells, f"{100.0 * told.falls(law, name):.0f}"
+            )
     first = next(iter(about.conditions))
     medians = [right(law.replace("_", " ")) for law in about.order]
     title = f"What of the twin decides it: {about.rank.replace('_', ' ')} in {first}, {about.units[about.rank]}"
@@ -176,7 +255,9 @@ def predicted(told: Told) -> list[Table]:
                 cells[i] += f"\n{100.0 * fell:.0f} % fall"
         count, sets = told.ordered(first, without)
         label = f"without {without}" if without else "whole"
-        parts.add_row(label, *cells, f"{count} of {sets}", f"{told.correlation(first, without):z.2f}")
+        parts.add_row(
+            label, *cells, f"{count} of {sets}", f"{told.correlation(first, without):z.2f}"
+        )
     return [fitted, laws, parts]
 
 
@@ -193,34 +274,49 @@ def _spread(values: np.ndarray) -> str:
         return "all fall"
     middle, *ends = percentiles(values)
     low, high = (f"{float(f'{value:.{2 if abs(value) < 1.0 else 3}g}'):g}" for value in ends)
-    return number(middle) if low == high else f"{number(middle)}\n{low}…{high}"
+    if low == high:
+        return number(middle)
+    return f"{number(middle)}\n{low}…{high}"
 
 
 def _to_error(value: float, error: float) -> str:
-    """Return a value to the second digit of its standard error, with four digits or more: "3.19981" for 2.1e-4."""
-    digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2 if value and error else 4
+    """Return a value to the second digit of its standard error, with four digits or more: "3.19981"
+    for 2.1e-4.
+    """
+    if value and error:
+        digits = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+    else:
+        digits = 4
     return f"{value:#.{min(max(digits, 4), 12)}g}"
 
 
 def identified(result: Identified, names: Sequence[str]) -> list[Table]:
-    """Return a table of the quantities found, with standard errors and values before, and one of each record's fit.
+    """Return a table of the quantities found, with standard errors and values before, and one of
+    each record's fit.
 
     Of three records or more, median and worst fit are added; a fall is the worst.
     """
     values = titled(
-        result.rig.label, "quantity", *(Column(head, justify="right") for head in ("value", "±", "before")), ""
+        result.rig.label,
+        "quantity",
+        *(Column(head, justify="right") for head in ("value", "±", "before")),
+        "",
     )
     for name, value in result.values.items():
         quantity = result.rig.quantities[name]
         before = number(result.before.values[name])
         error = result.errors[name]
-        values.add_row(name, _to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim"))
+        values.add_row(
+            name, _to_error(value, error), f"{error:.2g}", before, Text(quantity.unit, "dim")
+        )
     heads = [Column(head, justify="right") for head in result.fits[0]]
     fits = titled("fit, % (before)", "record", *heads)
     for name, fit, before in zip(names, result.fits, result.fits_before, strict=True):
         fits.add_row(name, *(f"{value:.1f} ({before[key]:.1f})" for key, value in fit.items()))
     parts = result.fits, result.fits_before
     for word, chosen in (("median", median_low), ("worst", min)) if len(names) > 2 else ():
-        columns = (tuple(chosen(fit[key] for fit in part) for part in parts) for key in result.fits[0])
+        columns = (
+            tuple(chosen(fit[key] for fit in part) for part in parts) for key in result.fits[0]
+        )
         fits.add_row(word, *(f"{after:.1f} ({before:.1f})" for after, before in columns))
     return [values, fits]

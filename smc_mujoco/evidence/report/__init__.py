@@ -1,10 +1,11 @@
-"""A study as one HTML file: which controller, where, how sure, and which of the paper's claims hold.
+"""A study as one HTML file: which controller, where, how sure, and which of the paper's claims
+hold.
 
     from smc_mujoco.evidence.report import report
     report("report", quick=True)                   # report/report.html, which needs no other file and no network
 
-The folder also keeps the data: study/results.parquet, claims, margins and region maps as JSON, films as WebM. A second
-call computes only what is missing.
+The folder also keeps the data: study/results.parquet, claims, margins and region maps as JSON,
+films as WebM. A second call computes only what is missing.
 """
 
 import dataclasses
@@ -41,13 +42,16 @@ def report(
       threads: simulations at once; None for one per available core.
       progress: whether to show a bar for each stage.
       plan: how much of everything, instead of `quick`.
-      records: a folder with records of rigs, CSV or npz files, which their twins repeat; see docs/rigs.md.
-      laws: names of further laws, beside those of the plan; each needs tuned gains on every plant of the plan.
-      relevant: the least relevant difference, as a share of the larger value, see `leaderboard`; by default 0.03.
+      records: a folder with records of rigs, CSV or npz files, which their twins repeat; see
+        docs/rigs.md.
+      laws: names of further laws, beside those of the plan; each needs tuned gains on every plant
+        of the plan.
+      relevant: the least relevant difference, as a share of the larger value, see `leaderboard`; by
+        default 0.03.
 
     Raises:
-      ScenarioError: an impossible number of seeds or threads, a folder that cannot be written, records of no known
-        rig, or a further law that is unknown or has no tuned gains.
+      ScenarioError: an impossible number of seeds or threads, a folder that cannot be written,
+        records of no known rig, or a further law that is unknown or has no tuned gains.
       MissingPackageError: jinja2 is not installed.
     """
     from smc_mujoco.common import extras
@@ -65,9 +69,15 @@ def report(
     if relevant is not None:
         plan = dataclasses.replace(plan, relevant=relevant)
     if laws:
-        plan = dataclasses.replace(plan, laws=tuple(dict.fromkeys((*plan.laws, *items_of("laws", laws)))))
+        plan = dataclasses.replace(
+            plan, laws=tuple(dict.fromkeys((*plan.laws, *items_of("laws", laws))))
+        )
     folder = Path(out)
-    html = page.page(stages.find(plan, folder, threads, Bars(progress), None if records is None else Path(records)))
+    html = page.page(
+        stages.find(
+            plan, folder, threads, Bars(progress), None if records is None else Path(records)
+        )
+    )
     with replacing(folder / "report.html") as part:
         part.write_text(html, encoding="utf-8")
     return folder / "report.html"

@@ -1,4 +1,6 @@
-"""How a report was computed, in words: the grid, the conditions, the gains with their provenance, the versions."""
+"""How a report was computed, in words: the grid, the conditions, the gains with their provenance,
+the versions.
+"""
 
 import contextlib
 import dataclasses
@@ -20,7 +22,10 @@ from smc_mujoco.mechanisms.plant import catalogue as plants
 from smc_mujoco.simulation.conditions import find_condition
 from smc_mujoco.studies.table import Table
 
-SHOWN_PACKAGES = ("pyarrow", "scipy")  # packages whose versions are shown beside those that each run records
+SHOWN_PACKAGES = (
+    "pyarrow",
+    "scipy",
+)  # packages whose versions are shown beside those that each run records
 
 
 class Gains(NamedTuple):
@@ -57,16 +62,27 @@ class About:
         texts, duration = {}, self.plan.duration
         for name in self.plan.conditions:
             known = find_condition(name)
-            fields = {words.plant(p): known.brief(plants()[p], duration) or "nothing" for p in self.plan.plants}
+            fields = {}
+            for p in self.plan.plants:
+                fields[words.plant(p)] = known.brief(plants()[p], duration) or "nothing"
             same = len(set(fields.values())) == 1
-            texts[name] = next(iter(fields.values())) if same else "; ".join(f"{p}: {t}" for p, t in fields.items())
+            if same:
+                texts[name] = next(iter(fields.values()))
+            else:
+                texts[name] = "; ".join(f"{p}: {t}" for p, t in fields.items())
         return texts
 
     @functools.cached_property
     def gains(self) -> list[Gains]:
         """The gains of every set, with where they are from."""
         return [
-            Gains(name, plant, law, ", ".join(f"{k} {v:g}" for k, v in its.gains.items()), _source(plant, law, name))
+            Gains(
+                name,
+                plant,
+                law,
+                ", ".join(f"{k} {v:g}" for k, v in its.gains.items()),
+                _source(plant, law, name),
+            )
             for name in sets.SETS
             for plant, laws in laws_of(self.plan, name).items()
             for law, its in laws.items()
@@ -81,7 +97,8 @@ def about(plan: Plan, table: Table, spent: Mapping[str, float], no_film: str | N
         failed=sum(failure is not None for failure in table.column("failure")),
         seeds=len(set(table.column("seed").tolist())),
         sources=in_words(paired_runs.sources(table)),
-        versions=json.loads(table.column("versions")[0]) | {name: version(name) for name in SHOWN_PACKAGES},
+        versions=json.loads(table.column("versions")[0])
+        | {name: version(name) for name in SHOWN_PACKAGES},
         spent=dict(spent),
         no_film=no_film,
     )
@@ -101,5 +118,8 @@ def _source(plant: str, law: str, name: str) -> str:
     if name not in sets.OBJECTIVES:
         return "chosen by hand before any comparison"
     its = sets.tuned(plant, law, name)
-    bounds = f"; at a bound: {', '.join(its.at_bound)}" if its.at_bound else ""
+    if its.at_bound:
+        bounds = f"; at a bound: {', '.join(its.at_bound)}"
+    else:
+        bounds = ""
     return f"shipped ({its.search}); least objective {its.objective:.4g} s²{bounds}"

@@ -1,4 +1,5 @@
-"""The report's answer in sentences: which law leads where, where no winner is known, where the paper's law loses.
+"""The report's answer in sentences: which law leads where, where no winner is known, where the
+paper's law loses.
 
 Everything here is counted from `Findings.scores`.
 """
@@ -22,7 +23,9 @@ from smc_mujoco.studies.worst_case import WorstCase, WorstCases
 if TYPE_CHECKING:
     from smc_mujoco.evidence.report.stages import Findings
 
-Cells = dict[tuple[str, str, str], list[Score]]  # (plant, condition, metric) -> a score for each law
+Cells = dict[
+    tuple[str, str, str], list[Score]
+]  # (plant, condition, metric) -> a score for each law
 
 
 class Pick(NamedTuple):
@@ -31,10 +34,14 @@ class Pick(NamedTuple):
     law: str  # "" where no law is beaten
     median: float  # of the conditions' medians
     wins: int  # conditions
-    losses: int  # conditions in which another law is better, it has runs that fail, or samples are too few to tell
+    # conditions in which another law is better, it has runs that fail, or samples are too few to
+    # tell
+    losses: int
     conditions: int
     others: tuple[str, ...]  # the other laws that lose no more of them
-    level: bool = False  # whether all laws are level, which more than that none is beaten, in every condition
+    level: bool = (
+        False  # whether all laws are level, which more than that none is beaten, in every condition
+    )
 
     @property
     def sure(self) -> str:
@@ -45,7 +52,9 @@ class Pick(NamedTuple):
         if self.wins == self.conditions:
             return "wins" + f" in {every(self.conditions)}" * (self.conditions > 1)
         unbeaten = f"unbeaten in {self.conditions - self.losses or 'none'} of {self.conditions}"
-        return f"{unbeaten}, wins in {self.wins}" if self.wins else unbeaten
+        if self.wins:
+            return f"{unbeaten}, wins in {self.wins}"
+        return unbeaten
 
 
 class Loss(NamedTuple):
@@ -57,10 +66,12 @@ class Loss(NamedTuple):
     median: float  # of the paper's law
     rival: float  # median of the best law
     law: str  # the best one
-    # Ratio of the medians; where the rival's is below the least difference that counts, the ratio to that difference.
+    # Ratio of the medians; where the rival's is below the least difference that counts, the ratio
+    # to that difference.
     times: float
     rounded: bool  # whether the rival's is below it, so that `times` is a lower bound
-    settles: bool  # whether the best law settles there: a law that hardly acts may be calm, and never arrive
+    # whether the best law settles there: a law that hardly acts may be calm, and never arrive
+    settles: bool
 
 
 def cells(scores: Sequence[Score]) -> Cells:
@@ -74,7 +85,9 @@ def cells(scores: Sequence[Score]) -> Cells:
 def leaders(by_cell: Cells, plant: str, condition: str, metric: str) -> list[str]:
     """Return the laws that are best, or level with the best; none where no law has a finite median."""
     best = [s for s in by_cell.get((plant, condition, metric), ()) if s.best]
-    return [s.law for s in best] if any(math.isfinite(s.median) for s in best) else []
+    if any(math.isfinite(s.median) for s in best):
+        return [s.law for s in best]
+    return []
 
 
 def nobody(by_cell: Cells, plant: str, condition: str, metric: str) -> str:
@@ -86,12 +99,19 @@ def nobody(by_cell: Cells, plant: str, condition: str, metric: str) -> str:
 
 def settles(by_cell: Cells, plant: str, condition: str, law: str) -> bool:
     """Return whether a law settles in the median of a cell; True where that was not measured."""
-    return all(s.median < math.inf for s in by_cell.get((plant, condition, "settling_time"), ()) if s.law == law)
+    return all(
+        s.median < math.inf
+        for s in by_cell.get((plant, condition, "settling_time"), ())
+        if s.law == law
+    )
 
 
 def undecided(by_cell: Cells, metrics: Sequence[str]) -> tuple[int, int]:
     """Return how many comparisons have no winner, and how many comparisons there are."""
-    won = [any(score.wins for score in scores) for key, scores in by_cell.items() if key[2] in metrics]
+    won = []
+    for key, scores in by_cell.items():
+        if key[2] in metrics:
+            won.append(any(score.wins for score in scores))
     return won.count(False), len(won)
 
 
@@ -107,19 +127,35 @@ def losses(by_cell: Cells, metrics: Sequence[str]) -> list[Loss]:
             least = max(best.median, best.floor)
             times, rounded = score.median / least if least else math.inf, best.median < best.floor
             arrives = settles(by_cell, plant, condition, best.law)
-            lost.append(Loss(metric, plant, condition, score.median, best.median, best.law, times, rounded, arrives))
+            lost.append(
+                Loss(
+                    metric,
+                    plant,
+                    condition,
+                    score.median,
+                    best.median,
+                    best.law,
+                    times,
+                    rounded,
+                    arrives,
+                )
+            )
     return sorted(lost, key=lambda loss: -loss.times)
 
 
 def pick(findings: "Findings", metric: str, plant: str) -> Pick | None:
     """Return the law that is unbeaten in the most conditions.
 
-    Of several such laws it is the one with the fewest runs that fail, then by mean rank. If no law is beaten anywhere,
-    none is named. Laws that settle in less than half as many runs as the law that settles in the most are left out: a
-    law that does nothing is calm. None for a metric without numbers.
+    Of several such laws it is the one with the fewest runs that fail, then by mean rank. If no law
+    is beaten anywhere, none is named. Laws that settle in less than half as many runs as the law
+    that settles in the most are left out: a law that does nothing is calm. None for a metric
+    without numbers.
     """
     boards = {board.metric: board for board in findings.boards if board.group["plant"] == plant}
-    settled = {entry.law: entry.interval.median for entry in boards[SETTLES].entries} if SETTLES in boards else {}
+    if SETTLES in boards:
+        settled = {entry.law: entry.interval.median for entry in boards[SETTLES].entries}
+    else:
+        settled = {}
     enough = MIN_SETTLED * max(settled.values(), default=0.0)
     if (board := boards.get(metric)) is None:
         return None
@@ -127,25 +163,44 @@ def pick(findings: "Findings", metric: str, plant: str) -> Pick | None:
     wins = {law: len(board.wins(law)) for law in entries}
     losses = {law: sum(law not in block.best for block in board.blocks) for law in entries}
     best = min(entries, key=lambda law: (losses[law], entries[law].failed, entries[law].rank.mean))
-    others = [law for law in sorted(entries, key=lambda law: entries[law].rank.mean) if losses[law] == losses[best]]
+    others = [
+        law
+        for law in sorted(entries, key=lambda law: entries[law].rank.mean)
+        if losses[law] == losses[best]
+    ]
     conditions = len(board.blocks)
     if len(entries) > 1 and not any((*wins.values(), *losses.values())):
-        return Pick("", math.nan, 0, 0, conditions, tuple(others), all(block.level for block in board.blocks))
+        return Pick(
+            "",
+            math.nan,
+            0,
+            0,
+            conditions,
+            tuple(others),
+            all(block.level for block in board.blocks),
+        )
     others.remove(best)
-    return Pick(best, entries[best].interval.median, wins[best], losses[best], conditions, tuple(others))
+    return Pick(
+        best, entries[best].interval.median, wins[best], losses[best], conditions, tuple(others)
+    )
 
 
 def attacked(findings: "Findings") -> dict[str, WorstCases]:
     """Return plant -> the worst cases found there, the least bad law first."""
     plants = dict.fromkeys(case.nominal.plant.name for case in findings.worst)
-    return {plant: WorstCases(case for case in findings.worst if case.nominal.plant.name == plant) for plant in plants}
+    return {
+        plant: WorstCases(case for case in findings.worst if case.nominal.plant.name == plant)
+        for plant in plants
+    }
 
 
 # sentences
 
 
 def robust(attacked: Mapping[str, WorstCases]) -> str:
-    """Return which law has the smallest worst-case error on each plant, and which has the smallest median if others."""
+    """Return which law has the smallest worst-case error on each plant, and which has the smallest
+    median if others.
+    """
     first = [rows[0] for rows in attacked.values()]
     lowest = [min(rows, key=lambda case: case.median) for rows in attacked.values()]
     others = [case for case in lowest if case not in first]
@@ -163,18 +218,32 @@ def _both(case: WorstCase) -> str:
 def verdict(findings: "Findings", metrics: Sequence[str]) -> str:
     """Return the paper's verdict in one line: how its law does, and how many of its claims hold."""
     own = [s for s in findings.scores if s.law == words.PAPER_LAW and s.metric in metrics]
-    lost, wins, parts = len(losses(cells(findings.scores), metrics)), sum(s.wins for s in own) or "none", []
+    lost, wins, parts = (
+        len(losses(cells(findings.scores), metrics)),
+        sum(s.wins for s in own) or "none",
+        [],
+    )
     if own:
         unclear = sum(not s.best and not s.beaten for s in own)
         also = f", and has too few samples to tell in {unclear}" * bool(unclear)
-        parts.append(f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}{also}")
+        parts.append(
+            f"its observer-free law is beaten in {lost} of {len(own)} comparisons and wins in {wins}{also}"
+        )
     if counts := totals(findings.claims):
         verdicts = joined(f"{n} {'are' if n != 1 else 'is'} {said}" for said, n in counts.items())
-        sets = {name for claim in findings.claims for name in claim.verdicts}
-        gains = "one set of gains" if len(sets) == 1 else f"{len(sets)} sets of gains"
+        sets = set()
+        for claim in findings.claims:
+            for name in claim.verdicts:
+                sets.add(name)
+        if len(sets) == 1:
+            gains = "one set of gains"
+        else:
+            gains = f"{len(sets)} sets of gains"
         less = f" audited quickly under {gains}," * findings.about.plan.quick
         parts.append(f"of its {sum(counts.values())} checked claims,{less} {verdicts}")
-    return f"The paper: {'; '.join(parts)}." if parts else ""
+    if parts:
+        return f"The paper: {'; '.join(parts)}."
+    return ""
 
 
 def first(findings: "Findings", metrics: Sequence[str]) -> str:
@@ -198,7 +267,8 @@ def families(leads: Sequence[Lead]) -> str:
     """Return in how many cells each family of laws is first."""
     counts = counted(leads)
     shares = [
-        f"{words.FAMILY[name]} in {counts[name] or 'none'}" for name in sorted(FAMILIES, key=lambda f: -counts[f])
+        f"{words.FAMILY[name]} in {counts[name] or 'none'}"
+        for name in sorted(FAMILIES, key=lambda f: -counts[f])
     ]
     where = f"First in {words.metric(METRIC)}, in {len(leads)} plants and conditions"
     return f"{where}: {joined(shares)}; in {counts[''] or 'none'} it is open."
@@ -209,11 +279,15 @@ def sure(findings: "Findings", metrics: Sequence[str]) -> str:
     open, of = undecided(cells(findings.scores), metrics)
     compared = len({(s.plant, s.condition) for s in findings.scores})
     repeated = len({(s.plant, s.condition) for s in findings.scores if s.runs < s.seeds})
-    samples = list(dict.fromkeys(s.sample for s in findings.scores if s.runs == s.seeds)) or ["distinct runs only"]
+    samples = list(dict.fromkeys(s.sample for s in findings.scores if s.runs == s.seeds)) or [
+        "distinct runs only"
+    ]
     text = f"In {open} of {of} comparisons no single winner can be declared; each has {samples[0]}, and the tests of a "
     text += f"metric are corrected for all {compared} cells."
-    return text + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once." * bool(
-        repeated
+    return (
+        text
+        + f" In {repeated} of the cells seeds change nothing, or not each: equal runs count once."
+        * bool(repeated)
     )
 
 

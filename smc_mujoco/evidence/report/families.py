@@ -1,7 +1,9 @@
-"""Sliding mode against its rivals: which family of laws is first, by how much, and how sure that is.
+"""Sliding mode against its rivals: which family of laws is first, by how much, and how sure that
+is.
 
-In each family the law is chosen by half of the runs and scored in the other half, and the reverse, so the larger family
-has no advantage. A lead is the ratio of two families' scores, run by run; runs that share a set of gains count once.
+In each family the law is chosen by half of the runs and scored in the other half, and the reverse,
+so the larger family has no advantage. A lead is the ratio of two families' scores, run by run; runs
+that share a set of gains count once.
 """
 
 import math
@@ -18,10 +20,19 @@ if TYPE_CHECKING:
 
 FAMILIES = {
     "switching": (
-        *("classical", "adaptive", "super_twisting", "conditioned_super_twisting", "implicit_first_order"),
+        *(
+            "classical",
+            "adaptive",
+            "super_twisting",
+            "conditioned_super_twisting",
+            "implicit_first_order",
+        ),
         *("twisting", "terminal"),
     ),
-    "smoothed": ("observer_free", "boundary_layer"),  # the same surface, and a steep slope in place of the sign
+    "smoothed": (
+        "observer_free",
+        "boundary_layer",
+    ),  # the same surface, and a steep slope in place of the sign
     "rivals": ("pid", "extended_state", "adrc", "pd_observer", "lqi", "mpc", "loop_shaping"),
 }
 METRIC, ERROR = "itae", 0.025  # of the map; beyond each end of an interval
@@ -46,7 +57,8 @@ class Lead(NamedTuple):
 
 
 def told(values: np.ndarray) -> tuple[np.ndarray, list[int]]:
-    """Return a family's score in each run, of the law that the other half of the runs chose, and both laws.
+    """Return a family's score in each run, of the law that the other half of the runs chose, and
+    both laws.
 
     `values`: (laws, runs).
     """
@@ -63,12 +75,18 @@ def lead(
     floor: float,
     families: Mapping[str, Sequence[str]] = FAMILIES,
 ) -> Lead | None:
-    """Return the lead in a cell; None with fewer than two families, or two runs. Scores: law -> (runs,)."""
+    """Return the lead in a cell; None with fewer than two families, or two runs.
+
+    Scores: law -> (runs,).
+    """
     members = {family: [law for law in laws if law in scores] for family, laws in families.items()}
     members = {family: laws for family, laws in members.items() if laws}
     if len(members) < 2 or len(next(iter(scores.values()))) < 2:
         return None
-    by_family = {family: told(np.maximum([scores[law] for law in laws], floor)) for family, laws in members.items()}
+    by_family = {
+        family: told(np.maximum([scores[law] for law in laws], floor))
+        for family, laws in members.items()
+    }
     first, second = sorted(by_family, key=lambda family: float(np.median(by_family[family][0])))[:2]
     with np.errstate(invalid="ignore"):
         ratios = np.log(by_family[second][0]) - np.log(by_family[first][0])  # NaN where both fail
@@ -80,8 +98,12 @@ def lead(
     return Lead("", "", first, second, times, low, high, laws)
 
 
-def leads(table: "Table", metric: str = METRIC, families: Mapping[str, Sequence[str]] = FAMILIES) -> tuple[Lead, ...]:
-    """Return the lead in every cell of a study's table that has one; families: name -> names of laws."""
+def leads(
+    table: "Table", metric: str = METRIC, families: Mapping[str, Sequence[str]] = FAMILIES
+) -> tuple[Lead, ...]:
+    """Return the lead in every cell of a study's table that has one; families: name -> names of
+    laws.
+    """
     found, by_row = [], paired_runs.by_row(table, metric)
     for group in paired_runs.groups(table, by=("plant", "condition")):
         ((plant, condition),) = group.blocks
@@ -89,7 +111,9 @@ def leads(table: "Table", metric: str = METRIC, families: Mapping[str, Sequence[
         if not (its := group.scores(by_row)).values:
             continue
         there = ~np.isnan(np.array([row[0] for row in its.values.values()])).any(axis=0)
-        values, sets = ({law: row[0][there] for law, row in of.items()} for of in (its.values, its.sets))
+        values, sets = (
+            {law: row[0][there] for law, row in of.items()} for of in (its.values, its.sets)
+        )
         if one := lead(values, sets, paired_runs.floor(ran, metric), families):
             found.append(one._replace(plant=plant, condition=condition))
     return tuple(found)

@@ -53,14 +53,20 @@ def picture(draw: Callable[[Path], object]) -> bytes:
 
 
 def medians(table: "Table", condition: str) -> bytes:
-    """Draw each law's median in one condition, with its interval: a row of panels per plant, a column per metric."""
+    """Draw each law's median in one condition, with its interval: a row of panels per plant, a
+    column per metric.
+    """
     title, some = f"Medians, {words.condition(condition)}", table.select(condition=condition)
     plants, laws = (len(set(some.column(name).tolist())) for name in ("plant", "law"))
     size = WIDTH, 1.1 + plants * (0.7 + dot_plot.LINE_HEIGHT * (laws + 1))
-    return picture(lambda path: dot_plot.plot(some, path, words.MAIN_METRICS, title, size, format="svg"))
+    return picture(
+        lambda path: dot_plot.plot(some, path, words.MAIN_METRICS, title, size, format="svg")
+    )
 
 
 def curves(traces: Sequence[Trace], title: str) -> bytes:
     """Draw x and u of every law over time."""
     size = WIDTH, 5.6
-    return picture(lambda path: figure(traces, path, title=title, panels=("x", "u"), size=size, format="svg"))
+    return picture(
+        lambda path: figure(traces, path, title=title, panels=("x", "u"), size=size, format="svg")
+    )

@@ -44,7 +44,9 @@ class Flight:
     """Laws of flight compared over conditions."""
 
     board: Board  # of the ultimate bound, whose blocks are the conditions
-    worst: Mapping[tuple[str, str], float]  # condition and law -> the largest of its runs, m; inf for one that fails
+    worst: Mapping[
+        tuple[str, str], float
+    ]  # condition and law -> the largest of its runs, m; inf for one that fails
     medians: bytes  # SVG
     gains: str  # "tuned" or "default"
 
@@ -54,10 +56,14 @@ class Flight:
         return sorted(entry.law for entry in self.board.entries)
 
     def sentence(self) -> str:
-        """Return who is unbeaten how often, in the median, and whose worst run is the smallest how often."""
+        """Return who is unbeaten how often, in the median, and whose worst run is the smallest how
+        often.
+        """
         count, blocks = len(self.board.blocks), self.board.blocks
         unbeaten = [law for law in self.laws for block in blocks if law in block.best]
-        least = [min(self.laws, key=lambda law: self.worst[block.condition, law]) for block in blocks]
+        least = [
+            min(self.laws, key=lambda law: self.worst[block.condition, law]) for block in blocks
+        ]
         told, calm = (
             ", ".join(f"{words.law(law)} in {n}" for law, n in Counter(sorted(laws)).most_common())
             for laws in (unbeaten, least)
@@ -67,20 +73,36 @@ class Flight:
 
 def condition(name: str) -> Condition:
     """Return a condition of flight by its name."""
-    return Condition(name, CONDITIONS[name]) if name in CONDITIONS else find_condition(name)
+    if name in CONDITIONS:
+        return Condition(name, CONDITIONS[name])
+    return find_condition(name)
 
 
 def flight(work: Work) -> Flight:
-    """Return the comparison of all laws of flight, with tuned gains where all have some, else with default ones."""
+    """Return the comparison of all laws of flight, with tuned gains where all have some, else with
+    default ones.
+    """
     plan, drone = work.plan, plant(PLANT)
-    names, conditions = [name for name in laws(drone) if name != "none"], plan.flights or ("nominal", *CONDITIONS)
-    gains = GAINS if all(gain_sets.in_set(drone, name, GAINS) for name in names) else "default"
-    runs = grid(drone, names, [condition(name) for name in conditions], plan.flight_seeds, gains, DURATION)
+    names, conditions = (
+        [name for name in laws(drone) if name != "none"],
+        plan.flights or ("nominal", *CONDITIONS),
+    )
+    if all(gain_sets.in_set(drone, name, GAINS) for name in names):
+        gains = GAINS
+    else:
+        gains = "default"
+    runs = grid(
+        drone, names, [condition(name) for name in conditions], plan.flight_seeds, gains, DURATION
+    )
     with work.bars.stage("flight", f"{len(runs)} runs", bar=False):
         table = study(runs, work.folder / "flight", threads=work.threads, progress=work.bars.shown)
     (board,) = leaderboard(table, (METRIC,), relevant=plan.relevant)
     size = WIDTH, 1.3 + dot_plot.LINE_HEIGHT * (len(names) + 1) * len(conditions)
-    drawn = picture(lambda path: dot_plot.plot(table, path, (METRIC, "tv_rate"), "Flight: medians", size, format="svg"))
+    drawn = picture(
+        lambda path: dot_plot.plot(
+            table, path, (METRIC, "tv_rate"), "Flight: medians", size, format="svg"
+        )
+    )
     return Flight(board=board, worst=worst(table), medians=drawn, gains=gains)
 
 

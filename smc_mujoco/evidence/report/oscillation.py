@@ -1,4 +1,6 @@
-"""Chattering in a report: predicted by harmonic balance behind a lagging actuator, and measured in runs."""
+"""Chattering in a report: predicted by harmonic balance behind a lagging actuator, and measured in
+runs.
+"""
 
 import dataclasses
 import math
@@ -16,7 +18,12 @@ from smc_mujoco.simulation.run import run
 
 LAG = 0.01  # s, of the actuator
 DURATION = 8.0  # s, of the runs
-PREDICTED = ("amplitude", "frequency", "third_harmonic", "uncertainty")  # fields of a `Chattering` that are kept
+PREDICTED = (
+    "amplitude",
+    "frequency",
+    "third_harmonic",
+    "uncertainty",
+)  # fields of a `Chattering` that are kept
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -35,7 +42,9 @@ class Oscillation:
 
     @property
     def error(self) -> float:
-        """The error of the predicted amplitude in percent of the measured one; NaN where one of them is missing."""
+        """The error of the predicted amplitude in percent of the measured one; NaN where one of
+        them is missing.
+        """
         return 100.0 * (self.amplitude / self.measured_amplitude - 1.0)
 
 
@@ -54,9 +63,20 @@ def oscillations(work: Work) -> tuple[Oscillation, ...]:
     return tuple(row for rows in by_plant for row in rows)
 
 
-def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) -> list[Oscillation]:
-    """Return the limit cycles on a plant. Laws whose chattering cannot be predicted are left out."""
-    rows, cases = [], [case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)}) for law in laws]
+def _on(
+    plant: str, laws: tuple[str, ...], threads: int | None, report: Report
+) -> list[Oscillation]:
+    """Return the limit cycles on a plant.
+
+    Laws whose chattering cannot be predicted are left out.
+    """
+    rows, cases = (
+        [],
+        [
+            case(plant, law, "nominal", DURATION, GAINS, changes={"actuator": Lag(LAG)})
+            for law in laws
+        ],
+    )
     traces = run(cases, threads)
     changes = step_halving(traces, 0, threads)
     for done, (scenario, trace, change) in enumerate(zip(cases, traces, changes, strict=True)):
@@ -65,15 +85,24 @@ def _on(plant: str, laws: tuple[str, ...], threads: int | None, report: Report) 
             cycle = chattering(scenario)
         except ScenarioError:
             continue
-        amplitude, frequency = NO_CYCLE if trace.diverged_at is not None else channel_cycle(trace)
+        if trace.diverged_at is not None:
+            amplitude, frequency = NO_CYCLE
+        else:
+            amplitude, frequency = channel_cycle(trace)
         predicted = {name: getattr(cycle, name) for name in PREDICTED}
-        measured = {"measured_amplitude": amplitude, "measured_frequency": frequency, "marked": change.marked}
+        measured = {
+            "measured_amplitude": amplitude,
+            "measured_frequency": frequency,
+            "marked": change.marked,
+        }
         rows.append(Oscillation(plant=plant, law=scenario.law.name, **predicted, **measured))
     return rows
 
 
 def sentence(rows: tuple[Oscillation, ...]) -> str:
-    """Return in a sentence how many limit cycles were predicted, how many were found, and how large the error is."""
+    """Return in a sentence how many limit cycles were predicted, how many were found, and how large
+    the error is.
+    """
     both = [row for row in rows if not math.isnan(row.error)]
     calm = sum(math.isnan(row.amplitude) and math.isnan(row.measured_amplitude) for row in rows)
     text = f"Of {len(rows)} pairs of plant and law {len(both)} are predicted to oscillate and do; {calm} do neither"

@@ -2,8 +2,8 @@
 
     page(findings)                 # the HTML, a str
 
-Each section is a template of its name. Text is escaped by jinja2. Charts are SVG in the page, films data URIs. A
-content security policy in the file forbids everything that is not in it.
+Each section is a template of its name. Text is escaped by jinja2. Charts are SVG in the page, films
+data URIs. A content security policy in the file forbids everything that is not in it.
 """
 
 import base64
@@ -34,11 +34,18 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).parent / "templates"
 SECTIONS = {
-    "overview": "The answer", "accuracy": "How accurate is it", "claims": "The paper’s claims",
-    "tradeoffs": "Error against effort", "margins": "Margins", "chattering": "How much will it chatter",
-    "regions": "Regions of attraction", "rigs": "On the rig", "flight": "In flight", "films": "Films and traces",
+    "overview": "The answer",
+    "accuracy": "How accurate is it",
+    "claims": "The paper’s claims",
+    "tradeoffs": "Error against effort",
+    "margins": "Margins",
+    "chattering": "How much will it chatter",
+    "regions": "Regions of attraction",
+    "rigs": "On the rig",
+    "flight": "In flight",
+    "films": "Films and traces",
     "method": "How it was computed",
-}  # fmt: skip
+}
 
 Row = TypeVar("Row", bound=Hashable)
 Column = TypeVar("Column", bound=Hashable)
@@ -65,18 +72,28 @@ def page(findings: Findings) -> str:
 
     made, share = environment(), findings.about.plan.relevant
     made.globals |= {
-        "f": findings, "about": findings.about,
-        "first_film": next((scene for scene in findings.scenes if scene.film), None), "gains_set": GAINS,
-        "infinity": math.inf, "answer": answer, "charts": charts, "rigs": rigs, "oscillation": oscillation,
+        "f": findings,
+        "about": findings.about,
+        "first_film": next((scene for scene in findings.scenes if scene.film), None),
+        "gains_set": GAINS,
+        "infinity": math.inf,
+        "answer": answer,
+        "charts": charts,
+        "rigs": rigs,
+        "oscillation": oscillation,
         "link": link,
-    }  # fmt: skip
+    }
     return made.get_template("page.jinja").render(
         css=Markup((TEMPLATES / "style.css").read_text(encoding="utf-8")),
         js=Markup((TEMPLATES / "page.js").read_text(encoding="utf-8")),
         sections=SECTIONS,
         # tables: what identifies a row -> column -> cell
         board=pivot(((s.plant, s.condition, s.law), s.metric, s) for s in findings.scores),
-        set_margins=pivot(((m.kind, m.plant, m.law), name, m) for name, some in findings.by_set.items() for m in some),
+        set_margins=pivot(
+            ((m.kind, m.plant, m.law), name, m)
+            for name, some in findings.by_set.items()
+            for m in some
+        ),
         gains=pivot(((row.plant, row.law), row.set, row) for row in findings.about.gains),
         twins=twin_figures.summaries(twin_figures.rows()),
         # how it was computed
@@ -88,7 +105,10 @@ def page(findings: Findings) -> str:
         step_change=APART,
         nudged=NUDGED,
         relevance=relevance(share, ((s.metric, s.floor) for s in findings.scores)),
-        metrics={metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n") for metric in metrics()},
+        metrics={
+            metric.name: (inspect.getdoc(metric.formula) or "").split("\n\n")
+            for metric in metrics()
+        },
     )
 
 
@@ -103,22 +123,34 @@ def pivot(cells: Iterable[tuple[Row, Column, Cell]]) -> dict[Row, dict[Column, C
 def checks(sets: Sequence[str], claim: Claim) -> list[SimpleNamespace]:
     """Return a row for each check of a claim, those that fail first.
 
-    Each has what is measured, set of gains -> Check, and its limit in words, "" where the sets have several limits.
+    Each has what is measured, set of gains -> Check, and its limit in words, "" where the sets have
+    several limits.
     """
     rows = []
-    its_checks = pivot((c.what, name, c) for name in sets if name in claim.numbers for c in claim.checks(name))
+    its_checks = pivot(
+        (c.what, name, c) for name in sets if name in claim.numbers for c in claim.checks(name)
+    )
     for what, by_set in its_checks.items():
-        limits = {f"{words.pretty(check.relation)} {words.number(check.limit)}" for check in by_set.values()}
-        rows.append(SimpleNamespace(what=what, checks=by_set, must=limits.pop() if len(limits) == 1 else ""))
+        limits = set()
+        for check in by_set.values():
+            limits.add(f"{words.pretty(check.relation)} {words.number(check.limit)}")
+        rows.append(
+            SimpleNamespace(what=what, checks=by_set, must=limits.pop() if len(limits) == 1 else "")
+        )
     return sorted(rows, key=lambda row: all(check.holds for check in row.checks.values()))
 
 
 def link(what: str) -> str:
     """Return the anchor of the metric that a check names, else that of "verdict"."""
-    names = {called: m.name for m in metrics() for called in (m.name, words.metric(m.name))}
+    names = {}
+    for m in metrics():
+        for called in (m.name, words.metric(m.name)):
+            names[called] = m.name
     known = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     match = re.search(rf"(?<!\w)({known})(?!\w)", what)
-    return f"metric-{names[match[1]]}" if match else "verdict"
+    if match:
+        return f"metric-{names[match[1]]}"
+    return "verdict"
 
 
 def uri(kind: str, data: bytes) -> str:

@@ -19,8 +19,11 @@ from smc_mujoco.evidence.report import words
 from smc_mujoco.evidence.report.page import TEMPLATES, environment, uri
 
 SECTIONS = {
-    "claims": "The claims", "checks": "How far from the thresholds", "gains": "Gains", "method": "How it was computed",
-}  # fmt: skip
+    "claims": "The claims",
+    "checks": "How far from the thresholds",
+    "gains": "Gains",
+    "method": "How it was computed",
+}
 
 
 def report(
@@ -30,7 +33,9 @@ def report(
     threads: int | None = None,
     progress: bool = False,
 ) -> Path:
-    """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and checks.svg beside it."""
+    """Audit a paper and write its report, out/report.html, with evidence.json, badge.svg and
+    checks.svg beside it.
+    """
     if why := extras.missing("report", "a report", "jinja2"):
         raise extras.MissingPackageError(why)
     folder = Path(out)

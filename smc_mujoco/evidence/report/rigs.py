@@ -1,4 +1,6 @@
-"""Rigs in a report: who wins on a real machine's parameter sets, and how well its twin repeats records of it."""
+"""Rigs in a report: who wins on a real machine's parameter sets, and how well its twin repeats
+records of it.
+"""
 
 import dataclasses
 import math
@@ -27,7 +29,9 @@ MAX_CURVE_POINTS = 1200  # of a curve; chosen
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Machine:
-    """Laws compared on every parameter set of a rig: a board for each metric, whose conditions are the sets."""
+    """Laws compared on every parameter set of a rig: a board for each metric, whose conditions are
+    the sets.
+    """
 
     rig: Rig
     boards: tuple[Board, ...]
@@ -67,8 +71,12 @@ class Repeated:
 
     rig: Rig
     name: str  # of the record's file
-    fits: Mapping[str, Mapping[str, float]] = frozen({})  # parameter set or "do nothing" -> column -> percent
-    t: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0))  # s, (K,), thinned to few points
+    fits: Mapping[str, Mapping[str, float]] = frozen(
+        {}
+    )  # parameter set or "do nothing" -> column -> percent
+    t: np.ndarray = dataclasses.field(
+        default_factory=lambda: np.empty(0)
+    )  # s, (K,), thinned to few points
     measured: records.Record = dataclasses.field(default_factory=dict)  # column -> values, (K,)
     twin: records.Record = dataclasses.field(default_factory=dict)
     why: str = ""  # why it could not be repeated
@@ -81,13 +89,22 @@ def machines(work: Work) -> tuple[Machine, ...]:
         twin = rig(name)
         runs = ensemble.runs(twin, seeds=plan.seeds, duration=plan.duration)
         with work.bars.stage("rigs", f"{len(runs)} runs", bar=False):
-            table = study(runs, work.folder / "rigs" / name, threads=work.threads, progress=work.bars.shown)
-        twins.append(Machine(rig=twin, boards=tuple(leaderboard(table, words.MAIN_METRICS, relevant=plan.relevant))))
+            table = study(
+                runs, work.folder / "rigs" / name, threads=work.threads, progress=work.bars.shown
+            )
+        twins.append(
+            Machine(
+                rig=twin,
+                boards=tuple(leaderboard(table, words.MAIN_METRICS, relevant=plan.relevant)),
+            )
+        )
     return tuple(twins)
 
 
 def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
-    """Return the records of a folder, each repeated by the twin of the machine whose columns it has."""
+    """Return the records of a folder, each repeated by the twin of the machine whose columns it
+    has.
+    """
     files = [] if folder is None else read(folder)
 
     def compute(file: tuple[Path, Rig, Mapping[str, np.ndarray]], report: Report) -> Repeated:
@@ -100,16 +117,27 @@ def repeated(work: Work, folder: Path | None) -> tuple[Repeated, ...]:
             return Repeated(rig=twin, name=path.name, why=str(error))
         fits["do nothing"] = twin.idle(record)
         step = -(-len(t) // MAX_CURVE_POINTS)
-        thin = [{name: values[::step] for name, values in columns.items()} for columns in (measured, predicted)]
-        return Repeated(rig=twin, name=path.name, fits=fits, t=t[::step], measured=thin[0], twin=thin[1])
+        thin = []
+        for columns in (measured, predicted):
+            thin.append({name: values[::step] for name, values in columns.items()})
+        return Repeated(
+            rig=twin, name=path.name, fits=fits, t=t[::step], measured=thin[0], twin=thin[1]
+        )
 
-    return tuple(work.each("records", "records", files, compute)) if files else ()
+    if files:
+        return tuple(work.each("records", "records", files, compute))
+    return ()
 
 
 def read(folder: Path) -> list[tuple[Path, Rig, Mapping[str, np.ndarray]]]:
-    """Return the records in a folder with their rigs: CSV and npz files that have all columns of a rig."""
+    """Return the records in a folder with their rigs:
+
+    CSV and npz files that have all columns of a rig.
+    """
     if not os.path.isdir(folder):
-        raise ScenarioError(f"no folder at {printable(str(folder))}: give one with records, CSV or npz files")
+        raise ScenarioError(
+            f"no folder at {printable(str(folder))}: give one with records, CSV or npz files"
+        )
     known = [twin for twin in map(rig, rigs()) if twin.free]
     files = []
     for path in sorted(file for file in folder.iterdir() if file.suffix in (".csv", ".npz")):
@@ -131,4 +159,7 @@ def fit(values: Mapping[str, float]) -> str:
     """Return a fit in words: "theta 94.1, u 86.7 %", or "falls at 8.4 s"."""
     if -math.inf in values.values():
         return str(next(value for value in values.values() if isinstance(value, Fall)))
-    return ", ".join(f"{name} {value:z.1f}" for name, value in values.items()) + f" {words.typeset('%')}"
+    return (
+        ", ".join(f"{name} {value:z.1f}" for name, value in values.items())
+        + f" {words.typeset('%')}"
+    )

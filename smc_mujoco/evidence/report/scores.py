@@ -24,7 +24,9 @@ class Score(NamedTuple):
     median: float
     low: float
     high: float
-    best: bool  # no other law is better there, and no run failed, see `ranking`; several laws may be
+    best: (
+        bool  # no other law is better there, and no run failed, see `ranking`; several laws may be
+    )
     beaten: bool  # another law is better, or runs failed; neither where samples are too few to tell
     wins: bool  # it is better than every other
     lead: str  # by how much it wins
@@ -33,15 +35,25 @@ class Score(NamedTuple):
     runs: int  # distinct ones
     sample: str  # its size in words
     floor: float  # see `paired_runs.floor`
-    by_step: tuple[float, float] | None = None  # medians at the physics step and at half of it, where they are apart
+    by_step: tuple[float, float] | None = (
+        None  # medians at the physics step and at half of it, where they are apart
+    )
 
 
 def scores(table: "Table", boards: Sequence[Board]) -> tuple[Score, ...]:
-    """Return a score for every law, cell and column of the leaderboard, in the table's order; boards: of each plant."""
+    """Return a score for every law, cell and column of the leaderboard, in the table's order;
+    boards: of each plant.
+    """
     columns = [table.column(name).tolist() for name in ("plant", "condition", "law", "failure")]
-    failed = Counter(tuple(cell) for *cell, failure in zip(*columns, strict=True) if failure is not None)
+    failed = Counter(
+        tuple(cell) for *cell, failure in zip(*columns, strict=True) if failure is not None
+    )
     order = list(dict.fromkeys(columns[2]))
-    blocks = {(block.plant, block.condition, board.metric): block for board in boards for block in board.blocks}
+    blocks = {
+        (block.plant, block.condition, board.metric): block
+        for board in boards
+        for block in board.blocks
+    }
     by_row = {metric: paired_runs.by_row(table, metric) for metric in words.TABLE_METRICS}
     rows = []
     for group in paired_runs.groups(table, by=("plant", "condition")):

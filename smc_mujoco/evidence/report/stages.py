@@ -1,9 +1,10 @@
-"""The stages of a report: records, grid, claims, margins, maps, rigs, flight, chattering, scenes, statistics.
+"""The stages of a report: records, grid, claims, margins, maps, rigs, flight, chattering, scenes,
+statistics.
 
     findings = find(QUICK, Path("report"), threads=2, bars=Bars(True))
 
-If it is killed and called again, the grid continues where it stopped. The other stages continue with the first plant,
-map, film or list of claims that is missing.
+If it is killed and called again, the grid continues where it stopped. The other stages continue
+with the first plant, map, film or list of claims that is missing.
 """
 
 import contextlib
@@ -30,7 +31,16 @@ from smc_mujoco.evidence.accuracy.accuracy import load as load_accuracy
 from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.verdict import Claim, Claims
 from smc_mujoco.evidence.papers.gaber import lyapunov, scenarios
-from smc_mujoco.evidence.report import about, families, films, flight, oscillation, rigs, scores, words
+from smc_mujoco.evidence.report import (
+    about,
+    families,
+    films,
+    flight,
+    oscillation,
+    rigs,
+    scores,
+    words,
+)
 from smc_mujoco.evidence.report.plan import GAINS, Bars, Plan, Report, Work
 from smc_mujoco.evidence.report.scores import Score
 from smc_mujoco.mechanisms.plant import plant as find_plant
@@ -49,7 +59,9 @@ FIELD_POINTS = 121  # of a map of V', along each axis
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Front:
-    """Gains of a law that none beats in both tracking (s^2) and variation (1/s), and those of the study (`chosen`)."""
+    """Gains of a law that none beats in both tracking (s^2) and variation (1/s), and those of the
+    study (`chosen`).
+    """
 
     plant: str
     law: str
@@ -92,7 +104,9 @@ class Findings:
     fronts: tuple[Front, ...]
     worst: tuple[WorstCase, ...]
     margins: tuple[Margin, ...]
-    by_set: Mapping[str, tuple[Margin, ...]]  # set of gains -> the margins that are searched under every set
+    by_set: Mapping[
+        str, tuple[Margin, ...]
+    ]  # set of gains -> the margins that are searched under every set
     oscillations: tuple[oscillation.Oscillation, ...]
     accuracies: AccuracyTable
     basins: tuple[Basin, ...]
@@ -121,10 +135,16 @@ class Findings:
         return self._names("condition")
 
 
-def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Path | None = None) -> Findings:
-    """Return everything that a report shows, computed or read from the folder; `records`: folder of rigs' records."""
+def find(
+    plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Path | None = None
+) -> Findings:
+    """Return everything that a report shows, computed or read from the folder; `records`: folder of
+    rigs' records.
+    """
     work = Work(plan=plan, folder=folder, threads=threads, bars=bars)
-    repeated = rigs.repeated(work, records)  # first, so that bad files are refused before anything is computed
+    repeated = rigs.repeated(
+        work, records
+    )  # first, so that bad files are refused before anything is computed
     table = grid(work)
     claims = judged_claims(work, table)
     worst, margins = worst_cases(work), all_margins(work)
@@ -133,7 +153,9 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
     oscillations, accurate = oscillation.oscillations(work), accuracies(work)
     no_film = video.missing() if plan.filmed else None
     with bars.stage("statistics"):
-        boards = leaderboard(table, (SETTLES, *words.TABLE_METRICS), by=("plant",), relevant=plan.relevant)
+        boards = leaderboard(
+            table, (SETTLES, *words.TABLE_METRICS), by=("plant",), relevant=plan.relevant
+        )
         return Findings(
             medians=films.medians(table, plan.conditions[0]),
             scores=scores.scores(table, boards),
@@ -152,7 +174,9 @@ def find(plan: Plan, folder: Path, threads: int | None, bars: Bars, records: Pat
             repeated=repeated,
             flight=flown,
             scenes=scenes,
-            about=about.about(plan, table, bars.spent, no_film and no_film.removeprefix("no film: ")),
+            about=about.about(
+                plan, table, bars.spent, no_film and no_film.removeprefix("no film: ")
+            ),
         )
 
 
@@ -162,7 +186,9 @@ def grid(work: Work) -> Table:
     runs = make_grid(plan.plants, plan.laws, plan.conditions, plan.seeds, GAINS, plan.duration)
     with work.bars.stage("grid", f"{len(runs)} runs", bar=False):
         options: dict[str, Any] = {"half_steps": True}
-        return study(runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, **options)
+        return study(
+            runs, work.folder / "study", threads=work.threads, progress=work.bars.shown, **options
+        )
 
 
 def judged_claims(work: Work, table: Table) -> Claims:
@@ -172,7 +198,15 @@ def judged_claims(work: Work, table: Table) -> Claims:
     with work.bars.stage("claims", "quick" * plan.quick) as bar:
         return cached(
             work.folder / "claims.json",
-            [plan.claims, plan.quick, plan.plants, plan.laws, plan.conditions, plan.seeds, plan.duration],
+            [
+                plan.claims,
+                plan.quick,
+                plan.plants,
+                plan.laws,
+                plan.conditions,
+                plan.seeds,
+                plan.duration,
+            ],
             lambda: audit(only=plan.claims, **options, table=table, report=bar.reached).claims,
             lambda claims, path: write_json(path, [dataclasses.asdict(claim) for claim in claims]),
             lambda path: Claims(Claim(**entry) for entry in read_json(path)),
@@ -186,9 +220,13 @@ def worst_cases(work: Work) -> tuple[WorstCase, ...]:
     def compute(pair: tuple[str, str], report: Report) -> WorstCase:
         plant, law = pair
         scenario = case(plant, law, "nominal", DURATION, GAINS)
-        return cached_worst_case(work.folder / f"worst-{plant}-{law}.json", scenario, None, plan.attacks, work.threads)
+        return cached_worst_case(
+            work.folder / f"worst-{plant}-{law}.json", scenario, None, plan.attacks, work.threads
+        )
 
-    return tuple(work.each("worst", "searches", list(itertools.product(plan.attacked, plan.laws)), compute))
+    return tuple(
+        work.each("worst", "searches", list(itertools.product(plan.attacked, plan.laws)), compute)
+    )
 
 
 def all_margins(work: Work) -> tuple[Margin, ...]:
@@ -199,7 +237,9 @@ def all_margins(work: Work) -> tuple[Margin, ...]:
 
 
 def margins_by_set(work: Work, margins: Sequence[Margin]) -> dict[str, tuple[Margin, ...]]:
-    """Return set of gains -> margins of the kinds that are compared, of the laws that the set has gains for."""
+    """Return set of gains -> margins of the kinds that are compared, of the laws that the set has
+    gains for.
+    """
     plan = work.plan
     if not plan.compared:
         return {}
@@ -220,7 +260,9 @@ def _margins(
         return margin_search.margins([plant], laws[plant], kinds, **options, report=report)
 
     plants, depends = [(plant,) for plant in laws], [laws, kinds, work.plan.quick, gains]
-    by_plant = work.kept(stage, "plants", plants, depends, search, margin_search.save, margin_search.load)
+    by_plant = work.kept(
+        stage, "plants", plants, depends, search, margin_search.save, margin_search.load
+    )
     return tuple(margin for margins in by_plant for margin in margins)
 
 
@@ -232,7 +274,10 @@ def all_basins(work: Work) -> tuple[Basin, ...]:
     def search(plant: str, law: str, report: Report) -> Basin:
         return regions.basin(plant, law, plan.points, **options, report=report)
 
-    pairs, depends = list(itertools.product(plan.basins, plan.basin_laws)), [plan.points, plan.region, GAINS]
+    pairs, depends = (
+        list(itertools.product(plan.basins, plan.basin_laws)),
+        [plan.points, plan.region, GAINS],
+    )
     return tuple(work.kept("regions", "maps", pairs, depends, search, Basin.save, regions.load))
 
 
@@ -242,10 +287,17 @@ def accuracies(work: Work) -> AccuracyTable:
     periods, starts = plan.periods, plan.accuracy_starts
 
     def measure(plant: str, condition: str, report: Report) -> AccuracyTable:
-        return accuracy(plan.laws, plant, periods, condition, starts, GAINS, threads=work.threads, report=report)
+        return accuracy(
+            plan.laws, plant, periods, condition, starts, GAINS, threads=work.threads, report=report
+        )
 
-    pairs, depends = list(itertools.product(plan.accurate, ACCURACY_CONDITIONS)), [plan.laws, periods, starts, GAINS]
-    tables = work.kept("accuracy", "tables", pairs, depends, measure, AccuracyTable.save, load_accuracy)
+    pairs, depends = (
+        list(itertools.product(plan.accurate, ACCURACY_CONDITIONS)),
+        [plan.laws, periods, starts, GAINS],
+    )
+    tables = work.kept(
+        "accuracy", "tables", pairs, depends, measure, AccuracyTable.save, load_accuracy
+    )
     return AccuracyTable(row for rows in tables for row in rows)
 
 
@@ -256,9 +308,19 @@ def all_scenes(work: Work) -> tuple[films.Scene, ...]:
     def compute(scene: tuple[str, str], report: Report) -> films.Scene:
         plant, condition = scene
         title = f"{words.plant(plant)}, {words.condition(condition)}"
-        runs = scenarios.comparison(plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS)
+        runs = scenarios.comparison(
+            plant, condition, plan.scene_laws, duration=plan.scene, gains=GAINS
+        )
         traces = run(list(runs.values()), work.threads)
-        film, its = None, {"plant": plant, "condition": condition, "laws": plan.scene_laws, "seconds": plan.scene}
+        film, its = (
+            None,
+            {
+                "plant": plant,
+                "condition": condition,
+                "laws": plan.scene_laws,
+                "seconds": plan.scene,
+            },
+        )
         if scene in plan.scenes[: plan.filmed] and video.missing() is None:
             film = cached(
                 work.folder / f"film-{plant}-{condition}.webm",
@@ -292,5 +354,13 @@ def fronts(plan: Plan) -> tuple[Front, ...]:
             with contextlib.suppress(ScenarioError):
                 tuned = sets.tuned(plant, law, GAINS)
                 tracking, variation = zip(*tuned.front, strict=True)
-                pairs.append(Front(plant=plant, law=law, tracking=tracking, variation=variation, chosen=tuned.first))
+                pairs.append(
+                    Front(
+                        plant=plant,
+                        law=law,
+                        tracking=tracking,
+                        variation=variation,
+                        chosen=tuned.first,
+                    )
+                )
     return tuple(pairs)

@@ -1,6 +1,7 @@
 """Names and numbers as a report writes them: laws, plants, conditions, metrics, kinds of margin.
 
-Colours and names are those of `draw.style`; numbers those of the terminal's tables, three significant digits.
+Colours and names are those of `draw.style`; numbers those of the terminal's tables, three
+significant digits.
 """
 
 import math
@@ -21,29 +22,56 @@ from smc_mujoco.metrics.catalogue import CATALOGUE
 PAPER_LAW = "observer_free"  # the law that the suite was built to test
 # What the overview compares; the tables' columns.
 MAIN_METRICS = ("settling_time", "itae", "ultimate_bound", "tv_rate")
-TABLE_METRICS = ("settling_time", "overshoot", "itae", "ultimate_bound", "steady_error", "max_u", "tv_rate")
+TABLE_METRICS = (
+    "settling_time",
+    "overshoot",
+    "itae",
+    "ultimate_bound",
+    "steady_error",
+    "max_u",
+    "tv_rate",
+)
 # Mathematical signs and proper names for the audit's ASCII.
-SIGNS = {"<=": "≤", ">=": "≥", "!=": "≠", "^2": "²", "alphadot": "α′", "alpha": "α", "lambda": "λ", "eps": "ε"}
+SIGNS = {
+    "<=": "≤",
+    ">=": "≥",
+    "!=": "≠",
+    "^2": "²",
+    "alphadot": "α′",
+    "alpha": "α",
+    "lambda": "λ",
+    "eps": "ε",
+}
 SIGNS |= {"Vdot": "V′", "xdot": "x′"}
 
 __all__ = ["MARKS", "law", "short", "style"]
-FAMILY = {"switching": "sliding mode that switches", "smoothed": "smoothed sliding mode", "rivals": "no sliding mode"}
+FAMILY = {
+    "switching": "sliding mode that switches",
+    "smoothed": "smoothed sliding mode",
+    "rivals": "no sliding mode",
+}
 
 
 def number(value: float) -> str:
     """Return three significant digits; "never" for inf, "none" for NaN."""
-    return "none" if math.isnan(value) else in_digits(value)
+    if math.isnan(value):
+        return "none"
+    return in_digits(value)
 
 
 def interval(median: float, low: float, high: float) -> str:
-    """Return the interval about a median, "" where it is unknown, or too narrow to be seen in three digits."""
+    """Return the interval about a median, "" where it is unknown, or too narrow to be seen in three
+    digits.
+    """
     if math.isnan(low) or math.isnan(high) or number(low) == number(median) == number(high):
         return ""
     return f"{number(low)} – {number(high)}"
 
 
 def colour(name: str) -> str:
-    """Return the colour of a law, different from those of the short list and of other packages' laws."""
+    """Return the colour of a law, different from those of the short list and of other packages'
+    laws.
+    """
     shown = list(dict.fromkeys([*gain_sets.COMPARED, *known_laws().added, name]))
     return style.law_colours(shown)[shown.index(name)]
 
@@ -60,12 +88,16 @@ def condition(name: str) -> str:
 
 def kind(name: str) -> str:
     """Return a kind of margin in words."""
-    return MARGIN_KINDS[name].label if name in MARGIN_KINDS else name.replace("_", " ")
+    if name in MARGIN_KINDS:
+        return MARGIN_KINDS[name].label
+    return name.replace("_", " ")
 
 
 def metric(name: str) -> str:
     """Return a metric's name in words."""
-    return CATALOGUE[name].label if name in CATALOGUE else name.replace("_", " ")
+    if name in CATALOGUE:
+        return CATALOGUE[name].label
+    return name.replace("_", " ")
 
 
 def asks(metric: str) -> str:
@@ -77,7 +109,10 @@ def unit(metric: str, plant: str | None = None) -> str:
     """Return a metric's unit on a plant; without a plant its different units, as "rad or m"."""
     if metric not in CATALOGUE:
         return ""
-    xs = [plants()[plant].unit] if plant and plant in plants() else ["rad", "m"]
+    if plant and plant in plants():
+        xs = [plants()[plant].unit]
+    else:
+        xs = ["rad", "m"]
     return either(CATALOGUE[metric].unit_for(x) for x in xs)
 
 
@@ -88,14 +123,25 @@ def either(units: Iterable[str]) -> str:
 
 def typeset(unit: str) -> str:
     """Return a unit with its dots and powers: "rad s^2" as "rad·s²"."""
-    return re.sub(r"\((\w+)\)²", r"\1²", unit.replace("^2", "²")).replace(" ", "·").replace("·of·", " of ")
+    return (
+        re.sub(r"\((\w+)\)²", r"\1²", unit.replace("^2", "²"))
+        .replace(" ", "·")
+        .replace("·of·", " of ")
+    )
 
 
 def pretty(text: str) -> str:
-    """Return a sentence of the audit, written in ASCII, with mathematical signs, proper names and no backquotes."""
+    """Return a sentence of the audit, written in ASCII, with mathematical signs, proper names and
+    no backquotes.
+    """
     text = text.replace("`", "")
-    signs = [rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s) for s in SIGNS]  # no eps within steps
+    # no eps within steps
+    signs = []
+    for s in SIGNS:
+        signs.append(rf"(?<![^\W\d_]){s}(?![^\W\d_])" if s.isalpha() else re.escape(s))
     text = re.sub("|".join(signs), lambda m: SIGNS[m[0]], text)
     names = {name: plant(name) for name in plants()} | {name: law(name).lower() for name in laws()}
-    known = "|".join(sorted((name for name in names if "_" in name or name in plants()), key=len, reverse=True))
+    known = "|".join(
+        sorted((name for name in names if "_" in name or name in plants()), key=len, reverse=True)
+    )
     return re.sub(rf"\b({known})\b(?!_)", lambda m: names[m[1]], text)

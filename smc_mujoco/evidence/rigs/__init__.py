@@ -1,1 +1,3 @@
-"""Rigs: real machines with published or identified numbers, their records, and identification from records."""
+"""Rigs: real machines with published or identified numbers, their records, and identification from
+records.
+"""

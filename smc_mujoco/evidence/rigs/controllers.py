@@ -1,4 +1,5 @@
-"""Controllers of real rigs, as laws, with which records of their closed loops are replayed, and laws beside them.
+"""Controllers of real rigs, as laws, with which records of their closed loops are replayed, and
+laws beside them.
 
 The controllers are not in the catalogue of laws, because the gains of each belong to one machine.
 """
@@ -20,13 +21,18 @@ KINDS = {  # of the catalogue's law for a rotary pendulum -> its gains in scene 
 
 
 def rotary(torque: float, surface: Mapping[str, float]) -> tuple[Law, ...]:
-    """Return the laws of scene furuta for a machine with `torque` N m per unit of u, on its own surface c1 .. c4.
+    """Return the laws of scene furuta for a machine with `torque` N m per unit of u, on its own
+    surface c1 .. c4.
 
-    The surface is that of least quadratic cost for its quantities, with the weights of `rotary_swing_up`.
+    The surface is that of least quadratic cost for its quantities, with the weights of
+    `rotary_swing_up`.
     """
     force, made = 1.0 / torque, []
     for name, gains in KINDS.items():
-        own = {**{key: value * force for key, value in gains.items()}, "k1": gains["k1"] * math.sqrt(force)}
+        own = {
+            **{key: value * force for key, value in gains.items()},
+            "k1": gains["k1"] * math.sqrt(force),
+        }
         law = rotary_swing_up(**own, w_max=0.03 * force, catch=0.05 * force, **surface)
         made.append(law.named(name).sourced(SHIPPED))
     return tuple(made)
@@ -34,21 +40,24 @@ def rotary(torque: float, surface: Mapping[str, float]) -> tuple[Law, ...]:
 
 @law_function(
     gains={
-        "kp": Gain(6.0, FORCE_PER_POSITION), "kd": Gain(1.8, FORCE_PER_SPEED),
-        "kp_free": Gain(30.0, FORCE_PER_POSITION), "kd_free": Gain(2.5, FORCE_PER_SPEED),
+        "kp": Gain(6.0, FORCE_PER_POSITION),
+        "kd": Gain(1.8, FORCE_PER_SPEED),
+        "kp_free": Gain(30.0, FORCE_PER_POSITION),
+        "kd_free": Gain(2.5, FORCE_PER_SPEED),
         "cutoff": Gain(50.0, RATE, positive=True, held=True),
     },
     memory=5,
     plants=("furuta", "cart_pole"),
     label="Rig's state feedback",
-)  # fmt: skip
+)
 def state_feedback(y, gains, memory):
-    """State feedback of a driven and of a free joint: u = kp e + kd d(e) + kp_free q + kd_free d(q).
+    """State feedback of a driven and of a free joint: u = kp e + kd d(e) + kp_free q + kd_free
+    d(q).
 
-    d(z) is a filtered difference, d_k = (cutoff (z_k - z_(k-1)) + d_(k-1)) / (1 + cutoff h), 0 at the first sample.
-    The gains are positive, as an arm must first move with the pendulum that it balances.
-    Source: the controller of the public records of decargroup/closed_loop_koopman (MIT), whose gains are the defaults,
-    in V/rad, V s/rad and 1/s.
+    d(z) is a filtered difference, d_k = (cutoff (z_k - z_(k-1)) + d_(k-1)) / (1 + cutoff h), 0 at
+    the first sample. The gains are positive, as an arm must first move with the pendulum that it
+    balances. Source: the controller of the public records of decargroup/closed_loop_koopman (MIT),
+    whose gains are the defaults, in V/rad, V s/rad and 1/s.
     """
     started, e_, q_, de, dq = memory[0], memory[1], memory[2], memory[3], memory[4]
     if started != 0.0:
@@ -58,10 +67,14 @@ def state_feedback(y, gains, memory):
     return gains.kp * y.e + gains.kd * de + gains.kp_free * y.q + gains.kd_free * dq, 0.0
 
 
-@law_function(gains={"kp": Gain(160.18, positive=True), "kv": Gain(243.45, positive=True)}, label="Rig's cascade")
+@law_function(
+    gains={"kp": Gain(160.18, positive=True), "kv": Gain(243.45, positive=True)},
+    label="Rig's cascade",
+)
 def cascade(y, gains, memory):
     """Position loop about a velocity loop: u = kv (kp (r - x) - v).
 
-    Source: the drive of EMPS (Janot, Gautier and Brunot 2019), whose gains are the defaults: 1/s, and V s/m.
+    Source: the drive of EMPS (Janot, Gautier and Brunot 2019), whose gains are the defaults: 1/s,
+    and V s/m.
     """
     return gains.kv * (-gains.kp * y.e - y.v), 0.0

@@ -3,7 +3,8 @@
     table = smc.study(ensemble.runs(smc.rig("qube_servo")), "qube")
     print(ensemble.verdict(smc.leaderboard(table)))
 
-`tuned` gives every law gains by one rule: the searches of `smc.tune`, each candidate once on every parameter set.
+`tuned` gives every law gains by one rule: the searches of `smc.tune`, each candidate once on every
+parameter set.
 """
 
 import dataclasses
@@ -37,37 +38,60 @@ def runs(
     duration: float = 10.0,
     starts: Starts | None = None,
 ) -> list[Scenario]:
-    """Return scenarios of every law on every parameter set from every seed. The set is the condition.
+    """Return scenarios of every law on every parameter set from every seed.
 
-    `laws`: by default the rig's own; the name of one of these means it, with its gains; or those that `tuned` returns.
-    `seeds`, `gains`, `duration` and `starts` are as in `smc.grid`; starts are by default within 20 % of the rig's x0.
+    The set is the condition.
+
+    `laws`: by default the rig's own; the name of one of these means it, with its gains; or those
+    that `tuned` returns. `seeds`, `gains`, `duration` and `starts` are as in `smc.grid`; starts are
+    by default within 20 % of the rig's x0.
     """
     chosen = _chosen(rig, laws)
-    given, found = ([law for law in chosen if isinstance(law, Candidate) == searched] for searched in (False, True))
+    given, found = (
+        [law for law in chosen if isinstance(law, Candidate) == searched]
+        for searched in (False, True)
+    )
     scenarios, around = [], _starts(rig, starts)
     for name, fields in _machines(rig).items():
         free = dict(fields)
         plant = free.pop("plant")
-        base = grid([plant], given, ["nominal"], seeds, gains, duration, around) if given else []
+        if given:
+            base = grid([plant], given, ["nominal"], seeds, gains, duration, around)
+        else:
+            base = []
         if found:
             nominal = [Condition("nominal", {})]
-            base += all_combinations([plant], lambda _: found, nominal, range(seeds), duration, around)
+            base += all_combinations(
+                [plant], lambda _: found, nominal, range(seeds), duration, around
+            )
         scenarios += [dataclasses.replace(scenario, **free).named(name) for scenario in base]
     return scenarios
 
 
 def objective(rig: Rig, starts: Starts | None = None) -> Objective:
-    """Return what `tuned` minimises: the J of tuning, with a run on each parameter set in place of each condition."""
+    """Return what `tuned` minimises: the J of tuning, with a run on each parameter set in place of
+    each condition.
+    """
     machines = _machines(rig)
     u_max = machines["set 1"]["u_max"]
-    bound: Any = None if u_max == math.inf else u_max  # where firmware bounds its own command, that of the drive
-    fields: dict[str, Any] = machines["set 1"] | {"law": "none", "x0": _starts(rig, starts).x0, "u_max": bound}
+    bound: Any = (
+        None if u_max == math.inf else u_max
+    )  # where firmware bounds its own command, that of the drive
+    fields: dict[str, Any] = machines["set 1"] | {
+        "law": "none",
+        "x0": _starts(rig, starts).x0,
+        "u_max": bound,
+    }
     first = Scenario(**fields)
     period = first.control_period
     sets = tuple(Condition(name, fields) for name, fields in machines.items())
     return Objective(
-        conditions=sets, starts=_starts(rig, starts), control_period=period, weight=period, u_max=min(first.limits)
-    )  # fmt: skip
+        conditions=sets,
+        starts=_starts(rig, starts),
+        control_period=period,
+        weight=period,
+        u_max=min(first.limits),
+    )
 
 
 def tuned(
@@ -82,16 +106,26 @@ def tuned(
 ) -> list[Candidate]:
     """Return laws with the gains of every search, by one rule for all, see `smc.tune`.
 
-    A law that has no gains to search keeps its own, and its remark says why. `laws` and `starts` are as in `runs`;
-    `folder` keeps each search.
+    A law that has no gains to search keeps its own, and its remark says why. `laws` and `starts`
+    are as in `runs`; `folder` keeps each search.
     """
     goal, plant, found = objective(rig, starts), _machines(rig)["set 1"]["plant"], []
     for law in map(coerce.law, _chosen(rig, laws)):
         try:
             with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", "no set of gains tried", ScenarioWarning)  # the remark says so
-                made = tune(plant, law, budget, objective=goal, searches=searches, folder=folder, threads=threads,
-                            progress=progress)  # fmt: skip
+                warnings.filterwarnings(
+                    "ignore", "no set of gains tried", ScenarioWarning
+                )  # the remark says so
+                made = tune(
+                    plant,
+                    law,
+                    budget,
+                    objective=goal,
+                    searches=searches,
+                    folder=folder,
+                    threads=threads,
+                    progress=progress,
+                )
         except BrokenLawError:
             raise
         except ScenarioError as error:
@@ -110,7 +144,9 @@ def _chosen(rig: Rig, laws: Sequence[Any] | None) -> list[Any]:
         )
     shipped, given = {law.name: law for law in rig.laws}, rig.laws if laws is None else laws
     if not (chosen := [shipped.get(law, law) if isinstance(law, str) else law for law in given]):
-        raise ScenarioError(f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)")
+        raise ScenarioError(
+            f"no laws have gains for {rig.name}: give some, such as pid(kp=30,kd=6)"
+        )
     return chosen
 
 
@@ -122,21 +158,30 @@ def _machines(rig: Rig) -> dict[str, dict[str, Any]]:
     """Return set -> the fields of a Scenario that a rig's machine has, without where runs begin."""
     found = {}
     for name, member in rig.members().items():
-        fields: dict[str, Any] = {"u_max": None, "physics_step": None} | member.machine(Values(**member.values))
+        fields: dict[str, Any] = {"u_max": None, "physics_step": None} | member.machine(
+            Values(**member.values)
+        )
         found[name] = {key: value for key, value in fields.items() if key not in BY_STARTS}
     return found
 
 
 def verdict(boards: Sequence[Any]) -> str:
-    """Return a line for each metric of `smc.leaderboard`: whether one law wins on every parameter set."""
+    """Return a line for each metric of `smc.leaderboard`: whether one law wins on every parameter
+    set.
+    """
     return "\n".join(f"{board.metric}: {sentence(board)}" for board in boards)
 
 
 def sentence(board: Any, labels: Mapping[str, str] = frozen({})) -> str:
-    """Return whether one law wins on every parameter set, and who wins on how many. `labels`: law -> its label."""
+    """Return whether one law wins on every parameter set, and who wins on how many.
+
+    `labels`: law -> its label.
+    """
     count = len(board.blocks)
     if board.winner:
         return f"{labels.get(board.winner, board.winner)} wins on all {count} parameter sets"
     wins = Counter(block.winner for block in board.blocks if block.winner).most_common()
-    others = ", ".join(f"{labels.get(law, law)} on {number}" for law, number in wins) or "none on any"
+    others = (
+        ", ".join(f"{labels.get(law, law)} on {number}" for law, number in wins) or "none on any"
+    )
     return f"no law wins on all {count} parameter sets ({others})"

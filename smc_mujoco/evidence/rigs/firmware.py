@@ -1,9 +1,11 @@
-"""Firmware of the rotary pendulum on a stepper: its three laws with their filters, trim, gates, moves and falls.
+"""Firmware of the rotary pendulum on a stepper: its three laws with their filters, trim, gates,
+moves and falls.
 
-One function, as on the machine, 200 times a second; the gain `kind` chooses the law. It counts in degrees and steps.
-It returns the acceleration of the arm that a `Stepper` sums to the firmware's own speed, in rad/s^2, and its sliding
-variable, deg/s (0 of the linear law). Source: Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa, as read there; what it
-does before it engages and after a fall is simpler here.
+One function, as on the machine, 200 times a second; the gain `kind` chooses the law. It counts in
+degrees and steps. It returns the acceleration of the arm that a `Stepper` sums to the firmware's
+own speed, in rad/s^2, and its sliding variable, deg/s (0 of the linear law). Source:
+Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa, as read there; what it does before it engages and
+after a fall is simpler here.
 """
 
 import math
@@ -17,13 +19,31 @@ LINEAR, TWO_STATES, FOUR_STATES = 0.0, 1.0, 2.0
 TICK = 5e-3  # s, the period that the firmware counts with
 STEPS = 1600.0 / 360.0  # a degree
 DEGREES = 180.0 / math.pi
-GRAVITY, COUPLING = 100.8, 1.952  # A, 1/s^2, and B of its model a'' = A sin a + sin a cos a th'^2 - B cos a th''
-SLOPE, OLD_RATE, MAX_RATE = 211.7647, 0.0588, 300.0  # filter of rates: 1/s, share of the old one, deg/s
+GRAVITY, COUPLING = (
+    100.8,
+    1.952,
+)  # A, 1/s^2, and B of its model a'' = A sin a + sin a cos a th'^2 - B cos a th''
+SLOPE, OLD_RATE, MAX_RATE = (
+    211.7647,
+    0.0588,
+    300.0,
+)  # filter of rates: 1/s, share of the old one, deg/s
 ENGAGE_TICKS, ENGAGE_ANGLE, ENGAGE_RATE = 20.0, 3.0, 20.0
 RAMP_TIME, GATE_TIME = 0.1, 0.2  # s after engaging
-FALL_ARM, STOP_ARM, FALL_PENDULUM, FALL_AT_ONCE, FALL_RATE, FALL_TICKS = 80.0, 78.0, 30.0, 25.0, 250.0, 3.0
+FALL_ARM, STOP_ARM, FALL_PENDULUM, FALL_AT_ONCE, FALL_RATE, FALL_TICKS = (
+    80.0,
+    78.0,
+    30.0,
+    25.0,
+    250.0,
+    3.0,
+)
 NEAR = 5.0  # deg, of the gates
-MOVE_RATE, MOVE_SPEED, MOVE_ACCELERATION = 80.0, 12.0, 60.0  # deg/s of the pendulum that freezes a move; of the arm
+MOVE_RATE, MOVE_SPEED, MOVE_ACCELERATION = (
+    80.0,
+    12.0,
+    60.0,
+)  # deg/s of the pendulum that freezes a move; of the arm
 DEAD_BAND, LEAK, LEAK_ARM = 0.5, 2.0, 20.0  # deg, 1/s, deg
 TRIM_RATE, TRIM_ANGLE, TRIM_SPEED, MAX_TRIM = 0.2, 3.0, 50.0, 1.5  # 1/s, deg, deg/s, deg
 (
@@ -68,7 +88,10 @@ def measure(y, m):
 
 @register_jitable
 def move(target, m, passed):
-    """Advance the arm's reference towards a target, deg, on a trapezoid of speed. Return its acceleration, deg/s^2."""
+    """Advance the arm's reference towards a target, deg, on a trapezoid of speed.
+
+    Return its acceleration, deg/s^2.
+    """
     left, old = target - m[REF], m[REF_RATE]
     braking = math.sqrt(2.0 * MOVE_ACCELERATION * abs(left))
     wanted = math.copysign(min(MOVE_SPEED, braking), left)
@@ -83,7 +106,10 @@ def move(target, m, passed):
 @register_jitable
 def falls(kind, alpha, m, since):
     """Return whether the machine falls, by the firmware's limits."""
-    m[TILTED] = m[TILTED] + 1.0 if abs(alpha) > FALL_PENDULUM else 0.0
+    if abs(alpha) > FALL_PENDULUM:
+        m[TILTED] = m[TILTED] + 1.0
+    else:
+        m[TILTED] = 0.0
     fast = abs(m[ALPHA_RATE]) > FALL_RATE and abs(alpha) > NEAR and since > GATE_TIME
     m[FAST] = m[FAST] + 1.0 if fast else 0.0
     sliding = kind != LINEAR and (abs(alpha) > FALL_AT_ONCE or m[FAST] >= FALL_TICKS)
@@ -99,12 +125,15 @@ def acceleration(kind, alpha, m, since, ref_acceleration):
         tilt = 0.0 if abs(alpha) < DEAD_BAND else alpha
         return base + 725.6 * tilt + 73.5 * rate, 0.0
     gate = 150.0 if kind == TWO_STATES else 250.0
-    base = base if abs(alpha) < NEAR and abs(rate) < gate and since >= GATE_TIME else 0.0
+    if not (abs(alpha) < NEAR and abs(rate) < gate and since >= GATE_TIME):
+        base = 0.0
     sine, cosine = math.sin(alpha / DEGREES), max(math.cos(alpha / DEGREES), 0.2)
     free = DEGREES * GRAVITY * sine + sine * cosine * m[THETA_RATE] ** 2 / DEGREES
     if kind == TWO_STATES:
         s = rate + 15.0 * alpha
-        return STEPS * (free + 15.0 * rate + 800.0 * clip(s / 50.0, 1.0)) / (COUPLING * cosine) + base, s
+        return STEPS * (free + 15.0 * rate + 800.0 * clip(s / 50.0, 1.0)) / (
+            COUPLING * cosine
+        ) + base, s
     rate, de = clip(rate, 200.0), clip(de, 200.0)
     k = 0.5 * min(since / 0.2, 1.0)
     s = rate + 15.0 * alpha + k * clip(de + 2.0 * clip(e, STOP_ARM), 300.0)
@@ -122,10 +151,12 @@ def acceleration(kind, alpha, m, since, ref_acceleration):
     label="Firmware of the stepper's pendulum",
 )
 def firmware(y, gains, memory):
-    """Linear law (kind 0), or sliding mode on two (1) or four states (2); `top` steps/s^2, `speed` steps/s at most.
+    """Linear law (kind 0), or sliding mode on two (1) or four states (2); `top` steps/s^2, `speed`
+    steps/s at most.
 
     The reference is the arm's target, to which the firmware moves on its own.
-    Source: Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa, without a licence; the constants are its facts.
+    Source: Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa, without a licence; the constants are
+    its facts.
     """
     m = memory
     passed = measure(y, m)
@@ -135,7 +166,10 @@ def firmware(y, gains, memory):
         m[READY], m[ENGAGED], m[SPEED] = m[READY] + 1.0 if calm else 0.0, y.t, 0.0
         return -before / passed / STEPS / DEGREES, 0.0
     calm, target = abs(alpha) < NEAR and abs(m[ALPHA_RATE]) < MOVE_RATE, DEGREES * y.r
-    ref_acceleration = move(target, m, passed) if calm else 0.0
+    if calm:
+        ref_acceleration = move(target, m, passed)
+    else:
+        ref_acceleration = 0.0
     moving = m[REF] != target or m[REF_RATE] != 0.0
     u, s = acceleration(gains.kind, alpha, m, since, ref_acceleration)
     saturated = abs(u) > gains.top
@@ -143,7 +177,12 @@ def firmware(y, gains, memory):
     still = not moving and not saturated
     if still and abs(alpha) < TRIM_ANGLE and abs(m[ALPHA_RATE]) < TRIM_SPEED:
         m[TRIM] = clip(m[TRIM] + TRIM_RATE * alpha * passed, MAX_TRIM)
-    leaks = gains.kind == LINEAR and abs(alpha) < NEAR and abs(m[THETA] - m[REF]) < LEAK_ARM and not moving
+    leaks = (
+        gains.kind == LINEAR
+        and abs(alpha) < NEAR
+        and abs(m[THETA] - m[REF]) < LEAK_ARM
+        and not moving
+    )
     m[SPEED] = clip(before + (u - (LEAK * before if leaks else 0.0)) * passed, gains.speed)
     if abs(m[THETA]) > STOP_ARM and m[SPEED] * m[THETA] > 0.0:
         m[SPEED] = 0.0

@@ -1,9 +1,11 @@
-"""Inverse dynamics: the torques that a measured motion takes, and the measured torques, both below 5 Hz.
+"""Inverse dynamics: the torques that a measured motion takes, and the measured torques, both below
+5 Hz.
 
-Velocities and accelerations are those of cubics through the positions. The noise of an acceleration, times the inertia,
-may exceed the torque itself. Least squares would then find too small an inertia, which reduces that noise. So computed
-and measured torques go through the same low-pass filter, forward and backward.
-Source: M. Gautier, "Dynamic identification of robots with power model", IEEE ICRA 1997 (the parallel filter).
+Velocities and accelerations are those of cubics through the positions. The noise of an
+acceleration, times the inertia, may exceed the torque itself. Least squares would then find too
+small an inertia, which reduces that noise. So computed and measured torques go through the same
+low-pass filter, forward and backward. Source: M. Gautier, "Dynamic identification of robots with
+power model", IEEE ICRA 1997 (the parallel filter).
 """
 
 import mujoco
@@ -15,8 +17,11 @@ from smc_mujoco.mechanisms.hardware.part import dof_ids, joint_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 CUBIC_WINDOW, CUBIC_DEGREE = 0.04, 3  # s, and degree, of the cubic about each sample; chosen
-COMPARED_PERIOD = 0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
-# Hz, and number of poles, of the low-pass filter. Chosen: three times the fastest public exciting motions, 1.6 Hz.
+COMPARED_PERIOD = (
+    0.01  # s, between the samples that are compared; chosen: the cubics leave nothing above 30 Hz
+)
+# Hz, and number of poles, of the low-pass filter. Chosen: three times the fastest public exciting
+# motions, 1.6 Hz.
 CUTOFF, POLES = 5.0, 4
 END_DURATION = 0.1  # s, left out at both ends, where the filter knows only one side; chosen
 MIN_DURATION, MAX_STEP = 1.0, 0.05  # s: of a record, and between its samples; chosen
@@ -40,11 +45,15 @@ class Filter:
         self.poles = butter(POLES, CUTOFF, fs=1.0 / (self.stride * self.step), output="sos")
 
     def cubic(self, name: str, derivative: int = 0) -> np.ndarray:
-        """Return a column or its derivative, (N,), at the samples that are compared, from cubics about each of them."""
+        """Return a column or its derivative, (N,), at the samples that are compared, from cubics
+        about each of them.
+        """
         from scipy.signal import savgol_filter
 
         samples = 2 * max(2, round(CUBIC_WINDOW / self.step / 2)) + 1
-        smooth = savgol_filter(self.data[name], samples, CUBIC_DEGREE, deriv=derivative, delta=self.step)
+        smooth = savgol_filter(
+            self.data[name], samples, CUBIC_DEGREE, deriv=derivative, delta=self.step
+        )
         return np.asarray(smooth)[:: self.stride]
 
     def low(self, values: np.ndarray) -> np.ndarray:
@@ -78,10 +87,14 @@ def long_enough(data: Record, columns: Columns) -> bool:
 
 
 def torques(plant: Plant, data: Record, columns: Columns) -> Record:
-    """Return the torque of each joint in the measured motion, below CUTOFF, N m, by MuJoCo's inverse dynamics."""
+    """Return the torque of each joint in the measured motion, below CUTOFF, N m, by MuJoCo's
+    inverse dynamics.
+    """
     filtered, model = Filter(data, columns), plant.load()
     state, joints, dofs = mujoco.MjData(model), joint_ids(model), dof_ids(model)
-    x, v, a = (np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3))
+    x, v, a = (
+        np.column_stack([filtered.cubic(name, order) for name in columns.x]) for order in range(3)
+    )
     forces = np.empty_like(x)
     at = model.jnt_qposadr[joints]
     for k in range(len(x)):

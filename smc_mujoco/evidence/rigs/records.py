@@ -1,6 +1,7 @@
 """Records of rigs: their columns, checks and files.
 
-A record is a mapping from names of columns to arrays, with one value for each control period of the rig.
+A record is a mapping from names of columns to arrays, with one value for each control period of the
+rig.
 """
 
 import dataclasses
@@ -21,10 +22,14 @@ from smc_mujoco.simulation.trace import Trace
 
 Record = dict[str, np.ndarray]  # column -> values, (K,)
 MIN_SAMPLES = 50  # of a replay; chosen
-STATE_SAMPLES = 15  # on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
+STATE_SAMPLES = (
+    15  # on each side of a sample, for the cubic that gives its velocity; chosen: 30 ms at 500 Hz
+)
 RATE_TOLERANCE = 0.02  # of a period, by which the median step of time may differ from it; chosen
-MAX_PERIOD = 0.2  # s, between samples: beyond it the time is in another unit, or the motion is missed; chosen
-MAX_GAP = 10  # periods: a longer gap in an open-loop record is refused, shorter ones are interpolated; chosen
+# s, between samples: beyond it the time is in another unit, or the motion is missed; chosen
+MAX_PERIOD = 0.2
+# periods: a longer gap in an open-loop record is refused, shorter ones are interpolated; chosen
+MAX_GAP = 10
 MAX_GAP_CLOSED = 1.5  # periods: the same for a closed loop, of which no sample may be missing
 NORMAL_MEDIAN = 0.6745  # median of |z| for a standard normal z
 RESOLUTION = 1e-6  # s, to which the period of an open-loop record is rounded
@@ -35,14 +40,22 @@ class Columns:
     """Names of a record's columns."""
 
     time: str = "t"  # s
-    x: tuple[str, ...] = ("x",)  # position of each channel, rad or m; or of each joint that has a torque
+    x: tuple[str, ...] = (
+        "x",
+    )  # position of each channel, rad or m; or of each joint that has a torque
     u: str = "u"  # command, in the unit of the rig's u
     reference: str = "reference"  # of the driven joint, if the loop is closed
     feedforward: str = "feedforward"  # what is added to the controller's u; records may lack it
     others: tuple[str, ...] = ()  # references of the other joints; records may lack them
-    state: tuple[str, ...] = ()  # positions, then velocities, without noise and offset; only simulated runs have them
-    offset: tuple[float, ...] = ()  # what is subtracted from each channel's column to get the plant's x; empty for 0
-    torque: tuple[str, ...] = ()  # of each joint, for records whose torques are predicted from the motion
+    state: tuple[
+        str, ...
+    ] = ()  # positions, then velocities, without noise and offset; only simulated runs have them
+    offset: tuple[
+        float, ...
+    ] = ()  # what is subtracted from each channel's column to get the plant's x; empty for 0
+    torque: tuple[
+        str, ...
+    ] = ()  # of each joint, for records whose torques are predicted from the motion
 
     def needed(self, closed: bool) -> tuple[str, ...]:
         """Return the columns that a record must have; for a closed loop also the reference."""
@@ -57,12 +70,19 @@ class Columns:
     @property
     def known(self) -> tuple[str, ...]:
         """All columns that a replay may read."""
-        return tuple(dict.fromkeys((*self.needed(True), *self.references, self.feedforward, *self.state)))
+        return tuple(
+            dict.fromkeys((*self.needed(True), *self.references, self.feedforward, *self.state))
+        )
 
 
 def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -> Record | Trace:
-    """Return the columns of a CSV or npz file, or a saved trace. `names`: the rig's name of a column -> the file's."""
-    with reading(path, "record", "give the path of a CSV file, or of an npz file with arrays by column") as file:
+    """Return the columns of a CSV or npz file, or a saved trace.
+
+    `names`: the rig's name of a column -> the file's.
+    """
+    with reading(
+        path, "record", "give the path of a CSV file, or of an npz file with arrays by column"
+    ) as file:
         columns = None
         if file.suffix == ".npz":
             with file.open("rb") as opened, np.load(opened) as arrays:
@@ -73,7 +93,9 @@ def load(path: str | os.PathLike[str], names: Mapping[str, str] | None = None) -
         return traces.load(file)
     for ours, theirs in (names or {}).items():
         if theirs not in columns:
-            raise ScenarioError(f"{path} has no column {theirs!r} (it has {', '.join(columns)}): give one that it has")
+            raise ScenarioError(
+                f"{path} has no column {theirs!r} (it has {', '.join(columns)}): give one that it has"
+            )
         columns[ours] = columns[theirs]
     return columns
 
@@ -83,11 +105,15 @@ def _csv(file: Path) -> Record:
     rows = [row for _, row in csv_rows(file)]
     if len(rows) < 2:
         count = "no lines" if not rows else "only 1 line"
-        raise ScenarioError(f"{file} has {count}: give a first line with the columns' names, and samples")
+        raise ScenarioError(
+            f"{file} has {count}: give a first line with the columns' names, and samples"
+        )
     heads = [name.split("[")[0].strip().lstrip("# ") for name in rows[0]]
     for number, row in enumerate(rows, 1):
         if len(row) != len(heads):
-            raise ScenarioError(f"{file}, line {number}: {len(row)} cells for {len(heads)} columns: give one for each")
+            raise ScenarioError(
+                f"{file}, line {number}: {len(row)} cells for {len(heads)} columns: give one for each"
+            )
     values = np.array([[_cell(cell) for cell in row] for row in rows[1:]])
     return {name: values[:, i] for i, name in enumerate(heads)}
 
@@ -100,13 +126,17 @@ def _cell(text: str) -> float:
 
 
 def positions(trace: Trace, columns: Columns, noisy: bool = False) -> Record:
-    """Return a run's positions by column, with the encoder's bias and rounding and, if `noisy`, the run's noise."""
+    """Return a run's positions by column, with the encoder's bias and rounding and, if `noisy`, the
+    run's noise.
+    """
     s, sensor, by_column = trace.scenario, trace.scenario.sensor, {}
     for i, name in enumerate(columns.x):
         x = trace.x[:, i] + (sensor.bias if sensor else 0.0)
         if noisy and s.noise.position:
             kind = philox.MEASUREMENT
-            x = x + s.noise.position * np.array([philox.normals(s.seed, i, kind, k)[0] for k in range(len(x))])
+            x = x + s.noise.position * np.array(
+                [philox.normals(s.seed, i, kind, k)[0] for k in range(len(x))]
+            )
         if quantum := sensor.quantum(s.plant.units[i] == "rad") if sensor else 0.0:
             x = quantum * np.floor(x / quantum + 0.5)
         by_column[name] = x
@@ -127,18 +157,22 @@ def of_trace(trace: Trace, columns: Columns) -> Record:
 def checked(record: Mapping[str, Any], columns: Columns, period: float | None, rig: str) -> Record:
     """Return the record's known columns as float arrays, (K,) each. `rig`: its name, for errors.
 
-    `period`: s, of the rig's controller, at which a closed loop must be recorded. None for an open loop, whose columns
-    are interpolated at the record's own median step.
+    `period`: s, of the rig's controller, at which a closed loop must be recorded. None for an open
+    loop, whose columns are interpolated at the record's own median step.
     """
     if not isinstance(record, Mapping):
-        raise ScenarioError(f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)")
+        raise ScenarioError(
+            f"record is {shown(record)}: give a mapping of columns, such as numpy.load(file)"
+        )
     missing = [name for name in columns.needed(period is not None) if name not in record]
     if missing:
         has = ", ".join(map(str, record)) or "none"
         spare = next((name for name in record if name not in columns.known), "NAME")
         example = f"--columns {missing[0]}={spare} (in Python names={{{missing[0]!r}: {spare!r}}})"
         cure = f"add it, or say which it is, as {example}"
-        raise ScenarioError(f"the record of {rig} has no column {', '.join(missing)} (it has {has}): {cure}")
+        raise ScenarioError(
+            f"the record of {rig} has no column {', '.join(missing)} (it has {has}): {cure}"
+        )
     data = {name: _numbers(name, record[name], rig) for name in columns.known if name in record}
     t = data[columns.time]
     for name, values in data.items():
@@ -164,7 +198,9 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
 
     back, step = np.flatnonzero(np.diff(t) <= 0.0), step_of(t)
     if len(back):
-        raise ScenarioError(f"time of {rig} runs backward after sample {at(back[0])}: give times that increase")
+        raise ScenarioError(
+            f"time of {rig} runs backward after sample {at(back[0])}: give times that increase"
+        )
     if step > MAX_PERIOD:
         raise ScenarioError(
             f"the record of {rig} is sampled every {step:g} s and lasts {t[-1] - t[0]:g} s: give time in s (a column "
@@ -177,7 +213,9 @@ def _checked_step(t: np.ndarray, period: float | None, rig: str) -> float:
         )
     gaps = np.flatnonzero(np.diff(t) > (MAX_GAP if period is None else MAX_GAP_CLOSED) * step)
     if len(gaps):
-        raise ScenarioError(f"the record of {rig} has a gap after sample {at(gaps[0])}: fill it in, or cut it there")
+        raise ScenarioError(
+            f"the record of {rig} has a gap after sample {at(gaps[0])}: fill it in, or cut it there"
+        )
     return step
 
 
@@ -187,13 +225,17 @@ def step_of(t: np.ndarray) -> float:
 
 
 def noise(data: Record, columns: Columns) -> float:
-    """Return the standard deviation of the white noise of the positions, rad or m: the least of all columns.
+    """Return the standard deviation of the white noise of the positions, rad or m: the least of all
+    columns.
 
-    It follows from the fourth differences of a column, which are near 0 for a smooth motion, and have the standard
-    deviation sqrt(70) sigma for white noise of sigma. Their median ignores short transients.
+    It follows from the fourth differences of a column, which are near 0 for a smooth motion, and
+    have the standard deviation sqrt(70) sigma for white noise of sigma. Their median ignores short
+    transients.
     """
     differences = [np.abs(np.diff(data[name], 4)) for name in columns.x]
-    return min(float(np.median(column)) / (NORMAL_MEDIAN * math.sqrt(70.0)) for column in differences)
+    return min(
+        float(np.median(column)) / (NORMAL_MEDIAN * math.sqrt(70.0)) for column in differences
+    )
 
 
 def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
@@ -216,7 +258,8 @@ def _numbers(name: str, values: Any, rig: str) -> np.ndarray:
 def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and velocities at a sample, (n,) each.
 
-    They come from the columns `state`; if there are none, from a cubic through the samples about it.
+    They come from the columns `state`; if there are none, from a cubic through the samples about
+    it.
     """
     if columns.state:
         measured = np.array([data[name][at] for name in columns.state])
@@ -230,7 +273,10 @@ def state(data: Record, columns: Columns, period: float, at: int) -> tuple[np.nd
 
 
 def rate(values: np.ndarray, period: float, order: int = 1) -> np.ndarray:
-    """Return a derivative of columns, (..., K), from a cubic about each sample. Order 0 is the cubic itself."""
+    """Return a derivative of columns, (..., K), from a cubic about each sample.
+
+    Order 0 is the cubic itself.
+    """
     from scipy.signal import savgol_filter
 
     return np.asarray(savgol_filter(values, 2 * STATE_SAMPLES + 1, 3, deriv=order, delta=period))

@@ -1,14 +1,17 @@
-"""Residuals of records and their slopes: what a twin predicts at trial values, in pieces that have states of their own.
+"""Residuals of records and their slopes: what a twin predicts at trial values, in pieces that have
+states of their own.
 
-A piece of a record is replayed from positions and velocities at its start. These are free numbers of the search, one
-set for each piece (multiple shooting), because a few samples give them too poorly. They enter almost linearly, so
-each step of the search moves them by linear least squares, and only the quantities remain.
-Source: H. G. Bock, "Recent advances in parameter identification techniques for ODE", 1983.
+A piece of a record is replayed from positions and velocities at its start. These are free numbers
+of the search, one set for each piece (multiple shooting), because a few samples give them too
+poorly. They enter almost linearly, so each step of the search moves them by linear least squares,
+and only the quantities remain. Source: H. G. Bock, "Recent advances in parameter identification
+techniques for ODE", 1983.
 
-MuJoCo's steps are of first order where there is dry friction or a motor, and their error biases the quantities by many
-standard errors. So replays of measured open loops are corrected by what short steps change, which is extrapolated from
-two runs with steps h and h/2: 2 x(h/2) - x(h). The correction hardly depends on the quantities. So a search keeps that
-of one point, and simulates its other points with longer steps.
+MuJoCo's steps are of first order where there is dry friction or a motor, and their error biases the
+quantities by many standard errors. So replays of measured open loops are corrected by what short
+steps change, which is extrapolated from two runs with steps h and h/2: 2 x(h/2) - x(h). The
+correction hardly depends on the quantities. So a search keeps that of one point, and simulates its
+other points with longer steps.
 """
 
 import dataclasses
@@ -28,12 +31,18 @@ from smc_mujoco.evidence.rigs.rig import Part, Quantity, Rig
 from smc_mujoco.simulation.run import run
 from smc_mujoco.simulation.scenario import Scenario
 
-DIFFERENCE_STEP = 2e-3  # of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
-STATE_SCALE = 0.05  # scale of a state at the start, relative to the standard deviation of its column or rate; chosen
+# of a quantity's scale, for central differences; chosen: dry friction makes shorter ones rough
+DIFFERENCE_STEP = 2e-3
+# scale of a state at the start, relative to the standard deviation of its column or rate; chosen
+STATE_SCALE = 0.05
 MAX_STEP = 2.5e-4  # s, of RK4 in corrected replays; chosen
-SLOPE_HALVINGS = 2  # of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
-WORST = 1.0  # largest residual of a sample, relative to the norm of the record; that of a run that fails
-SINGULAR_RATIO = 1e-6  # ratio of singular values below which states at the start have no effect of their own
+# of that step, for slopes: with dry friction they err by 5 % then, and by up to 45 % before; chosen
+SLOPE_HALVINGS = 2
+# largest residual of a sample, relative to the norm of the record; that of a run that fails
+WORST = 1.0
+SINGULAR_RATIO = (
+    1e-6  # ratio of singular values below which states at the start have no effect of their own
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,7 +53,9 @@ class Piece:
     part: Part | None  # what its replay takes from the record; None if torques are predicted
     skipped: int  # samples at its start that are not compared
     measured: Record  # the columns compared, (N,) each
-    spread: Mapping[str, float]  # norm of each whole column about its mean, by which residuals are divided
+    spread: Mapping[
+        str, float
+    ]  # norm of each whole column about its mean, by which residuals are divided
     scales: np.ndarray  # units of the free states, (s,)
 
 
@@ -58,7 +69,9 @@ class Point:
 
 @dataclasses.dataclass(frozen=True)
 class Slopes:
-    """Residuals of each piece at a point, in the order of time, each sample with all columns, and their derivatives."""
+    """Residuals of each piece at a point, in the order of time, each sample with all columns, and
+    their derivatives.
+    """
 
     point: Point
     residuals: list[np.ndarray]  # (N,) of each piece
@@ -68,19 +81,26 @@ class Slopes:
     records: int  # number of records whose pieces these are
 
     def freed(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Return rows of each piece, (N,) or (N, p), without the part that states at its start can cause."""
+        """Return rows of each piece, (N,) or (N, p), without the part that states at its start can
+        cause.
+        """
         return [
             row - S @ np.linalg.lstsq(S, row, rcond=SINGULAR_RATIO)[0]
             for S, row in zip(self.by_states, rows, strict=True)
         ]
 
     def moves(self, step: np.ndarray) -> np.ndarray:
-        """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities (p,) best."""
+        """Return the moves of each piece's states, (pieces, s), that suit a step of the quantities
+        (p,) best.
+        """
         pieces = zip(self.residuals, self.by_values, self.by_states, strict=True)
-        return np.array([-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0] for r, J, S in pieces])
+        return np.array(
+            [-np.linalg.lstsq(S, r + J @ step, rcond=SINGULAR_RATIO)[0] for r, J, S in pieces]
+        )
 
     def stepped(self, step: np.ndarray) -> "Slopes":
-        """Return the slopes after a small step of the quantities (p,), with residuals that follow from derivatives.
+        """Return the slopes after a small step of the quantities (p,), with residuals that follow
+        from derivatives.
 
         States that the noise hides, such as a starting velocity in dry friction, do not move.
         """
@@ -114,27 +134,47 @@ class Replays:
     """Replays of records at trial values of some quantities."""
 
     def __init__(
-        self, twin: Rig, names: list[str], data: Sequence[Mapping[str, Any]], closed: bool,
-        report: Callable[[int], None] = lambda count: None, whole: bool = False,
-    ):  # fmt: skip
+        self,
+        twin: Rig,
+        names: list[str],
+        data: Sequence[Mapping[str, Any]],
+        closed: bool,
+        report: Callable[[int], None] = lambda count: None,
+        whole: bool = False,
+    ):
         """Cut the records of a rig into pieces, to find the quantities `names`, (p,).
 
-        If `closed`, each record is replayed as a whole, by the rig's own controller; else its pieces of the rig's
-        `window` under the recorded command, or the `whole` record. `report` is called with the number of replays of all
-        records after a batch.
+        If `closed`, each record is replayed as a whole, by the rig's own controller; else its
+        pieces of the rig's `window` under the recorded command, or the `whole` record. `report` is
+        called with the number of replays of all records after a batch.
         """
-        self.twin, self.names, self.data, self.closed, self.report = twin, names, data, closed, report
+        self.twin, self.names, self.data, self.closed, self.report = (
+            twin,
+            names,
+            data,
+            closed,
+            report,
+        )
         self.whole = whole or closed or not twin.window
         self.known = known = [twin.quantities[name] for name in names]
         self.scales = np.array([_scale(quantity) for quantity in known])
         self.low = np.array([quantity.least for quantity in known]) / self.scales
         self.high = np.array([quantity.most for quantity in known]) / self.scales
         n = len(twin.columns.x)
-        known_start = twin.columns.state or twin.dynamics is not None or (closed and twin.score_from > twin.start)
+        known_start = (
+            twin.columns.state
+            or twin.dynamics is not None
+            or (closed and twin.score_from > twin.start)
+        )
         # a controller reads the first positions as they were measured
-        self.free = np.zeros(0, int) if known_start else np.arange(2 * n)[n if closed else 0 :]
+        if known_start:
+            self.free = np.zeros(0, int)
+        else:
+            self.free = np.arange(2 * n)[n if closed else 0 :]
         self.evaluations = 0
-        self.steps: dict[str, Any] = {}  # integrator and step of replays; none for the scenario's own
+        self.steps: dict[
+            str, Any
+        ] = {}  # integrator and step of replays; none for the scenario's own
         self.corrections: list[Record] | None = None  # of each piece; None for none
         self.pieces = [piece for i in range(len(data)) for piece in self._pieces(i)]
 
@@ -146,7 +186,9 @@ class Replays:
 
     def values(self, point: Point) -> dict[str, float]:
         """Return the quantities at a point, cut to their ranges."""
-        cut = np.clip(point.values * self.scales, [q.least for q in self.known], [q.most for q in self.known])
+        cut = np.clip(
+            point.values * self.scales, [q.least for q in self.known], [q.most for q in self.known]
+        )
         return dict(zip(self.names, cut.tolist(), strict=True))
 
     def rig(self, point: Point) -> Rig:
@@ -158,7 +200,9 @@ class Replays:
         return self.pieces[k].part
 
     def state(self, point: Point, k: int) -> np.ndarray | None:
-        """Return positions and velocities at the start of piece k, (2n,); None if they are not free."""
+        """Return positions and velocities at the start of piece k, (2n,); None if they are not
+        free.
+        """
         if not len(self.free):
             return None
         state = self._part(k).state.copy()
@@ -174,14 +218,18 @@ class Replays:
 
     def residuals(self, points: Sequence[Point]) -> list[list[np.ndarray]]:
         """Return the residuals of each piece, (N,), at each point. All replays are one batch."""
-        return [list(map(self.relative, self.pieces, by_piece)) for by_piece in self.predicted(points)]
+        return [
+            list(map(self.relative, self.pieces, by_piece)) for by_piece in self.predicted(points)
+        ]
 
     def predicted(self, points: Sequence[Point]) -> list[list[Record]]:
         """Return the predicted columns of each piece at each point."""
         self.evaluations += len(points)
         rigs = [self.rig(point) for point in points]
         if self.twin.dynamics is not None:
-            predictions = [[predicted for predicted, _, _ in rig.predictions(self.data)] for rig in rigs]
+            predictions = [
+                [predicted for predicted, _, _ in rig.predictions(self.data)] for rig in rigs
+            ]
         else:
             predictions = self._replayed(rigs, points, self.steps)
         self.report(len(points))
@@ -196,7 +244,9 @@ class Replays:
         ]
 
     def correct(self, point: Point, halvings: int) -> bool:
-        """Correct later replays by what `halvings` of MAX_STEP change at a point; return whether that is needed."""
+        """Correct later replays by what `halvings` of MAX_STEP change at a point; return whether
+        that is needed.
+        """
         if self.closed or self.twin.columns.state or self.twin.dynamics is not None:
             return False  # records of simulated runs have the same errors by steps
         rig = self.rig(point)
@@ -226,8 +276,12 @@ class Replays:
         self.steps = steps
         return dataclasses.replace(sharp, residuals=slopes.residuals)
 
-    def _replayed(self, rigs: Sequence[Rig], points: Sequence[Point], fields: dict[str, Any]) -> list[list[Record]]:
-        """Return what `predicted` returns, without corrections; `fields` replace those of the replays' scenarios."""
+    def _replayed(
+        self, rigs: Sequence[Rig], points: Sequence[Point], fields: dict[str, Any]
+    ) -> list[list[Record]]:
+        """Return what `predicted` returns, without corrections; `fields` replace those of the
+        replays' scenarios.
+        """
         with warnings.catch_warnings():  # about values that are only tried
             warnings.simplefilter("ignore", ScenarioWarning)
             scenarios = [
@@ -245,12 +299,20 @@ class Replays:
         ]
 
     def relative(self, piece: Piece, predicted: Record) -> np.ndarray:
-        """Return the residuals of a piece, sample by sample with all columns, (N,), divided by the columns' spread."""
-        rows = np.column_stack([(piece.measured[name] - predicted[name]) / piece.spread[name] for name in predicted])
-        return np.clip(np.nan_to_num(rows, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST).ravel()
+        """Return the residuals of a piece, sample by sample with all columns, (N,), divided by the
+        columns' spread.
+        """
+        rows = np.column_stack(
+            [(piece.measured[name] - predicted[name]) / piece.spread[name] for name in predicted]
+        )
+        return np.clip(
+            np.nan_to_num(rows, nan=WORST, posinf=WORST, neginf=-WORST), -WORST, WORST
+        ).ravel()
 
     def slopes(self, point: Point) -> Slopes:
-        """Return residuals and their derivatives at a point, by central differences that stay within the ranges."""
+        """Return residuals and their derivatives at a point, by central differences that stay
+        within the ranges.
+        """
         p, s = len(self.names), len(self.free)
         moved = []
         for sign in (1.0, -1.0):
@@ -261,13 +323,20 @@ class Replays:
                 moved.append(Point(point.values, point.states + sign * DIFFERENCE_STEP * e))
         residuals, *rows = self.residuals([point, *moved])
         ahead, back = rows[: p + s], rows[p + s :]
-        gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [2.0 * DIFFERENCE_STEP] * s
-        columns = [
-            np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
-            for k in range(len(self.pieces))
-        ]
-        by_values, by_states = ([of_piece[:, part] for of_piece in columns] for part in (slice(p), slice(p, None)))
-        return Slopes(point, residuals, by_values, by_states, len(self.pieces[0].measured), len(self.data))
+        gaps = [moved[j].values[j] - moved[p + s + j].values[j] for j in range(p)] + [
+            2.0 * DIFFERENCE_STEP
+        ] * s
+        columns = []
+        for k in range(len(self.pieces)):
+            columns.append(
+                np.column_stack([(ahead[j][k] - back[j][k]) / gap for j, gap in enumerate(gaps)])
+            )
+        by_values, by_states = (
+            [of_piece[:, part] for of_piece in columns] for part in (slice(p), slice(p, None))
+        )
+        return Slopes(
+            point, residuals, by_values, by_states, len(self.pieces[0].measured), len(self.data)
+        )
 
     def _pieces(self, i: int) -> list[Piece]:
         """Return the pieces of record i."""
@@ -279,19 +348,32 @@ class Replays:
         period, t = twin.step(data), data[twin.columns.time]
         first, last = round(twin.start / period), len(t) - 1
         shortest = max(twin.window, (records.MIN_SAMPLES + 1) * period)
-        count = 1 if self.whole else max(1, int((last - first) * period / shortest + 0.01))
+        if self.whole:
+            count = 1
+        else:
+            count = max(1, int((last - first) * period / shortest + 0.01))
         ends = np.linspace(first, last, count + 1).round().astype(int)
         names = [*twin.columns.x, *([twin.columns.u] if self.closed else [])]
         rates = [records.rate(data[name], period) for name in twin.columns.x]
-        varied = np.array([column.std() or 1.0 for column in (*(data[name] for name in twin.columns.x), *rates)])
+        varied = np.array(
+            [column.std() or 1.0 for column in (*(data[name] for name in twin.columns.x), *rates)]
+        )
         pieces = []
         for first, last in itertools.pairwise(ends):
-            duration = None if count == 1 else float(period * (last - first))
+            if count == 1:
+                duration = None
+            else:
+                duration = float(period * (last - first))
             part = twin.part(self.data[i], float(period * first), duration, self.closed)
-            skipped = round((twin.score_from - twin.start) / period) if self.closed else 0
+            if self.closed:
+                skipped = round((twin.score_from - twin.start) / period)
+            else:
+                skipped = 0
             measured = {name: data[name][first + skipped : last + 1] for name in names}
             spread = {name: _norm(data[name]) for name in names}
-            pieces.append(Piece(i, part, skipped, measured, spread, STATE_SCALE * varied[self.free]))
+            pieces.append(
+                Piece(i, part, skipped, measured, spread, STATE_SCALE * varied[self.free])
+            )
         return pieces
 
 
@@ -303,16 +385,23 @@ def _norm(values: np.ndarray) -> float:
 def _steps(scenario: Scenario, halvings: int) -> dict[str, Any]:
     """Return integrator and step of a corrected replay.
 
-    RK4 has errors of first order only where dry friction changes its direction. It cannot integrate friction that has a
-    state.
+    RK4 has errors of first order only where dry friction changes its direction. It cannot integrate
+    friction that has a state.
     """
-    integrator, step = "RK4", scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9)
+    integrator, step = (
+        "RK4",
+        scenario.control_period / math.ceil(scenario.control_period / MAX_STEP - 1e-9),
+    )
     if scenario.input_delay or any(part.bristles for part in scenario.friction):
         integrator, step = scenario.resolved.integrator, scenario.resolved.physics_step
     return {"integrator": integrator, "physics_step": step / 2**halvings}
 
 
 def _scale(quantity: Quantity) -> float:
-    """Return the scale of a quantity: its magnitude, at least a hundredth of its range; 1e-3 for 0 without a range."""
+    """Return the scale of a quantity: its magnitude, at least a hundredth of its range; 1e-3 for 0
+    without a range.
+    """
     span = quantity.most - quantity.least
-    return max(abs(quantity.value), 0.01 * span if np.isfinite(span) else 1e-3 * (quantity.value == 0.0))
+    return max(
+        abs(quantity.value), 0.01 * span if np.isfinite(span) else 1e-3 * (quantity.value == 0.0)
+    )

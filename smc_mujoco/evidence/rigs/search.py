@@ -1,11 +1,13 @@
-"""The search of identification: starts from torques and over decades, and damped Gauss-Newton steps from the best.
+"""The search of identification: starts from torques and over decades, and damped Gauss-Newton steps
+from the best.
 
-Where the joints have the recorded command as their force, a first least squares compares that force with the inverse
-dynamics of the measured motion. It is nearly linear in masses and frictions, so any values may start it. The noise
-of accelerations biases it, so its result is only a start.
+Where the joints have the recorded command as their force, a first least squares compares that force
+with the inverse dynamics of the measured motion. It is nearly linear in masses and frictions, so
+any values may start it. The noise of accelerations biases it, so its result is only a start.
 
-Quantities that cannot be negative, such as masses and frictions, differ between machines by powers of ten. So further
-starts are drawn evenly in their logarithms, and no step changes such a quantity by more than a factor of ten.
+Quantities that cannot be negative, such as masses and frictions, differ between machines by powers
+of ten. So further starts are drawn evenly in their logarithms, and no step changes such a quantity
+by more than a factor of ten.
 """
 
 import dataclasses
@@ -19,9 +21,19 @@ from smc_mujoco.evidence.rigs.uncertainty import jackknife
 
 START_DECADES = 2.0  # by which a quantity of a further start may differ from the rig's own; chosen
 CANDIDATES = 8  # further starts that are drawn for each one that is refined; chosen
-DAMPINGS = (0.0, 1e-2, 1.0, 1e3)  # of the steps that are tried at once, relative to the curvature; chosen
-SHARES = (0.3, 1.0)  # shares of its linear move by which a piece's starting state is moved in trials; chosen
-MAX_STATE = 100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
+DAMPINGS = (
+    0.0,
+    1e-2,
+    1.0,
+    1e3,
+)  # of the steps that are tried at once, relative to the curvature; chosen
+SHARES = (
+    0.3,
+    1.0,
+)  # shares of its linear move by which a piece's starting state is moved in trials; chosen
+MAX_STATE = (
+    100.0  # scales of a state at the start, by which it may differ from the measured one; chosen
+)
 MAX_FACTOR = 10.0  # by which a step may change a quantity that cannot be negative; chosen
 NEGLIGIBLE_VALUE = 1e-4  # of its scale: below it such a quantity may become 0; chosen
 COST_TOLERANCE = 1e-5  # relative change of the cost at which the search ends; chosen
@@ -33,10 +45,11 @@ GOOD_FIT = 97.0  # percent: fit of the pieces beyond which a start needs no riva
 
 
 def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
-    """Return the slopes at the least squares near the best of several starts, the rig's own values first.
+    """Return the slopes at the least squares near the best of several starts, the rig's own values
+    first.
 
-    Further starts, of which the random ones have a `seed`, are only tried while none fits well. `most`: largest number
-    of steps from the best start.
+    Further starts, of which the random ones have a `seed`, are only tried while none fits well.
+    `most`: largest number of steps from the best start.
     """
     reached = [refine(replays, replays.start, min(most, ROUGH_STEPS))]
     if reached[0].fit < GOOD_FIT and (point := _by_torques(replays)):
@@ -50,13 +63,17 @@ def search(replays: Replays, starts: int, seed: int, most: int) -> Slopes:
 
 
 def _by_torques(replays: Replays) -> Point | None:
-    """Return the point at which inverse dynamics give the recorded command; None where u is not the joints' force."""
+    """Return the point at which inverse dynamics give the recorded command; None where u is not the
+    joints' force.
+    """
     from scipy.optimize import least_squares
 
     twin, start = replays.twin, replays.start
     data = [twin.checked(record) for record in replays.data]
     direct = replays.pieces[0].part is not None and twin.scenario("none").actuator == ()
-    columns = dataclasses.replace(twin.columns, torque=tuple(f"torque of {name}" for name in twin.columns.x))
+    columns = dataclasses.replace(
+        twin.columns, torque=tuple(f"torque of {name}" for name in twin.columns.x)
+    )
     if not direct or not all(inverse.long_enough(record, columns) for record in data):
         return None
     for record in data:
@@ -66,8 +83,15 @@ def _by_torques(replays: Replays) -> Point | None:
 
     def differences(values: np.ndarray) -> np.ndarray:
         fields = twin.machine(Values(**twin.values | replays.values(Point(values, start.states))))
-        pairs = zip((inverse.torques(fields["plant"], record, columns) for record in data), measured, strict=True)
-        gaps = [ours[name] - theirs[name] for ours, theirs in pairs for name in columns.torque]
+        pairs = zip(
+            (inverse.torques(fields["plant"], record, columns) for record in data),
+            measured,
+            strict=True,
+        )
+        gaps = []
+        for ours, theirs in pairs:
+            for name in columns.torque:
+                gaps.append(ours[name] - theirs[name])
         return np.nan_to_num(np.concatenate(gaps))
 
     inside = np.clip(start.values, replays.low, replays.high)
@@ -83,7 +107,9 @@ def _random(replays: Replays, count: int, seed: int) -> list[Point]:
     for _ in range(CANDIDATES * count):
         factors = 10.0 ** rng.uniform(-START_DECADES, START_DECADES, len(magnitudes))
         signs = np.where(replays.low < 0.0, rng.choice((-1.0, 1.0), len(magnitudes)), 1.0)
-        drawn.append(Point(np.clip(signs * factors * magnitudes, replays.low, replays.high), start.states))
+        drawn.append(
+            Point(np.clip(signs * factors * magnitudes, replays.low, replays.high), start.states)
+        )
     costs = [cost(rows) for rows in replays.residuals(drawn)]
     return [drawn[i] for i in np.argsort(costs, kind="stable")[:count]]
 
@@ -95,10 +121,12 @@ def better(replays: Replays, *points: Point) -> Point:
 
 
 def accurate(replays: Replays, slopes: Slopes) -> tuple[Slopes, np.ndarray]:
-    """Return what a search reaches when its replays are corrected, and how far the last halving moved it, (p,).
+    """Return what a search reaches when its replays are corrected, and how far the last halving
+    moved it, (p,).
 
-    The step is halved until that move is far below the standard errors. Residuals are corrected at each point, because
-    the moments at which dry friction changes its direction move. The derivatives stay those of the first step.
+    The step is halved until that move is far below the standard errors. Residuals are corrected at
+    each point, because the moments at which dry friction changes its direction move. The
+    derivatives stay those of the first step.
     """
     moved = np.zeros(len(replays.names))
     if not replays.correct(slopes.point, 1):
@@ -125,7 +153,9 @@ def not_worse(replays: Replays, reached: Slopes) -> Slopes:
 
 
 def refine(replays: Replays, point: Point, most: int) -> Slopes:
-    """Return the slopes at the least squares near a point, after at most `most` steps that lower the cost."""
+    """Return the slopes at the least squares near a point, after at most `most` steps that lower
+    the cost.
+    """
     best = replays.slopes(point)
     for _ in range(most):
         chosen, reached = _best_step(replays, best)
@@ -140,7 +170,10 @@ def refine(replays: Replays, point: Point, most: int) -> Slopes:
 
 
 def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
-    """Return the best of several damped steps, and its cost. Each piece chooses the best move of its own states."""
+    """Return the best of several damped steps, and its cost.
+
+    Each piece chooses the best move of its own states.
+    """
     groups = [_variants(replays, slopes, _moved(replays, slopes, damping)) for damping in DAMPINGS]
     trials, size = [point for group in groups for point in group], len(groups[0])
     costs = np.array([[cost([rows]) for rows in pieces] for pieces in replays.residuals(trials)])
@@ -148,18 +181,28 @@ def _best_step(replays: Replays, slopes: Slopes) -> tuple[Point, float]:
     for i, group in enumerate(groups):
         of_length = costs[i * size : (i + 1) * size]
         states = [group[variant].states[k] for k, variant in enumerate(of_length.argmin(axis=0))]
-        reached.append((Point(group[0].values, np.array(states)), float(of_length.min(axis=0).sum())))
+        reached.append(
+            (Point(group[0].values, np.array(states)), float(of_length.min(axis=0).sum()))
+        )
     return min(reached, key=lambda pair: pair[1])
 
 
 def _variants(replays: Replays, slopes: Slopes, values: np.ndarray) -> list[Point]:
-    """Return points with the same quantities, and states at the starts that a piece may choose from.
+    """Return points with the same quantities, and states at the starts that a piece may choose
+    from.
 
-    Dry friction makes a kink in the cost at velocity 0, which no step crosses from another velocity. So rest is tried.
+    Dry friction makes a kink in the cost at velocity 0, which no step crosses from another
+    velocity. So rest is tried.
     """
     moves = slopes.moves(values - slopes.point.values)
-    moved = [Point(values, np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE)) for share in SHARES]
-    return [*moved, replays.at_rest(moved[-1])] if len(replays.free) else moved[-1:]
+    moved = []
+    for share in SHARES:
+        moved.append(
+            Point(values, np.clip(slopes.point.states + share * moves, -MAX_STATE, MAX_STATE))
+        )
+    if len(replays.free):
+        return [*moved, replays.at_rest(moved[-1])]
+    return moved[-1:]
 
 
 def _moved(replays: Replays, slopes: Slopes, damping: float) -> np.ndarray:

@@ -1,13 +1,16 @@
-"""What simulation said of real machines, and what these did: a row for each figure of each public record.
+"""What simulation said of real machines, and what these did: a row for each figure of each public
+record.
 
     for one in rows("qube_servo"):
         one.machine, one.twin, one.use            # of theta in record 11: 0.2638, 0.2628, "held out"
 
-A twin is a distribution over its parameter sets and seeds, so that each figure has a range. Whether a record was used
-is not written down with the figure but follows from the rig: one that was identified from no record here is "unfitted";
-of others the records of `Rig.identified_from` are "fitted on", and all the rest are "held out".
+A twin is a distribution over its parameter sets and seeds, so that each figure has a range. Whether
+a record was used is not written down with the figure but follows from the rig: one that was
+identified from no record here is "unfitted"; of others the records of `Rig.identified_from` are
+"fitted on", and all the rest are "held out".
 
-The records do not come with the package. `python benchmarks/machines.py FOLDER` computes the rows from them.
+The records do not come with the package. `python benchmarks/machines.py FOLDER` computes the rows
+from them.
 """
 
 import dataclasses
@@ -38,14 +41,18 @@ class TwinFigure:
     Attributes:
       rig, record, law: names; the law is "none" where a command was repeated.
       figure, unit: what is compared, such as "theta rms", and its unit.
-      machine: the recorded figure; NaN where it is kept aside, and only the order of laws is known here.
-      twin: the figure by the rig's own quantities, or the median of all runs where there are several seeds; inf if the
-        twin falls.
-      low, high: the least and the largest over parameter sets; of runs from several seeds 5 and 95 %.
+      machine: the recorded figure; NaN where it is kept aside, and only the order of laws is known
+        here.
+      twin: the figure by the rig's own quantities, or the median of all runs where there are
+        several seeds; inf if the twin falls.
+      low, high: the least and the largest over parameter sets; of runs from several seeds 5 and 95
+        %.
       runs: number of these runs.
       fit: of the whole signal, percent, see `Rig.fit`; NaN for a figure that is not of a signal.
-      published: the figure by published numbers of the machine; NaN without any, inf if they let it fall.
-      variant: what of the twin is left out or changed, as "without the commutator"; "" for the whole twin.
+      published: the figure by published numbers of the machine; NaN without any, inf if they let it
+        fall.
+      variant: what of the twin is left out or changed, as "without the commutator"; "" for the
+        whole twin.
     """
 
     rig: str
@@ -66,11 +73,15 @@ class TwinFigure:
     def use(self) -> str:
         """What the record was for the twin: "unfitted", "fitted on" or "held out"."""
         sources = catalogue()[self.rig].identified_from
-        return FITTED if self.record in sources else HELD_OUT if sources else UNFITTED
+        if self.record in sources:
+            return FITTED
+        return HELD_OUT if sources else UNFITTED
 
     @property
     def apart(self) -> float:
-        """How far the twin's figure is from the machine's, as a share of this; NaN if it is kept aside."""
+        """How far the twin's figure is from the machine's, as a share of this; NaN if it is kept
+        aside.
+        """
         return abs(self.twin / self.machine - 1.0)
 
     @property
@@ -83,7 +94,8 @@ class TwinFigure:
 class Order:
     """In how many of a twin's parameter sets its laws stand in the machine's order.
 
-    `laws`: in that order, the least `figure` first. `tau`: Kendall's, over machine and twin, the mean over sets.
+    `laws`: in that order, the least `figure` first. `tau`: Kendall's, over machine and twin, the
+    mean over sets.
     """
 
     rig: str
@@ -126,19 +138,36 @@ class Summary(NamedTuple):
     @property
     def published(self) -> float:
         """How far published numbers are from the machine, the median, a share; NaN without any."""
-        known = [abs(row.published / row.machine - 1.0) for row in self.rows if not math.isnan(row.published)]
+        known = []
+        for row in self.rows:
+            if not math.isnan(row.published):
+                known.append(abs(row.published / row.machine - 1.0))
         return float(np.median(known)) if known else math.nan
 
     @property
     def cells(self) -> list[str]:
-        """The summary as the cells of a table: rig, use, rows, median, largest, within its range, published."""
+        """The summary as the cells of a table: rig, use, rows, median, largest, within its range,
+        published.
+        """
         median, largest, published = map(percent, (self.median, self.largest, self.published))
-        return [self.rig, self.use, f"{len(self.rows)}", median, largest, f"{self.inside}", published]
+        return [
+            self.rig,
+            self.use,
+            f"{len(self.rows)}",
+            median,
+            largest,
+            f"{self.inside}",
+            published,
+        ]
 
 
 def percent(share: float) -> str:
     """Return a share as percent; "" for none, and "falls" for a twin that falls."""
-    return "" if math.isnan(share) else "falls" if math.isinf(share) else f"{100.0 * share:.1f}"
+    if math.isnan(share):
+        return ""
+    if math.isinf(share):
+        return "falls"
+    return f"{100.0 * share:.1f}"
 
 
 def summaries(rows: Sequence[TwinFigure]) -> list[Summary]:
@@ -162,25 +191,40 @@ def rows(rig: str = "") -> list[TwinFigure]:
       ScenarioError: an unknown rig.
     """
     every = [TwinFigure(**_numbers(row)) for row in _stored()["figures"]]
-    return every if not rig else [row for row in every if row.rig == find("rig", rig, catalogue()).name]
+    if not rig:
+        return every
+    return [row for row in every if row.rig == find("rig", rig, catalogue()).name]
 
 
 def orders(rig: str = "") -> list[Order]:
-    """Return the orders of laws on the machines that ran several, of a rig, or of all; raises as `rows`."""
+    """Return the orders of laws on the machines that ran several, of a rig, or of all; raises as
+    `rows`.
+    """
     every = [Order(**row | {"laws": tuple(row["laws"])}) for row in _stored()["orders"]]
-    return every if not rig else [row for row in every if row.rig == find("rig", rig, catalogue()).name]
+    if not rig:
+        return every
+    return [row for row in every if row.rig == find("rig", rig, catalogue()).name]
 
 
 def described(row: TwinFigure | Order) -> dict[str, Any]:
-    """Return a row as JSON data, without fields that have their default; None stands for NaN, and "falls" for inf."""
+    """Return a row as JSON data, without fields that have their default; None stands for NaN, and
+    "falls" for inf.
+    """
     fields = {f.name: (getattr(row, f.name), f.default) for f in dataclasses.fields(row)}
-    told = {name: value for name, (value, default) in fields.items() if value is not default and value != default}
+    told = {}
+    for name, (value, default) in fields.items():
+        if value is not default and value != default:
+            told[name] = value
     return {name: _as_data(value) for name, value in told.items()}
 
 
 def _as_data(value: Any) -> Any:
     if isinstance(value, float):
-        return None if math.isnan(value) else "falls" if math.isinf(value) else float(f"{value:.4g}")
+        if math.isnan(value):
+            return None
+        if math.isinf(value):
+            return "falls"
+        return float(f"{value:.4g}")
     return value
 
 

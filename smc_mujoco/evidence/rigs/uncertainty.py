@@ -1,14 +1,16 @@
-"""Standard errors and correlations of identified quantities, and errors where records cannot tell them apart.
+"""Standard errors and correlations of identified quantities, and errors where records cannot tell
+them apart.
 
-Standard errors allow for residuals that depend on their neighbours: they come from a jackknife, at first order, that
-leaves out one block of time after the other. The states at the start of the block's piece are found again without it,
-because they share its samples. Blocks must be longer than the residuals' correlation time. Where a force that was not
-recorded moves the machine, no record has enough of them. So a standard error is at least that of least squares with as
-many residuals as are independent of each other. It is still too small then, and a note says so.
+Standard errors allow for residuals that depend on their neighbours: they come from a jackknife, at
+first order, that leaves out one block of time after the other. The states at the start of the
+block's piece are found again without it, because they share its samples. Blocks must be longer than
+the residuals' correlation time. Where a force that was not recorded moves the machine, no record
+has enough of them. So a standard error is at least that of least squares with as many residuals as
+are independent of each other. It is still too small then, and a note says so.
 
-A closed loop feeds the noise of its measurement back. If one short transient decides a quantity, the other blocks do
-not show the effect of that noise. So closed loops are also simulated with their own noise and rounding, and a standard
-error is at least the deviation that these cause.
+A closed loop feeds the noise of its measurement back. If one short transient decides a quantity,
+the other blocks do not show the effect of that noise. So closed loops are also simulated with their
+own noise and rounding, and a standard error is at least the deviation that these cause.
 """
 
 import dataclasses
@@ -24,15 +26,20 @@ from smc_mujoco.simulation.signals import Noise
 
 MAX_CORRELATION = 0.98  # beyond this correlation records cannot tell two quantities apart; chosen
 REPEATS = 24  # simulated repetitions of the records of a closed loop, for standard errors; chosen
-# Of the jackknife, chosen: blocks of time in all pieces together, and the length of a block in correlation times of the
-# residuals.
+# Of the jackknife, chosen: blocks of time in all pieces together, and the length of a block in
+# correlation times of the residuals.
 BLOCKS, CORRELATION_TIMES = (60, 400), 10.0
 MIN_POWER = 1e-300  # in place of the power 0 of residuals that are all 0
-SINGULAR_RATIO = 1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
+SINGULAR_RATIO = (
+    1e-6  # ratio of the slopes' singular values below which quantities cannot be told apart; chosen
+)
 
 
-def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[dict[str, float], np.ndarray, float]:
-    """Return the standard error of each quantity, their correlations (p, p), and `independent`, at the solution.
+def statistics(
+    replays: Replays, slopes: Slopes, by_steps: np.ndarray
+) -> tuple[dict[str, float], np.ndarray, float]:
+    """Return the standard error of each quantity, their correlations (p, p), and `independent`, at
+    the solution.
 
     `by_steps`: errors of the quantities that the simulation's steps cause, in their scales, (p,).
     """
@@ -41,7 +48,9 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
     sizes = np.linalg.norm(J, axis=0)
     for name, size in zip(names, sizes, strict=True):
         if size == 0.0:
-            raise ScenarioError(f"nothing in the records depends on {name}: leave it out, or give other records")
+            raise ScenarioError(
+                f"nothing in the records depends on {name}: leave it out, or give other records"
+            )
     _, singular, rows = np.linalg.svd(J / sizes, full_matrices=False)
     if singular[-1] < SINGULAR_RATIO * singular[0]:
         raise _alike(replays.twin.name, (names[i] for i in np.argsort(-np.abs(rows[-1]))[:2]))
@@ -58,8 +67,12 @@ def statistics(replays: Replays, slopes: Slopes, by_steps: np.ndarray) -> tuple[
     return errors, correlations, count
 
 
-def _refuse_alike(rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray) -> None:
-    """Raise ScenarioError for two quantities of which only a sum is known: neither is above its standard error."""
+def _refuse_alike(
+    rig: str, values: dict[str, float], errors: dict[str, float], correlations: np.ndarray
+) -> None:
+    """Raise ScenarioError for two quantities of which only a sum is known: neither is above its
+    standard error.
+    """
     names = list(values)
     unknown = np.array([errors[name] > abs(value) for name, value in values.items()])
     pairs = np.triu(np.abs(correlations), 1) * np.outer(unknown, unknown)
@@ -78,7 +91,9 @@ def _alike(rig: str, quantities: Iterable[str]) -> ScenarioError:
 
 
 def jackknife(slopes: Slopes) -> np.ndarray:
-    """Return the covariance of the solution, (p, p), from leaving out one block of time after the other."""
+    """Return the covariance of the solution, (p, p), from leaving out one block of time after the
+    other.
+    """
     pieces = list(zip(slopes.residuals, slopes.by_values, slopes.by_states, strict=True))
     parts = -(-_blocks(slopes) // len(pieces))
     normal = [_normal(*piece) for piece in pieces]
@@ -95,7 +110,9 @@ def jackknife(slopes: Slopes) -> np.ndarray:
 
 
 def by_correlation(slopes: Slopes, J: np.ndarray, count: float) -> np.ndarray:
-    """Return the deviation of the solution, (p,), by least squares with `count` samples that are independent."""
+    """Return the deviation of the solution, (p,), by least squares with `count` samples that are
+    independent.
+    """
     variance = slopes.cost / max(count * slopes.columns - J.shape[1], 1.0)
     return np.sqrt(variance * np.diag(np.linalg.pinv(J.T @ J)))
 
@@ -106,9 +123,11 @@ def _blocks(slopes: Slopes) -> int:
 
 
 def independent(slopes: Slopes) -> float:
-    """Return how many samples of the residuals are independent of each other: their number over a correlation time.
+    """Return how many samples of the residuals are independent of each other: their number over a
+    correlation time.
 
-    A correlation time is 1 + 2 (sum of the autocorrelations up to the first one below 0), in samples.
+    A correlation time is 1 + 2 (sum of the autocorrelations up to the first one below 0), in
+    samples.
     """
     times = []
     for r in slopes.residuals:
@@ -116,34 +135,52 @@ def independent(slopes: Slopes) -> float:
         power = np.abs(np.fft.rfft(rows, 2 * len(rows), axis=0)) ** 2
         for correlation in np.fft.irfft(power, axis=0)[: len(rows)].T:
             end = int(np.argmax(correlation < 0.0)) or len(correlation)
-            times.append(1.0 + 2.0 * float(correlation[1:end].sum() / max(correlation[0], MIN_POWER)))
+            times.append(
+                1.0 + 2.0 * float(correlation[1:end].sum() / max(correlation[0], MIN_POWER))
+            )
     return sum(map(len, slopes.residuals)) / slopes.columns / float(np.median(times))
 
 
 def _normal(r: np.ndarray, J: np.ndarray, S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return J'J and J'r of a piece, (p, p) and (p,), with J less what states S at its start can cause."""
+    """Return J'J and J'r of a piece, (p, p) and (p,), with J less what states S at its start can
+    cause.
+    """
     J = J - S @ np.linalg.lstsq(S, J, rcond=SINGULAR_RATIO)[0]
     return J.T @ J, J.T @ r
 
 
 def _fed_back(replays: Replays, point: Point, J: np.ndarray) -> np.ndarray:
-    """Return the deviation of the solution, (p,), that the measurement's noise causes through the controller.
+    """Return the deviation of the solution, (p,), that the measurement's noise causes through the
+    controller.
 
-    It is the root mean square over REPEATS simulations of the records with their noise and rounding, at first order.
+    It is the root mean square over REPEATS simulations of the records with their noise and
+    rounding, at first order.
     """
     rig, pieces = replays.rig(point), replays.pieces
-    known = [(piece.part, replays.state(point, k)) for k, piece in enumerate(pieces) if piece.part is not None]
+    known = [
+        (piece.part, replays.state(point, k))
+        for k, piece in enumerate(pieces)
+        if piece.part is not None
+    ]
     calm = [rig.repeated(part, state=state) for part, state in known]
-    noise = [records.noise(rig.checked(replays.data[piece.record]), rig.columns) for piece in pieces]
+    noise = []
+    for piece in pieces:
+        noise.append(records.noise(rig.checked(replays.data[piece.record]), rig.columns))
     noisy = [
-        dataclasses.replace(rig.repeated(part, rounded=True, state=state), noise=Noise(noise[k]), seed=repeat)
+        dataclasses.replace(
+            rig.repeated(part, rounded=True, state=state), noise=Noise(noise[k]), seed=repeat
+        )
         for repeat in range(REPEATS)
         for k, (part, state) in enumerate(known)
     ]
-    predicted = [
-        {name: values[pieces[k % len(pieces)].skipped :] for name, values in rig.predicted(trace).items()}
-        for k, trace in enumerate(run(calm + noisy))
-    ]
+    predicted = []
+    for k, trace in enumerate(run(calm + noisy)):
+        predicted.append(
+            {
+                name: values[pieces[k % len(pieces)].skipped :]
+                for name, values in rig.predicted(trace).items()
+            }
+        )
     rows = [replays.relative(pieces[k % len(pieces)], values) for k, values in enumerate(predicted)]
     expected, *repeats = np.concatenate(rows).reshape(1 + REPEATS, -1)
     moved = np.array([np.linalg.lstsq(J, repeat - expected, rcond=None)[0] for repeat in repeats])

@@ -1,6 +1,8 @@
-"""What firmware needs around a law of a free body in C: its pose, its errors, and what its actuators get.
+"""What firmware needs around a law of a free body in C: its pose, its errors, and what its
+actuators get.
 
-These functions are translated, from the Python that runs in MuJoCo's callback, so that they give the same bits.
+These functions are translated, from the Python that runs in MuJoCo's callback, so that they give
+the same bits.
 """
 
 from collections.abc import Callable
@@ -29,7 +31,10 @@ def errors(x, v, r, dr, e, de):
 
 
 def functions(plant: Plant | None) -> dict[str, tuple[Callable[..., Any], list[str]]]:
-    """Return name in smc_law.h -> function, and the kinds of its arguments. Without a plant there are no actuators."""
+    """Return name in smc_law.h -> function, and the kinds of its arguments.
+
+    Without a plant there are no actuators.
+    """
     found = {"smc_pose": (pose, ["real[7]", VECTOR]), "smc_errors": (errors, [VECTOR] * 6)}
     if plant is None:
         return found

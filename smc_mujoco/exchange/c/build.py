@@ -1,4 +1,6 @@
-"""Compile C into a shared library with the system's compiler, and report its errors in one sentence."""
+"""Compile C into a shared library with the system's compiler, and report its errors in one
+sentence.
+"""
 
 import atexit
 import functools
@@ -24,19 +26,28 @@ HEADER = FOLDER / "smc_law.h"
 MEASUREMENT_SIZE = len(Measurement._fields)  # numbers in a measurement
 # How a measurement is stored, for glue.c and replay.c.
 LAYOUT_FLAGS = f"-DSMC_INPUTS={MEASUREMENT_SIZE}", f"-DSMC_VECTORS={joint_law.ARRAYS.index('M')}"
-PROTOTYPE = "int {}(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+PROTOTYPE = (
+    "int {}(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+)
 # The same arithmetic as compiled Python: no fused multiply-add.
 LIBRARY_FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
-# A library uses its own functions and data even if the C library has the same names, such as remove, y0, timezone.
-SYMBOLIC_FLAGS = ("-Wl,-Bsymbolic",) if sys.platform not in ("darwin", "win32") else ()
+# A library uses its own functions and data even if the C library has the same names, such as
+# remove, y0, timezone.
+if sys.platform not in ("darwin", "win32"):
+    SYMBOLIC_FLAGS = ("-Wl,-Bsymbolic",)
+else:
+    SYMBOLIC_FLAGS = ()
 # For a trial: an access beyond an array or undefined behaviour ends the process with a report.
 SANITIZER_FLAGS = ("-O0", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 WARNING_FLAGS = ("-Wall", "-Wextra")
 # Compiler warnings that are errors here.
 STRICT_FLAGS = tuple(
-    f"-Werror={name}" for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
+    f"-Werror={name}"
+    for name in ("incompatible-pointer-types", "implicit-function-declaration", "int-conversion")
 )
-ERROR = re.compile(r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE)
+ERROR = re.compile(
+    r"^(?P<file>[^:\n]+):(?:(?P<line>\d+):)?(?:\d+:)? (?:fatal )?error: (?P<what>.*)$", re.MULTILINE
+)
 NO_ROOM_WORDS = re.compile(  # what compilers and linkers say
     "No space left on device|Disk quota exceeded|File too large|File size limit exceeded|Cannot create temporary file"
 )
@@ -48,7 +59,8 @@ _count = itertools.count()
 def folder() -> Path:
     """Return the folder for compiled files, which is removed when the process ends.
 
-    No file is deleted earlier: a new file could get its inode number, and the loader would take it for the old one.
+    No file is deleted earlier: a new file could get its inode number, and the loader would take it
+    for the old one.
     """
     with no_room():
         path, owner = tempfile.mkdtemp(prefix="smc_mujoco-"), os.getpid()
@@ -76,15 +88,23 @@ def compiler() -> list[str]:
 
 
 def run_compiler(command: Sequence[str], timeout: float) -> subprocess.CompletedProcess[str]:
-    """Run the command of a compiler, for at most `timeout` seconds. Errors are those of `process.timed`."""
+    """Run the command of a compiler, for at most `timeout` seconds.
+
+    Errors are those of `process.timed`.
+    """
     done = timed(command, timeout)
     if done.returncode and (why := NO_ROOM_WORDS.search(done.stderr)):
         raise without_room(why[0])
     return done
 
 
-def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> tuple[Path, list[str]]:
-    """Compile a C file with the glue that calls its function `symbol`. Return the library and the warnings."""
+def library(
+    source: Path, symbol: str, flags: Sequence[str], timeout: float
+) -> tuple[Path, list[str]]:
+    """Compile a C file with the glue that calls its function `symbol`.
+
+    Return the library and the warnings.
+    """
     path, target, command = str(source.resolve()), fresh(".so"), compiler()
     if set('"\\\n') & set(path):
         raise ScenarioError(
@@ -94,7 +114,17 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
     files = [str(FOLDER / "glue.c"), "-o", str(target)]
     try:
         done = run_compiler(
-            [*command, *LIBRARY_FLAGS, *SYMBOLIC_FLAGS, *STRICT_FLAGS, *macros, *files, *flags, "-lm"], timeout
+            [
+                *command,
+                *LIBRARY_FLAGS,
+                *SYMBOLIC_FLAGS,
+                *STRICT_FLAGS,
+                *macros,
+                *files,
+                *flags,
+                "-lm",
+            ],
+            timeout,
         )
     except TimedOut:
         raise ScenarioError(
@@ -113,7 +143,15 @@ def library(source: Path, symbol: str, flags: Sequence[str], timeout: float) -> 
 def replayer(command: tuple[str, ...]) -> Path | None:
     """Return `replay.c`, compiled with a compiler's sanitizers; None if these do not work."""
     target = fresh(".exe")
-    line = [*command, *SANITIZER_FLAGS, *LAYOUT_FLAGS, str(FOLDER / "replay.c"), "-o", str(target), "-ldl"]
+    line = [
+        *command,
+        *SANITIZER_FLAGS,
+        *LAYOUT_FLAGS,
+        str(FOLDER / "replay.c"),
+        "-o",
+        str(target),
+        "-ldl",
+    ]
     try:
         if run_compiler(line, 60.0).returncode or timed([str(target)], 60.0).returncode:
             return None
@@ -130,18 +168,31 @@ def undefined(source: Path, symbol: str) -> str:
 def _sentence(source: Path, symbol: str, command: str, output: str) -> str:
     """Return the first error in a compiler's output, with a cure."""
     error, name = ERROR.search(output), source.name
-    what, file = (error["what"], Path(error["file"]).name) if error else ("", "")
-    if (f"'{symbol}'" in what and "undeclared" in what) or re.search(rf"ndefined \w+.*\b_?{symbol}\b", output):
+    if error:
+        what, file = (error["what"], Path(error["file"]).name)
+    else:
+        what, file = ("", "")
+    if (f"'{symbol}'" in what and "undeclared" in what) or re.search(
+        rf"ndefined \w+.*\b_?{symbol}\b", output
+    ):
         return undefined(source, symbol)
     if error is None or error["line"] is None:  # from the linker or the command itself
         lines = [line for line in output.splitlines() if line.strip()] or ["it says nothing"]
-        telling = [line for line in lines if re.search(r"ndefined|cannot find|error:", line)] or lines
+        telling = [
+            line for line in lines if re.search(r"ndefined|cannot find|error:", line)
+        ] or lines
         return f"{name} does not compile, {command} says: {telling[0].strip()}; fix it, or give other flags="
     if f"'{symbol}'" in what or file == "glue.c":
         return f"{name} has another {symbol} than smc_mujoco calls: it must be {PROTOTYPE.format(symbol)}"
     if what.startswith("#error"):
         wanted = what.removeprefix("#error").strip(' "')
         return f"{name} does not compile: {wanted}"
-    where = f"line {error['line']}" if file == name else f"{error['file']}, line {error['line']}"
-    cure = f"the law must be {PROTOTYPE.format(symbol)}" if "unknown type name 'smc_" in what else "fix it"
+    if file == name:
+        where = f"line {error['line']}"
+    else:
+        where = f"{error['file']}, line {error['line']}"
+    if "unknown type name 'smc_" in what:
+        cure = f"the law must be {PROTOTYPE.format(symbol)}"
+    else:
+        cure = "fix it"
     return f"{name} does not compile: {where}, {what}; {cure}"

@@ -1,8 +1,8 @@
 """Export laws to C99: one file without dependencies, with the signature of `smc_law.h`.
 
-The C is translated from the law's Python, operation by operation. In double precision it equals the compiled law bit
-for bit if both use the same C library. A division by zero raises nothing in C: it gives inf or NaN, which ends a run
-too.
+The C is translated from the law's Python, operation by operation. In double precision it equals the
+compiled law bit for bit if both use the same C library. A division by zero raises nothing in C: it
+gives inf or NaN, which ends a run too.
 """
 
 import functools
@@ -20,7 +20,15 @@ from smc_mujoco.common.version import __version__
 from smc_mujoco.control.component import Component, Template, gain_at, gain_text
 from smc_mujoco.control.law import FREE_BODY, Law, catalogue, known_laws
 from smc_mujoco.exchange.c import body, build
-from smc_mujoco.exchange.c.translate import JOINTS, MATH, SLOTS, Untranslatable, plain, rows, translate
+from smc_mujoco.exchange.c.translate import (
+    JOINTS,
+    MATH,
+    SLOTS,
+    Untranslatable,
+    plain,
+    rows,
+    translate,
+)
 from smc_mujoco.mechanisms.hardware.part import PLACES
 from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
@@ -33,25 +41,34 @@ MAX_JOINTS = 100
 SIZE_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off")  # with which the size of the code is measured
 
 
-def law_to_c(law: Component | Template | str | Scenario, numbers: str = "double", joints: int | None = None) -> str:
-    """Return a law as one C99 file, with its gains as defaults. `smc.exchange.law_from_c` can load it.
+def law_to_c(
+    law: Component | Template | str | Scenario, numbers: str = "double", joints: int | None = None
+) -> str:
+    """Return a law as one C99 file, with its gains as defaults.
+
+    `smc.exchange.law_from_c` can load it.
 
     Args:
-      law: a Law, its Template, or its text, see `law`; or a Scenario, which then gives the number of joints, what the
-        law knows of its plant, and of a free body the function that gives its actuators their commands.
-      numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16 bits.
-      joints: the number of joints for which a law of many joints is written. Default: the number of a gain's values.
+      law: a Law, its Template, or its text, see `law`; or a Scenario, which then gives the number
+        of joints, what the law knows of its plant, and of a free body the function that gives its
+        actuators their commands.
+      numbers: "double", "float", or, only for the paper's law observer_free, "q15": words of 16
+        bits.
+      joints: the number of joints for which a law of many joints is written. Default: the number of
+        a gain's values.
 
     Raises:
-      ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python that cannot be
-        translated, which the error quotes.
+      ScenarioError: no such law or type of numbers, no number of joints, or the law uses Python
+        that cannot be translated, which the error quotes.
     """
     if numbers not in NUMBER_BYTES:
         raise unknown("type of numbers", numbers, NUMBER_BYTES)
     plant = None
     if isinstance(law, Scenario):
         if joints is not None:
-            raise ScenarioError("a scenario has its own joints: leave joints out, or give its law instead")
+            raise ScenarioError(
+                "a scenario has its own joints: leave joints out, or give its law instead"
+            )
         plant, law = law.resolved.plant, law.resolved.law
         joints = plant.n if law.joint else None
     law = writable(law)
@@ -64,12 +81,22 @@ def law_to_c(law: Component | Template | str | Scenario, numbers: str = "double"
     return with_head(law, numbers, slots, code, joints, measured=True)
 
 
-def with_head(law: Component, numbers: str, slots: int, code: str, joints: int, *, measured: bool) -> str:
-    """Return the file of a law that is translated. If `measured`, its head has the size that a compiler gives it."""
-    real = ["#define SMC_REAL float"] if numbers == "float" else []
+def with_head(
+    law: Component, numbers: str, slots: int, code: str, joints: int, *, measured: bool
+) -> str:
+    """Return the file of a law that is translated.
+
+    If `measured`, its head has the size that a compiler gives it.
+    """
+    if numbers == "float":
+        real = ["#define SMC_REAL float"]
+    else:
+        real = []
     facts = _facts(law, slots, joints, numbers == "float")
     body = "\n".join([*includes(facts + code), "", *real, facts, code, ""])
-    return f"{_head(law, numbers, slots, joints, code, _measured(body) if measured else '')}\n{body}"
+    return (
+        f"{_head(law, numbers, slots, joints, code, _measured(body) if measured else '')}\n{body}"
+    )
 
 
 def writable(law: Component | Template | str) -> Component:
@@ -80,16 +107,23 @@ def writable(law: Component | Template | str) -> Component:
     if isinstance(law.function, AtAddress):
         raise ScenarioError(f"law {law.name!r} is in C already: take {law.function.__module__}")
     if not law.joint and law.of_channel(0) is not law:
-        raise ScenarioError(f"law {law} has gains by channel: give one channel's, such as law.of_channel(0)")
+        raise ScenarioError(
+            f"law {law} has gains by channel: give one channel's, such as law.of_channel(0)"
+        )
     return law
 
 
 def number_of_joints(law: Component, joints: int | None) -> int:
-    """Return for how many joints the C of a law is: `joints`, or the number of values of a gain; 0 for one channel."""
+    """Return for how many joints the C of a law is:
+
+    `joints`, or the number of values of a gain; 0 for one channel.
+    """
     several = {name: len(value) for name, value in law.gains.items() if isinstance(value, tuple)}
     if not law.joint:
         if joints is not None:
-            raise ScenarioError(f"law {law.name!r} is of one channel: leave joints={shown(joints)} out")
+            raise ScenarioError(
+                f"law {law.name!r} is of one channel: leave joints={shown(joints)} out"
+            )
         return 0
     if law.plants == (FREE_BODY,):
         if joints not in (None, len(PLACES)):
@@ -98,8 +132,12 @@ def number_of_joints(law: Component, joints: int | None) -> int:
             )
         joints = len(PLACES)
     if joints is None and not several:
-        raise ScenarioError(f"law {law.name!r} is of many joints: give their number, such as joints=7")
-    count = whole("joints", next(iter(several.values())) if joints is None else joints, 2, MAX_JOINTS)
+        raise ScenarioError(
+            f"law {law.name!r} is of many joints: give their number, such as joints=7"
+        )
+    count = whole(
+        "joints", next(iter(several.values())) if joints is None else joints, 2, MAX_JOINTS
+    )
     for name, values in several.items():
         if values != count:
             raise ScenarioError(
@@ -112,16 +150,24 @@ def number_of_joints(law: Component, joints: int | None) -> int:
 def translated(
     component: Component, single: bool = False, joints: int = 0, plant: Plant | None = None
 ) -> tuple[int, str]:
-    """Return the memory slots and the C of a component, of a law of many joints for a number of these.
+    """Return the memory slots and the C of a component, of a law of many joints for a number of
+    these.
 
     Of a law of a free body, or for a plant that is one, it has `body.functions`, too.
     """
-    plant = plant if plant is not None and plant.pose else None
-    of_body = plant is not None or (joints and isinstance(component, Law) and component.plants == (FREE_BODY,))
+    if not (plant is not None and plant.pose):
+        plant = None
+    of_body = plant is not None or (
+        joints and isinstance(component, Law) and component.plants == (FREE_BODY,)
+    )
     try:
-        slots, code = translate(component, single, joints, body.functions(plant) if of_body else None)
+        slots, code = translate(
+            component, single, joints, body.functions(plant) if of_body else None
+        )
     except Untranslatable as error:
-        raise ScenarioError(f"{component.kind} {component.name!r} cannot be written in C: {error}") from None
+        raise ScenarioError(
+            f"{component.kind} {component.name!r} cannot be written in C: {error}"
+        ) from None
     if plant is not None:
         code = f"enum {{ SMC_ACTUATORS = {len(mixer(plant))} }}; /* whose controls smc_actuators sets */\n\n{code}"
     return slots, code
@@ -129,7 +175,10 @@ def translated(
 
 def includes(code: str) -> list[str]:
     """Return the lines that include the headers of C that some code needs."""
-    headers = {"math.h": rf"\b(?:{'|'.join(MATH)})f?\(|\bNAN\b|\bINFINITY\b", "stdint.h": r"\bint(?:16|32)_t\b"}
+    headers = {
+        "math.h": rf"\b(?:{'|'.join(MATH)})f?\(|\bNAN\b|\bINFINITY\b",
+        "stdint.h": r"\bint(?:16|32)_t\b",
+    }
     return [f"#include <{name}>" for name, needs in headers.items() if re.search(needs, code)]
 
 
@@ -140,7 +189,9 @@ def gain_names(component: Component) -> list[str]:
 
 
 def _in_q15(law: Component) -> Component:
-    """Return the fixed-point law with the gains of a law, which must be the paper's or fixed-point itself."""
+    """Return the fixed-point law with the gains of a law, which must be the paper's or fixed-point
+    itself.
+    """
     if law.name == "observer_free" and law.function is catalogue()["observer_free"].function:
         law = catalogue()[Q15_LAW].bind(law.gains, warn=True)
     if law.function is not catalogue()[Q15_LAW].function:
@@ -167,16 +218,29 @@ def _fixed_point(law: Component) -> str:
 
 def _facts(law: Component, slots: int, joints: int, single: bool) -> str:
     """Return the header, the names of the gains, and the constants that describe the law."""
-    texts = {name: " ".join(map(repr, v if isinstance(v, tuple) else (v,))) for name, v in law.gains.items()}
+    texts = {}
+    for name, v in law.gains.items():
+        texts[name] = " ".join(map(repr, v if isinstance(v, tuple) else (v,)))
     defaults = ",".join(f"{plain(name)}={text}" for name, text in texts.items())
-    values = [_literal(gain_at(value, i), single) for value in law.gains.values() for i in range(max(joints, 1))]
+    values = []
+    for value in law.gains.values():
+        for i in range(max(joints, 1)):
+            values.append(_literal(gain_at(value, i), single))
     lines = [
         *([f"#define {JOINTS} {joints}", f"#define {SLOTS} {slots}"] if joints else []),
         build.HEADER.read_text(encoding="utf-8"),
         *gain_names(law),
         f'const char smc_law_gains[] = "{defaults}";',
-        *(textwrap.wrap(f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};", 112) if values else []),
-        *([f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";'] if joints else []),
+        *(
+            textwrap.wrap(f"const smc_real smc_law_defaults[] = {{{', '.join(values)}}};", 112)
+            if values
+            else []
+        ),
+        *(
+            [f'const char smc_law_shared[] = "{",".join(map(plain, law.shared))}";']
+            if joints
+            else []
+        ),
         f"const int smc_law_memory = {slots};",
         "const int smc_law_real = sizeof(smc_real);",
         *([] if joints else [f"const int smc_law_degree = {law.relative_degree};"]),
@@ -197,15 +261,27 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
     """Return the comment at the top: formula, source, gains, sizes."""
     template = known_laws().get(law.name)
     ours = template is not None and template.function is law.function
-    doc = template.doc if template is not None and ours else inspect.cleandoc(law.function.__doc__ or "")
+    if template is not None and ours:
+        doc = template.doc
+    else:
+        doc = inspect.cleandoc(law.function.__doc__ or "")
     gains = ", ".join(f"{name} = {gain_text(value)}" for name, value in law.gains.items()) or "none"
-    many, unit = (f" of {joints} joints", "joint") if joints else ("", "channel")
+    if joints:
+        many, unit = (f" of {joints} joints", "joint")
+    else:
+        many, unit = ("", "channel")
     facts = {
         "gains": f"{gains}; gains[] in this order" + f", {joints} numbers each" * bool(joints),
-        "numbers": {"q15": "words of 16 bits, sums of 32, and double where they meet the plant"}.get(numbers, numbers),
+        "numbers": {
+            "q15": "words of 16 bits, sums of 32, and double where they meet the plant"
+        }.get(numbers, numbers),
         "state": f"{slots * NUMBER_BYTES[numbers]} bytes a {unit}, memory[{slots * max(joints, 1)}]; no static data "
         "but constants, no malloc",
-        **({"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))} if joints else {}),
+        **(
+            {"reads": ", ".join(dict.fromkeys(re.findall(r"->(?!plant)(\w+)", code)))}
+            if joints
+            else {}
+        ),
         **({"code": size} if size else {}),
         "licence": "use without restriction, without warranty",
         "build": "cc -std=c99 -O2 -ffp-contract=off, and -lm",
@@ -213,7 +289,9 @@ def _head(law: Component, numbers: str, slots: int, joints: int, code: str, size
     title = f"{law.name}: a control law{many} in C99, written out by smc_mujoco {__version__}."
     lines = [title, "", *doc.splitlines(), ""]
     for name, fact in facts.items():
-        lines += textwrap.wrap(f"{name:8} {fact}", 112, subsequent_indent=" " * 9, break_on_hyphens=False)
+        lines += textwrap.wrap(
+            f"{name:8} {fact}", 112, subsequent_indent=" " * 9, break_on_hyphens=False
+        )
     text = "\n".join(f" * {line}".rstrip() for line in lines)[2:]
     return f"/*{text.replace('*/', '* /').replace('/*', '/ *')}\n */"
 
@@ -231,13 +309,19 @@ def _measured(code: str) -> str:
     with no_room():
         source.write_text(code, encoding="utf-8")
     try:
-        done = build.run_compiler([*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0)
+        done = build.run_compiler(
+            [*command, *SIZE_FLAGS, "-c", str(source), "-o", str(target)], 60.0
+        )
         version, tool = _tools(tuple(command))
         table = timed([tool, "-A", str(target)], 60.0).stdout
     except (OSError, TimedOut):
         return "not measured: there is no compiler here"
-    sections = [(name, int(n)) for name, n in re.findall(r"^\.(text|rodata)\S*\s+(\d+)", table, re.MULTILINE)]
+    sections = []
+    for name, n in re.findall(r"^\.(text|rodata)\S*\s+(\d+)", table, re.MULTILINE):
+        sections.append((name, int(n)))
     if done.returncode or not sections:
         return "not measured: the compiler here does not say"
-    text, constants = (sum(n for name, n in sections if name == kind) for kind in ("text", "rodata"))
+    text, constants = (
+        sum(n for name, n in sections if name == kind) for kind in ("text", "rodata")
+    )
     return f"{text} bytes, and {constants} of constants ({command[0]} {version} -Os, {platform.machine()})"

@@ -1,8 +1,11 @@
-"""Laws written in C: `law_from_c` compiles and loads them, and they run in the callback like the library's own.
+"""Laws written in C:
 
-`smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`, which calls the law
-the way the callback does, so a law of another type is a compiler error. A shared library is called directly. Loading,
-smc_setup and, on request, the law itself are tried in a separate process first, because they can hang or crash.
+`law_from_c` compiles and loads them, and they run in the callback like the library's own.
+
+`smc_law.h`, beside this file, describes the C function. A file is compiled together with `glue.c`,
+which calls the law the way the callback does, so a law of another type is a compiler error. A
+shared library is called directly. Loading, smc_setup and, on request, the law itself are tried in a
+separate process first, because they can hang or crash.
 """
 
 # pyright: reportCallIssue=false
@@ -52,7 +55,10 @@ class CLaw(AtAddress):
         self._function, self.library = sandbox.entry(str(file), symbol)
         self.address: int = ctypes.cast(self._function, ctypes.c_void_p).value or 0
         glued, self._arithmetic = hasattr(self.library, "smc_mujoco_entry"), None
-        self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value if glued else 0
+        if glued:
+            self.joints = ctypes.c_int.in_dll(self.library, "smc_mujoco_joints").value
+        else:
+            self.joints = 0
         if not glued:
             self._arithmetic = Arithmetic()
             self._trampoline = _trampoline(self.address, self._arithmetic)
@@ -62,22 +68,36 @@ class CLaw(AtAddress):
         self.__module__, self.__doc__ = path.name, None
 
     def __call__(self, y: Any, gains: Sequence[Any], memory: np.ndarray) -> tuple[Any, Any]:
-        """Return u and s, two vectors of a law of many joints. `y`: a Measurement, or a JointMeasurement."""
+        """Return u and s, two vectors of a law of many joints.
+
+        `y`: a Measurement, or a JointMeasurement.
+        """
         if not self.joints:
             u, s = self._out(y, gains, memory, 2)
             return u, s
         requests = sandbox.Requests(
-            self.joints, lambda w: y.dynamics.coriolis(np.array(w)).tolist(), lambda: y.dynamics.jacobian().ravel()
+            self.joints,
+            lambda w: y.dynamics.coriolis(np.array(w)).tolist(),
+            lambda: y.dynamics.jacobian().ravel(),
         )
-        numbers = sandbox.stored(y[:3], requests, [np.ravel(getattr(y, name)).tolist() for name in ARRAYS])
-        numbers_of_gains = [n for g in gains for n in np.broadcast_to(g, self.joints).tolist()]
+        numbers = sandbox.stored(
+            y[:3], requests, [np.ravel(getattr(y, name)).tolist() for name in ARRAYS]
+        )
+        numbers_of_gains = []
+        for g in gains:
+            for n in np.broadcast_to(g, self.joints).tolist():
+                numbers_of_gains.append(n)
         out = self._out(numbers, numbers_of_gains, memory, 2 * len(y.x))
         return np.array(out[: self.joints]), np.array(out[self.joints :])
 
-    def _out(self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int) -> list[float]:
+    def _out(
+        self, y: Sequence[float], gains: Sequence[float], memory: np.ndarray, count: int
+    ) -> list[float]:
         """Call the C function, and return the numbers of its out[]."""
         out = sandbox.doubles([math.nan] * count)
-        code = self._function(sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out)
+        code = self._function(
+            sandbox.doubles(y), sandbox.doubles(gains), memory.ctypes.data_as(sandbox.DOUBLES), out
+        )
         if self._arithmetic is not None and self._arithmetic.changed():
             code = sandbox.ALTERED_ARITHMETIC
         if code != 0:
@@ -129,11 +149,19 @@ def _unpickled(file: str, symbol: str, code: bytes, sizes: tuple[int, int], name
 def _trampoline(address: int, arithmetic: Arithmetic) -> Function:
     """Return a function of the callback's type that calls a C function which returns an int.
 
-    It restores the arithmetic of its thread, and returns ALTERED_ARITHMETIC if the C function has changed it.
+    It restores the arithmetic of its thread, and returns ALTERED_ARITHMETIC if the C function has
+    changed it.
     """
-    numbers, environment = ctypes.addressof(arithmetic.numbers), ctypes.addressof(arithmetic.environment)
+    numbers, environment = (
+        ctypes.addressof(arithmetic.numbers),
+        ctypes.addressof(arithmetic.environment),
+    )
     restore = ctypes.cast(arithmetic.library.fesetenv, ctypes.c_void_p).value or 0
-    results, altered, compute = arithmetic.results, sandbox.ALTERED_ARITHMETIC, njit(computed, error_model="numpy")
+    results, altered, compute = (
+        arithmetic.results,
+        sandbox.ALTERED_ARITHMETIC,
+        njit(computed, error_model="numpy"),
+    )
 
     def native(y: Any, g: Any, m: Any, out: Any):
         output = carray(pointer(out), (2,))
@@ -159,35 +187,38 @@ def law_from_c(
     timeout: float = 10.0,
     plants: Iterable[str] = (),
 ) -> Template:
-    """Load your own law in C. It runs in MuJoCo's control callback at the speed of the built-in laws.
+    """Load your own law in C.
+
+    It runs in MuJoCo's control callback at the speed of the built-in laws.
 
     Args:
-      source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in double precision.
-        `smc_law.h`, which the file may include, describes the function. A file that defines SMC_JOINTS before that
-        has a law of so many joints.
-      gains: name -> default or Gain, in the order of the function's gains[]. If the file has smc_law_gains, they
-        change its defaults.
+      source: a .c file, compiled by $CC or cc in a temporary folder; or a .so with the function in
+        double precision. `smc_law.h`, which the file may include, describes the function. A file
+        that defines SMC_JOINTS before that has a law of so many joints.
+      gains: name -> default or Gain, in the order of the function's gains[]. If the file has
+        smc_law_gains, they change its defaults.
       memory: number of state variables per channel. Default: smc_law_memory of the file, or 8.
       name: of the law. Default: the file's name.
       symbol: the function's name.
       flags: additional compiler flags or files: "-Ifirmware/include", "-DUNIT_TEST", "filter.c".
-      isolate: whether to try the law first in a separate process, on short runs of a double integrator. The error is
-        one sentence that says where the law crashes, hangs, returns NaN, writes beyond its memory or keeps state
-        elsewhere.
+      isolate: whether to try the law first in a separate process, on short runs of a double
+        integrator. The error is one sentence that says where the law crashes, hangs, returns NaN,
+        writes beyond its memory or keeps state elsewhere.
       timeout: s, for each of compilation, set-up and trial.
       plants: as in `smc.law_function`.
 
     Returns:
-      A Template. Called with gains it returns the Law of a Scenario: `law_from_c("my_law.c")(lam=5.0)`. It does not
-      follow later edits of the file: call `law_from_c` again. A pickle contains the machine code.
+      A Template. Called with gains it returns the Law of a Scenario:
+      `law_from_c("my_law.c")(lam=5.0)`. It does not follow later edits of the file: call
+      `law_from_c` again. A pickle contains the machine code.
 
     Raises:
-      ScenarioError: no such file or function, a compiler error, a function of another type, a set-up that fails,
-        crashes or does not end, or with isolate a law that fails its trial.
+      ScenarioError: no such file or function, a compiler error, a function of another type, a
+        set-up that fails, crashes or does not end, or with isolate a law that fails its trial.
 
-    Nothing checks C while it runs. A law that accesses other memory crashes the process or changes the numbers of
-    other runs; one that does not return hangs it. Try a new law with isolate=True, or with
-    `smc-mujoco list my_law.c`.
+    Nothing checks C while it runs. A law that accesses other memory crashes the process or changes
+    the numbers of other runs; one that does not return hangs it. Try a new law with isolate=True,
+    or with `smc-mujoco list my_law.c`.
     """
     if name is not None:
         errors.name("name", name)
@@ -198,13 +229,24 @@ def law_from_c(
     law = CLaw(library.path, symbol, library.file)
     law.set_up(len(about.gains), about.memory, name)
     words = {"requires_model": about.modelled, "joint": bool(about.joints)}
-    return template_decorator("law", about.gains, about.memory, (), (), about.degree, None, plants, **words)(law)
+    return template_decorator(
+        "law", about.gains, about.memory, (), (), about.degree, None, plants, **words
+    )(law)
 
 
 def _try(library: sandbox.Library, about: "About") -> str:
-    """Call a law in a separate process, then with sanitizers. Return why there were none, or an empty text."""
-    fields, channels = (ARRAYS, about.joints) if about.joints else (Measurement._fields, 1)
-    gains = [gain_at(gain.default, i) for gain in about.gains.values() for i in range(channels)]
+    """Call a law in a separate process, then with sanitizers.
+
+    Return why there were none, or an empty text.
+    """
+    if about.joints:
+        fields, channels = (ARRAYS, about.joints)
+    else:
+        fields, channels = (Measurement._fields, 1)
+    gains = []
+    for gain in about.gains.values():
+        for i in range(channels):
+            gains.append(gain_at(gain.default, i))
     trial = {"fields": fields, "gains": gains, "memory": about.memory, "modelled": about.modelled}
     calls = build.fresh(".calls")
     sandbox.load(library, trial | {"joints": about.joints, "calls": str(calls)})
@@ -221,20 +263,32 @@ def check(
     flags: Sequence[str],
     timeout: float,
 ) -> Iterator[str]:
-    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and memory."""
-    library = _library(source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout)
+    """Try a law without loading it, and yield lines: warnings, limits of the trial, gains and
+    memory.
+    """
+    library = _library(
+        source, symbol, (*build.WARNING_FLAGS, *flags) if source.suffix == ".c" else flags, timeout
+    )
     about = _about(library, gains, memory)
     yield from library.warnings
     if why := _try(library, about):
         yield f"{source.name} is tried without address and undefined-behaviour sanitizers: {why}"
-    gains_text = ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items()) or "none"
+    gains_text = (
+        ", ".join(f"{name} = {gain_text(gain.default)}" for name, gain in about.gains.items())
+        or "none"
+    )
     joints = f"{about.joints} joints; " * bool(about.joints)
     yield f"{source.name}: {symbol} passes; {joints}gains {gains_text}; memory {about.memory}"
 
 
 @constrained
-def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: Timeout) -> sandbox.Library:
-    """Return the library of a law, compiled from a .c file or copied. Arguments and errors as in `law_from_c`."""
+def _library(
+    source: str | Path, symbol: str, flags: Sequence[str], timeout: Timeout
+) -> sandbox.Library:
+    """Return the library of a law, compiled from a .c file or copied.
+
+    Arguments and errors as in `law_from_c`.
+    """
     if sys.platform == "win32":
         raise ScenarioError(
             f"cannot take a law from {shown(str(source))} on Windows: run smc_mujoco on Linux, or in WSL"
@@ -242,19 +296,29 @@ def _library(source: str | Path, symbol: str, flags: Sequence[str], timeout: Tim
     path = Path(source)
     if not isinstance(symbol, str) or not re.fullmatch(r"[A-Za-z_]\w*", symbol, re.ASCII):
         raise ScenarioError(f"symbol is {shown(symbol)}: give the name of a C function")
-    if isinstance(flags, str) or not isinstance(flags, Sequence) or not all(isinstance(flag, str) for flag in flags):
+    if (
+        isinstance(flags, str)
+        or not isinstance(flags, Sequence)
+        or not all(isinstance(flag, str) for flag in flags)
+    ):
         raise ScenarioError(f"flags is {shown(flags)}: give several, such as ['-DUNIT_TEST']")
     if path.suffix not in (".c", *LIBRARY_SUFFIXES):
-        raise ScenarioError(f"cannot take a law from {shown(str(path))}: give a .c file, or a shared library, .so")
+        raise ScenarioError(
+            f"cannot take a law from {shown(str(path))}: give a .c file, or a shared library, .so"
+        )
     if not os.path.isfile(path):
         raise ScenarioError(f"there is no file {path}: give the path of a .c file or of a .so")
     if path.suffix == ".c":
         file, warnings = build.library(path, symbol, flags, timeout)
         return sandbox.Library(file, path, symbol, flags, timeout, warnings)
     try:
-        copy = shutil.copy(path, build.fresh(path.suffix))  # so that a rebuilt library is loaded again
+        copy = shutil.copy(
+            path, build.fresh(path.suffix)
+        )  # so that a rebuilt library is loaded again
     except OSError as error:
-        raise ScenarioError(f"{path} cannot be read ({error.strerror}): give one that can") from None
+        raise ScenarioError(
+            f"{path} cannot be read ({error.strerror}): give one that can"
+        ) from None
     return sandbox.Library(Path(copy), path, symbol, flags, timeout)
 
 
@@ -268,31 +332,47 @@ class About(NamedTuple):
     joints: int
 
 
-def _about(library: sandbox.Library, gains: Mapping[str, float | Gain] | None, memory: int | None) -> About:
+def _about(
+    library: sandbox.Library, gains: Mapping[str, float | Gain] | None, memory: int | None
+) -> About:
     """Return the properties of a library's law: the arguments, or else what the file states."""
     facts, file = sandbox.load(library), library.path.name
     joints = facts.get("smc_mujoco_joints", 0)
     if "smc_law_shared" in facts and not facts["glue"]:
         raise ScenarioError(f"{file} is a library with a law of many joints: give its .c file")
     if facts.get("smc_law_real", 8) != 8 and not facts["glue"]:
-        raise ScenarioError(f"{file} is a library of single precision: give its .c file, or build it of doubles")
+        raise ScenarioError(
+            f"{file} is a library of single precision: give its .c file, or build it of doubles"
+        )
     text = facts.get("smc_law_gains")
-    stated = {} if text is None else parsed_gains(text, f"{file}'s smc_law_gains")
+    if text is None:
+        stated = {}
+    else:
+        stated = parsed_gains(text, f"{file}'s smc_law_gains")
     named = as_gains(gains, stated)
     for name in () if text is None else named:
         errors.find(f"gain of {file}", name, stated)
     for name, gain in named.items():
         if isinstance(gain.default, tuple) and len(gain.default) != joints:
             choice = f", or {joints}" * bool(joints)
-            raise ScenarioError(f"gain {name} of {file} is {gain_text(gain.default)}: give it one number{choice}")
+            raise ScenarioError(
+                f"gain {name} of {file} is {gain_text(gain.default)}: give it one number{choice}"
+            )
     for name in filter(None, facts.get("smc_law_shared", "").split(",")):
         gain = errors.find(f"shared gain of {file}", name, named)
         if isinstance(gain.default, tuple):
-            raise ScenarioError(f"shared gain {name} of {file} is {gain_text(gain.default)}: give it one number")
+            raise ScenarioError(
+                f"shared gain {name} of {file} is {gain_text(gain.default)}: give it one number"
+            )
         named[name] = dataclasses.replace(gain, shared=True)
     return About(
         named,
-        whole("memory", max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory, 1, 10_000),
+        whole(
+            "memory",
+            max(facts.get("smc_law_memory", DEFAULT_MEMORY), 1) if memory is None else memory,
+            1,
+            10_000,
+        ),
         whole("degree", facts.get("smc_law_degree") or 1, 1, 3),
         bool(facts.get("smc_law_modelled")),
         joints,

@@ -1,7 +1,9 @@
-"""Try a law's library in a separate process, which may crash, and report the result in one sentence.
+"""Try a law's library in a separate process, which may crash, and report the result in one
+sentence.
 
-`attempt`, in the process of `common.guard`, loads the library, sets it up, calls the law on request, and unloads it.
-The process must start quickly, so the functions that start it, and only they, import more of smc_mujoco.
+`attempt`, in the process of `common.guard`, loads the library, sets it up, calls the law on
+request, and unloads it. The process must start quickly, so the functions that start it, and only
+they, import more of smc_mujoco.
 """
 
 import ctypes
@@ -18,33 +20,57 @@ from typing import Any, NamedTuple
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Failed, Fault, tried
 
 STEPS, LONG_STEPS = 500, 10_000  # samples of 1 ms per run, and in the longest run
-LATER_STEPS, TIME_RATIO = 200, 1.06  # samples after those, and the ratio of successive times: up to 15 hours
+LATER_STEPS, TIME_RATIO = (
+    200,
+    1.06,
+)  # samples after those, and the ratio of successive times: up to 15 hours
 MAX_POSITION = 3.0  # a stop for the double integrator, because a law need not stabilise it
-GUARD_VALUE, GUARD_COUNT = -7.25, 512  # a value that no law writes by chance, and its number on either side of an array
+GUARD_VALUE, GUARD_COUNT = (
+    -7.25,
+    512,
+)  # a value that no law writes by chance, and its number on either side of an array
 MASS_COUPLING = 0.1  # elements of M off its diagonal
 OVERRUN = 2**40  # code of glue.c: a law of floats wrote beyond its memory; one more: beyond out
 ALTERED_ARITHMETIC = OVERRUN + 2  # code of glue.c: a law changed the arithmetic of its thread
 FAULTS = {  # code -> fault, formatted with the size of memory, and cure
-    OVERRUN: ("writes beyond the {} numbers of its memory", "say more in smc_law_memory, or give memory="),
+    OVERRUN: (
+        "writes beyond the {} numbers of its memory",
+        "say more in smc_law_memory, or give memory=",
+    ),
     OVERRUN + 1: (
         "writes beyond the numbers of out",
         "write only u and s, which are out[0] and out[1] for one channel",
     ),
     OVERRUN + 4: ("changes its measurement", "keep what changes in memory"),
-    OVERRUN + 3: ("asks for the Jacobian of a tip, and there is none", "give the plant a tip, and the law the model"),
+    OVERRUN + 3: (
+        "asks for the Jacobian of a tip, and there is none",
+        "give the plant a tip, and the law the model",
+    ),
     ALTERED_ARITHMETIC: (ALTERS, "let it restore that, and leave out -Ofast and -ffast-math"),
 }
 TWO_ANSWERS = (
     "gave two answers to one measurement, as from state which all channels and simulations share, on several threads: "
     "keep it in memory"
 )
-INT_NAMES = ("smc_law_memory", "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_mujoco_joints")
+INT_NAMES = (
+    "smc_law_memory",
+    "smc_law_real",
+    "smc_law_degree",
+    "smc_law_modelled",
+    "smc_mujoco_joints",
+)
 TEXT_NAMES = ("smc_law_gains", "smc_law_shared")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
-ON_REQUEST = ctypes.CFUNCTYPE(ctypes.c_int64, *[DOUBLES] * 4)  # C(x, v) w, or the Jacobian of the tip
+ON_REQUEST = ctypes.CFUNCTYPE(
+    ctypes.c_int64, *[DOUBLES] * 4
+)  # C(x, v) w, or the Jacobian of the tip
 # Output of the sanitizers: undefined behaviour; a bad access, and the stack frames it happened in.
-UNDEFINED_LINE = re.compile(r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE)
-ACCESS_LINE = re.compile(r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?")
+UNDEFINED_LINE = re.compile(
+    r"^(?P<file>.+?):(?P<line>\d+):\d+: runtime error: (?P<what>.*)$", re.MULTILINE
+)
+ACCESS_LINE = re.compile(
+    r"AddressSanitizer: (?P<what>[\w-]+).*(?:\n(?P<size>(?:READ|WRITE) of size \d+))?"
+)
 FRAME_LINE = re.compile(r"^ +#\d+ .* in \S+ (?P<file>.+?):(?P<line>\d+)(?::\d+)?$", re.MULTILINE)
 
 
@@ -60,11 +86,13 @@ class Library(NamedTuple):
 
 
 def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Load, set up, try and unload a library in a separate process, and return the constants that describe its law.
+    """Load, set up, try and unload a library in a separate process, and return the constants that
+    describe its law.
 
-    `trial`: "fields", names of the numbers in a measurement, or of the arrays in one of many "joints"; "gains", each
-    gain's number for each channel; "memory" and "modelled" as in smc_law.h; "calls", a new file for the gains and the
-    measurement of each call, which `sanitize` reads. None: the law is not called.
+    `trial`: "fields", names of the numbers in a measurement, or of the arrays in one of many
+    "joints"; "gains", each gain's number for each channel; "memory" and "modelled" as in smc_law.h;
+    "calls", a new file for the gains and the measurement of each call, which `sanitize` reads.
+    None: the law is not called.
     """
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.exchange.c import build
@@ -74,13 +102,22 @@ def load(library: Library, trial: dict[str, Any] | None = None) -> dict[str, Any
         return tried(__name__, words, library.timeout)
     except Failed as failed:
         why, file = str(failed).replace(str(library.file), library.path.name), library.path.name
-        if library.symbol in why and failed.stage == "loading" and re.search("undefined symbol|not found", why):
+        if (
+            library.symbol in why
+            and failed.stage == "loading"
+            and re.search("undefined symbol|not found", why)
+        ):
             raise ScenarioError(build.undefined(library.path, library.symbol)) from None
-        raise ScenarioError(f"{file} {why}" if why.startswith("cannot") else f"{file}: {why}") from None
+        raise ScenarioError(
+            f"{file} {why}" if why.startswith("cannot") else f"{file}: {why}"
+        ) from None
 
 
 def sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
-    """Repeat the calls of a trial with sanitizers. Return why this is not possible, or an empty text."""
+    """Repeat the calls of a trial with sanitizers.
+
+    Return why this is not possible, or an empty text.
+    """
     from smc_mujoco.common.errors import ScenarioError
     from smc_mujoco.common.process import TimedOut, timed
     from smc_mujoco.exchange.c import build
@@ -91,7 +128,9 @@ def sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
     if (program := build.replayer(tuple(compiler))) is None:
         return f"{compiler[0]} has none that work here"
     try:
-        file, _ = build.library(library.path, library.symbol, (*library.flags, *build.SANITIZER_FLAGS), library.timeout)
+        file, _ = build.library(
+            library.path, library.symbol, (*library.flags, *build.SANITIZER_FLAGS), library.timeout
+        )
     except ScenarioError:
         return f"{compiler[0]} has none with these flags"
     try:
@@ -106,9 +145,18 @@ def sanitize(library: Library, calls: Path, gains: int, memory: int) -> str:
         what, places = report["what"], [report]
     elif report := ACCESS_LINE.search(done.stderr):
         what = ", ".join(filter(None, report.group("what", "size")))
-        places = [frame for frame in FRAME_LINE.finditer(done.stderr) if Path(frame["file"]).exists()]
-    name = Path(places[0]["file"]).name if places else library.path.name
-    where = f"line {places[0]['line']}" if places else library.symbol
+        places = []
+        for frame in FRAME_LINE.finditer(done.stderr):
+            if Path(frame["file"]).exists():
+                places.append(frame)
+    if places:
+        name = Path(places[0]["file"]).name
+    else:
+        name = library.path.name
+    if places:
+        where = f"line {places[0]['line']}"
+    else:
+        where = library.symbol
     raise ScenarioError(f"{name} makes an error in {where}: {what}; fix it")
 
 
@@ -131,12 +179,18 @@ def facts(library) -> dict[str, str | int]:
         if hasattr(library, name):
             text = ctypes.string_at(ctypes.addressof(ctypes.c_char.in_dll(library, name)))
             constants[name] = text.decode(errors="replace")
-    return constants | {name: ctypes.c_int.in_dll(library, name).value for name in INT_NAMES if hasattr(library, name)}
+    return constants | {
+        name: ctypes.c_int.in_dll(library, name).value
+        for name in INT_NAMES
+        if hasattr(library, name)
+    }
 
 
 def set_up(library) -> int:
     """Return the result of smc_setup; 0 if the library has none."""
-    return int(library.smc_setup()) if hasattr(library, "smc_setup") else 0
+    if hasattr(library, "smc_setup"):
+        return int(library.smc_setup())
+    return 0
 
 
 def set_sizes(library, gains: int, memory: int) -> None:
@@ -152,11 +206,13 @@ def doubles(values) -> ctypes.Array:
 
 
 class Requests:
-    """C functions that compute what a law of many joints asks for. They are valid as long as this object lives.
+    """C functions that compute what a law of many joints asks for.
 
-    `coriolis`: a list w -> the numbers of C(x, v) w. `jacobian` returns the numbers of the tip's Jacobian by rows, or
-    raises ValueError if there is none. `address` is that of a table with the addresses of both functions and of their
-    parameters, and with the force per unit of u.
+    They are valid as long as this object lives.
+
+    `coriolis`: a list w -> the numbers of C(x, v) w. `jacobian` returns the numbers of the tip's
+    Jacobian by rows, or raises ValueError if there is none. `address` is that of a table with the
+    addresses of both functions and of their parameters, and with the force per unit of u.
     """
 
     def __init__(self, joints: int, coriolis: Callable, jacobian: Callable):
@@ -171,13 +227,17 @@ class Requests:
         product = ON_REQUEST(lambda w, parameters, memory, out: answer(out, coriolis, w[:joints]))
         tip = ON_REQUEST(lambda nothing, parameters, memory, out: answer(out, jacobian))
         self.joints, self.functions = joints, (product, tip)
-        addresses = [float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions]
+        addresses = [
+            float(ctypes.cast(function, ctypes.c_void_p).value or 0) for function in self.functions
+        ]
         self.table = doubles([*addresses, 0.0, 1.0])
         self.address = ctypes.addressof(self.table)
 
 
 def stored(head, requests: Requests, arrays) -> list[float]:
-    """Return the numbers of a joint measurement from t, dt and model and its arrays, see `joint_law.measurement_at`."""
+    """Return the numbers of a joint measurement from t, dt and model and its arrays, see
+    `joint_law.measurement_at`.
+    """
     return [*head, float(requests.address), requests.joints, *itertools.chain.from_iterable(arrays)]
 
 
@@ -211,18 +271,32 @@ class Trial:
 
     def __init__(self, law, order, calls):
         self.calls = calls
-        self.law, self.fields, self.size, self.modelled = law, order["fields"], order["memory"], order["modelled"]
+        self.law, self.fields, self.size, self.modelled = (
+            law,
+            order["fields"],
+            order["memory"],
+            order["modelled"],
+        )
         self.joints, self.channels = order["joints"], max(1, order["joints"])
-        self.requests = Requests(self.joints, lambda w: [0.1 * element for element in w], self.jacobian)
-        self.y, self.out = Fenced(self.measurement([{}] * self.channels)), Fenced([0.0] * (2 * self.channels))
+        self.requests = Requests(
+            self.joints, lambda w: [0.1 * element for element in w], self.jacobian
+        )
+        self.y, self.out = (
+            Fenced(self.measurement([{}] * self.channels)),
+            Fenced([0.0] * (2 * self.channels)),
+        )
         self.gains = Fenced(order["gains"], math.nan)  # a gain without a name is NaN
         self.gains_before = bytes(self.gains.whole)
         calls.write(bytes(self.gains.values))
         self.random, self.arithmetic = random.Random(0), Arithmetic()
-        self.first: list[tuple[list[float], str]] = []  # measurements of the first calls, and the law's answers
+        self.first: list[
+            tuple[list[float], str]
+        ] = []  # measurements of the first calls, and the law's answers
 
     def all(self) -> None:
-        """Make every kind of run, and calls at very large errors, at which a law may return an error."""
+        """Make every kind of run, and calls at very large errors, at which a law may return an
+        error.
+        """
         steps = LONG_STEPS
         for model in (1.0,) if self.modelled else (0.0, 1.0):
             for surfaced in (0.0,) if self.joints else (0.0, 1.0):
@@ -230,23 +304,60 @@ class Trial:
                 steps = STEPS
         for e in (-1e6, -1e3, 0.0, 1e3, 1e6):
             for de in (-1e6, 0.0, 1e6):
-                far = {"dt": 1e-3, "x": e, "v": de, "e": e, "de": de, "g": 1.0, "limit": 6.0, "model": 1.0}
+                far = {
+                    "dt": 1e-3,
+                    "x": e,
+                    "v": de,
+                    "e": e,
+                    "de": de,
+                    "g": 1.0,
+                    "limit": 6.0,
+                    "model": 1.0,
+                }
                 self.call(self.measurement([far] * self.channels), self.state())
         memory = self.state()
-        for y, answer in self.first:  # by now, state that is kept elsewhere is not as it was at the first call
+        for (
+            y,
+            answer,
+        ) in self.first:  # by now, state that is kept elsewhere is not as it was at the first call
             if repr(self.answer(y, memory)) != answer:
                 raise Fault(TWO_ANSWERS)
 
     def run(self, model: float, surfaced: float, x0: float, steps: int) -> None:
-        """Make a run with measurement noise and a sine as reference. After `steps` the time grows geometrically."""
-        xs, vs, dt, memory = [x0 - 0.1 * i for i in range(self.channels)], [0.0] * self.channels, 1e-3, self.state()
+        """Make a run with measurement noise and a sine as reference.
+
+        After `steps` the time grows geometrically.
+        """
+        xs, vs, dt, memory = (
+            [x0 - 0.1 * i for i in range(self.channels)],
+            [0.0] * self.channels,
+            1e-3,
+            self.state(),
+        )
         for k in range(steps + LATER_STEPS):
             t, seen = dt * (k if k < steps else steps * TIME_RATIO ** (k - steps)), []
             r, dr, ddr = 0.1 * math.sin(t), 0.1 * math.cos(t), -0.1 * math.sin(t)
             for x, v in zip(xs, vs, strict=True):
                 e, de = x + self.random.gauss(0.0, 1e-3) - r, v + self.random.gauss(0.0, 1e-2) - dr
-                channel = {"t": t, "dt": dt, "x": e + r, "v": de + dr, "e": e, "de": de, "r": r, "dr": dr, "ddr": ddr}
-                channel |= {"g": 1.0, "a": ddr, "limit": 6.0, "model": model, "q": 0.1 * e, "gq": 1.0}
+                channel = {
+                    "t": t,
+                    "dt": dt,
+                    "x": e + r,
+                    "v": de + dr,
+                    "e": e,
+                    "de": de,
+                    "r": r,
+                    "dr": dr,
+                    "ddr": ddr,
+                }
+                channel |= {
+                    "g": 1.0,
+                    "a": ddr,
+                    "limit": 6.0,
+                    "model": model,
+                    "q": 0.1 * e,
+                    "gq": 1.0,
+                }
                 if surfaced:
                     channel |= {"has_surface": 1.0, "s": de + 2.0 * e, "v_eq": -2.0 * de}
                 seen.append(channel)
@@ -254,9 +365,14 @@ class Trial:
             code, us, ss = self.call(y, memory)
             for i, (channel, u, s) in enumerate(zip(seen, us, ss, strict=True)):
                 if code != 0 or not (math.isfinite(u) and math.isfinite(s)):
-                    what, joint = code or f"u = {u}, s = {s}", f" of joint {i}" * bool(self.joints and not code)
+                    what, joint = (
+                        code or f"u = {u}, s = {s}",
+                        f" of joint {i}" * bool(self.joints and not code),
+                    )
                     where = f"t = {t:g}, e = {channel['e']:g}, de = {channel['de']:g}"
-                    cure = "fix it, or name all gains that it reads in smc_law_gains, or give gains="
+                    cure = (
+                        "fix it, or name all gains that it reads in smc_law_gains, or give gains="
+                    )
                     raise Fault(f"returned {what}{joint} at {where}: {cure}")
             if k % 50 == 0 and repr(self.answer(y, self.state(before))) != repr((code, us, ss)):
                 raise Fault(TWO_ANSWERS)
@@ -269,13 +385,23 @@ class Trial:
                     xs[i], vs[i] = math.copysign(MAX_POSITION, xs[i]), 0.0
 
     def measurement(self, seen: list[dict[str, float]]) -> list[float]:
-        """Return the numbers of a measurement in their order, from those of each channel. Those left out are 0."""
+        """Return the numbers of a measurement in their order, from those of each channel.
+
+        Those left out are 0.
+        """
         if not self.joints:
             return [seen[0].get(name, 0.0) for name in self.fields]
-        M = [1.0 if i == j else MASS_COUPLING for i in range(self.joints) for j in range(self.joints)]
+        M = []
+        for i in range(self.joints):
+            for j in range(self.joints):
+                M.append(1.0 if i == j else MASS_COUPLING)
         known = {"M": M, "h": [0.0] * self.joints, "g": [0.0] * self.joints}
-        arrays = [known.get(name) or [channel.get(name, 0.0) for channel in seen] for name in self.fields]
-        return stored([seen[0].get(name, 0.0) for name in ("t", "dt", "model")], self.requests, arrays)
+        arrays = []
+        for name in self.fields:
+            arrays.append(known.get(name) or [channel.get(name, 0.0) for channel in seen])
+        return stored(
+            [seen[0].get(name, 0.0) for name in ("t", "dt", "model")], self.requests, arrays
+        )
 
     def jacobian(self) -> list[float]:
         """Return the Jacobian of a tip that the first three joints move."""
@@ -322,7 +448,9 @@ def attempt(order: Mapping[str, Any], say: Callable) -> dict[str, str | int]:
     try:
         law, library = entry(order["library"], symbol)
     except (OSError, AttributeError) as error:
-        raise Fault(f"cannot be loaded ({error}): build it for this machine, with all it needs") from None
+        raise Fault(
+            f"cannot be loaded ({error}): build it for this machine, with all it needs"
+        ) from None
     done("loading it")
     say("smc_setup")
     if code := set_up(library):

@@ -1,15 +1,17 @@
-"""Translate the Python of a law, surface or estimator into C99, operation by operation and with the same rounding.
+"""Translate the Python of a law, surface or estimator into C99, operation by operation and with the
+same rounding.
 
-numba turns some powers with a constant exponent into products or roots. The C does the same, so that its results in
-double precision equal those of the compiled function bit for bit.
+numba turns some powers with a constant exponent into products or roots. The C does the same, so
+that its results in double precision equal those of the compiled function bit for bit.
 
-An array has a kind such as "real[SMC_JOINTS]" or "real[3][SMC_JOINTS]". An expression of arrays becomes a loop over its
-elements, with the operations of numba in the same order. A function that returns an array writes it to a pointer. A
-tuple of numbers is an array whose kind ends in the names of its fields, such as "real[4]()" or "real[2](e,de)".
+An array has a kind such as "real[SMC_JOINTS]" or "real[3][SMC_JOINTS]". An expression of arrays
+becomes a loop over its elements, with the operations of numba in the same order. A function that
+returns an array writes it to a pointer. A tuple of numbers is an array whose kind ends in the names
+of its fields, such as "real[4]()" or "real[2](e,de)".
 
-Python's names of arrays may share numbers. A name that is bound once to a part of an array, as in `w = memory[:, 0]`,
-is a pointer into it. All others are copies. So an array that the function changes must not share its numbers with
-another name; such code is refused.
+Python's names of arrays may share numbers. A name that is bound once to a part of an array, as in
+`w = memory[:, 0]`, is a pointer into it. All others are copies. So an array that the function
+changes must not share its numbers with another name; such code is refused.
 """
 
 import ast
@@ -34,53 +36,104 @@ from smc_mujoco.control.estimator import Reading
 from smc_mujoco.control.law import Measurement
 
 PARSING_LOCK = threading.Lock()
-# Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in the file.
+# Kinds of numbers from narrow to wide. `single` is numpy.float32 in Python; `real` is smc_real in
+# the file.
 KINDS = ("bool", "int", "single", "real")
 WHOLE_KINDS = ("bool", "int")
 TYPES = {"bool": "int32_t", "int": "int32_t", "single": "float", "real": "smc_real"}
 # The arguments of a component. They are pointers, not numbers.
 ARGUMENTS = {"y": "const smc_measurement *", "gains": "const smc_real *", "memory": "smc_real *"}
 STRUCTS = {"estimator": "smc_reading"}  # structs of y, where they differ from a measurement
-CHANNEL_FIELDS = {"law": Measurement._fields, "surface": Measurement._fields, "estimator": Reading._fields}  # of y
+CHANNEL_FIELDS = {
+    "law": Measurement._fields,
+    "surface": Measurement._fields,
+    "estimator": Reading._fields,
+}  # of y
 
-# Laws of many joints: dimensions that are macros in the file, fields of the measurement -> their dimensions, and what
-# the caller of the law provides.
+# Laws of many joints: dimensions that are macros in the file, fields of the measurement -> their
+# dimensions, and what the caller of the law provides.
 JOINTS, SLOTS = "SMC_JOINTS", "SMC_LAW_MEMORY"
-JOINT_FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(("t", "dt", "model"), "")
+JOINT_FIELDS = dict.fromkeys(joint_law.ARRAYS, f"[{JOINTS}]") | dict.fromkeys(
+    ("t", "dt", "model"), ""
+)
 JOINT_FIELDS["M"] = f"[{JOINTS}][{JOINTS}]"
-REQUESTED_ARRAYS = {joint_law.coriolis: ("coriolis", (JOINTS,)), joint_law.jacobian: ("jacobian", ("3", JOINTS))}
+REQUESTED_ARRAYS = {
+    joint_law.coriolis: ("coriolis", (JOINTS,)),
+    joint_law.jacobian: ("jacobian", ("3", JOINTS)),
+}
 ROW, COLUMN = "\x00", "\x01"  # stand for the indices in the text of an array's element
-TOKEN = re.compile("\x02(\\d+)\x03")  # stands for a call in an expression, which may move before its loop
+TOKEN = re.compile(
+    "\x02(\\d+)\x03"
+)  # stands for a call in an expression, which may move before its loop
 LONE_TOKEN = re.compile("(?<!\\w)\\((\x02\\d+\x03)\\)")  # the same in parentheses
 
 # Precedence of C's operators. An operand of lower precedence is put in parentheses.
 ATOM, UNARY, PRODUCT, SUM, LOOSE = 5, 4, 3, 2, 1
 OPERATORS: dict[type, tuple[str, int]] = {
-    ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT), ast.Div: ("/", PRODUCT),
-}  # fmt: skip
-BIT_OPERATORS: dict[type, str] = {ast.LShift: "<<", ast.RShift: ">>", ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^"}
+    ast.Add: ("+", SUM),
+    ast.Sub: ("-", SUM),
+    ast.Mult: ("*", PRODUCT),
+    ast.Div: ("/", PRODUCT),
+}
+BIT_OPERATORS: dict[type, str] = {
+    ast.LShift: "<<",
+    ast.RShift: ">>",
+    ast.BitAnd: "&",
+    ast.BitOr: "|",
+    ast.BitXor: "^",
+}
 COMPARISONS: dict[type, str] = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
 
 # Functions of Python's math module that have the same name in C.
 MATH_NAMES = """sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log log1p log10 log2 sqrt
 hypot fabs copysign fmod"""
 SAME_IN_C = {getattr(math, name) for name in MATH_NAMES.split()}
-ROUNDING = {math.floor: "floor", math.ceil: "ceil", math.trunc: "trunc"}  # integers in Python, floating-point in C
+ROUNDING = {
+    math.floor: "floor",
+    math.ceil: "ceil",
+    math.trunc: "trunc",
+}  # integers in Python, floating-point in C
 MATH = {"pow", *ROUNDING.values(), *MATH_NAMES.split()}
 CASTS = {float: "real", np.float64: "real", np.float32: "single", int: "int"}
 # Functions of numpy with elements -> the same in C.
-NUMPY_NAMES = ("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "fabs")
-NUMPY_RENAMED = {"arctan": "atan", "arctan2": "atan2", "arcsin": "asin", "arccos": "acos", "hypot": "hypot"}
-ELEMENTWISE = {getattr(np, name): name for name in NUMPY_NAMES} | {getattr(np, n): c for n, c in NUMPY_RENAMED.items()}
+NUMPY_NAMES = (
+    "sqrt",
+    "exp",
+    "expm1",
+    "log",
+    "log1p",
+    "sin",
+    "cos",
+    "tan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "fabs",
+)
+NUMPY_RENAMED = {
+    "arctan": "atan",
+    "arctan2": "atan2",
+    "arcsin": "asin",
+    "arccos": "acos",
+    "hypot": "hypot",
+}
+ELEMENTWISE = {getattr(np, name): name for name in NUMPY_NAMES} | {
+    getattr(np, n): c for n, c in NUMPY_RENAMED.items()
+}
 ELEMENTWISE |= {np.abs: "fabs", abs: "fabs"}
 HELPER_NAMES = {np.minimum: "lesser", np.maximum: "greater", np.sign: "sign"}
 FILL_VALUES = {np.zeros: 0.0, np.empty: 0.0, np.ones: 1.0}
 SHARED_WORDS = "which shares its numbers with another name: write .copy() behind it"
 
-# Python's min, max, abs, % and indices of integers, and numpy's functions as numba compiles them, where NaN stays NaN:
-# functions that the C file defines if it uses them.
+# Python's min, max, abs, % and indices of integers, and numpy's functions as numba compiles them,
+# where NaN stays NaN: functions that the C file defines if it uses them.
 HELPERS = {
     "minimum": "b < a ? b : a",
     "maximum": "b > a ? b : a",
@@ -93,13 +146,19 @@ HELPERS = {
 }
 SQUARE, FOURTH = "(a * a)", "((a * a) * (a * a))"
 POWERS = {  # multiplied in numba's order: by repeated squaring, from the lowest bit
-    "power_2": "a * a", "power_3": f"a * {SQUARE}", "power_4": FOURTH, "power_5": f"a * {FOURTH}",
-    "power_6": f"{SQUARE} * {FOURTH}", "power_7": f"a * {SQUARE} * {FOURTH}", "power_8": f"({FOURTH} * {FOURTH})",
-}  # fmt: skip
+    "power_2": "a * a",
+    "power_3": f"a * {SQUARE}",
+    "power_4": FOURTH,
+    "power_5": f"a * {FOURTH}",
+    "power_6": f"{SQUARE} * {FOURTH}",
+    "power_7": f"a * {SQUARE} * {FOURTH}",
+    "power_8": f"({FOURTH} * {FOURTH})",
+}
 
 KEYWORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"""
-# Other reserved names: functions and macros of C's headers, keywords of later standards and of compilers.
+# Other reserved names: functions and macros of C's headers, keywords of later standards and of
+# compilers.
 OTHER_RESERVED_NAMES = """_Bool _Complex _Imaginary alignas alignof asm bool constexpr false linux nullptr static_assert
 thread_local true typeof unix main abort abs exit free index labs rindex NAN INFINITY HUGE_VAL cbrt drem erf erfc exp2
 exp10 fdim finite fma fmax fmin fpclassify frexp gamma ilogb isfinite isgreater isgreaterequal isinf isless islessequal
@@ -120,31 +179,46 @@ class Value(NamedTuple):
     kind: str
     level: int = ATOM
     pointer: str = ""  # of an array: to its numbers in C
-    stride: str = ""  # of a vector with a pointer: from one number to the next, if they do not lie in a row
+    stride: str = (
+        ""  # of a vector with a pointer: from one number to the next, if they do not lie in a row
+    )
 
     def within(self, level: int) -> str:
         """Return the text as an operand of an operator of precedence `level`."""
-        return self.text if self.level >= level else f"({self.text})"
+        if self.level >= level:
+            return self.text
+        return f"({self.text})"
 
 
 def translate(
-    component: Component, single: bool, joints: int = 0, others: Mapping[str, tuple[Any, Sequence[str]]] | None = None
+    component: Component,
+    single: bool,
+    joints: int = 0,
+    others: Mapping[str, tuple[Any, Sequence[str]]] | None = None,
 ) -> tuple[int, str]:
-    """Return the number of memory slots of a component, and the C of its function and of all functions it calls.
+    """Return the number of memory slots of a component, and the C of its function and of all
+    functions it calls.
 
-    The function's name is smc_law, smc_surface or smc_estimator. If `single`, smc_real is float. `joints` is 0 for a
-    component of one channel. `others`: name in C -> another function for the file, and the kinds of its arguments.
+    The function's name is smc_law, smc_surface or smc_estimator. If `single`, smc_real is float.
+    `joints` is 0 for a component of one channel. `others`: name in C -> another function for the
+    file, and the kinds of its arguments.
     """
     program = Program(component, single, joints)
-    functions = [Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)]
+    functions = [
+        Function(program, component.function, list(ARGUMENTS), {}, entry=True).text(program.symbol)
+    ]
     for name, (function, kinds) in (others or {}).items():
         program.used_names.add(name)
         functions.append(Function(program, function, kinds, {}).text(name).removeprefix("static "))
     for name, text in reversed(program.functions.items()):
-        if any(re.search(rf"\b{name}\(", other) for other in functions):  # calls by earlier, narrower drafts are gone
+        if any(
+            re.search(rf"\b{name}\(", other) for other in functions
+        ):  # calls by earlier, narrower drafts are gone
             functions.insert(0, text)
     arrays = [
-        text for name, text in program.arrays.items() if any(re.search(rf"\b{name}\b", other) for other in functions)
+        text
+        for name, text in program.arrays.items()
+        if any(re.search(rf"\b{name}\b", other) for other in functions)
     ]
     return program.slots, "\n\n".join([*arrays, *functions])
 
@@ -157,14 +231,18 @@ class Program:
         self.symbol, self.joints = f"smc_{component.kind}", joints
         self.arrays: dict[str, str] = {}  # name -> text
         self.functions: dict[str, str] = {}  # name -> text
-        self.translated: dict[tuple, tuple[str, list[str]] | None] = {}  # -> name, result kinds; None in progress
+        self.translated: dict[
+            tuple, tuple[str, list[str]] | None
+        ] = {}  # -> name, result kinds; None in progress
         self.changing: dict[Any, set[int]] = {}  # Python function -> `changes`
         self.used_names = {self.symbol, *ARGUMENTS, *RESERVED}
         self.slots = 0  # of memory
 
     def size(self, dimension: str) -> int:
         """Return a dimension as a number; that of the memory is not known before the end."""
-        return self.joints if dimension == JOINTS else int(dimension)
+        if dimension == JOINTS:
+            return self.joints
+        return int(dimension)
 
     def unique_name(self, name: str) -> str:
         """Reserve and return a name that is not used yet: `name`, or `name` with a number."""
@@ -174,7 +252,9 @@ class Program:
         return unique
 
     def changes(self, function: Any) -> set[int]:
-        """Return the positions of the arguments whose elements a function changes, itself or by another one."""
+        """Return the positions of the arguments whose elements a function changes, itself or by
+        another one.
+        """
         written = in_python(function)
         if written is None or written in REQUESTED_ARRAYS:
             return set()
@@ -183,14 +263,29 @@ class Program:
         self.changing[written] = set()
         tree, known = parsed(written)[1], around(written)
         names, inside = [a.arg for a in tree.args.args], in_body(tree)
-        given = [(target.id, root(value)) for target, value in pairs(inside) if isinstance(target, ast.Name)]
+        given = [
+            (target.id, root(value))
+            for target, value in pairs(inside)
+            if isinstance(target, ast.Name)
+        ]
         origins, before = {name: name for name in names}, 0
         while before != (before := len(origins)):
-            origins |= {name: origins[source] for name, source in given if source in origins and name not in names}
-        changed = [n for n in inside if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store)]
+            origins |= {
+                name: origins[source]
+                for name, source in given
+                if source in origins and name not in names
+            }
+        changed = []
+        for n in inside:
+            if isinstance(n, ast.Subscript) and isinstance(n.ctx, ast.Store):
+                changed.append(n)
         for call in (n for n in inside if isinstance(n, ast.Call)):
-            changed += [call.args[i] for i in self.changes(resolved(call.func, known)) if i < len(call.args)]
-        self.changing[written] = {names.index(origins[root(n)]) for n in changed if root(n) in origins}
+            changed += [
+                call.args[i] for i in self.changes(resolved(call.func, known)) if i < len(call.args)
+            ]
+        self.changing[written] = {
+            names.index(origins[root(n)]) for n in changed if root(n) in origins
+        }
         return self.changing[written]
 
     def claim(self, node: ast.AST, slot: int) -> None:
@@ -198,23 +293,34 @@ class Program:
         size = self.component.memory
         if slot >= size:
             code = shown(ast.unparse(node))[1:-1]
-            raise Untranslatable(f"it uses {code}, and its memory has {size} numbers: give memory={slot + 1}")
+            raise Untranslatable(
+                f"it uses {code}, and its memory has {size} numbers: give memory={slot + 1}"
+            )
         self.slots = max(self.slots, slot + 1)
 
     def helper(self, name: str, kind: str) -> str:
         """Return the C name of a helper or a power such as power_3, for numbers of a kind."""
-        function = name if name in POWERS and kind == "real" else f"{name}_{kind}"
+        if name in POWERS and kind == "real":
+            function = name
+        else:
+            function = f"{name}_{kind}"
         body, of = (HELPERS | POWERS)[name], TYPES[kind]
         second = f", {of} b" if "b" in body else ""
         self.used_names.add(function)
-        self.functions.setdefault(function, f"static {of} {function}({of} a{second})\n{{\n    return {body};\n}}")
+        self.functions.setdefault(
+            function, f"static {of} {function}({of} a{second})\n{{\n    return {body};\n}}"
+        )
         return function
 
     def array(self, name: str, values: Any) -> Value:
-        """Return a constant array, of smc_real or of the smallest integer type that holds its values."""
+        """Return a constant array, of smc_real or of the smallest integer type that holds its
+        values.
+        """
         data, name = np.asarray(values), plain(name)
         if data.ndim != 1 or data.dtype.kind not in "if":
-            raise refuse(None, f"the constant {name}, which is not a one-dimensional array of numbers,")
+            raise refuse(
+                None, f"the constant {name}, which is not a one-dimensional array of numbers,"
+            )
         kind, of = "real", "smc_real"
         items = [literal(float(v), self.single, ast.Constant(0)).text for v in data]
         if data.dtype.kind == "i":
@@ -230,20 +336,31 @@ class Program:
         self.arrays[name] = f"static const {of} {name}{content}"
         return Value(name, kind)
 
-    def function(self, function: Any, values: Sequence[Value], nodes: Sequence[ast.expr]) -> tuple[list[str], str]:
-        """Return the kinds of a function's results, and a call of it without the closing parenthesis.
+    def function(
+        self, function: Any, values: Sequence[Value], nodes: Sequence[ast.expr]
+    ) -> tuple[list[str], str]:
+        """Return the kinds of a function's results, and a call of it without the closing
+        parenthesis.
 
-        A function is translated once per combination of argument kinds. A literal exponent is not an argument in C:
-        each exponent gives its own function.
+        A function is translated once per combination of argument kinds. A literal exponent is not
+        an argument in C: each exponent gives its own function.
         """
         written, tree = parsed(function)
         names = [a.arg for a in tree.args.args]
-        exponents = {n.right.id for n in ast.walk(tree) if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Pow)
-            and isinstance(n.right, ast.Name)}  # fmt: skip
+        exponents = set()
+        for n in ast.walk(tree):
+            if (
+                isinstance(n, ast.BinOp)
+                and isinstance(n.op, ast.Pow)
+                and isinstance(n.right, ast.Name)
+            ):
+                exponents.add(n.right.id)
         constants = {
             name: node.value
             for name, node in zip(names, nodes, strict=False)
-            if name in exponents and isinstance(node, ast.Constant) and isinstance(node.value, int | float)
+            if name in exponents
+            and isinstance(node, ast.Constant)
+            and isinstance(node.value, int | float)
         }
         kinds = [v.kind for v in values]
         key = (written, tuple(kinds), tuple(constants.items()))
@@ -265,32 +382,59 @@ class Program:
 class Function:
     """One function in C.
 
-    A component's own function, the `entry`, writes its results to out[0] and out[1]. Another function returns a single
-    result, or writes several to pointers. `constants`: arguments replaced by literal numbers.
+    A component's own function, the `entry`, writes its results to out[0] and out[1]. Another
+    function returns a single result, or writes several to pointers. `constants`: arguments replaced
+    by literal numbers.
     """
 
     def __init__(
-        self, program: Program, function: Any, kinds: Sequence[str], constants: Mapping[str, float], entry: bool = False
+        self,
+        program: Program,
+        function: Any,
+        kinds: Sequence[str],
+        constants: Mapping[str, float],
+        entry: bool = False,
     ):
         self.program, self.constants, self.entry = program, constants, entry
         self.counters = set[str]()  # variables of the present loops that are never negative
-        self.frames = list[tuple[list[str], list[Value]]]()  # shapes and calls of operands of nested expressions
+        self.frames = list[
+            tuple[list[str], list[Value]]
+        ]()  # shapes and calls of operands of nested expressions
         self.fixed = False  # whether nothing may move before the present line
         written, self.tree = parsed(function)
         self.globals = around(written) | dict(constants)
         arguments = [a.arg for a in self.tree.args.args]
-        if len(arguments) != len(kinds) or self.tree.args.vararg or self.tree.args.kwonlyargs or self.tree.args.kwarg:
+        if (
+            len(arguments) != len(kinds)
+            or self.tree.args.vararg
+            or self.tree.args.kwonlyargs
+            or self.tree.args.kwarg
+        ):
             raise refuse(None, f"{self.tree.name} with its arguments")
         inside = in_body(self.tree)
-        if (entry or any(isinstance(n, ast.Return) for n in inside)) and not returns(self.tree.body):
+        if (entry or any(isinstance(n, ast.Return) for n in inside)) and not returns(
+            self.tree.body
+        ):
             raise refuse(None, f"{self.tree.name}, which does not end in a return,")
-        given = {n: kind.partition("@") for n, kind in zip(arguments, kinds, strict=True) if n not in constants}
+        given = {}
+        for n, kind in zip(arguments, kinds, strict=True):
+            if n not in constants:
+                given[n] = kind.partition("@")
         self.parameters = {n: kind for n, (kind, _, _) in given.items()}
-        self.changed = {arguments[i] for i in program.changes(function)}  # arguments whose elements it changes
+        self.changed = {
+            arguments[i] for i in program.changes(function)
+        }  # arguments whose elements it changes
         self.origins = dict[str, str]()  # names that are parts of arrays -> the arrays' names
-        # places of arrays that are not where their names say: of these parts, and of arguments with a stride
-        self.places = {n: array_at(plain(n), kind, stride=stride) for n, (kind, _, stride) in given.items() if stride}
-        self.read = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+        # places of arrays that are not where their names say: of these parts, and of arguments with
+        # a stride
+        self.places = {
+            n: array_at(plain(n), kind, stride=stride)
+            for n, (kind, _, stride) in given.items()
+            if stride
+        }
+        self.read = {
+            n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)
+        }
         self.kinds, self.results = dict(self.parameters), list[str]()
         before = None
         while before != (self.kinds, self.results):  # repeat until no variable's kind widens
@@ -303,12 +447,21 @@ class Function:
     def text(self, name: str) -> str:
         """Return the whole function under a name.
 
-        A variable is declared by its first assignment, or at the top if that is inside a block or by a pointer. C does
-        not read a length that only declares arrays.
+        A variable is declared by its first assignment, or at the top if that is inside a block or
+        by a pointer. C does not read a length that only declares arrays.
         """
-        words = set(re.findall(r"\w+", " ".join(line.partition(" = ")[2] or line for line in self.lines)))
-        self.read -= {n for n, kind in self.kinds.items() if kind in WHOLE_KINDS and self.c_name(n) not in words}
-        numbers = {n: TYPES[kind] for n, kind in self.kinds.items() if kind in TYPES and n not in self.parameters}
+        words = set(
+            re.findall(r"\w+", " ".join(line.partition(" = ")[2] or line for line in self.lines))
+        )
+        self.read -= {
+            n
+            for n, kind in self.kinds.items()
+            if kind in WHOLE_KINDS and self.c_name(n) not in words
+        }
+        numbers = {}
+        for n, kind in self.kinds.items():
+            if kind in TYPES and n not in self.parameters:
+                numbers[n] = TYPES[kind]
         types = {self.c_name(n): f"{of} " for n, of in numbers.items()}
         types |= {self.c_name(n): self.pointer_to(array) for n, array in self.origins.items()}
         unread = [self.c_name(n) for n in self.kinds if n not in self.read]
@@ -318,26 +471,38 @@ class Function:
         for line in self.lines:
             depth -= line.startswith("}")
             target, words = line.partition(" = ")[0], re.findall(r"\w+", line)
-            indent, declaration = "    " * depth, types.pop(target) if depth == 1 and target in types else ""
+            indent, declaration = (
+                "    " * depth,
+                types.pop(target) if depth == 1 and target in types else "",
+            )
             top += [f"{types.pop(n)}{n} = 0;" for n in list(types) if n in words]
             lines += wrapped(indent, declaration + line)
             depth += line.endswith("{")
-        return "\n".join([*wrapped("", self.head(name)), "{", *(f"    {line}" for line in top), *lines, "}"])
+        return "\n".join(
+            [*wrapped("", self.head(name)), "{", *(f"    {line}" for line in top), *lines, "}"]
+        )
 
     def arrays(self) -> Iterable[str]:
         """Return the declarations of the function's arrays."""
         own = self.kinds.keys() - self.parameters.keys() - self.origins.keys()
         kinds = {self.c_name(n): kind for n, kind in self.kinds.items() if n in own}
-        shaped = [(name, base(kind), shape(kind)) for name, kind in (kinds | self.temporaries).items() if shape(kind)]
+        shaped = []
+        for name, kind in (kinds | self.temporaries).items():
+            if shape(kind):
+                shaped.append((name, base(kind), shape(kind)))
         return [f"{TYPES[of]} {name}[{' * '.join(dimensions)}];" for name, of, dimensions in shaped]
 
     def head(self, name: str) -> str:
         """Return the declaration without a semicolon. Arrays are pointers."""
-        pointers = ARGUMENTS | {"y": f"const {STRUCTS.get(self.program.component.kind, 'smc_measurement')} *"}
+        pointers = ARGUMENTS | {
+            "y": f"const {STRUCTS.get(self.program.component.kind, 'smc_measurement')} *"
+        }
         arguments = []
         for parameter in self.parameters:
             kind = self.kinds[parameter]
-            of = pointers.get(kind) or (self.pointer_to(parameter) if shape(kind) else f"{TYPES[kind]} ")
+            of = pointers.get(kind) or (
+                self.pointer_to(parameter) if shape(kind) else f"{TYPES[kind]} "
+            )
             arguments.append(f"{of}{self.c_name(parameter)}")
         if self.entry:
             return f"int {name}({', '.join(arguments)}, smc_real *out)"
@@ -355,10 +520,14 @@ class Function:
         """Return the value of a name."""
         if name in self.places:
             return self.places[name]
-        return array_at(self.c_name(name), kind) if shape(kind) else Value(self.c_name(name), kind)
+        if shape(kind):
+            return array_at(self.c_name(name), kind)
+        return Value(self.c_name(name), kind)
 
     def origin(self, node: ast.expr | str) -> str:
-        """Return the name of the array whose numbers are those of an expression, or of a name; else an empty text."""
+        """Return the name of the array whose numbers are those of an expression, or of a name; else
+        an empty text.
+        """
         name = node if isinstance(node, str) else root(node)
         return self.origins.get(name, name)
 
@@ -379,8 +548,12 @@ class Function:
     def block(self, body: Sequence[ast.stmt]) -> Iterator[str]:
         """Yield the lines of some statements, each after the lines that have moved before it."""
         if body is self.tree.body:
-            self.before = list[str]()  # lines before the present one, such as loops that fill arrays
-            self.temporaries = dict[str, str]()  # name -> kind of arrays for results within expressions
+            self.before = list[
+                str
+            ]()  # lines before the present one, such as loops that fill arrays
+            self.temporaries = dict[
+                str, str
+            ]()  # name -> kind of arrays for results within expressions
             self.counts = itertools.count(1)
         for line in itertools.chain.from_iterable(map(self.statement, body)):
             before, self.before = self.before, []
@@ -433,7 +606,9 @@ class Function:
                 yield f"{self.destination(target, number.kind)} = {number.text};"
             return
         targets, values = target.elts, self.parts(value, len(target.elts))
-        if values and any(self.set_by(targets[:i]) & self.arrays_in([v]) for i, v in enumerate(values)):
+        if values and any(
+            self.set_by(targets[:i]) & self.arrays_in([v]) for i, v in enumerate(values)
+        ):
             yield "{"
             yield from self.at_once(targets, values)
             yield "}"
@@ -446,12 +621,16 @@ class Function:
             raise refuse(value, "a tuple from anything but a call")
 
     def needs_lines(self, value: ast.IfExp) -> bool:
-        """Return whether one of two values is a tuple, or the result of a Python function, which may be one."""
+        """Return whether one of two values is a tuple, or the result of a Python function, which
+        may be one.
+        """
         values = value.body, value.orelse
         calls = [self.resolve(one.func) for one in values if isinstance(one, ast.Call)]
         return any(isinstance(one, ast.Tuple) for one in values) or any(map(in_python, calls))
 
-    def either(self, value: ast.IfExp, translated: Callable[[ast.expr], Iterable[str]]) -> Iterator[str]:
+    def either(
+        self, value: ast.IfExp, translated: Callable[[ast.expr], Iterable[str]]
+    ) -> Iterator[str]:
         """Yield the lines for one value or for the other one, by a condition."""
         yield f"if ({self.truth(value.test)}) {{"
         yield from translated(value.body)
@@ -465,26 +644,39 @@ class Function:
 
     def set_by(self, targets: Iterable[ast.expr]) -> set[str]:
         """Return the names that targets bind, and the arrays whose elements they set."""
-        return bound(targets) | {self.origin(n) for t in targets for n in ast.walk(t) if isinstance(n, ast.Subscript)}
+        return bound(targets) | {
+            self.origin(n) for t in targets for n in ast.walk(t) if isinstance(n, ast.Subscript)
+        }
 
     def is_part(self, name: str, value: ast.expr) -> bool:
-        """Return whether a name is always the part of an array that a value is, so that it can be a pointer into it."""
+        """Return whether a name is always the part of an array that a value is, so that it can be a
+        pointer into it.
+        """
         nodes, array = [*ast.walk(self.tree)], self.origin(value)
-        in_loops = {n for loop in nodes if isinstance(loop, ast.For | ast.While) for n in ast.walk(loop)}
+        in_loops = {
+            n for loop in nodes if isinstance(loop, ast.For | ast.While) for n in ast.walk(loop)
+        }
         given, of_array = ([n for n in nodes if one in assigned(n)] for one in (name, array))
         lasts = array in self.parameters or (len(of_array) == 1 and of_array[0] not in in_loops)
         kind = self.kinds.get(array, "")
-        is_place = isinstance(value, ast.Subscript) and (kind == "memory" or (shape(kind) and not is_tuple(kind)))
+        is_place = isinstance(value, ast.Subscript) and (
+            kind == "memory" or (shape(kind) and not is_tuple(kind))
+        )
         return bool(is_place and lasts and len(given) == 1 and name not in self.parameters)
 
     def bind(self, name: str, part: Value, node: ast.expr) -> str:
         """Make a name a pointer to a part of an array, and return the line that sets it."""
         self.kinds[name], self.origins[name] = part.kind, self.origin(node)
-        self.names[name] = self.places[name] = array_at(self.c_name(name), part.kind, stride=part.stride)
+        self.names[name] = self.places[name] = array_at(
+            self.c_name(name), part.kind, stride=part.stride
+        )
         return f"{self.c_name(name)} = {part.pointer};"
 
     def at_once(self, targets: Sequence[ast.expr], values: Sequence[ast.expr]) -> Iterator[str]:
-        """Compute all values before the first assignment, because one reads an earlier target. Arrays are refused."""
+        """Compute all values before the first assignment, because one reads an earlier target.
+
+        Arrays are refused.
+        """
         new = [self.numeric(value) for value in values]
         if any(shape(v.kind) for v in new):
             raise refuse(values[0], "arrays that change places at once")
@@ -493,10 +685,14 @@ class Function:
             yield f"{self.destination(target, value.kind)} = new_{i};"
 
     def parts(self, value: ast.expr, count: int) -> Sequence[ast.expr] | None:
-        """Return the expressions of a tuple, or the elements of one or of memory; None for another expression."""
+        """Return the expressions of a tuple, or the elements of one or of memory; None for another
+        expression.
+        """
         if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == count:
             return value.elts
-        if isinstance(value, ast.Name) and ((kind := self.kinds.get(value.id, "")) == "memory" or is_tuple(kind)):
+        if isinstance(value, ast.Name) and (
+            (kind := self.kinds.get(value.id, "")) == "memory" or is_tuple(kind)
+        ):
             if is_tuple(kind) and int(shape(kind)[0]) != count:
                 raise refuse(value, f"{count} names for {shape(kind)[0]} numbers")
             return [ast.Subscript(value, ast.Constant(i), ast.Load()) for i in range(count)]
@@ -505,7 +701,9 @@ class Function:
     def unpack(self, targets: Sequence[ast.expr], call: ast.Call) -> Iterator[str]:
         """Assign the results of a function that has several."""
         function = self.callee(call)
-        kinds, beginning = self.program.function(function, self.arguments(function, call), call.args)
+        kinds, beginning = self.program.function(
+            function, self.arguments(function, call), call.args
+        )
         if len(kinds) != len(targets):
             raise refuse(call, f"{len(targets)} names for {len(kinds)} results")
         pointers, stores, read = [], [], self.arrays_in(call.args)
@@ -524,17 +722,27 @@ class Function:
                 yield f"{self.destination(target, value.kind)} = {value.text};"
 
     def receiver(self, target: ast.expr, kind: str, read: set[str]) -> str:
-        """Return a pointer by which a call that reads some arrays can set a target; "" if it cannot."""
+        """Return a pointer by which a call that reads some arrays can set a target; "" if it
+        cannot.
+        """
         if isinstance(target, ast.Name):
-            if self.kinds.get(target.id, kind) != kind or (shape(kind) and target.id in {*self.parameters, *read}):
+            if self.kinds.get(target.id, kind) != kind or (
+                shape(kind) and target.id in {*self.parameters, *read}
+            ):
                 return ""
             place = self.destination(target, kind)
             return place if shape(kind) else f"&{place}"
         place = self.changeable(target)
-        fits = base(place.kind) == base(kind) and self.same_shape(place.kind, kind) and not place.stride
+        fits = (
+            base(place.kind) == base(kind)
+            and self.same_shape(place.kind, kind)
+            and not place.stride
+        )
         if not fits or self.origin(target) in read:
             return ""
-        return place.pointer if shape(kind) else f"&{place.text}"
+        if shape(kind):
+            return place.pointer
+        return f"&{place.text}"
 
     def destination(self, target: ast.expr, kind: str) -> str:
         """Return a target in C, to which a value of a kind is assigned."""
@@ -543,7 +751,10 @@ class Function:
             if wider(place.kind, kind) != place.kind:
                 raise refuse(target, "a real number for an element of an array of whole numbers")
             return place.text
-        name = target.id if isinstance(target, ast.Name) else ""
+        if isinstance(target, ast.Name):
+            name = target.id
+        else:
+            name = ""
         if not name or self.kinds.get(name) in ARGUMENTS or name in self.constants:
             raise refuse(target, "an assignment to this")
         self.kinds[name] = kind = wider(self.kinds.get(name, kind), kind)
@@ -553,7 +764,9 @@ class Function:
 
     def augment(self, node: ast.AugAssign) -> Iterator[str]:
         """Translate target op= value, element by element if the target is an array."""
-        whole = ast.BinOp(syntax(ast.unparse(node.target), "eval").body, node.op, node.value)  # target op value
+        whole = ast.BinOp(
+            syntax(ast.unparse(node.target), "eval").body, node.op, node.value
+        )  # target op value
         if self.is_array(node.target):
             yield from self.store(node.target, self.numeric(whole))
             return
@@ -595,11 +808,18 @@ class Function:
     def counted(self, node: ast.For, variable: str) -> Iterator[str]:
         """Translate for i in range(...) with a step of 1 or -1."""
         call = node.iter
-        if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range" and 1 <= len(call.args) <= 3):
+        if not (
+            isinstance(call, ast.Call)
+            and ast.unparse(call.func) == "range"
+            and 1 <= len(call.args) <= 3
+        ):
             raise refuse(call, "a loop over anything but a range")
         if changed(node.body) & names_in([node.target, *call.args]):
             raise refuse(call, "a loop that changes its own variable or range")
-        step = self.constant(call.args[2]) if len(call.args) == 3 else 1
+        if len(call.args) == 3:
+            step = self.constant(call.args[2])
+        else:
+            step = 1
         bounds = [self.numeric(a) for a in call.args[:2]]
         if any(b.kind != "int" for b in bounds) or step not in (1, -1):
             raise refuse(call, "a range of other than integers with a step of 1 or -1")
@@ -607,9 +827,18 @@ class Function:
             raise refuse(node.target, "a loop over a variable that exists already")
         name = self.c_name(variable)
         self.names[variable] = Value(name, "int")
-        self.counters |= {variable} if self.counts_naturals(call) else set()
-        first, last = bounds if len(bounds) == 2 else (Value("0", "int"), bounds[0])
-        sign, change = ("<", "++") if step == 1 else (">", "--")
+        if self.counts_naturals(call):
+            self.counters |= {variable}
+        else:
+            self.counters |= set()
+        if len(bounds) == 2:
+            first, last = bounds
+        else:
+            first, last = (Value("0", "int"), bounds[0])
+        if step == 1:
+            sign, change = ("<", "++")
+        else:
+            sign, change = (">", "--")
         yield f"for (int32_t {name} = {first.text}; {name} {sign} {last.within(SUM)}; {name}{change}) {{"
         yield from self.block(node.body)
         yield "}"
@@ -621,17 +850,26 @@ class Function:
         if isinstance(value, ast.IfExp) and self.needs_lines(value):
             yield from self.either(value, self.returned)
             return
-        values = [self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])]
+        values = [
+            self.numeric(v) for v in (value.elts if isinstance(value, ast.Tuple) else [value])
+        ]
         if len(values) == 1 and is_tuple((one := values[0]).kind):
-            values = [Value(f"{one.pointer}[{i}]", base(one.kind)) for i in range(int(shape(one.kind)[0]))]
+            values = [
+                Value(f"{one.pointer}[{i}]", base(one.kind)) for i in range(int(shape(one.kind)[0]))
+            ]
         if self.entry and self.program.component.kind == "estimator" and len(values) == 1:
             values.append(Value("NAN", "real", UNARY))
         self.results = self.results or [v.kind for v in values]
         if len(values) != len(self.results):
             raise refuse(value, "another number of results")
         self.results = [wider(kind, v.kind) for kind, v in zip(self.results, values, strict=True)]
-        wanted = f"real[{JOINTS}]" if self.program.joints else "real"
-        if self.entry and (len(values) != 2 or any(not self.same_shape(kind, wanted) for kind in self.results)):
+        if self.program.joints:
+            wanted = f"real[{JOINTS}]"
+        else:
+            wanted = "real"
+        if self.entry and (
+            len(values) != 2 or any(not self.same_shape(kind, wanted) for kind in self.results)
+        ):
             joints = "a result other than two vectors, u and s, of one number for each joint,"
             raise refuse(value, joints if self.program.joints else "another number of results")
         if len(values) == 1 and not shape(self.results[0]):
@@ -639,7 +877,9 @@ class Function:
             return
         for i, v in enumerate(values):
             if not self.entry:
-                yield from self.fill(array_at(f"out_{i}", v.kind) if shape(v.kind) else Value(f"*out_{i}", v.kind), v)
+                yield from self.fill(
+                    array_at(f"out_{i}", v.kind) if shape(v.kind) else Value(f"*out_{i}", v.kind), v
+                )
             elif self.program.joints:
                 yield from self.fill(array_at("out", v.kind, f"{JOINTS} + " if i else ""), v)
             else:
@@ -652,7 +892,9 @@ class Function:
             if target.id in self.parameters:
                 raise refuse(target, "an assignment to an argument that is an array")
             before, kind = self.kinds.get(target.id, ""), value.kind
-            if shape(before) and self.same_shape(before, kind):  # 3 or SMC_JOINTS, where there are three joints
+            if shape(before) and self.same_shape(
+                before, kind
+            ):  # 3 or SMC_JOINTS, where there are three joints
                 kind = base(kind) + before[len(base(before)) :]
             self.destination(target, kind)
             place = self.value(target)
@@ -661,10 +903,18 @@ class Function:
             if wider(base(place.kind), base(value.kind)) != base(place.kind):
                 raise refuse(target, "real numbers for elements of an array of whole numbers")
         if shape(value.kind) and not self.same_shape(value.kind, place.kind):
-            raise refuse(target, f"an array of {', '.join(shape(value.kind))} numbers for one of another shape")
-        same = [re.escape(place.text), rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]"]  # elements of the same joint
+            raise refuse(
+                target,
+                f"an array of {', '.join(shape(value.kind))} numbers for one of another shape",
+            )
+        same = [
+            re.escape(place.text),
+            rf"\w+\[{ROW} \* {SLOTS} \+ \w+\]",
+        ]  # elements of the same joint
         others = re.sub("|".join(same), "", value.text)
-        if self.sharing(place.text) & set(re.findall(r"\w+", others)):  # reads elements that the loop has changed
+        if self.sharing(place.text) & set(
+            re.findall(r"\w+", others)
+        ):  # reads elements that the loop has changed
             kept = self.temporary(value.kind)
             yield from self.fill(kept, value)
             value = kept
@@ -677,27 +927,43 @@ class Function:
             yield from moved
             return
         indices = [self.index(i) for i in range(len(dimensions))]
-        loops = [f"for (int32_t {i} = 0; {i} < {n}; {i}++)" for i, n in zip(indices, dimensions, strict=True)]
+        loops = [
+            f"for (int32_t {i} = 0; {i} < {n}; {i}++)"
+            for i, n in zip(indices, dimensions, strict=True)
+        ]
         line = f"{place.text} = {value.text};"
         for token, i in zip((ROW, COLUMN), indices, strict=False):
             line = line.replace(token, i)
         yield " ".join([*loops, line])
 
     def retargeted(self, place: Value, value: Value) -> list[str]:
-        """Take back and return the lines that have just computed a value, if they can write to a place itself."""
+        """Take back and return the lines that have just computed a value, if they can write to a
+        place itself.
+        """
         name, given = value.pointer, place.pointer
         lines = [line for line in self.before if name and re.search(rf"\b{name}\b", line)]
-        if name not in self.temporaries or not lines or self.before[-len(lines) :] != lines or place.stride:
+        if (
+            name not in self.temporaries
+            or not lines
+            or self.before[-len(lines) :] != lines
+            or place.stride
+        ):
             return []
-        calls = len(lines) == 1 and re.match(r"\w+\(", lines[0]) is not None  # for and if have a space
+        calls = (
+            len(lines) == 1 and re.match(r"\w+\(", lines[0]) is not None
+        )  # for and if have a space
         fits = given and base(place.kind) == base(value.kind) and (calls or given.isidentifier())
-        if not fits or self.sharing(given) & set(re.findall(r"\w+", " ".join(lines))):  # it reads from there
+        if not fits or self.sharing(given) & set(
+            re.findall(r"\w+", " ".join(lines))
+        ):  # it reads from there
             return []
         del self.before[-len(lines) :], self.temporaries[name]
         return [re.sub(rf"\b{name}\b", given, line) for line in lines]
 
     def changeable(self, target: ast.expr) -> Value:
-        """Return elements that the function may change: of its memory, of an array that it makes, or of an argument."""
+        """Return elements that the function may change: of its memory, of an array that it makes,
+        or of an argument.
+        """
         kind = self.kinds.get(self.origin(target), "")
         if kind != "memory" and (not shape(kind) or is_tuple(kind)):
             raise refuse(target, "an assignment to this, which is no array of the function's own,")
@@ -707,7 +973,10 @@ class Function:
         """Return whether a target of an assignment is an array already."""
         kind, indices = self.kinds.get(root(target), ""), 0
         while isinstance(target, ast.Subscript):
-            places = target.slice.elts if isinstance(target.slice, ast.Tuple) else [target.slice]
+            if isinstance(target.slice, ast.Tuple):
+                places = target.slice.elts
+            else:
+                places = [target.slice]
             indices += sum(not isinstance(place, ast.Slice) for place in places)
             target = target.value
         return indices < (1 + bool(self.program.joints) if kind == "memory" else len(shape(kind)))
@@ -718,14 +987,22 @@ class Function:
 
     def index(self, place: int = 0) -> str:
         """Return the name of a loop's index, which no variable has."""
-        taken = {n.id for n in ast.walk(self.tree) if isinstance(n, ast.Name)} | set(self.parameters)
-        return [name for name in (*"ijklmn", "row", "column", "element_1", "element_2") if name not in taken][place]
+        taken = {n.id for n in ast.walk(self.tree) if isinstance(n, ast.Name)} | set(
+            self.parameters
+        )
+        return [
+            name
+            for name in (*"ijklmn", "row", "column", "element_1", "element_2")
+            if name not in taken
+        ][place]
 
     # expressions
 
     def value(self, node: ast.expr) -> Value:
         """Translate an expression that is a number, an array, or one of the law's arguments."""
-        method: Callable[[Any], Value] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
+        method: Callable[[Any], Value] | None = getattr(
+            self, f"_{type(node).__name__.lower()}", None
+        )
         if method is None:
             raise refuse(node, f"{type(node).__name__}")
         match node:
@@ -738,7 +1015,9 @@ class Function:
         return method(node)
 
     def numeric(self, node: ast.expr) -> Value:
-        """Translate an expression that is a number or an array; an array in an elementwise one to its element."""
+        """Translate an expression that is a number or an array; an array in an elementwise one to
+        its element.
+        """
         value = self.value(node)
         if value.kind in ARGUMENTS or not value.kind or (self.frames and is_tuple(value.kind)):
             raise refuse(node, f"{'a tuple' if is_tuple(value.kind) else value.text} as a number")
@@ -756,14 +1035,19 @@ class Function:
         return value
 
     def elementwise(self, method: Callable[[Any], Value], node: Any) -> Value:
-        """Translate an expression by its elements: an array if an operand is one. Calls then move before the loop."""
+        """Translate an expression by its elements: an array if an operand is one.
+
+        Calls then move before the loop.
+        """
         self.frames.append(([], []))
         try:
             value = method(node)
         finally:
             shapes, calls = self.frames.pop()
         if not shapes:
-            return value._replace(text=TOKEN.sub(lambda match: calls[int(match[1])].text, value.text))
+            return value._replace(
+                text=TOKEN.sub(lambda match: calls[int(match[1])].text, value.text)
+            )
         names = {}
 
         def moved(match: re.Match[str]) -> str:
@@ -821,7 +1105,10 @@ class Function:
         return value._replace(text=value.pointer)
 
     def arguments(self, function: Any, call: ast.Call) -> list[Value]:
-        """Translate the arguments of a call. An array that the function changes is a pointer, with its stride."""
+        """Translate the arguments of a call.
+
+        An array that the function changes is a pointer, with its stride.
+        """
         changed, values = self.program.changes(function), list[Value]()
         shared = [self.shared(a) for a in call.args]
         for i, node in enumerate(call.args):
@@ -834,16 +1121,30 @@ class Function:
             if shape(value.kind):
                 if not value.pointer:
                     raise refuse(node, "a part of a matrix, which a function changes,")
-                value = value._replace(text=value.pointer, kind=value.kind + f"@{value.stride}" * bool(value.stride))
+                value = value._replace(
+                    text=value.pointer, kind=value.kind + f"@{value.stride}" * bool(value.stride)
+                )
             values.append(value)
         return values
 
     def check_order(self, call: ast.Call) -> None:
-        """Refuse a call that changes an array which the rest of its line reads: C does not say which comes first."""
-        changed = {self.origin(call.args[i]) for i in self.program.changes(self.callee(call)) if i < len(call.args)}
+        """Refuse a call that changes an array which the rest of its line reads:
+
+        C does not say which comes first.
+        """
+        changed = set()
+        for i in self.program.changes(self.callee(call)):
+            if i < len(call.args):
+                changed.add(self.origin(call.args[i]))
         for line in (n for n in in_body(self.tree) if isinstance(n, ast.stmt)):
-            targets = line.targets if isinstance(line, ast.Assign) else []
-            parts = [n for n in ast.iter_child_nodes(line) if not isinstance(n, ast.stmt) and n not in targets]
+            if isinstance(line, ast.Assign):
+                targets = line.targets
+            else:
+                targets = []
+            parts = []
+            for n in ast.iter_child_nodes(line):
+                if not isinstance(n, ast.stmt) and n not in targets:
+                    parts.append(n)
             inside = [n for part in parts for n in ast.walk(part)]
             names = [n for n in inside if isinstance(n, ast.Name) and n not in ast.walk(call)]
             if call in inside and changed & self.arrays_in(names):
@@ -854,7 +1155,9 @@ class Function:
         value = self.staying(self.outside, self.numeric, node)
         if shape(value.kind):
             raise refuse(node, "an array as a condition")
-        return value.text if value.kind in WHOLE_KINDS else f"{value.within(UNARY)} != 0"
+        if value.kind in WHOLE_KINDS:
+            return value.text
+        return f"{value.within(UNARY)} != 0"
 
     def constant(self, node: ast.expr) -> float | None:
         """Return the literal number that an expression is, or None."""
@@ -863,11 +1166,15 @@ class Function:
             return None if value is None else -value
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return node.value
-        return self.constants.get(node.id) if isinstance(node, ast.Name) else None
+        if isinstance(node, ast.Name):
+            return self.constants.get(node.id)
+        return None
 
     def resolve(self, node: ast.expr) -> Any:
         """Return the value of a global name, dotted or not; None for a variable."""
-        return None if names_in([node]) & self.names.keys() else resolved(node, self.globals)
+        if names_in([node]) & self.names.keys():
+            return None
+        return resolved(node, self.globals)
 
     def callee(self, node: ast.Call) -> Any:
         """Return the function that is called."""
@@ -892,7 +1199,10 @@ class Function:
         owner, name, joints = self.outside(self.value, node.value), node.attr, self.program.joints
         if owner.kind == "y":
             kind = self.program.component.kind
-            fields = JOINT_FIELDS if joints else CHANNEL_FIELDS[kind]
+            if joints:
+                fields = JOINT_FIELDS
+            else:
+                fields = CHANNEL_FIELDS[kind]
             known(name, "reading" if kind == "estimator" else "measurement", fields)
             if joints and JOINT_FIELDS[name]:
                 return array_at(f"{owner.text}->{name}", f"real{JOINT_FIELDS[name]}")
@@ -914,7 +1224,10 @@ class Function:
             return literal(value, self.program.single, node)
         made = self.program.array(ast.unparse(node).replace(".", "_"), value)
         array = array_at(made.text, f"{made.kind}[{len(value)}]" + "()" * isinstance(value, tuple))
-        return array if made.kind == "real" else array._replace(pointer="")  # of 16 bits, so that functions get a copy
+        # of 16 bits, so that functions get a copy
+        if made.kind == "real":
+            return array
+        return array._replace(pointer="")
 
     def _subscript(self, node: ast.Subscript) -> Value:
         constants, joints = self.resolve(node.value), self.program.joints
@@ -925,34 +1238,58 @@ class Function:
         if owner.kind == "memory":
             owner = array_at(owner.text, f"real[{JOINTS}][{SLOTS}]" if joints else f"real[{SLOTS}]")
         dimensions = shape(owner.kind)
-        places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        if isinstance(node.slice, ast.Tuple):
+            places = node.slice.elts
+        else:
+            places = [node.slice]
         if not dimensions or len(places) > len(dimensions):
             raise refuse(node, "an element")
-        return self.elements(node, owner, [*places, *[ast.Slice()] * (len(dimensions) - len(places))])
+        return self.elements(
+            node, owner, [*places, *[ast.Slice()] * (len(dimensions) - len(places))]
+        )
 
     def elements(self, node: ast.Subscript, owner: Value, places: Sequence[ast.expr]) -> Value:
         """Return some elements of an array, by an index or a colon for each dimension."""
         dimensions, text, pointer = shape(owner.kind), owner.text, owner.pointer
-        strides = [dimensions[1], ""] if len(dimensions) == 2 else [owner.stride]
+        if len(dimensions) == 2:
+            strides = [dimensions[1], ""]
+        else:
+            strides = [owner.stride]
         left, steps = list[str](), list[str]()
-        for token, place, dimension, stride in zip((ROW, COLUMN), places, dimensions, strides, strict=False):
+        for token, place, dimension, stride in zip(
+            (ROW, COLUMN), places, dimensions, strides, strict=False
+        ):
             if isinstance(place, ast.Slice):
                 first, count = self.part(node, place, dimension)
                 kept = (ROW, COLUMN)[len(left)]
-                index = Value(f"{kept} + {first}", "int", SUM) if first else Value(kept, "int")
+                if first:
+                    index = Value(f"{kept} + {first}", "int", SUM)
+                else:
+                    index = Value(kept, "int")
                 left.append(count)
                 steps.append(stride)
                 moved = Value(str(first), "int")
             else:
                 index = self.outside(self.numeric, place)
                 self.check_index(node, place, index, dimension)
-                if dimension != SLOTS and not self.natural(place):  # Python counts a negative index from the end
-                    index = Value(f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int")
+                if dimension != SLOTS and not self.natural(
+                    place
+                ):  # Python counts a negative index from the end
+                    index = Value(
+                        f"{self.program.helper('wrapped', 'int')}({index.text}, {dimension})", "int"
+                    )
                 moved = index
             text = re.sub(rf"\[{token}\]|{token}", functools.partial(put, index), text)
             if moved.text != "0":
-                pointer += f" + {moved.within(PRODUCT)} * {stride}" if stride else f" + {moved.within(SUM)}"
-        kind = base(owner.kind) + "".join(f"[{n}]" for n in left) + "()" * (is_tuple(owner.kind) and bool(left))
+                if stride:
+                    pointer += f" + {moved.within(PRODUCT)} * {stride}"
+                else:
+                    pointer += f" + {moved.within(SUM)}"
+        kind = (
+            base(owner.kind)
+            + "".join(f"[{n}]" for n in left)
+            + "()" * (is_tuple(owner.kind) and bool(left))
+        )
         in_rows = len(left) < 2 or left[1] == dimensions[1]
         located = bool(left and owner.pointer and in_rows)
         return Value(text, kind, owner.level, pointer * located, steps[-1] if located else "")
@@ -961,7 +1298,10 @@ class Function:
         """Return where a slice of a dimension begins, and its length."""
         if place.step:
             raise refuse(node, "a part of an array with a step")
-        size = self.program.component.memory if dimension == SLOTS else self.program.size(dimension)
+        if dimension == SLOTS:
+            size = self.program.component.memory
+        else:
+            size = self.program.size(dimension)
         found = range(size)[slice(self.bound(place.lower), self.bound(place.upper))]
         if not found:
             raise refuse(node, "an empty part of an array")
@@ -974,9 +1314,13 @@ class Function:
         if node is None:
             return None
         constant = self.constant(node)
-        return constant if isinstance(constant, int) else self.program.size(self.dimensions(node)[0])
+        if isinstance(constant, int):
+            return constant
+        return self.program.size(self.dimensions(node)[0])
 
-    def check_index(self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str) -> None:
+    def check_index(
+        self, node: ast.Subscript, place: ast.expr, index: Value, dimension: str
+    ) -> None:
         """Refuse an index that is no integer, or out of range as far as it is known."""
         constant, component = self.constant(place), self.program.component
         if index.kind != "int":
@@ -985,10 +1329,15 @@ class Function:
             if constant is None:  # a ring of readings or a matrix, as long as its memory
                 constant = component.memory - 1
             if constant is None or constant < 0:
-                why = "at an index that is not constant" if constant is None else "at a negative index"
+                if constant is None:
+                    why = "at an index that is not constant"
+                else:
+                    why = "at a negative index"
                 raise refuse(node, f"memory {why}")
             self.program.claim(node, int(constant))
-        elif constant is not None and not -(size := self.program.size(dimension)) <= constant < size:
+        elif (
+            constant is not None and not -(size := self.program.size(dimension)) <= constant < size
+        ):
             raise refuse(node, f"an index outside {-size} to {size - 1}")
 
     def counts_naturals(self, node: ast.expr) -> bool:
@@ -1000,7 +1349,9 @@ class Function:
                 return self.natural(first)
             case ast.Call(args=[first, last, step]):
                 end = self.constant(last)
-                return self.natural(first) if self.constant(step) == 1 else end is not None and end >= -1
+                if self.constant(step) == 1:
+                    return self.natural(first)
+                return end is not None and end >= -1
         return False
 
     def natural(self, node: ast.expr) -> bool:
@@ -1035,9 +1386,15 @@ class Function:
         if type(operator) in BIT_OPERATORS:
             if not whole:
                 raise refuse(node, "a bit operation on real numbers")
-            return Value(f"{left.within(ATOM)} {BIT_OPERATORS[type(operator)]} {right.within(ATOM)}", "int", LOOSE)
+            return Value(
+                f"{left.within(ATOM)} {BIT_OPERATORS[type(operator)]} {right.within(ATOM)}",
+                "int",
+                LOOSE,
+            )
         if isinstance(operator, ast.Mod) and whole:
-            return Value(f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})", "int")
+            return Value(
+                f"{self.program.helper('modulo', 'int')}({left.text}, {right.text})", "int"
+            )
         if type(operator) not in OPERATORS:
             raise refuse(node, f"the operator {type(operator).__name__}")
         sign, level = OPERATORS[type(operator)]
@@ -1057,7 +1414,10 @@ class Function:
         if exponent == 0.5:
             return self.math("sqrt", [base])
         if (power := f"power_{exponent}") in POWERS or exponent == 2:
-            return Value(f"{self.program.helper(power.removesuffix('.0'), base.kind)}({base.text})", base.kind)
+            return Value(
+                f"{self.program.helper(power.removesuffix('.0'), base.kind)}({base.text})",
+                base.kind,
+            )
         power = self.numeric(node.right)
         if power.kind in WHOLE_KINDS:
             raise refuse(node, "a power with such an exponent")
@@ -1077,7 +1437,9 @@ class Function:
             raise refuse(node, "`and` or `or` of numbers instead of comparisons")
         # && and || of other operands need parentheses around a nested && or ||
         parts = [f"({v.text})" if "&&" in v.text or "||" in v.text else v.text for v in values]
-        return Value((" && " if isinstance(node.op, ast.And) else " || ").join(parts), "bool", LOOSE)
+        return Value(
+            (" && " if isinstance(node.op, ast.And) else " || ").join(parts), "bool", LOOSE
+        )
 
     def _ifexp(self, node: ast.IfExp) -> Value:
         yes, no, test = self.numeric(node.body), self.numeric(node.orelse), self.truth(node.test)
@@ -1085,7 +1447,11 @@ class Function:
 
     def chosen(self, test: Value, yes: Value, no: Value) -> Value:
         """Return one of two values, by a condition."""
-        return Value(f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}", wider(yes.kind, no.kind), LOOSE)
+        return Value(
+            f"{test.within(SUM)} ? {yes.within(SUM)} : {no.within(SUM)}",
+            wider(yes.kind, no.kind),
+            LOOSE,
+        )
 
     def _tuple(self, node: ast.Tuple) -> Value:
         return self.gathered(node, node.elts, "()")
@@ -1102,8 +1468,10 @@ class Function:
             method = self.sized
         elif function is np.array or hasattr(function, "_fields"):
             method = self.listed
+        elif function in REQUESTED_ARRAYS:
+            method = self.requested
         else:
-            method = self.requested if function in REQUESTED_ARRAYS else self.called
+            method = self.called
         return self.outside(method, function, node)
 
     def called(self, function: Any, node: ast.Call) -> Value:
@@ -1112,7 +1480,11 @@ class Function:
         if not any(shape(v.kind) for v in values):
             if (built_in := self.built_in(function, values, node)) is not None:
                 return built_in
-        elif function in (min, max) or inspect.isbuiltin(function) or isinstance(function, type | np.ufunc):
+        elif (
+            function in (min, max)
+            or inspect.isbuiltin(function)
+            or isinstance(function, type | np.ufunc)
+        ):
             raise refuse(node, f"{getattr(function, '__name__', function)} of an array")
         kinds, beginning = self.program.function(function, values, node.args)
         self.check_order(node)
@@ -1126,7 +1498,9 @@ class Function:
         return array
 
     def built_in(self, function: Any, values: list[Value], node: ast.Call) -> Value | None:
-        """Translate a call of a function of Python, math or numpy; return None for another function."""
+        """Translate a call of a function of Python, math or numpy; return None for another
+        function.
+        """
         if function in (min, max):
             return self.extreme("minimum" if function is min else "maximum", values, node)
         if function in CASTS and len(values) == 1:
@@ -1134,7 +1508,9 @@ class Function:
             return Value(f"({TYPES[kind]}){values[0].within(UNARY)}", kind, UNARY)
         if function in ROUNDING:
             return Value(f"(int32_t){self.math(ROUNDING[function], values).text}", "int", UNARY)
-        return self.math(function.__name__, values) if function in SAME_IN_C else None
+        if function in SAME_IN_C:
+            return self.math(function.__name__, values)
+        return None
 
     def extreme(self, helper: str, values: list[Value], node: ast.Call) -> Value:
         """Translate min or max, from left to right."""
@@ -1143,26 +1519,34 @@ class Function:
         result = values[0]
         for value in values[1:]:
             kind = wider(result.kind, value.kind)
-            result = Value(f"{self.program.helper(helper, kind)}({result.text}, {value.text})", kind)
+            result = Value(
+                f"{self.program.helper(helper, kind)}({result.text}, {value.text})", kind
+            )
         return result
 
     def math(self, name: str, values: Sequence[Value]) -> Value:
         """Translate a call of a function of math.h, in the precision of its arguments."""
         single = all(v.kind == "single" for v in values)
         suffix = "f" if single or self.program.single else ""
-        return Value(f"{name}{suffix}({', '.join(v.text for v in values)})", "single" if single else "real")
+        return Value(
+            f"{name}{suffix}({', '.join(v.text for v in values)})", "single" if single else "real"
+        )
 
     def of_elements(self, function: Any, node: ast.Call) -> Value:
         """Translate a function of numpy, by its elements."""
         values = [self.numeric(a) for a in node.args]
-        kind = "single" if all(v.kind == "single" for v in values) else "real"
+        if all(v.kind == "single" for v in values):
+            kind = "single"
+        else:
+            kind = "real"
         if function is np.where:
             if len(values) != 3:
                 raise refuse(node, "where without two values")
             return self.chosen(*values)
         if function in HELPER_NAMES:
             return Value(
-                f"{self.program.helper(HELPER_NAMES[function], kind)}({', '.join(v.text for v in values)})", kind
+                f"{self.program.helper(HELPER_NAMES[function], kind)}({', '.join(v.text for v in values)})",
+                kind,
             )
         if function in (abs, np.abs) and values[0].kind in WHOLE_KINDS:
             return Value(f"{self.program.helper('absolute', 'int')}({values[0].text})", "int")
@@ -1205,10 +1589,14 @@ class Function:
         if function is len:
             return Value(self.dimensions(node)[0], "int")
         dimensions = "".join(f"[{n}]" for n in self.dimensions(node.args[0]))
-        return literal(FILL_VALUES[function], self.program.single, node)._replace(kind=f"real{dimensions}")
+        return literal(FILL_VALUES[function], self.program.single, node)._replace(
+            kind=f"real{dimensions}"
+        )
 
     def dimensions(self, node: ast.expr) -> list[str]:
-        """Return the dimensions that an expression gives: a number, len(array), a variable, or a tuple of these."""
+        """Return the dimensions that an expression gives: a number, len(array), a variable, or a
+        tuple of these.
+        """
         match node:
             case ast.Tuple(elts=elements) if len(elements) <= 2:
                 return [self.dimensions(element)[0] for element in elements]
@@ -1218,10 +1606,20 @@ class Function:
                 if dimensions := shape(self.value(array).kind):
                     return [dimensions[0]]
             case ast.Name(id=name):
-                given = [statement for statement in ast.walk(self.tree) if name in assigned(statement)]
-                if len(given) == 1 and isinstance(given[0], ast.Assign) and isinstance(given[0].targets[0], ast.Name):
+                given = [
+                    statement for statement in ast.walk(self.tree) if name in assigned(statement)
+                ]
+                if (
+                    len(given) == 1
+                    and isinstance(given[0], ast.Assign)
+                    and isinstance(given[0].targets[0], ast.Name)
+                ):
                     return self.dimensions(given[0].value)
-                if isinstance(size := self.globals.get(name), int) and not given and name not in self.kinds:
+                if (
+                    isinstance(size := self.globals.get(name), int)
+                    and not given
+                    and name not in self.kinds
+                ):
                     return [str(size)]
         raise refuse(node, "a length that is not known before the law runs")
 
@@ -1250,14 +1648,20 @@ class Function:
         names, parts = set[str](), list[ast.expr]()
         match node:
             case ast.Name() | ast.Subscript() if self.is_array(node):
-                names = set() if is_tuple(self.kinds.get(self.origin(node), "")) else {self.origin(node)}
+                if is_tuple(self.kinds.get(self.origin(node), "")):
+                    names = set()
+                else:
+                    names = {self.origin(node)}
             case ast.Attribute() | ast.Subscript(value=ast.Attribute()):  # of y or gains
                 names = {ast.unparse(node)}
             case ast.IfExp():
                 parts = [node.body, node.orelse]
             case ast.Call() if may_return_argument(self.resolve(node.func)):
                 parts = node.args
-                names = {a.id for a in parts if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS}
+                names = set()
+                for a in parts:
+                    if isinstance(a, ast.Name) and self.kinds.get(a.id) in ARGUMENTS:
+                        names.add(a.id)
         return names.union(*map(self.shared, parts))
 
 
@@ -1265,7 +1669,10 @@ class Function:
 
 
 def syntax(text: str, mode: Literal["exec", "eval"] = "exec") -> Any:
-    """Return the syntax tree of a text. Before Python 3.11.8 two threads must not build one at once (gh-106905)."""
+    """Return the syntax tree of a text.
+
+    Before Python 3.11.8 two threads must not build one at once (gh-106905).
+    """
     with PARSING_LOCK:
         return ast.parse(text, mode=mode)
 
@@ -1276,7 +1683,9 @@ def parsed(function: Any) -> tuple[FunctionType, ast.FunctionDef]:
     if of_numpy(written):
         raise refuse(None, f"numpy's {function.__name__}")
     if not isinstance(written, FunctionType):
-        raise refuse(None, f"{getattr(function, '__name__', function)}, which is not a Python function,")
+        raise refuse(
+            None, f"{getattr(function, '__name__', function)}, which is not a Python function,"
+        )
     try:
         (tree,) = syntax(textwrap.dedent(inspect.getsource(written))).body
     except (OSError, SyntaxError, ValueError):
@@ -1298,9 +1707,13 @@ def around(written: FunctionType) -> dict[str, Any]:
 
 
 def in_python(function: Any) -> FunctionType | None:
-    """Return the Python of a function, compiled or not; None for numpy's, for C's and for what is no function."""
+    """Return the Python of a function, compiled or not; None for numpy's, for C's and for what is
+    no function.
+    """
     written = getattr(function, "py_func", function)
-    return written if isinstance(written, FunctionType) and not of_numpy(written) else None
+    if isinstance(written, FunctionType) and not of_numpy(written):
+        return written
+    return None
 
 
 def of_numpy(function: Any) -> bool:
@@ -1314,20 +1727,34 @@ def names_in(nodes: Iterable[ast.AST]) -> set[str]:
 
 
 def pairs(nodes: Iterable[ast.AST]) -> list[tuple[ast.expr, ast.expr]]:
-    """Return the targets and values of the assignments among some nodes; of tuples, those of their elements."""
+    """Return the targets and values of the assignments among some nodes; of tuples, those of their
+    elements.
+    """
     found = list[tuple[ast.expr, ast.expr]]()
     for node in nodes:
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 paired = isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple)
-                found += zip(target.elts, node.value.elts, strict=False) if paired else [(target, node.value)]  # pyright: ignore[reportAttributeAccessIssue]
+                # pyright: ignore[reportAttributeAccessIssue]
+                if paired:
+                    found += zip(target.elts, node.value.elts, strict=False)
+                else:
+                    found += [(target, node.value)]
     return found
 
 
 def changed(nodes: Iterable[ast.AST]) -> set[str]:
     """Return the names of variables and arrays that some code changes."""
-    inside = [n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name | ast.Subscript)]
-    return names_in(n.value if isinstance(n, ast.Subscript) else n for n in inside if isinstance(n.ctx, ast.Store))
+    inside = []
+    for node in nodes:
+        for n in ast.walk(node):
+            if isinstance(n, ast.Name | ast.Subscript):
+                inside.append(n)
+    return names_in(
+        n.value if isinstance(n, ast.Subscript) else n
+        for n in inside
+        if isinstance(n.ctx, ast.Store)
+    )
 
 
 def returns(body: Sequence[ast.stmt]) -> bool:
@@ -1347,23 +1774,32 @@ def known(name: str, kind: str, names: Iterable[str]) -> None:
 
 def refuse(node: ast.AST | None, what: str) -> Untranslatable:
     """Return the error for a piece of Python without translation."""
-    code = f" ({shown(ast.unparse(node))[1:-1]})" if node is not None else ""
+    if node is not None:
+        code = f" ({shown(ast.unparse(node))[1:-1]})"
+    else:
+        code = ""
     return Untranslatable(
         f"{what}{code} has no translation into C: write it with arithmetic, if, for and math's functions"
     )
 
 
 def resolved(node: ast.expr, known: Mapping[str, Any]) -> Any:
-    """Return the value of a name, dotted or not, among known names and Python's own; None for another expression."""
+    """Return the value of a name, dotted or not, among known names and Python's own; None for
+    another expression.
+    """
     if isinstance(node, ast.Name):
         return known.get(node.id, getattr(builtins, node.id, None))
-    if isinstance(node, ast.Attribute) and isinstance(module := resolved(node.value, known), ModuleType):
+    if isinstance(node, ast.Attribute) and isinstance(
+        module := resolved(node.value, known), ModuleType
+    ):
         return getattr(module, node.attr, None)
     return None
 
 
 def may_return_argument(function: Any) -> bool:
-    """Return whether a function may return one of its arguments, or a part of it, and not only what it computes."""
+    """Return whether a function may return one of its arguments, or a part of it, and not only what
+    it computes.
+    """
     written = in_python(function)
     if written is None:
         return False
@@ -1382,22 +1818,33 @@ def may_return_argument(function: Any) -> bool:
             case ast.Subscript(value=array):
                 return may_share(array, seen)
             case ast.Name(id=name):
-                values = [] if name in seen else [v for n, v in given if n == name]
+                if name in seen:
+                    values = []
+                else:
+                    values = [v for n, v in given if n == name]
                 return name in arguments or any(may_share(v, seen | {name}) for v in values)
         return isinstance(value, ast.Attribute)
 
-    return any(may_share(node.value) for node in nodes if isinstance(node, ast.Return) and node.value)
+    return any(
+        may_share(node.value) for node in nodes if isinstance(node, ast.Return) and node.value
+    )
 
 
 def assigned(node: ast.AST) -> set[str]:
     """Return the names in the targets of an assignment or of a loop; none of other code."""
-    targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+    if isinstance(node, ast.Assign):
+        targets = node.targets
+    else:
+        targets = [getattr(node, "target", None)]
     return bound(target for target in targets if target is not None)
 
 
 def bound(targets: Iterable[ast.AST]) -> set[str]:
     """Return the names that some targets bind, and not only change the elements of."""
-    inside = [n for target in targets for n in ast.walk(target)]
+    inside = []
+    for target in targets:
+        for n in ast.walk(target):
+            inside.append(n)
     return {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
 
 
@@ -1412,8 +1859,13 @@ def root(node: ast.expr) -> str:
 
 
 def wider(first: str, second: str) -> str:
-    """Return the kind of an operation on two kinds, in C and in numba. An integer and a single give a real."""
-    bases, shapes = zip(*((base(kind), kind.removeprefix(base(kind))) for kind in (first, second)), strict=True)
+    """Return the kind of an operation on two kinds, in C and in numba.
+
+    An integer and a single give a real.
+    """
+    bases, shapes = zip(
+        *((base(kind), kind.removeprefix(base(kind))) for kind in (first, second)), strict=True
+    )
     if shapes[0] != shapes[1]:
         raise refuse(None, "a name for a number and an array, or for arrays of two shapes,")
     mixed = "single" in bases and any(kind in WHOLE_KINDS for kind in bases)
@@ -1427,7 +1879,10 @@ def call_to(beginning: str, pointers: str) -> str:
 
 def literal(value: Any, single: bool, node: ast.AST) -> Value:
     """Return a Python number in C. `single`: whether smc_real is float."""
-    kind = "single" if type(value) is np.float32 else "real"
+    if type(value) is np.float32:
+        kind = "single"
+    else:
+        kind = "real"
     if isinstance(value, bool):
         return Value(str(int(value)), "bool")
     if type(value).__name__.startswith("int"):
@@ -1440,9 +1895,13 @@ def literal(value: Any, single: bool, node: ast.AST) -> Value:
     except (TypeError, ValueError):
         raise refuse(node, f"the value {shown(value)}") from None
     if math.isnan(x) or math.isinf(x):
-        return Value("NAN" if math.isnan(x) else "INFINITY" if x > 0.0 else "-INFINITY", kind, UNARY)
+        return Value(
+            "NAN" if math.isnan(x) else "INFINITY" if x > 0.0 else "-INFINITY", kind, UNARY
+        )
     text = repr(x)
-    return Value(text + "f" * (single or kind == "single"), kind, UNARY if text.startswith("-") else ATOM)
+    return Value(
+        text + "f" * (single or kind == "single"), kind, UNARY if text.startswith("-") else ATOM
+    )
 
 
 def plain(name: str) -> str:
@@ -1459,7 +1918,11 @@ def rows(items: Sequence[str]) -> str:
 def wrapped(indent: str, line: str) -> list[str]:
     """Return a line of code in lines of at most 110 characters."""
     return textwrap.wrap(
-        indent + line, 110, subsequent_indent=f"{indent}        ", break_long_words=False, break_on_hyphens=False
+        indent + line,
+        110,
+        subsequent_indent=f"{indent}        ",
+        break_long_words=False,
+        break_on_hyphens=False,
     )
 
 
@@ -1480,17 +1943,30 @@ def is_tuple(kind: str) -> bool:
 
 def fields_of(kind: str) -> list[str]:
     """Return the names of a tuple's fields, if it has some."""
-    return kind.partition("(")[2].removesuffix(")").split(",") if is_tuple(kind) and not kind.endswith("()") else []
+    if is_tuple(kind) and not kind.endswith("()"):
+        return kind.partition("(")[2].removesuffix(")").split(",")
+    return []
 
 
 def put(index: Value, token: re.Match[str]) -> str:
     """Return an index in the place of a token, which may be in brackets."""
-    return f"[{index.text}]" if token[0].startswith("[") else index.within(PRODUCT)
+    if token[0].startswith("["):
+        return f"[{index.text}]"
+    return index.within(PRODUCT)
 
 
 def array_at(pointer: str, kind: str, offset: str = "", stride: str = "") -> Value:
-    """Return the array at a pointer, from an offset on. `stride`: from one number to the next, if it is not 1."""
-    place = ROW if len(shape(kind)) == 1 else f"{ROW} * {shape(kind)[-1]} + {COLUMN}"
+    """Return the array at a pointer, from an offset on.
+
+    `stride`: from one number to the next, if it is not 1.
+    """
+    if len(shape(kind)) == 1:
+        place = ROW
+    else:
+        place = f"{ROW} * {shape(kind)[-1]} + {COLUMN}"
     place += f" * {stride}" * bool(stride)
-    moved = f"{pointer} + {offset.removesuffix(' + ')}" if offset else pointer
+    if offset:
+        moved = f"{pointer} + {offset.removesuffix(' + ')}"
+    else:
+        moved = pointer
     return Value(f"{pointer}[{offset}{place}]", kind, ATOM, moved, stride)

@@ -1,14 +1,16 @@
 """The controller that an FMU contains: its variables and its C.
 
-The variables are numbers in one array, in the order of their value references: time, inputs, outputs, intermediate
-results, parameters, the control period, and the memories of law, surface and estimator. `fmu.c` knows the array and
-nothing of the law. `controller.c` computes, like the callback,
+The variables are numbers in one array, in the order of their value references: time, inputs,
+outputs, intermediate results, parameters, the control period, and the memories of law, surface and
+estimator. `fmu.c` knows the array and nothing of the law. `controller.c` computes, like the
+callback,
 
     estimator -> surface -> law -> saturation
 
-With a law of many joints, every vector and matrix is one variable for each element, x[1], x[2], M[1,1], M[1,2], counted
-from 1 as in FMI's structured names. The arrays of FMI 3.0 are not used, because FMPy's `simulate_fmu` takes no inputs
-of several shapes. The elements follow each other in the array of variables, so C reads them as an array.
+With a law of many joints, every vector and matrix is one variable for each element, x[1], x[2],
+M[1,1], M[1,2], counted from 1 as in FMI's structured names. The arrays of FMI 3.0 are not used,
+because FMPy's `simulate_fmu` takes no inputs of several shapes. The elements follow each other in
+the array of variables, so C reads them as an array.
 """
 
 import dataclasses
@@ -34,7 +36,8 @@ from smc_mujoco.simulation.model import mixer
 
 MAX_DOUBLE = sys.float_info.max  # stands for infinity, because not every importer reads INF
 
-# Input -> its unit and description, in the order of the variables: of every FMU, and of one channel or of many joints.
+# Input -> its unit and description, in the order of the variables: of every FMU, and of one channel
+# or of many joints.
 COMMON_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "x": (POSITION, "measured position"),
     "v": (SPEED, "measured velocity"),
@@ -57,15 +60,36 @@ JOINT_INPUTS: dict[str, tuple[Unit | None, str]] = {
     "C": (units.FORCE_PER_SPEED, "nominal matrix of Coriolis forces C v, M' - 2 C skew-symmetric"),
     "J": (None, "nominal Jacobian of the tip, in the world: its velocity is J v"),
 }
-MODEL_INPUTS = {"f", "g", "fq", "gq", "M", "h"}  # of the nominal model; C and J are what coriolis and jacobian need
+MODEL_INPUTS = {
+    "f",
+    "g",
+    "fq",
+    "gq",
+    "M",
+    "h",
+}  # of the nominal model; C and J are what coriolis and jacobian need
 REQUIRED_INPUTS = ("x", "r", "dr")  # inputs of every FMU
 OUTPUTS = ("u", "s")
 SYMBOLS = (  # names that the linker sees
-    "smc_law", "smc_surface", "smc_estimator", "smc_controller", "smc_variables", "smc_law_gains", "smc_law_memory",
-    "smc_law_real", "smc_law_degree", "smc_law_modelled", "smc_law_shared", "smc_pose", "smc_errors", "smc_actuators",
-)  # fmt: skip
+    "smc_law",
+    "smc_surface",
+    "smc_estimator",
+    "smc_controller",
+    "smc_variables",
+    "smc_law_gains",
+    "smc_law_memory",
+    "smc_law_real",
+    "smc_law_degree",
+    "smc_law_modelled",
+    "smc_law_shared",
+    "smc_pose",
+    "smc_errors",
+    "smc_actuators",
+)
 # In C, a function's return for a run without the model, and all that follows it.
-UNREACHED = re.compile(r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL)
+UNREACHED = re.compile(
+    r"(if \(\w+->model == 0\.0\) \{\s*return [^;]*;\s*\}).*?^\}", re.MULTILINE | re.DOTALL
+)
 
 
 class Variable(NamedTuple):
@@ -108,7 +132,10 @@ class ExportedLaw:
     def code(self) -> dict[str, tuple[int, str]]:
         """Kind -> number of memory slots, and C code, of each component."""
         of_law = {"joints": self.joints, "plant": self.plant}
-        return {kind: export.translated(p, **of_law if kind == "law" else {}) for kind, p in self.parts.items()}
+        return {
+            kind: export.translated(p, **of_law if kind == "law" else {})
+            for kind, p in self.parts.items()
+        }
 
     @property
     def of_body(self) -> bool:
@@ -122,8 +149,14 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     wanted = inputs(exported)
     listed = [Variable("time", "SMC_CLOCK", "time", TIME)]
     for name, (unit, words) in {**COMMON_INPUTS, **of_model}.items():
-        starts = _starts(name, exported) if name in wanted else {}
-        listed += [Variable(f"{name}{place}", "SMC_INPUT", words, unit, start) for place, start in starts.items()]
+        if name in wanted:
+            starts = _starts(name, exported)
+        else:
+            starts = {}
+        listed += [
+            Variable(f"{name}{place}", "SMC_INPUT", words, unit, start)
+            for place, start in starts.items()
+        ]
     computed = [("u", "command, within u_max", FORCE), ("s", "sliding variable", None)]
     if exported.surface:
         computed.append(("v_eq", "acceleration of the error that keeps s constant", None))
@@ -132,21 +165,40 @@ def variables(exported: ExportedLaw) -> list[Variable]:
     for name, words, unit in computed:
         listed += [Variable(name + place, "SMC_COMPUTED", words, unit) for place in places]
     for i in range(len(mixer(exported.plant)) if exported.plant else 0):
-        listed.append(Variable(f"control[{i + 1}]", "SMC_COMPUTED", "command of an actuator, for u"))
+        listed.append(
+            Variable(f"control[{i + 1}]", "SMC_COMPUTED", "command of an actuator, for u")
+        )
     words = "bound on the magnitude of u"
     for place, bound in zip(places, exported.u_max, strict=True):
         start = bound if math.isfinite(bound) else MAX_DOUBLE
         listed.append(Variable(f"u_max{place}", "SMC_PARAMETER", words, FORCE, start, 0.0, True))
     for kind, part in exported.parts.items():
         for name, value in part.gains.items():
-            indices = places if kind == "law" and name not in part.shared else ("",)
-            listed += [parameter(kind, part, name, gain_at(value, i), place) for i, place in enumerate(indices)]
-    listed.append(Variable("dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, exported.period))
+            if kind == "law" and name not in part.shared:
+                indices = places
+            else:
+                indices = ("",)
+            listed += [
+                parameter(kind, part, name, gain_at(value, i), place)
+                for i, place in enumerate(indices)
+            ]
+    listed.append(
+        Variable(
+            "dt", "SMC_CONSTANT", "control period: the law runs this often", TIME, exported.period
+        )
+    )
     for kind, (slots, _) in exported.code.items():
         for i in range(max(1, exported.joints)):
-            joint, place = (f", joint {i + 1}", f"{i + 1},") if exported.joints else ("", "")
+            if exported.joints:
+                joint, place = (f", joint {i + 1}", f"{i + 1},")
+            else:
+                joint, place = ("", "")
             listed += [
-                Variable(f"{kind}.memory[{place}{k}]", "SMC_STATE", f"number {k} of the memory of the {kind}{joint}")
+                Variable(
+                    f"{kind}.memory[{place}{k}]",
+                    "SMC_STATE",
+                    f"number {k} of the memory of the {kind}{joint}",
+                )
                 for k in range(1, slots + 1)
             ]
     return listed
@@ -159,13 +211,18 @@ def _starts(name: str, exported: ExportedLaw) -> dict[str, float]:
     """
     if name not in ("M", "C", "J"):
         return dict.fromkeys(exported.places, float(name in ("g", "gq") and not exported.joints))
-    rows, columns = range(1, 4 if name == "J" else exported.joints + 1), range(1, exported.joints + 1)
+    rows, columns = (
+        range(1, 4 if name == "J" else exported.joints + 1),
+        range(1, exported.joints + 1),
+    )
     return {f"[{i},{j}]": float(name == "M" and i == j) for i in rows for j in columns}
 
 
 def inputs(exported: ExportedLaw) -> set[str]:
     """Return the names of the inputs that the components read, without indices."""
-    texts = [text if exported.modelled else UNREACHED.sub(r"\1", text) for _, text in exported.code.values()]
+    texts = []
+    for _, text in exported.code.values():
+        texts.append(text if exported.modelled else UNREACHED.sub(r"\1", text))
     read, wanted = reads("".join(texts)), {*REQUIRED_INPUTS}
     if exported.estimator is None or "v" in reads(exported.code["estimator"][1]):
         wanted.add("v")
@@ -184,14 +241,31 @@ def reads(code: str) -> set[str]:
 
 def parameter(kind: str, part: Component, name: str, value: float, index: str = "") -> Variable:
     """Return a gain of a component, or its element for one joint, such as "[1]", as a parameter."""
-    gain = part.template.gains[name] if part.template and name in part.template.gains else None
-    unit = gain.unit_at({key: gain_at(number, 0) for key, number in part.gains.items()}) if gain else None
+    if part.template and name in part.template.gains:
+        gain = part.template.gains[name]
+    else:
+        gain = None
+    if gain:
+        unit = gain.unit_at({key: gain_at(number, 0) for key, number in part.gains.items()})
+    else:
+        unit = None
     positive = bool(gain and gain.positive)
-    minimum = 0.0 if gain and (gain.positive or gain.nonnegative) else -math.inf
-    limits = ", greater than 0" if positive else ", at least 0" if minimum == 0.0 else ""
-    finite = value if math.isfinite(value) else math.copysign(MAX_DOUBLE, value)
+    if gain and (gain.positive or gain.nonnegative):
+        minimum = 0.0
+    else:
+        minimum = -math.inf
+    if positive:
+        limits = ", greater than 0"
+    else:
+        limits = ", at least 0" if minimum == 0.0 else ""
+    if math.isfinite(value):
+        finite = value
+    else:
+        finite = math.copysign(MAX_DOUBLE, value)
     words = f"gain {name} of the {kind} {part.name}{limits}"
-    return Variable(f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, minimum, positive)
+    return Variable(
+        f"{kind}.{plain(name)}{index}", "SMC_PARAMETER", words, unit, finite, minimum, positive
+    )
 
 
 # C
@@ -203,10 +277,18 @@ def place(variable: str) -> str:
 
 
 def header(listed: Sequence[Variable], exported: ExportedLaw, identifier: str, token: str) -> str:
-    """Return controller.h: the sizes, and the indices of the variables. `identifier`: the model's name in C."""
-    memory = next((i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed))
+    """Return controller.h: the sizes, and the indices of the variables.
+
+    `identifier`: the model's name in C.
+    """
+    memory = next(
+        (i for i, variable in enumerate(listed) if variable.kind == "SMC_STATE"), len(listed)
+    )
     own_names = "\n".join(f"#define {name} {identifier}_{name}" for name in SYMBOLS)
-    joints = f"\n#define {JOINTS} {exported.joints}" if exported.joints else ""
+    if exported.joints:
+        joints = f"\n#define {JOINTS} {exported.joints}"
+    else:
+        joints = ""
     indices = "\n".join(f"    {place(variable.name)}," for variable in listed)
     return f"""/* controller.h: sizes of this controller, and the indices of its variables. */
 #ifndef SMC_CONTROLLER_H
@@ -231,9 +313,13 @@ enum {{
 
 
 def source(listed: Sequence[Variable], helpers: str, body: Iterable[str]) -> str:
-    """Return controller.c: the variables, the functions `helpers`, and a last one with the statements `body`."""
+    """Return controller.c: the variables, the functions `helpers`, and a last one with the
+    statements `body`.
+    """
     limits = {0.0: "0.0", -math.inf: "-INFINITY"}
-    lines = (f'"{v.name}", {v.kind}, {v.start!r}, {limits[v.minimum]}, {int(v.positive)}' for v in listed)
+    lines = (
+        f'"{v.name}", {v.kind}, {v.start!r}, {limits[v.minimum]}, {int(v.positive)}' for v in listed
+    )
     table = "\n".join(f"    {{{line}}}," for line in lines)
     statements = "\n".join(f"    {line}" for line in body)
     return f"""/* controller.c: estimator, surface, law and saturation, in the order of smc_mujoco's own runs. */
@@ -261,12 +347,20 @@ static double number(double x)
 
 
 def helpers(exported: ExportedLaw) -> str:
-    """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and jacobian."""
+    """Return the C functions that a law of many joints calls: coriolis, for C(x, v) w, and
+    jacobian.
+    """
     wanted, needs, functions = inputs(exported), reads(exported.code["law"][1]), ""
     if "coriolis" in needs:
         given = "C" in wanted
-        matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}" if given else "(void)plant, (void)w"
-        add = "\n        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];" * given
+        if given:
+            matrix = f"const double *C = (const double *)plant + {place('C[1,1]')}"
+        else:
+            matrix = "(void)plant, (void)w"
+        add = (
+            "\n        for (int j = 0; j < SMC_JOINTS; j++) out[i] += C[i * SMC_JOINTS + j] * w[j];"
+            * given
+        )
         functions += f"""/* out = C w */
 static void coriolis(void *plant, const double *w, double *out)
 {{
@@ -291,9 +385,15 @@ static void coriolis(void *plant, const double *w, double *out)
 
 
 def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
-    """Yield the statements of smc_controller, without indentation. What is of each joint is in a loop over j."""
+    """Yield the statements of smc_controller, without indentation.
+
+    What is of each joint is in a loop over j.
+    """
     wanted, many = inputs(exported), exported.joints
-    j, u, s = ("[j]", "[j]", "[SMC_JOINTS + j]") if many else ("", "[0]", "[1]")
+    if many:
+        j, u, s = ("[j]", "[j]", "[SMC_JOINTS + j]")
+    else:
+        j, u, s = ("", "[0]", "[1]")
 
     def value(name: str, absent: str = "0.0") -> str:
         if name in COMMON_INPUTS | CHANNEL_INPUTS | JOINT_INPUTS and name not in wanted:
@@ -303,14 +403,18 @@ def body(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
     def for_each(lines: Iterable[str]) -> Iterable[str]:
         if not many:
             return lines
-        return itertools.chain(["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"])
+        return itertools.chain(
+            ["for (int j = 0; j < SMC_JOINTS; j++) {"], (f"    {line}" for line in lines), ["}"]
+        )
 
     yield from _tables(listed, exported)
     yield "smc_measurement y = {0};"
     yield f"double out[{'2 * SMC_JOINTS' if many else 2}];"
     yield "int failure;"
     yield f"y.t = t, y.dt = SMC_DT, y.model = {float(exported.modelled)!r};"
-    if needs := [name for name in ("coriolis", "jacobian") if name in reads(exported.code["law"][1])]:
+    if needs := [
+        name for name in ("coriolis", "jacobian") if name in reads(exported.code["law"][1])
+    ]:
         yield f"y.plant = value, {', '.join(f'y.{name} = {name}' for name in needs)};"
     yield from for_each(_measured(exported, value, j))
     if exported.of_body:
@@ -341,7 +445,8 @@ def _tables(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
         for name in part.gains:
             shared = f"{kind}.{plain(name)}"
             elements = [shared] * max(1, exported.joints * (kind == "law"))
-            elements = elements if shared in names else [shared + place for place in exported.places]
+            if shared not in names:
+                elements = [shared + place for place in exported.places]
             yield from (f"    number(value[{place(element)}])," for element in elements)
         yield from ("    0.0,",) if not part.gains else ()
         yield "};"
@@ -350,14 +455,19 @@ def _tables(listed: Sequence[Variable], exported: ExportedLaw) -> Iterator[str]:
 
 
 def _measured(exported: ExportedLaw, value: Callable[..., str], j: str) -> Iterator[str]:
-    """Yield the statements that fill in the measurement of one joint. `value` returns a variable in C, `j` an index."""
+    """Yield the statements that fill in the measurement of one joint.
+
+    `value` returns a variable in C, `j` an index.
+    """
     yield f"y.limit{j} = number({value('u_max')});"
     yield f"y.x{j} = {value('x')}, y.r{j} = {value('r')}, y.dr{j} = {value('dr')};"
     yield f"y.ddr{j} = y.a{j} = {value('ddr')};"
     if exported.estimator:
         slots = exported.code["estimator"][0]
         yield f"const smc_reading reading = {{SMC_DT, y.x{j}, {value('v')}}};"
-        yield from _call("estimator", "&reading", "estimator_memory" + f" + {slots} * j" * bool(j and slots))
+        yield from _call(
+            "estimator", "&reading", "estimator_memory" + f" + {slots} * j" * bool(j and slots)
+        )
         yield f"y.v{j} = {value('v_estimated')} = out[0];"
         yield f"if (!isnan(out[1])) y.a{j} = out[1];"
     else:
@@ -379,7 +489,15 @@ def _call(kind: str, measured: str, memory: str) -> Iterator[str]:
 
 
 def component_file(component: Component, slots: int, text: str) -> str:
-    """Return the C file of a surface or an estimator, with its number of memory slots and its C code."""
+    """Return the C file of a surface or an estimator, with its number of memory slots and its C
+    code.
+    """
     title = f"/* {component.name}: {component.kind}, with {slots} numbers of memory. */"
-    head = [title, *export.includes(text), '#include "controller.h"', "", *export.gain_names(component)]
+    head = [
+        title,
+        *export.includes(text),
+        '#include "controller.h"',
+        "",
+        *export.gain_names(component),
+    ]
     return "\n".join([*head, "", text, ""])

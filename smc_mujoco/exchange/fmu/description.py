@@ -15,10 +15,13 @@ JOINT_UNITS = {
 }
 # Kind of variable -> causality, variability, initial.
 VARIABLE_ROLES = {
-    "SMC_CLOCK": ("independent", "continuous", None), "SMC_INPUT": ("input", "discrete", None),
-    "SMC_COMPUTED": ("local", "discrete", "calculated"), "SMC_PARAMETER": ("parameter", "tunable", "exact"),
-    "SMC_CONSTANT": ("local", "constant", "exact"), "SMC_STATE": ("local", "discrete", "exact"),
-}  # fmt: skip
+    "SMC_CLOCK": ("independent", "continuous", None),
+    "SMC_INPUT": ("input", "discrete", None),
+    "SMC_COMPUTED": ("local", "discrete", "calculated"),
+    "SMC_PARAMETER": ("parameter", "tunable", "exact"),
+    "SMC_CONSTANT": ("local", "constant", "exact"),
+    "SMC_STATE": ("local", "discrete", "exact"),
+}
 
 
 def unit_name(unit: Unit, joint: str) -> str:
@@ -26,13 +29,20 @@ def unit_name(unit: Unit, joint: str) -> str:
     (force, _), (position, _) = JOINT_UNITS[joint]
     powers = {force: unit.force, position: unit.position, "s": unit.time}
     above = [_power(name, n) for name, n in powers.items() if n > 0.0]
-    below = [_power(f"({name})" if "." in name else name, -n) for name, n in powers.items() if n < 0.0]
+    below = []
+    for name, n in powers.items():
+        if n < 0.0:
+            below.append(_power(f"({name})" if "." in name else name, -n))
     return "/".join([".".join(above) or "1", *below])
 
 
 def _power(name: str, n: float) -> str:
     """Return a unit to a power."""
-    return name if n == 1.0 else f"({name})^{n:g}" if "." in name else f"{name}^{n:g}"
+    if n == 1.0:
+        return name
+    if "." in name:
+        return f"({name})^{n:g}"
+    return f"{name}^{n:g}"
 
 
 def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
@@ -50,18 +60,29 @@ def base_units(unit: Unit, joint: str) -> dict[str, int] | None:
 def model_description(
     listed: Sequence[Variable], exported: ExportedLaw, identifier: str, token: str, joint: str
 ) -> str:
-    """Return modelDescription.xml of an FMU for Co-Simulation, with the units of a hinge or a slide."""
+    """Return modelDescription.xml of an FMU for Co-Simulation, with the units of a hinge or a
+    slide.
+    """
     root = xml.Element(
-        "fmiModelDescription", fmiVersion="3.0", modelName=exported.law.name, instantiationToken=token,
-        description=summary(exported), generationTool=f"smc_mujoco {__version__}",
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=exported.law.name,
+        instantiationToken=token,
+        description=summary(exported),
+        generationTool=f"smc_mujoco {__version__}",
         license="use without restriction, without warranty; the headers of FMI under the 2-clause BSD licence",
         variableNamingConvention="structured",
-    )  # fmt: skip
+    )
     xml.SubElement(
-        root, "CoSimulation", modelIdentifier=identifier, canGetAndSetFMUState="true", canSerializeFMUState="true",
-        canHandleVariableCommunicationStepSize="true", hasEventMode="true",
+        root,
+        "CoSimulation",
+        modelIdentifier=identifier,
+        canGetAndSetFMUState="true",
+        canSerializeFMUState="true",
+        canHandleVariableCommunicationStepSize="true",
+        hasEventMode="true",
         fixedInternalStepSize=repr(exported.period),
-    )  # fmt: skip
+    )
     units = xml.SubElement(root, "UnitDefinitions")
     for unit in dict.fromkeys(v.unit for v in listed if v.unit is not None and any(v.unit)):
         definition = xml.SubElement(units, "Unit", name=unit_name(unit, joint))
@@ -69,8 +90,13 @@ def model_description(
             xml.SubElement(definition, "BaseUnit", {name: str(n) for name, n in base.items()})
     categories = xml.SubElement(root, "LogCategories")
     xml.SubElement(categories, "Category", name="error", description="why a call failed")
-    xml.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(exported.period))
-    variables, structure = xml.SubElement(root, "ModelVariables"), xml.SubElement(root, "ModelStructure")
+    xml.SubElement(
+        root, "DefaultExperiment", startTime="0.0", stopTime="10.0", stepSize=repr(exported.period)
+    )
+    variables, structure = (
+        xml.SubElement(root, "ModelVariables"),
+        xml.SubElement(root, "ModelStructure"),
+    )
     for reference, variable in enumerate(listed):
         variables.append(_variable(reference, variable, joint))
     outputs = [str(reference) for reference, variable in enumerate(listed) if is_output(variable)]
@@ -88,8 +114,15 @@ def is_output(variable: Variable) -> bool:
 def _variable(reference: int, variable: Variable, joint: str) -> xml.Element:
     """Return the element of a variable."""
     causality, variability, initial = VARIABLE_ROLES[variable.kind]
-    about = {"name": variable.name, "valueReference": str(reference), "description": variable.description}
-    about |= {"causality": "output" if is_output(variable) else causality, "variability": variability}
+    about = {
+        "name": variable.name,
+        "valueReference": str(reference),
+        "description": variable.description,
+    }
+    about |= {
+        "causality": "output" if is_output(variable) else causality,
+        "variability": variability,
+    }
     if initial is not None:
         about["initial"] = initial
     if variable.unit is not None and any(variable.unit):
@@ -106,11 +139,21 @@ def build_description(files: Iterable[str], identifier: str) -> str:
     root = xml.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     sources = xml.SubElement(
-        configuration, "SourceFileSet", language="C99", compiler="gcc", compilerOptions="-ffp-contract=off"
+        configuration,
+        "SourceFileSet",
+        language="C99",
+        compiler="gcc",
+        compilerOptions="-ffp-contract=off",
     )
     for name in files:
         xml.SubElement(sources, "SourceFile", name=name)
-    xml.SubElement(configuration, "Library", name="m", external="true", description="the C library's mathematics")
+    xml.SubElement(
+        configuration,
+        "Library",
+        name="m",
+        external="true",
+        description="the C library's mathematics",
+    )
     return written(root)
 
 
@@ -123,6 +166,12 @@ def written(root: xml.Element) -> str:
 def summary(exported: ExportedLaw) -> str:
     """Return the controller in one line."""
     parts = [f"law {exported.law}"]
-    parts += [f"surface {exported.surface}"] if exported.surface else []
-    parts += [f"velocity estimator {exported.estimator}"] if exported.estimator else []
+    if exported.surface:
+        parts += [f"surface {exported.surface}"]
+    else:
+        parts += []
+    if exported.estimator:
+        parts += [f"velocity estimator {exported.estimator}"]
+    else:
+        parts += []
     return f"Sliding-mode controller: {', '.join(parts)}; every {exported.period:g} s"

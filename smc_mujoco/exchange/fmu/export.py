@@ -1,7 +1,10 @@
-"""Writing a law as an FMU: FMI 3.0 for Co-Simulation, as source code and as a binary, without Python.
+"""Writing a law as an FMU:
 
-An FMU is a zip archive of modelDescription.xml, the sources and a shared library. It contains the law with its gains as
-parameters, and on request a surface and a velocity estimator. In double precision it gives the bits of `smc.run`.
+FMI 3.0 for Co-Simulation, as source code and as a binary, without Python.
+
+An FMU is a zip archive of modelDescription.xml, the sources and a shared library. It contains the
+law with its gains as parameters, and on request a surface and a velocity estimator. In double
+precision it gives the bits of `smc.run`.
 """
 
 import hashlib
@@ -34,14 +37,23 @@ from smc_mujoco.mechanisms.plant import Plant
 from smc_mujoco.simulation import coerce
 from smc_mujoco.simulation.scenario import Scenario, check_surface
 
-FOLDER, MIXED_JOINTS = Path(__file__).parent, "mixed"  # kind of joints of which some turn and some slide: without units
+FOLDER, MIXED_JOINTS = (
+    Path(__file__).parent,
+    "mixed",
+)  # kind of joints of which some turn and some slide: without units
 FMI_HEADERS = ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h")  # of the standard
 COMPILE_TIMEOUT = 120.0  # s
 BOUND = Number(above=0.0, infinite=True)  # on |u| of a joint
 # Only the symbols of FMI, and no paths of the build, so that the same law gives the same bytes.
 BINARY_FLAGS = ("-std=c99", "-fvisibility=hidden", "-s")
 SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
-MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64", "i686": "x86"}
+MACHINES = {
+    "amd64": "x86_64",
+    "x86_64": "x86_64",
+    "arm64": "aarch64",
+    "aarch64": "aarch64",
+    "i686": "x86",
+}
 
 
 @constrained
@@ -58,32 +70,42 @@ def law_to_fmu(
     joints: int | None = None,
     binary: bool = True,
 ) -> Path:
-    """Write a law as an FMU for Simulink, Modelica and other tools: FMI 3.0, Co-Simulation. Return its path.
+    """Write a law as an FMU for Simulink, Modelica and other tools:
+
+    FMI 3.0, Co-Simulation. Return its path.
 
     Args:
-      law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity, control_period, u_max,
-        model, the number of joints and their units.
+      law: a Law, its Template, its name, or a Scenario, which then gives surface, velocity,
+        control_period, u_max, model, the number of joints and their units.
       path: of the .fmu file. Default: the law's name, in the current folder.
       surface: a Surface or its name. None: the law's own, de + c e.
       velocity: an Estimator or its name. None: the FMU has the velocity as an input, v.
       control_period: s; the law runs this often. Default: 1 ms.
-      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. For many joints also one for each. Default: none.
-      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u, or those of M, h, g, C and J that a law of
-        many joints reads. Default: "nominal" for a law that requires it, else "none".
+      u_max: bound on |u|, N or N m; the parameter u_max of the FMU. For many joints also one for
+        each. Default: none.
+      model: "nominal" gives the FMU the inputs f and g of x'' = f + g u, or those of M, h, g, C and
+        J that a law of many joints reads. Default: "nominal" for a law that requires it, else
+        "none".
       joint: "hinge" for the units rad and N m, the default, or "slide" for m and N.
       joints: number of joints of a law of many joints. Default: as many as it has values of a gain.
       binary: whether the FMU also contains a binary for this machine, compiled by $CC or cc.
 
-    Inputs are x, v unless an estimator replaces it, the reference r and dr, and what else the law reads, such as ddr.
-    Outputs are u and s. All gains are tunable parameters. Many joints have x[1], x[2], M[1,1] and so on.
+    Inputs are x, v unless an estimator replaces it, the reference r and dr, and what else the law
+    reads, such as ddr. Outputs are u and s. All gains are tunable parameters. Many joints have
+    x[1], x[2], M[1,1] and so on.
 
     Raises:
-      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no compiler.
+      ScenarioError: a law in C, Python without translation into C, a surface that does not fit, no
+        compiler.
     """
     chosen = {
-        "surface": surface, "velocity": velocity, "control_period": control_period, "u_max": u_max, "model": model,
+        "surface": surface,
+        "velocity": velocity,
+        "control_period": control_period,
+        "u_max": u_max,
+        "model": model,
         "joints": joints,
-    }  # fmt: skip
+    }
     if isinstance(law, Scenario):
         law, chosen, joint = law.resolved.law, *_of_scenario(law, chosen | {"joint": joint})
     else:
@@ -91,28 +113,52 @@ def law_to_fmu(
     exported = _exported(law, **chosen)
     joint = MIXED_JOINTS if exported.of_body else joint
     plain = re.sub(r"\W+", "_", exported.law.name, flags=re.ASCII).strip("_")
-    identifier = plain if plain[:1].isalpha() else f"law_{plain}".rstrip("_")  # of C
+    # of C
+    if plain[:1].isalpha():
+        identifier = plain
+    else:
+        identifier = f"law_{plain}".rstrip("_")
     target = with_ending(path if path is not None else f"{identifier}.fmu", ".fmu")
     files = _files(exported, identifier, joint)
     if binary:
         files |= _binary(files, identifier)
-    with replacing(target) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+    with (
+        replacing(target) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
         for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)  # without the time
+            archive.writestr(
+                zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED
+            )  # without the time
     return target
 
 
 def _of_scenario(scenario: Scenario, chosen: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
-    """Return a scenario's arguments of `_exported`, and its kind of joint. `chosen`: those that the user gives."""
+    """Return a scenario's arguments of `_exported`, and its kind of joint.
+
+    `chosen`: those that the user gives.
+    """
     if given := [name for name, value in chosen.items() if value is not None]:
-        raise ScenarioError(f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead")
+        raise ScenarioError(
+            f"a scenario has its own {given[0]}: leave {given[0]} out, or give its law instead"
+        )
     s, limits = scenario.resolved, set(scenario.limits)
     several = len(limits) > 1 and not s.law.joint
     if several or s.feedforward is not None or s.stepper is not None:
-        what = "a bound for each channel" if several else "a feedforward" if s.feedforward else "a Stepper"
-        raise ScenarioError(f"the scenario has {what}, which an FMU cannot have: give its law, with u_max=")
+        if several:
+            what = "a bound for each channel"
+        elif s.feedforward:
+            what = "a feedforward"
+        else:
+            what = "a Stepper"
+        raise ScenarioError(
+            f"the scenario has {what}, which an FMU cannot have: give its law, with u_max="
+        )
     own = {name: getattr(s, name) for name in ("surface", "velocity", "control_period", "model")}
-    joint = MIXED_JOINTS if s.law.joint and s.plant.mixed else "slide" if s.plant.unit == "m" else "hinge"
+    if s.law.joint and s.plant.mixed:
+        joint = MIXED_JOINTS
+    else:
+        joint = "slide" if s.plant.unit == "m" else "hinge"
     if s.law.joint:
         plant = s.plant if s.plant.pose else None
         return own | {"u_max": list(scenario.limits), "joints": s.plant.n, "plant": plant}, joint
@@ -130,15 +176,22 @@ def _exported(
     plant: Plant | None = None,
 ) -> ExportedLaw:
     """Return what is exported, checked. Arguments and errors as in `law_to_fmu`."""
-    sliding, estimator = coerce.surface("surface", surface, None), coerce.velocity("velocity", velocity, None)
+    sliding, estimator = (
+        coerce.surface("surface", surface, None),
+        coerce.velocity("velocity", velocity, None),
+    )
     chosen = writable(law)
     count = number_of_joints(chosen, joints)
     if sliding is not None and count:
-        raise ScenarioError(f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out")
+        raise ScenarioError(
+            f"law {chosen.name!r} is of many joints and has its own surface: leave the surface out"
+        )
     if sliding is not None:
         check_surface(sliding, chosen)
     if chosen.requires_model and model == "none":
-        raise ScenarioError(f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'")
+        raise ScenarioError(
+            f"law {chosen.name!r} needs the nominal model: leave model out, or give 'nominal'"
+        )
     return ExportedLaw(
         law=chosen,
         surface=sliding,
@@ -156,7 +209,9 @@ def _bounds(u_max: float | Sequence[float], joints: int) -> tuple[float, ...]:
     if not (joints and isinstance(u_max, Sequence | np.ndarray)):
         return (BOUND("u_max", u_max),) * max(1, joints)
     if len(u_max) != joints:
-        raise ScenarioError(f"u_max has {len(u_max)} values for {joints} joints: give one, or {joints}")
+        raise ScenarioError(
+            f"u_max has {len(u_max)} values for {joints} joints: give one, or {joints}"
+        )
     return Each(one=BOUND)("u_max", u_max)
 
 
@@ -165,9 +220,16 @@ def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]
     listed = contents.variables(exported)
     if joint == MIXED_JOINTS:
         joint = "hinge"  # of which no unit is left but powers of the second
-        listed = [v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None) for v in listed]
+        listed = [
+            v if v.unit and not (v.unit.force or v.unit.position) else v._replace(unit=None)
+            for v in listed
+        ]
     law = with_head(exported.law, "double", *exported.code["law"], exported.joints, measured=False)
-    files = {"controller.c": contents.source(listed, contents.helpers(exported), contents.body(listed, exported))}
+    files = {
+        "controller.c": contents.source(
+            listed, contents.helpers(exported), contents.body(listed, exported)
+        )
+    }
     files["law.c"] = f'#include "controller.h"\n{law}'
     for kind, (slots, text) in exported.code.items():
         if kind != "law":
@@ -181,7 +243,9 @@ def _files(exported: ExportedLaw, identifier: str, joint: str) -> dict[str, str]
     files[build.HEADER.name] = build.HEADER.read_text(encoding="utf-8")
     files |= {name: (FOLDER / "headers" / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
     return {
-        "modelDescription.xml": description.model_description(listed, exported, identifier, token, joint),
+        "modelDescription.xml": description.model_description(
+            listed, exported, identifier, token, joint
+        ),
         "sources/buildDescription.xml": description.build_description(compiled, identifier),
         **{f"sources/{name}": text for name, text in files.items()},
     }
@@ -195,16 +259,29 @@ def platform_tuple() -> tuple[str, str]:
 
 
 def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
-    """Return path in the archive -> shared library for this machine, compiled from the sources in `files`."""
+    """Return path in the archive -> shared library for this machine, compiled from the sources in
+    `files`.
+    """
     (machine, suffix), command = platform_tuple(), build.compiler()
     with scratch() as folder:
-        sources, target = {Path(n).name: t for n, t in files.items() if n.startswith("sources/")}, folder / "out"
+        sources, target = (
+            {Path(n).name: t for n, t in files.items() if n.startswith("sources/")},
+            folder / "out",
+        )
         with no_room():
             for name, text in sources.items():
                 (folder / name).write_text(text, encoding="utf-8")
         compiled = [str(folder / name) for name in sources if name.endswith(".c")]
         try:
-            line = [*command, *build.LIBRARY_FLAGS, *BINARY_FLAGS, *compiled, "-o", str(target), "-lm"]
+            line = [
+                *command,
+                *build.LIBRARY_FLAGS,
+                *BINARY_FLAGS,
+                *compiled,
+                "-o",
+                str(target),
+                "-lm",
+            ]
             done = build.run_compiler(line, COMPILE_TIMEOUT)
         except TimedOut:
             raise ScenarioError(
@@ -217,6 +294,10 @@ def _binary(files: Mapping[str, str], identifier: str) -> dict[str, bytes]:
                 "the binary out (binary=False, --no-binary)"
             ) from None
         if done.returncode or not target.exists():
-            lines = [line for line in done.stderr.splitlines() if "error" in line] or ["it says nothing"]
-            raise ScenarioError(f"the FMU does not compile, {command[0]} says: {lines[0]}; set another compiler in CC")
+            lines = [line for line in done.stderr.splitlines() if "error" in line] or [
+                "it says nothing"
+            ]
+            raise ScenarioError(
+                f"the FMU does not compile, {command[0]} says: {lines[0]}; set another compiler in CC"
+            )
         return {f"binaries/{machine}/{identifier}{suffix}": target.read_bytes()}

@@ -1,8 +1,11 @@
-"""Controllers in FMUs as laws: `law_from_fmu` reads FMI 2.0 and 3.0 for Co-Simulation, through FMPy.
+"""Controllers in FMUs as laws:
 
-An FMU from Simulink, Modelica or `law_to_fmu` keeps its own state. So each channel of each run has its own instance,
-which is made at the first sample and freed with the run. The instance is called from Python, in the reference loop. The
-FMU is first tried in a separate process, which may crash or hang.
+`law_from_fmu` reads FMI 2.0 and 3.0 for Co-Simulation, through FMPy.
+
+An FMU from Simulink, Modelica or `law_to_fmu` keeps its own state. So each channel of each run has
+its own instance, which is made at the first sample and freed with the run. The instance is called
+from Python, in the reference loop. The FMU is first tried in a separate process, which may crash or
+hang.
 """
 
 import dataclasses
@@ -42,7 +45,9 @@ INPUT_FIELDS = tuple(n for n in Measurement._fields if n not in ("has_surface", 
 PERIOD_TOLERANCE = 1e-6  # relative difference below which two periods are equal
 CURE = "give an FMU for Co-Simulation of FMI 2.0 or 3.0"
 
-_running: dict[int, "Running"] = {}  # number of an instance, which its law's memory holds -> the instance
+_running: dict[
+    int, "Running"
+] = {}  # number of an instance, which its law's memory holds -> the instance
 _numbers = itertools.count(1)
 
 
@@ -58,14 +63,19 @@ class Running(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class FmuLaw(Uncompiled):
-    """The function of a law in an FMU. Two are equal if the content of the file and the settings are."""
+    """The function of a law in an FMU.
+
+    Two are equal if the content of the file and the settings are.
+    """
 
     path: str = dataclasses.field(compare=False)  # of the .fmu file
     digest: str  # of its bytes
     name: str  # of the law
     inputs: tuple[tuple[str, str], ...]  # our name and the FMU's
     outputs: tuple[str, ...]  # the FMU's name of u, and of s if it has s
-    constants: tuple[tuple[str, float], ...]  # the FMU's name and the value of inputs that do not change
+    constants: tuple[
+        tuple[str, float], ...
+    ]  # the FMU's name and the value of inputs that do not change
     parameters: tuple[str, ...]  # the FMU's names of its gains
     period: float | None  # of its steps, s; None for the control period
     once: bool = False  # whether a process can have only one instance
@@ -77,10 +87,13 @@ class FmuLaw(Uncompiled):
         """The law's name."""
         return self.name
 
-    def __call__(self, y: Measurement, gains: Sequence[float], memory: np.ndarray) -> tuple[float, float]:
+    def __call__(
+        self, y: Measurement, gains: Sequence[float], memory: np.ndarray
+    ) -> tuple[float, float]:
         """Return u and s. The memory holds the number of the instance, 0 before the first sample.
 
-        The FMU's own time counts its steps: it has none for a sample that is missed, and a late one is none to it.
+        The FMU's own time counts its steps: it has none for a sample that is missed, and a late one
+        is none to it.
         """
         if memory[0] == 0.0:
             memory[0] = self._begin(y, gains, memory)
@@ -91,7 +104,9 @@ class FmuLaw(Uncompiled):
         if k >= due:
             values = [getattr(y, ours) for ours, _ in self.inputs]
             for _ in range(round(every * y.dt / length)):
-                running.last[: len(self.outputs)] = running.slave.step(values, running.start + done * length, length)
+                running.last[: len(self.outputs)] = running.slave.step(
+                    values, running.start + done * length, length
+                )
                 done += 1
             running.steps[:] = done, every * (k // every + 1)
         return running.last[0], running.last[1]
@@ -112,15 +127,23 @@ class FmuLaw(Uncompiled):
                     f"FMU {Path(self.path).name!r} can have only one instance in a process, by its description: "
                     "give a plant of one channel"
                 )
-        made = Slave(str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t)
+        made = Slave(
+            str(extracted(self.path, self.digest)), names, self.outputs, self.fixed(gains), y.t
+        )
         _running[place] = Running(self, made, y.t, [0.0, 0.0], [0, 0])
-        owner: Any = memory if memory.base is None else memory.base
+        owner: Any
+        if memory.base is None:
+            owner = memory
+        else:
+            owner = memory.base
         weakref.finalize(owner, _end, place)
         return place
 
 
 def steps(period: float | None, dt: float) -> tuple[int, float]:
-    """Return after how many control periods of dt the FMU with a period steps, and how long each of its steps is, s."""
+    """Return after how many control periods of dt the FMU with a period steps, and how long each of
+    its steps is, s.
+    """
     if period is None:
         return 1, dt
     slower, faster = period / dt, dt / period
@@ -149,7 +172,9 @@ def extracted(path: str, digest: str) -> Path:
     except OSError:
         now = ""
     if now != digest:
-        raise ScenarioError(f"FMU {Path(path).name!r} is gone or has changed: call smc.exchange.law_from_fmu again")
+        raise ScenarioError(
+            f"FMU {Path(path).name!r} is gone or has changed: call smc.exchange.law_from_fmu again"
+        )
     folder = build.fresh("-fmu")
     with zipfile.ZipFile(path) as archive, no_room(errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         archive.extractall(folder)
@@ -171,14 +196,15 @@ def law_from_fmu(
 
     Args:
       path: of an .fmu file: FMI 2.0 or 3.0, Co-Simulation, with a binary for this machine.
-      variables: our name -> the FMU's name, as {"x": "theta", "u": "torque"}. Ours are those of a law's measurement (x,
-        v, e, de, r, dr, ddr, f, g, ...), u and s. Default: those that have our names, such as plant.x; a single output
-        is u.
+      variables: our name -> the FMU's name, as {"x": "theta", "u": "torque"}. Ours are those of a
+        law's measurement (x, v, e, de, r, dr, ddr, f, g, ...), u and s. Default: those that have
+        our names, such as plant.x; a single output is u.
       constants: name -> value of the FMU's inputs that have none of these meanings.
-      period: s; the FMU steps this often, and u is held in between. Default: its own period if it has a fixed one, else
-        the control period.
+      period: s; the FMU steps this often, and u is held in between. Default: its own period if it
+        has a fixed one, else the control period.
       name: of the law. Default: the file's name.
-      isolate: whether to try the FMU first in a separate process, for 500 steps on a double integrator.
+      isolate: whether to try the FMU first in a separate process, for 500 steps on a double
+        integrator.
       timeout: s, for the trial.
 
     Returns:
@@ -187,11 +213,12 @@ def law_from_fmu(
 
     Raises:
       MissingPackageError: FMPy is not installed: pip install 'smc-mujoco[fmu]'.
-      ScenarioError: the file is not an FMU, or is of another version, without Co-Simulation or for other machines; a
-        variable is unknown; an input has no meaning; or the trial fails, crashes or does not end.
+      ScenarioError: the file is not an FMU, or is of another version, without Co-Simulation or for
+        other machines; a variable is unknown; an input has no meaning; or the trial fails, crashes
+        or does not end.
 
-    u is what the FMU returns after a step from the sample's time, on the measurement of that sample. In a run the FMU
-    is part of your process: if it crashes, Python ends.
+    u is what the FMU returns after a step from the sample's time, on the measurement of that
+    sample. In a run the FMU is part of your process: if it crashes, Python ends.
     """
     with extra("fmu", "smc.exchange.law_from_fmu"):
         import fmpy  # noqa: F401
@@ -208,7 +235,9 @@ def law_from_fmu(
         name=errors.name("name", name if name is not None else re.sub(r"\W", "_", file.stem)),
         inputs=tuple(inputs.items()),
         outputs=tuple(outputs.values()),
-        constants=tuple((key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()),
+        constants=tuple(
+            (key, number(f"constants[{key!r}]", value)) for key, value in (constants or {}).items()
+        ),
         parameters=tuple(theirs for theirs, _ in gains.values()),
         once=bool(about.coSimulation.canBeInstantiatedOnlyOncePerProcess),
         period=_period(about) if period is None else period,
@@ -227,7 +256,9 @@ def _description(file: Path, digest: str) -> Any:
     try:
         with zipfile.ZipFile(file) as archive:
             if (wanted := "modelDescription.xml") not in archive.namelist():
-                raise ScenarioError(f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}")
+                raise ScenarioError(
+                    f"{file.name} is not an FMU, as there is no {wanted} in it: {CURE}"
+                )
         folder = extracted(str(file.resolve()), digest)
         about = fmpy.read_model_description(str(folder), validate=False)
     except ScenarioError:
@@ -239,19 +270,29 @@ def _description(file: Path, digest: str) -> Any:
     if str(about.fmiVersion)[:2] not in ("2.", "3."):
         raise ScenarioError(f"{file.name} is of FMI {about.fmiVersion}: {CURE}")
     if about.coSimulation is None:
-        kind = "Model Exchange" if about.modelExchange is not None else "Scheduled Execution"
+        if about.modelExchange is not None:
+            kind = "Model Exchange"
+        else:
+            kind = "Scheduled Execution"
         raise ScenarioError(f"{file.name} is for {kind} only: export it for Co-Simulation")
     if not str(about.coSimulation.modelIdentifier).isidentifier():
         raise ScenarioError(
             f"{file.name} has the modelIdentifier {shown(about.coSimulation.modelIdentifier)}, which is no name in C: "
             "export it with one of letters, digits and _"
         )
-    here = fmpy.platform if str(about.fmiVersion).startswith("2") else fmpy.platform_tuple
+    if str(about.fmiVersion).startswith("2"):
+        here = fmpy.platform
+    else:
+        here = fmpy.platform_tuple
     binaries = folder / "binaries" / here
     if not any(binary.stem == about.coSimulation.modelIdentifier for binary in binaries.glob("*")):
         if binaries.exists():
-            raise ScenarioError(f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again")
-        machines = ", ".join(sorted(path.name for path in (folder / "binaries").glob("*"))) or "no machine"
+            raise ScenarioError(
+                f"{file.name} has no binary of its modelIdentifier in {binaries.name}: export it again"
+            )
+        machines = (
+            ", ".join(sorted(path.name for path in (folder / "binaries").glob("*"))) or "no machine"
+        )
         raise ScenarioError(
             f"{file.name} has a binary for {machines}, and this one is {here}: export it for this one, or compile its "
             "sources with FMPy, fmpy compile"
@@ -262,18 +303,27 @@ def _description(file: Path, digest: str) -> Any:
 def _meanings(
     file: str, known: Mapping[str, Any], chosen: Mapping[str, str], constants: Mapping[str, float]
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """Return our name -> the FMU's, for its inputs and for its outputs, of the `known` variables by name."""
-    ins, outs = ([n for n, v in known.items() if v.causality == side] for side in ("input", "output"))
+    """Return our name -> the FMU's, for its inputs and for its outputs, of the `known` variables by
+    name.
+    """
+    ins, outs = (
+        [n for n, v in known.items() if v.causality == side] for side in ("input", "output")
+    )
     for ours, theirs in chosen.items():
         if ours not in (*INPUT_FIELDS, *OUTPUTS):
             raise unknown("meaning of a variable", ours, (*INPUT_FIELDS, *OUTPUTS))
-        side, theirs_known = ("output", outs) if ours in OUTPUTS else ("input", ins)
+        if ours in OUTPUTS:
+            side, theirs_known = ("output", outs)
+        else:
+            side, theirs_known = ("input", ins)
         errors.find(f"{side} of {file}", theirs, dict.fromkeys(theirs_known, ""))
     for theirs in constants:
         errors.find(f"input of {file}", theirs, dict.fromkeys(ins, ""))
     taken = {*chosen.values(), *constants}
     inputs = {ours: theirs for ours, theirs in chosen.items() if ours in INPUT_FIELDS}
-    inputs |= _by_name([n for n in ins if n not in taken], [n for n in INPUT_FIELDS if n not in chosen])
+    inputs |= _by_name(
+        [n for n in ins if n not in taken], [n for n in INPUT_FIELDS if n not in chosen]
+    )
     if strange := [n for n in ins if n not in {*inputs.values(), *constants}]:
         first = strange[0]
         meaning = f"say which it is, variables={{'x': {first!r}}}, or "
@@ -282,7 +332,9 @@ def _meanings(
             f"{meaning * (known[first].type in REAL_TYPES)}hold each, constants={{{first!r}: 0.0}}"
         )
     outputs = {ours: theirs for ours, theirs in chosen.items() if ours in OUTPUTS}
-    outputs |= _by_name([n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen])
+    outputs |= _by_name(
+        [n for n in outs if n not in taken], [n for n in OUTPUTS if n not in chosen]
+    )
     if not outs:
         raise ScenarioError(f"{file} has no output: export it with the command as an output")
     if "u" not in outputs and len(outs) != 1:
@@ -296,13 +348,16 @@ def _meanings(
     for theirs, types in {**dict.fromkeys(constants, CONSTANT_TYPES), **real}.items():
         if known[theirs].type not in types or known[theirs].dimensions:
             need = "real number: a law measures and returns real numbers"
-            need = need if types is REAL_TYPES else "number: export it without this input"
+            if types is not REAL_TYPES:
+                need = "number: export it without this input"
             raise ScenarioError(f"{theirs!r} of {file} is not one {need}")
     return inputs, {ours: outputs[ours] for ours in OUTPUTS if ours in outputs}
 
 
 def _by_name(theirs: Iterable[str], ours: Iterable[str]) -> dict[str, str]:
-    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours; case is ignored."""
+    """Return our name -> the FMU's, for its variables whose name, after the last dot, is ours; case
+    is ignored.
+    """
     words = {name.rsplit(".", 1)[-1].casefold(): name for name in theirs}
     return {name: words[name] for name in ours if name in words}
 
@@ -311,7 +366,11 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
     """Return name of a gain -> the FMU's name and the Gain, for its real parameters."""
     gains: dict[str, tuple[str, Gain]] = {}
     for variable in variables:
-        if variable.causality != "parameter" or variable.type not in REAL_TYPES or variable.dimensions:
+        if (
+            variable.causality != "parameter"
+            or variable.type not in REAL_TYPES
+            or variable.dimensions
+        ):
             continue
         try:
             start = float(variable.start)
@@ -321,8 +380,12 @@ def _gains(variables: Iterable[Any]) -> dict[str, tuple[str, Gain]]:
         ours += "_" * keyword.iskeyword(ours)
         if not ours.isidentifier() or ours.startswith("_") or ours in gains or math.isnan(start):
             continue
-        start = math.copysign(math.inf, start) if abs(start) >= MAX_DOUBLE else start
-        lower = math.nan if variable.min is None else float(variable.min)
+        if abs(start) >= MAX_DOUBLE:
+            start = math.copysign(math.inf, start)
+        if variable.min is None:
+            lower = math.nan
+        else:
+            lower = float(variable.min)
         gains[ours] = variable.name, Gain(start, nonnegative=lower == 0.0)
     return gains
 
@@ -332,14 +395,22 @@ def _period(about: Any) -> float | None:
     inside = about.coSimulation
     if inside.canHandleVariableCommunicationStepSize:
         return None
-    steps = getattr(inside, "fixedInternalStepSize", None), getattr(about.defaultExperiment, "stepSize", None)
+    steps = (
+        getattr(inside, "fixedInternalStepSize", None),
+        getattr(about.defaultExperiment, "stepSize", None),
+    )
     return next((float(step) for step in steps if step is not None and float(step) > 0.0), None)
 
 
 def _try(law: FmuLaw, gains: Iterable[float], timeout: float) -> None:
     """Try an FMU in a separate process, with these gains."""
     folder = str(extracted(law.path, law.digest))
-    order = {"folder": folder, "inputs": dict(law.inputs), "outputs": law.outputs, "step": law.period}
+    order = {
+        "folder": folder,
+        "inputs": dict(law.inputs),
+        "outputs": law.outputs,
+        "step": law.period,
+    }
     try:
         tried(slave.__name__, order | {"fixed": law.fixed(gains)}, timeout)
     except Failed as failed:

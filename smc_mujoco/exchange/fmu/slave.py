@@ -1,4 +1,6 @@
-"""One instance of an FMU, through FMPy, and its trial in another process (`common.guard`), which must start quickly."""
+"""One instance of an FMU, through FMPy, and its trial in another process (`common.guard`), which
+must start quickly.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -6,18 +8,35 @@ from typing import Any, NamedTuple
 
 from smc_mujoco.common.guard import ALTERS, Arithmetic, Fault
 
-REAL_TYPES = ("Real", "Float64", "Float32")  # types of real numbers, as in the names of FMPy's functions
-WHOLE_TYPES = ("Integer", "Enumeration", *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)))
+REAL_TYPES = (
+    "Real",
+    "Float64",
+    "Float32",
+)  # types of real numbers, as in the names of FMPy's functions
+WHOLE_TYPES = (
+    "Integer",
+    "Enumeration",
+    *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)),
+)
 CONSTANT_TYPES = (*REAL_TYPES, *WHOLE_TYPES, "Boolean")  # types of inputs that may keep one value
-CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {"Boolean": bool}  # of numbers into values of other types
-TRIAL_STEPS, TRIAL_PERIOD = 500, 1e-3  # of a trial: number of steps, and their length if the FMU names none, s; chosen
-MAX_POSITION = 3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
+CONVERTERS = dict.fromkeys(WHOLE_TYPES, round) | {
+    "Boolean": bool
+}  # of numbers into values of other types
+TRIAL_STEPS, TRIAL_PERIOD = (
+    500,
+    1e-3,
+)  # of a trial: number of steps, and their length if the FMU names none, s; chosen
+MAX_POSITION = (
+    3.0  # where the double integrator of a trial stops, because a law need not stabilise it; chosen
+)
 MAX_COMMAND = 6.0  # bound on u in a trial; chosen
 CURE = "fix the FMU, or its inputs and parameters"
 
 
 class Group(NamedTuple):
-    """Variables of one type: their names, value references, and places among the values that are set or read."""
+    """Variables of one type: their names, value references, and places among the values that are
+    set or read.
+    """
 
     kind: str
     names: list[str]
@@ -28,12 +47,17 @@ class Group(NamedTuple):
 class Slave:
     """An instance of the FMU in a folder, initialised at a time `start`, s.
 
-    `inputs`, `outputs`: names of its variables, in the order of the values of `step`. `fixed`: name -> value of its
-    parameters and of inputs that do not change.
+    `inputs`, `outputs`: names of its variables, in the order of the values of `step`. `fixed`: name
+    -> value of its parameters and of inputs that do not change.
     """
 
     def __init__(
-        self, folder: str, inputs: Sequence[str], outputs: Sequence[str], fixed: Mapping[str, float], start: float = 0.0
+        self,
+        folder: str,
+        inputs: Sequence[str],
+        outputs: Sequence[str],
+        fixed: Mapping[str, float],
+        start: float = 0.0,
     ):
         import fmpy
         from fmpy.simulation import instantiate_fmu
@@ -43,20 +67,29 @@ class Slave:
         self.known = {variable.name: variable for variable in about.modelVariables}
         self.two, self.said = str(about.fmiVersion).startswith("2"), list[str]()
         self.inputs, self.outputs = self._by_type(inputs), self._by_type(outputs)
-        self.fmu: Any = self._called("instantiation", instantiate_fmu, folder, about, "CoSimulation", logger=self._log)
+        self.fmu: Any = self._called(
+            "instantiation", instantiate_fmu, folder, about, "CoSimulation", logger=self._log
+        )
         if self.two:
             self._called("fmi2SetupExperiment", self.fmu.setupExperiment, startTime=start)
         for name, value in fixed.items():
             if self.known[name].causality != "input":
                 self._set(self._by_type([name]), [value])
-        self._called("initialization", self.fmu.enterInitializationMode, **({} if self.two else {"startTime": start}))
+        self._called(
+            "initialization",
+            self.fmu.enterInitializationMode,
+            **({} if self.two else {"startTime": start}),
+        )
         for name, value in fixed.items():
             if self.known[name].causality == "input":
                 self._set(self._by_type([name]), [value])
         self._called("initialization", self.fmu.exitInitializationMode)
 
     def step(self, values: Sequence[float], t: float, length: float) -> list[float]:
-        """Set the inputs, make a step from time t, and return the outputs. `t` and `length` are in s."""
+        """Set the inputs, make a step from time t, and return the outputs.
+
+        `t` and `length` are in s.
+        """
         self._set(self.inputs, values)
         where = {"currentCommunicationPoint": t, "communicationStepSize": length}
         self._called(f"the step from t = {t:g} s", self.fmu.doStep, **where)
@@ -84,25 +117,38 @@ class Slave:
         """Set variables to the values at their places."""
         for kind, names, references, places in groups:
             typed = [CONVERTERS.get(kind, float)(values[place]) for place in places]
-            setter = ("setInteger" if self.two else "setInt64") if kind == "Enumeration" else f"set{kind}"
-            what = ", ".join(f"{name} = {value:g}" for name, value in zip(names, typed, strict=True))
+            if kind == "Enumeration":
+                setter = "setInteger" if self.two else "setInt64"
+            else:
+                setter = f"set{kind}"
+            what = ", ".join(
+                f"{name} = {value:g}" for name, value in zip(names, typed, strict=True)
+            )
             self._called(f"setting {what}", getattr(self.fmu, setter), references, typed)
 
     def _get(self, groups: Sequence[Group]) -> list[float]:
         """Return the values of variables in the order of their places."""
         values = [0.0] * sum(len(group.places) for group in groups)
         for kind, names, references, places in groups:
-            read = self._called(f"reading {', '.join(names)}", getattr(self.fmu, f"get{kind}"), references)
+            read = self._called(
+                f"reading {', '.join(names)}", getattr(self.fmu, f"get{kind}"), references
+            )
             for place, value in zip(places, read, strict=True):
                 values[place] = float(value)
         return values
 
     def _called(self, what: str, function: Any, *arguments: Any, **named: Any) -> Any:
-        """Call a function of FMPy. Raise Fault if it fails, with the FMU's last words, or changes our arithmetic."""
+        """Call a function of FMPy.
+
+        Raise Fault if it fails, with the FMU's last words, or changes our arithmetic.
+        """
         try:
             result = function(*arguments, **named)
         except Exception as error:
-            why = self.said[-1] if self.said else f"{type(error).__name__}: {error}"
+            if self.said:
+                why = self.said[-1]
+            else:
+                why = f"{type(error).__name__}: {error}"
             raise Fault(f"{what} fails ({' '.join(why.split())}): {CURE}") from error
         finally:
             changed = self.arithmetic.changed()
@@ -117,14 +163,27 @@ class Slave:
 
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:
-    """Run an FMU on a double integrator x'' = u. `order` is from `load`, and `say` reports a stage."""
+    """Run an FMU on a double integrator x'' = u.
+
+    `order` is from `load`, and `say` reports a stage.
+    """
     say("instantiation")
     slave = Slave(order["folder"], list(order["inputs"].values()), order["outputs"], order["fixed"])
     length, x, v = order["step"] or TRIAL_PERIOD, 0.5, 0.0
     for k in range(TRIAL_STEPS):
         say(f"the step from t = {k * length:g} s")
         r, dr = 0.1 * math.sin(k * length), 0.1 * math.cos(k * length)
-        seen = {"t": k * length, "dt": length, "x": x, "v": v, "r": r, "dr": dr, "ddr": -r, "e": x - r, "de": v - dr}
+        seen = {
+            "t": k * length,
+            "dt": length,
+            "x": x,
+            "v": v,
+            "r": r,
+            "dr": dr,
+            "ddr": -r,
+            "e": x - r,
+            "de": v - dr,
+        }
         seen |= {"a": -r, "g": 1.0, "gq": 1.0, "limit": MAX_COMMAND, "model": 1.0}
         outputs = slave.step([seen.get(name, 0.0) for name in order["inputs"]], k * length, length)
         if not all(map(math.isfinite, outputs)):

@@ -1,4 +1,5 @@
-"""Channels of a user's model: the joints that the user names, checked against the model, and the motors on them.
+"""Channels of a user's model: the joints that the user names, checked against the model, and the
+motors on them.
 
 A motor of gear 1 replaces the actuator that drives a channel's joint.
 """
@@ -13,7 +14,14 @@ import mujoco
 import numpy as np
 
 from smc_mujoco.common.constraints import Bound, Flag, Number, constrain
-from smc_mujoco.common.errors import ScenarioError, ScenarioWarning, find, items_of, shown, users_stacklevel
+from smc_mujoco.common.errors import (
+    ScenarioError,
+    ScenarioWarning,
+    find,
+    items_of,
+    shown,
+    users_stacklevel,
+)
 from smc_mujoco.mechanisms.custom.mjcf import pick
 from smc_mujoco.mechanisms.hardware.part import PASSIVE, PLACES, POSE, exerted
 from smc_mujoco.mechanisms.plant import Range
@@ -24,10 +32,15 @@ UNIT_OF_JOINT = {mujoco.mjtJoint.mjJNT_HINGE: "rad", mujoco.mjtJoint.mjJNT_SLIDE
 
 Place = Annotated[float, Number(low=-1e6, high=1e6)]  # rad or m
 SUGGESTED = ("law", "u_max", "reference")  # fields of a Channel that are defaults of scenarios
-ONE_JOINT = (mujoco.mjtTrn.mjTRN_JOINT.value, mujoco.mjtTrn.mjTRN_JOINTINPARENT.value)  # transmissions to one joint
+ONE_JOINT = (
+    mujoco.mjtTrn.mjTRN_JOINT.value,
+    mujoco.mjtTrn.mjTRN_JOINTINPARENT.value,
+)  # transmissions to one joint
 FIXED, NO_BIAS = mujoco.mjtGain.mjGAIN_FIXED.value, mujoco.mjtBias.mjBIAS_NONE.value
 NO_DYNAMICS = mujoco.mjtDyn.mjDYN_NONE.value
-FLIES = 4  # independent forces and torques that hold a heading: a thrust, and a torque about each axis
+FLIES = (
+    4  # independent forces and torques that hold a heading: a thrust, and a torque about each axis
+)
 MOTOR_GROUP = 31  # actuator group of motors, which actuatorgroupdisable cannot turn off
 CURE = "give smc.Channel(motor=True), or JOINT(motor) in a text, for one ideal motor instead"
 
@@ -37,15 +50,18 @@ class Channel:
     """How a joint of a user's model is driven.
 
     Attributes:
-      motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps their forcerange, and
-        the joint's actuatorfrcrange. Without it, the joint needs exactly one actuator: a motor.
-      partner: a joint without an actuator that moves with this one, such as a pole on its cart. It is measured and
-        scored as a separate channel, after the driven ones. The law of this channel reads it in y.q, y.dq, y.fq and
-        y.gq. If it has an actuator, that stays at ctrl = 0: a motor then does nothing, a servo holds its position.
-      x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of the keyframe, or of
-        the model.
-      law, u_max, reference: defaults for this channel, of scenarios that leave them out; values as in a Scenario. Give
-        every channel a law, or no channel. None: the default bound, and rest at 0.
+      motor: whether to replace the joint's actuators, if it has any, by an ideal motor. It keeps
+        their forcerange, and the joint's actuatorfrcrange. Without it, the joint needs exactly one
+        actuator: a motor.
+      partner: a joint without an actuator that moves with this one, such as a pole on its cart. It
+        is measured and scored as a separate channel, after the driven ones. The law of this channel
+        reads it in y.q, y.dq, y.fq and y.gq. If it has an actuator, that stays at ctrl = 0: a motor
+        then does nothing, a servo holds its position.
+      x0, partner_x0: initial positions of the joint and of its partner, rad or m; None: those of
+        the keyframe, or of the model.
+      law, u_max, reference: defaults for this channel, of scenarios that leave them out; values as
+        in a Scenario. Give every channel a law, or no channel. None: the default bound, and rest at
+        0.
     """
 
     motor: Annotated[bool, Flag()] = False
@@ -65,10 +81,17 @@ Pairs = tuple[tuple[str, Channel], ...]  # each a joint and its Channel
 
 def coerce(channels: object) -> Pairs:
     """Coerce a user's channels to pairs of joint and Channel."""
-    if isinstance(channels, str | set | frozenset) or not isinstance(channels, Iterable):  # sets have no order
-        raise ScenarioError(f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']")
+    if isinstance(channels, str | set | frozenset) or not isinstance(
+        channels, Iterable
+    ):  # sets have no order
+        raise ScenarioError(
+            f"channels is {shown(channels)}: give joints' names in order, such as ['elbow', 'wrist']"
+        )
     named = isinstance(channels, Mapping)
-    pairs = list(channels.items()) if named else [(joint, None) for joint in items_of("channels", channels)]
+    if named:
+        pairs = list(channels.items())
+    else:
+        pairs = [(joint, None) for joint in items_of("channels", channels)]
     if not pairs:
         raise ScenarioError("channels is empty: give at least one joint's name")
     return tuple((joint, channel(joint, value)) for joint, value in pairs)
@@ -77,11 +100,15 @@ def coerce(channels: object) -> Pairs:
 def as_text(joint: str, channel: Channel) -> str:
     """Return a channel as on the command line, such as "lift(motor,x0=0.2)"."""
     given = [
-        field.name if value is True else f"{field.name}={value if isinstance(value, str) else format(value, 'g')}"
+        field.name
+        if value is True
+        else f"{field.name}={value if isinstance(value, str) else format(value, 'g')}"
         for field in dataclasses.fields(channel)
         if field.name not in SUGGESTED and (value := getattr(channel, field.name)) != field.default
     ]
-    return f"{joint}({','.join(given)})" if given else joint
+    if given:
+        return f"{joint}({','.join(given)})"
+    return joint
 
 
 def joints_of(channels: Pairs) -> list[str]:
@@ -94,26 +121,49 @@ def channel(joint: object, value: object) -> Channel:
     """Coerce a Channel, a dict of its fields, or None to a Channel."""
     if isinstance(value, Mapping):
         for key in value:
-            find("field of a Channel", key, {field.name: None for field in dataclasses.fields(Channel)})
-    made = Channel() if value is None else Channel(**value) if isinstance(value, Mapping) else value
+            find(
+                "field of a Channel",
+                key,
+                {field.name: None for field in dataclasses.fields(Channel)},
+            )
+    if value is None:
+        made = Channel()
+    elif isinstance(value, Mapping):
+        made = Channel(**value)
+    else:
+        made = value
     if not isinstance(made, Channel):
-        raise ScenarioError(f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None")
+        raise ScenarioError(
+            f"channel {shown(joint)} is {shown(value)}: give smc.Channel(...) or None"
+        )
     if made.partner is None and made.partner_x0 is not None:
-        raise ScenarioError(f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too")
+        raise ScenarioError(
+            f"channel {joint!r} has a partner_x0 and no partner: give smc.Channel(partner=...) too"
+        )
     return made
 
 
 def suggested(channels: Pairs) -> dict[str, tuple]:
-    """Return field -> what each channel suggests to scenarios, None for nothing; without fields that none suggests."""
+    """Return field -> what each channel suggests to scenarios, None for nothing; without fields
+    that none suggests.
+    """
     fields = {name: tuple(getattr(channel, name) for _, channel in channels) for name in SUGGESTED}
     bare = [joint for joint, channel in channels if channel.law is None]
     if 0 < len(bare) < len(channels):
-        raise ScenarioError(f"channel {bare[0]!r} has no law and others have: give each one, or none")
-    return {name: values for name, values in fields.items() if any(value is not None for value in values)}
+        raise ScenarioError(
+            f"channel {bare[0]!r} has no law and others have: give each one, or none"
+        )
+    return {
+        name: values
+        for name, values in fields.items()
+        if any(value is not None for value in values)
+    }
 
 
 def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
-    """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that forbid control."""
+    """Raise ScenarioError for joints that do not exist or cannot be channels, and for flags that
+    forbid control.
+    """
     joints = joints_of(channels)
     names = [model.joint(i).name for i in range(model.njnt)]
     for joint in joints:
@@ -132,9 +182,13 @@ def check(label: str, model: mujoco.MjModel, channels: Pairs) -> None:
             raise ScenarioError(f"joint {joint!r} is two channels or partners: name it once")
     if len(channels) < len(joints) < 2 * len(channels):
         bare = next(joint for joint, channel in channels if channel.partner is None)
-        raise ScenarioError(f"channel {bare!r} has no partner and others have: give each one, or none")
+        raise ScenarioError(
+            f"channel {bare!r} has no partner and others have: give each one, or none"
+        )
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION.value:
-        raise ScenarioError(f'{label} has <flag actuation="disable"/>, so that nothing drives it: take it out')
+        raise ScenarioError(
+            f'{label} has <flag actuation="disable"/>, so that nothing drives it: take it out'
+        )
 
 
 def starts(
@@ -142,24 +196,39 @@ def starts(
 ) -> tuple[dict[str, float], list[Range]]:
     """Return joint -> x0, rad or m, and the ranges of those joints whose x0 the user chose.
 
-    x0 is that of the channel, else of the keyframe, else of the model. The model's own x0 may be outside its range.
+    x0 is that of the channel, else of the keyframe, else of the model. The model's own x0 may be
+    outside its range.
     """
-    qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
+    if keyframe is None:
+        qpos = model.qpos0
+    else:
+        qpos = model.key_qpos[model.key(keyframe).id]
     chosen = {joint: channel.x0 for joint, channel in channels if channel.x0 is not None}
-    chosen |= {c.partner: c.partner_x0 for _, c in channels if c.partner is not None and c.partner_x0 is not None}
+    chosen |= {
+        c.partner: c.partner_x0
+        for _, c in channels
+        if c.partner is not None and c.partner_x0 is not None
+    }
     x0 = {joint: float(qpos[model.joint(joint).qposadr[0]]) for joint in joints} | chosen
     return x0, [row for row in ranges(model, joints) if keyframe is not None or row[0] in chosen]
 
 
 def ranges(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Range, ...]:
-    """Return joint, least and largest position of each channel, rad or m; empty where none has limits."""
+    """Return joint, least and largest position of each channel, rad or m; empty where none has
+    limits.
+    """
     rows = []
     for joint in map(model.joint, joints):
-        low, high = joint.range if joint.limited[0] else (-math.inf, math.inf)
+        if joint.limited[0]:
+            low, high = joint.range
+        else:
+            low, high = (-math.inf, math.inf)
         rows.append((joint.name, float(low), float(high)))
     flags = mujoco.mjtDisableBit
     off = model.opt.disableflags & (flags.mjDSBL_LIMIT.value | flags.mjDSBL_CONSTRAINT.value)
-    return () if off or not any(math.isfinite(low) for _, low, _ in rows) else tuple(rows)
+    if off or not any(math.isfinite(low) for _, low, _ in rows):
+        return ()
+    return tuple(rows)
 
 
 def is_free(model: mujoco.MjModel, joint: str) -> bool:
@@ -176,21 +245,33 @@ def thrusters(model: mujoco.MjModel, joint: str) -> list[int]:
 
 
 def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]:
-    """Return the largest force in any direction, three times, N, and the largest torque about each axis, N m."""
+    """Return the largest force in any direction, three times, N, and the largest torque about each
+    axis, N m.
+    """
     drives = thrusters(model, joint)
     if not 0 < len(drives) <= len(PLACES):
         cure = "give it one to six"
-        raise ScenarioError(f"{len(drives)} actuators of {label} act at sites of the body of joint {joint!r}: {cure}")
+        raise ScenarioError(
+            f"{len(drives)} actuators of {label} act at sites of the body of joint {joint!r}: {cure}"
+        )
     plain = (NO_DYNAMICS, mujoco.mjtDyn.mjDYN_FILTER.value, mujoco.mjtDyn.mjDYN_FILTEREXACT.value)
     for i in drives:
         name = model.actuator(i).name or f"number {i}"
         known = model.actuator_dyntype[i] in plain and model.actuator_trnid[i, 1] < 0
-        if not known or model.actuator_gaintype[i] != FIXED or model.actuator_biastype[i] != NO_BIAS:
-            raise ScenarioError(f"actuator {name!r} of {label} is more than a force behind a lag: make it a <general>")
+        if (
+            not known
+            or model.actuator_gaintype[i] != FIXED
+            or model.actuator_biastype[i] != NO_BIAS
+        ):
+            raise ScenarioError(
+                f"actuator {name!r} of {label} is more than a force behind a lag: make it a <general>"
+            )
     ends = model.actuator_gainprm[drives, :1] * model.actuator_ctrlrange[drives]
     ends[model.actuator_ctrllimited[drives] == 0] = math.inf
     clamped = np.clip(ends, *model.actuator_forcerange[drives].T[:, :, None])
-    ends[model.actuator_forcelimited[drives] == 1] = clamped[model.actuator_forcelimited[drives] == 1]
+    ends[model.actuator_forcelimited[drives] == 1] = clamped[
+        model.actuator_forcelimited[drives] == 1
+    ]
     largest, forces = np.abs(ends).max(axis=1), exerted(model, model.joint(joint).id, drives)
     sizes = np.array([np.linalg.norm(forces[:, :3], axis=1), *np.abs(forces[:, 3:]).T]).T
     reached = [float(np.sum(largest[column > 0.0] * column[column > 0.0])) for column in sizes.T]
@@ -198,31 +279,50 @@ def reach_of(label: str, model: mujoco.MjModel, joint: str) -> tuple[float, ...]
 
 
 def held_pose(label: str, model: mujoco.MjModel, joint: str) -> Literal["all", "heading"]:
-    """Return what of its pose a free body can hold, as in `Plant.pose`; warn if that is less than its heading."""
+    """Return what of its pose a free body can hold, as in `Plant.pose`; warn if that is less than
+    its heading.
+    """
     forces = exerted(model, model.joint(joint).id, thrusters(model, joint))
     rank = np.linalg.matrix_rank(forces, tol=1e-9 * np.abs(forces).max())
     if rank < FLIES:
         text = f"the actuators of {label} give {rank} independent forces and torques, and {FLIES} are to hold a heading"
-        warnings.warn(f"{text}: give them other places, or gears of other signs", ScenarioWarning, users_stacklevel())
+        warnings.warn(
+            f"{text}: give them other places, or gears of other signs",
+            ScenarioWarning,
+            users_stacklevel(),
+        )
     return "all" if rank == len(PLACES) else "heading"
 
 
 def pose_at_start(model: mujoco.MjModel, joint: str, keyframe: str | None) -> tuple[float, ...]:
-    """Return position, m, and rotation vector, rad, of a free body in the model or its keyframe, (6,)."""
-    qpos = model.qpos0 if keyframe is None else model.key_qpos[model.key(keyframe).id]
+    """Return position, m, and rotation vector, rad, of a free body in the model or its keyframe,
+    (6,).
+    """
+    if keyframe is None:
+        qpos = model.qpos0
+    else:
+        qpos = model.key_qpos[model.key(keyframe).id]
     place = qpos[model.joint(joint).qposadr[0] :][:7].tolist()
     return *place[:3], *rotation_vector(*place[3:])
 
 
 def add_pose(spec: mujoco.MjSpec, joint: str, drives: Sequence[int]) -> None:
-    """Add a free body's sensors, and keep the actuators that are not among its drives as passive parts."""
+    """Add a free body's sensors, and keep the actuators that are not among its drives as passive
+    parts.
+    """
     body = spec.joint(joint).parent
     site = body.add_site(name=POSE, size=(1e-6,) * 3, group=5)
     site.pos, site.quat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     kinds = mujoco.mjtSensor
-    for end, kind in (":x", kinds.mjSENS_FRAMEPOS), (":q", kinds.mjSENS_FRAMEQUAT), (":v", kinds.mjSENS_FRAMELINVEL):
+    for end, kind in (
+        (":x", kinds.mjSENS_FRAMEPOS),
+        (":q", kinds.mjSENS_FRAMEQUAT),
+        (":v", kinds.mjSENS_FRAMELINVEL),
+    ):
         spec.add_sensor(name=POSE + end, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE)
-    spec.add_sensor(name=f"{POSE}:w", type=kinds.mjSENS_GYRO, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE)
+    spec.add_sensor(
+        name=f"{POSE}:w", type=kinds.mjSENS_GYRO, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=POSE
+    )
     for i, actuator in enumerate(list(spec.actuators)):
         if i not in drives:
             actuator.name = f"{PASSIVE}smc:{i}"
@@ -239,21 +339,30 @@ class Motor(NamedTuple):
 def motor_of(label: str, model: mujoco.MjModel, joint: str, channel: Channel) -> Motor:
     """Return the motor that drives a joint."""
     joint_id = model.joint(joint).id
-    bounds = [tuple(map(float, model.jnt_actfrcrange[joint_id]))] if model.jnt_actfrclimited[joint_id] else []
+    if model.jnt_actfrclimited[joint_id]:
+        bounds = [tuple(map(float, model.jnt_actfrcrange[joint_id]))]
+    else:
+        bounds = []
     actuators = [i for i in range(model.nactuator) if model.actuator_trntype[i] in ONE_JOINT]
     actuators = [i for i in actuators if model.actuator_trnid[i, 0] == joint_id]
     if channel.motor:
         takes, cure = f"joint {joint!r} of {label} takes", "widen its actuatorfrcrange"
-        return Motor(joint, _limit(takes, cure, *bounds, _together(model, actuators)), tuple(actuators))
+        return Motor(
+            joint, _limit(takes, cure, *bounds, _together(model, actuators)), tuple(actuators)
+        )
     if not actuators:
         raise ScenarioError(f"no actuator of {label} drives joint {joint!r} alone: {CURE}")
     names = ", ".join(model.actuator(i).name or f"number {i}" for i in actuators)
     if len(actuators) > 1:
         raise ScenarioError(f"joint {joint!r} of {label} has the actuators {names}: {CURE}")
     if why := _no_motor(model, actuators[0]):
-        raise ScenarioError(f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}")
+        raise ScenarioError(
+            f"actuator {names!r} of joint {joint!r} {why}, and a law commands a force: {CURE}"
+        )
     gives = f"actuator {names!r} gives joint {joint!r} of {label}"
-    return Motor(joint, _limit(gives, CURE, *bounds, _of_actuator(model, actuators[0])), tuple(actuators))
+    return Motor(
+        joint, _limit(gives, CURE, *bounds, _of_actuator(model, actuators[0])), tuple(actuators)
+    )
 
 
 def _no_motor(model: mujoco.MjModel, i: int) -> str:
@@ -262,9 +371,16 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
         return "is a servo, a damper or a muscle"
     if model.actuator_dyntype[i] != NO_DYNAMICS or model.actuator_delay[i]:
         return "has dynamics or a delay"
-    if model.actuator_armature[i] or model.actuator_damping[i] or model.actuator_dampingpoly[i].any():
+    if (
+        model.actuator_armature[i]
+        or model.actuator_damping[i]
+        or model.actuator_dampingpoly[i].any()
+    ):
         return "has armature or damping"
-    if 0 <= model.actuator_group[i] <= 30 and model.opt.disableactuator >> int(model.actuator_group[i]) & 1:
+    if (
+        0 <= model.actuator_group[i] <= 30
+        and model.opt.disableactuator >> int(model.actuator_group[i]) & 1
+    ):
         return "is in a group that actuatorgroupdisable turns off"
     if not model.actuator_gear[i, 0] * model.actuator_gainprm[i, 0]:
         return "has gear or gain 0"
@@ -272,8 +388,13 @@ def _no_motor(model: mujoco.MjModel, i: int) -> str:
 
 
 def _limit(who: str, cure: str, *ranges: tuple[float, ...]) -> float:
-    """Return the largest force that all ranges allow in both directions, N m or N, because |u| has one bound."""
-    low, high = max([-math.inf, *(low for low, _ in ranges)]), min([math.inf, *(high for _, high in ranges)])
+    """Return the largest force that all ranges allow in both directions, N m or N, because |u| has
+    one bound.
+    """
+    low, high = (
+        max([-math.inf, *(low for low, _ in ranges)]),
+        min([math.inf, *(high for _, high in ranges)]),
+    )
     if not low < 0.0 < high:
         raise ScenarioError(f"{who} {low:g} to {high:g}, but a law pushes both ways: {cure}")
     return min(-low, high)
@@ -294,19 +415,29 @@ def _of_actuator(model: mujoco.MjModel, i: int) -> tuple[float, float]:
 
 
 def _together(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[float, float]:
-    """Return the least and the largest force that the forceranges of a joint's actuators allow together, N m or N.
+    """Return the least and the largest force that the forceranges of a joint's actuators allow
+    together, N m or N.
 
-    They give no bound if one has no forcerange, or if they push only one way: the ideal motor pushes both ways.
+    They give no bound if one has no forcerange, or if they push only one way: the ideal motor
+    pushes both ways.
     """
     if not actuators or not all(model.actuator_forcelimited[i] for i in actuators):
         return -math.inf, math.inf
-    ends = [sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i]) for i in actuators]
+    ends = []
+    for i in actuators:
+        ends.append(
+            sorted(float(model.actuator_gear[i, 0] * end) for end in model.actuator_forcerange[i])
+        )
     low, high = sum(low for low, _ in ends), sum(high for _, high in ends)
-    return (low, high) if low < 0.0 < high else (-math.inf, math.inf)
+    if low < 0.0 < high:
+        return (low, high)
+    return (-math.inf, math.inf)
 
 
 def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
-    """Add the channels' motors, in this order, and keep the model's other actuators as passive parts."""
+    """Add the channels' motors, in this order, and keep the model's other actuators as passive
+    parts.
+    """
     replaced = {i for motor in motors for i in motor.replaced}
     for i, actuator in enumerate(list(spec.actuators)):
         if i in replaced:
@@ -314,9 +445,24 @@ def add_motors(spec: mujoco.MjSpec, motors: Sequence[Motor]) -> None:
         else:
             actuator.name = f"{PASSIVE}smc:{i}"  # no joint has this name
     for motor in motors:  # named after joints: names of actuators may be missing
-        made = spec.add_actuator(name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        made = spec.add_actuator(
+            name=f"u:{motor.joint}", target=motor.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        )
         made.set_to_motor()
-        limit = motor.limit if math.isfinite(motor.limit) else 0.0
-        made.gear, made.ctrllimited, made.forcelimited = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), False, limit > 0.0
+        if math.isfinite(motor.limit):
+            limit = motor.limit
+        else:
+            limit = 0.0
+        made.gear, made.ctrllimited, made.forcelimited = (
+            (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            False,
+            limit > 0.0,
+        )
         made.ctrlrange, made.forcerange = (0.0, 0.0), (-limit, limit)
-        made.armature, made.damping, made.delay, made.nsample, made.group = 0.0, (0.0, 0.0, 0.0), 0.0, 0, MOTOR_GROUP
+        made.armature, made.damping, made.delay, made.nsample, made.group = (
+            0.0,
+            (0.0, 0.0, 0.0),
+            0.0,
+            0,
+            MOTOR_GROUP,
+        )

@@ -1,7 +1,9 @@
-"""Users' models: read from a file, text, MjSpec or PyMJCF, tried in a child process, checked, identified by a hash.
+"""Users' models: read from a file, text, MjSpec or PyMJCF, tried in a child process, checked,
+identified by a hash.
 
-A model may crash the process that compiles it, or fill its memory. So `tried` first compiles each model once in a child
-process, with bounds on time and memory. That takes some hundredths of a second.
+A model may crash the process that compiles it, or fill its memory. So `tried` first compiles each
+model once in a child process, with bounds on time and memory. That takes some hundredths of a
+second.
 """
 
 import dataclasses
@@ -33,7 +35,13 @@ DIGITS = 17  # of numbers in the XML of an MjSpec: enough for any float64
 ROUNDING = 1e-12  # relative and absolute: change of a model's numbers when it is written and read
 
 RESERVED = ("smc:", PLAY, ROTOR)  # prefixes of names of this package's parts
-RESERVED_KINDS = ("BODY", "JOINT", "GEOM", "TENDON", "TEXT")  # kinds of object that this package's parts add
+RESERVED_KINDS = (
+    "BODY",
+    "JOINT",
+    "GEOM",
+    "TENDON",
+    "TEXT",
+)  # kinds of object that this package's parts add
 # Parts of names of fields that do not affect the motion, or that MuJoCo computes.
 UNUSED = ("_user", "numeric_data", "key_", "bvh_", "aabb", "invweight0")
 
@@ -60,11 +68,19 @@ class Source:
         return f"{(roots and roots[0].get('model')) or 'model'}.xml"
 
     def read(self) -> mujoco.MjSpec:
-        """Return the model as an editable MjSpec. A free joint without a name has that of its body."""
+        """Return the model as an editable MjSpec.
+
+        A free joint without a name has that of its body.
+        """
         try:
             if not self.path:
-                included = {name: content for name, content in self.assets if name.lower().endswith(XML)}
-                spec = mujoco.MjSpec.from_string(self.text, include=included or None, assets=dict(self.assets))
+                included = {}
+                for name, content in self.assets:
+                    if name.lower().endswith(XML):
+                        included[name] = content
+                spec = mujoco.MjSpec.from_string(
+                    self.text, include=included or None, assets=dict(self.assets)
+                )
             elif self.path.lower().endswith(".urdf"):
                 spec = _of_urdf(Path(self.path))
             else:
@@ -72,10 +88,16 @@ class Source:
         except ValueError as error:
             raise broken(self.path or self.label, str(error)) from None
         if self.path and digest(Path(self.path)) != self.sha256:
-            raise ScenarioError(f"{self.path}, or a file that it names, has changed: call smc.plant_from again")
+            raise ScenarioError(
+                f"{self.path}, or a file that it names, has changed: call smc.plant_from again"
+            )
         taken = {joint.name for joint in spec.joints}
         for joint in spec.joints:
-            if joint.type == mujoco.mjtJoint.mjJNT_FREE and not joint.name and joint.parent.name not in taken:
+            if (
+                joint.type == mujoco.mjtJoint.mjJNT_FREE
+                and not joint.name
+                and joint.parent.name not in taken
+            ):
                 joint.name = joint.parent.name
         return spec
 
@@ -92,22 +114,27 @@ def _built(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def _of_urdf(path: Path) -> mujoco.MjSpec:
-    """Return a URDF with its visual shapes, which MuJoCo leaves out; they replace the others in pictures."""
+    """Return a URDF with its visual shapes, which MuJoCo leaves out; they replace the others in
+    pictures.
+    """
     elements = _elements(path)
     if not elements or elements[0].tag != "robot":
         return mujoco.MjSpec.from_file(str(path))
     robot = elements[0]
     own = robot.find("mujoco")
-    own = ET.SubElement(robot, "mujoco") if own is None else own
+    if own is None:
+        own = ET.SubElement(robot, "mujoco")
     compiler = own.find("compiler")
-    compiler = ET.SubElement(own, "compiler") if compiler is None else compiler
+    if compiler is None:
+        compiler = ET.SubElement(own, "compiler")
     compiler.attrib = {"discardvisual": "false"} | compiler.attrib
     compiler.set("meshdir", str(path.parent / compiler.get("meshdir", "")))
     spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"))
     for body in spec.bodies:
         if any(_only_seen(geom) for geom in body.geoms):
             for geom in body.geoms:
-                geom.group = geom.group if _only_seen(geom) else UNSEEN_GROUP
+                if not _only_seen(geom):
+                    geom.group = UNSEEN_GROUP
     return spec
 
 
@@ -116,7 +143,9 @@ def _only_seen(geom: mujoco.MjsGeom) -> bool:
 
 
 def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> Source:
-    """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of dm_control to a Source."""
+    """Coerce the path of a file, a text with its assets, an MjSpec, or a mjcf.RootElement of
+    dm_control to a Source.
+    """
     pymjcf = sys.modules.get("dm_control.mjcf")
     text = isinstance(model, str) and model.lstrip().startswith("<")
     if assets is not None and not text:
@@ -144,22 +173,31 @@ def source(model: object, assets: Mapping[str, bytes | str] | None = None) -> So
 def _of_text(text: str, assets: Mapping[str, Any]) -> Source:
     """Return the source of a text whose files are all among the assets."""
     kinds = bytes | bytearray | memoryview | str
-    if not (isinstance(assets, Mapping) and all(isinstance(k, str) and isinstance(assets[k], kinds) for k in assets)):
-        raise ScenarioError(f"assets is {shown(assets)}: give names of files with their contents, as bytes or text")
+    if not (
+        isinstance(assets, Mapping)
+        and all(isinstance(k, str) and isinstance(assets[k], kinds) for k in assets)
+    ):
+        raise ScenarioError(
+            f"assets is {shown(assets)}: give names of files with their contents, as bytes or text"
+        )
     assets = {name: v.encode() if isinstance(v, str) else bytes(v) for name, v in assets.items()}
     given = {PurePosixPath(name).name for name in assets}
     texts = [text, *(content for name, content in assets.items() if name.lower().endswith(XML))]
     for name in _files(element for content in texts for element in _elements(content)):
         if PurePosixPath(name).name not in given:
             cure = f"give assets={{{name!r}: its bytes}}, or the path of the model's file"
-            raise ScenarioError(f"the model names the file {shown(name)}, and a text has no folder: {cure}")
+            raise ScenarioError(
+                f"the model names the file {shown(name)}, and a text has no folder: {cure}"
+            )
     pairs = tuple(sorted(assets.items()))
     parts = [part for name, content in pairs for part in (name.encode(), content)]
     return Source("", _sha256([text.encode(errors="surrogatepass"), *parts]), text, pairs)
 
 
 def _of_spec(spec: mujoco.MjSpec) -> Source:
-    """Return the source of an MjSpec as it is now: its XML with all digits, and the files that it names."""
+    """Return the source of an MjSpec as it is now: its XML with all digits, and the files that it
+    names.
+    """
     copied = spec.copy()
     try:
         model = mjcb.compiled(copied)
@@ -168,7 +206,9 @@ def _of_spec(spec: mujoco.MjSpec) -> Source:
         raise broken("the MjSpec", str(error)) from None
     made = _of_text(text, _assets(spec, text))
     if lost := _difference(model, made.compiled(made.read())):
-        raise ScenarioError(f"the MjSpec loses its {lost} when it is written as XML: write the file, and give its path")
+        raise ScenarioError(
+            f"the MjSpec loses its {lost} when it is written as XML: write the file, and give its path"
+        )
     return made
 
 
@@ -181,7 +221,15 @@ def digest_of(spec: mujoco.MjSpec) -> str:
 def _assets(spec: mujoco.MjSpec, text: str) -> dict[str, bytes]:
     """Return name -> content of each file that an MjSpec names, given its XML."""
     elements = _elements(text)
-    inner = {"", *(element.get(name, "") for element in elements if element.tag == "compiler" for name in FOLDERS)}
+    inner = {
+        "",
+        *(
+            element.get(name, "")
+            for element in elements
+            if element.tag == "compiler"
+            for name in FOLDERS
+        ),
+    }
     assets = dict(spec.assets)
     for name in _files(elements):
         places = [Path(spec.modelfiledir) / sub / name for sub in sorted(inner)]
@@ -210,18 +258,26 @@ def _difference(model: mujoco.MjModel, again: mujoco.MjModel) -> str:
     """Return the first field in which two models differ by more than rounding, or ""."""
     for name in fields(model):
         a, b = getattr(model, name), getattr(again, name)
-        if a.shape != b.shape or not np.allclose(a, b, rtol=ROUNDING, atol=ROUNDING, equal_nan=True):
+        if a.shape != b.shape or not np.allclose(
+            a, b, rtol=ROUNDING, atol=ROUNDING, equal_nan=True
+        ):
             return name
     return ""
 
 
 def fields(model: mujoco.MjModel) -> list[str]:
     """Return the names of the model's arrays of numbers."""
-    return [name for name in dir(model) if name[0] != "_" and isinstance(getattr(model, name), np.ndarray)]
+    return [
+        name
+        for name in dir(model)
+        if name[0] != "_" and isinstance(getattr(model, name), np.ndarray)
+    ]
 
 
 def tried(source: Source, timeout: float) -> None:
-    """Compile a model in a child process within a timeout, s, unless this process has done so before."""
+    """Compile a model in a child process within a timeout, s, unless this process has done so
+    before.
+    """
     if source.sha256 in _tried:
         return
     with scratch() as folder, no_room():
@@ -236,8 +292,12 @@ def tried(source: Source, timeout: float) -> None:
         except OSError:  # this process may not start others
             return
         except guard.Failed as failed:
-            if failed.stage == "loading" or (failed.stage == "reading" and "plugin" in failed.fault):
-                return  # MuJoCo did not load, which is not the model's fault, or the user has loaded this plugin here
+            if failed.stage == "loading" or (
+                failed.stage == "reading" and "plugin" in failed.fault
+            ):
+                # MuJoCo did not load, which is not the model's fault, or the user has loaded this
+                # plugin here
+                return
             raise _complaint(source, failed, timeout) from None
     _tried.add(source.sha256)
 
@@ -245,7 +305,10 @@ def tried(source: Source, timeout: float) -> None:
 def _complaint(source: Source, failed: guard.Failed, timeout: float) -> ScenarioError:
     """Return the error for a model, from its trial."""
     names = {-known.value: known.name for known in signal.Signals}
-    cause = "" if failed.code is None else names.get(failed.code, f"exit code {failed.code}")
+    if failed.code is None:
+        cause = ""
+    else:
+        cause = names.get(failed.code, f"exit code {failed.code}")
     too_much = f"more than {guard.MAX_MEMORY / 2**30:g} GiB of memory"
     if cause == "SIGKILL" or re.search(r"unknown exception|bad_alloc|memory|allocat", failed.fault):
         return ScenarioError(f"{source.label} takes MuJoCo {too_much}: make it smaller")
@@ -254,7 +317,10 @@ def _complaint(source: Source, failed: guard.Failed, timeout: float) -> Scenario
     if not cause:
         slow = f"takes MuJoCo more than {timeout:g} s to compile"
         return ScenarioError(f"{source.label} {slow}: make it smaller, or give timeout=")
-    hint = too_much if cause == "SIGABRT" else "a model that attaches itself"
+    if cause == "SIGABRT":
+        hint = too_much
+    else:
+        hint = "a model that attaches itself"
     return ScenarioError(f"{source.label} ends MuJoCo with {cause}, as does {hint}: fix the model")
 
 
@@ -264,15 +330,21 @@ def broken(where: str, error: str) -> ScenarioError:
 
 
 def pick(label: str, kind: str, name: object, names: Sequence[str]) -> int:
-    """Return the index of a name among those of a model, or raise ScenarioError with the names that exist."""
+    """Return the index of a name among those of a model, or raise ScenarioError with the names that
+    exist.
+    """
     there = {known: i for i, known in enumerate(names) if known}
     if not there:
-        raise ScenarioError(f"unknown {kind} of {label} {shown(name)}: none has a name there, so give it one")
+        raise ScenarioError(
+            f"unknown {kind} of {label} {shown(name)}: none has a name there, so give it one"
+        )
     return find(f"{kind} of {label}", name, there)
 
 
 def digest(path: Path) -> str:
-    """Hash the file and every file that it names (includes, attached models, meshes, textures): SHA-256, 64 hex digits.
+    """Hash the file and every file that it names (includes, attached models, meshes, textures):
+
+    SHA-256, 64 hex digits.
 
     If a name fits files in several folders, all of them are hashed.
     """
@@ -282,11 +354,19 @@ def digest(path: Path) -> str:
         folders[text.parent] = None
         elements = _elements(text)
         names += _files(elements)
-        inner |= {element.get(name, ""): None for element in elements if element.tag == "compiler" for name in FOLDERS}
+        inner |= {
+            element.get(name, ""): None
+            for element in elements
+            if element.tag == "compiler"
+            for name in FOLDERS
+        }
         for place in [folder / sub / name for name in names for sub in inner for folder in folders]:
             if place.is_file() and place.resolve() not in files:
                 files[place.resolve()] = None
-                texts += [place] if place.suffix.lower() in XML else []
+                if place.suffix.lower() in XML:
+                    texts += [place]
+                else:
+                    texts += []
     return _sha256(file.read_bytes() for file in files)
 
 
@@ -305,23 +385,40 @@ def _elements(model: Path | str | bytes) -> list[ET.Element]:
 
 def _files(elements: Iterable[ET.Element]) -> list[str]:
     """Return the names of files in the attributes of elements."""
-    return [value for element in elements for key, value in element.attrib.items() if key.startswith("file")]
+    return [
+        value
+        for element in elements
+        for key, value in element.attrib.items()
+        if key.startswith("file")
+    ]
 
 
 def check_model(label: str, model: mujoco.MjModel) -> None:
-    """Raise ScenarioError for NaN, for numbers beyond MAX_PARAMETER, and for names that this package uses itself."""
+    """Raise ScenarioError for NaN, for numbers beyond MAX_PARAMETER, and for names that this
+    package uses itself.
+    """
     arrays = [(name, getattr(model, name)) for name in fields(model)]
-    arrays += [(f"opt.{name}", np.atleast_1d(getattr(model.opt, name))) for name in ("gravity", "wind", "density")]
+    arrays += [
+        (f"opt.{name}", np.atleast_1d(getattr(model.opt, name)))
+        for name in ("gravity", "wind", "density")
+    ]
     for field, values in arrays:
         if values.dtype.kind != "f" or any(part in field for part in UNUSED):
             continue
         endless = field.endswith("range")  # ranges may be infinite
-        wrong = np.isnan(values) if endless else ~(np.abs(values) <= MAX_PARAMETER)
+        if endless:
+            wrong = np.isnan(values)
+        else:
+            wrong = ~(np.abs(values) <= MAX_PARAMETER)
         if wrong.any():
             cure = f"give finite numbers of at most {MAX_PARAMETER:g} in its MJCF"
-            raise ScenarioError(f"{field}[{np.argwhere(wrong)[0][0]}] of {label} is {values[wrong][0]:g}: {cure}")
+            raise ScenarioError(
+                f"{field}[{np.argwhere(wrong)[0][0]}] of {label} is {values[wrong][0]:g}: {cure}"
+            )
     for name in [text.decode() for text in model.names.split(b"\0")]:
         for kind in RESERVED_KINDS if name.startswith(RESERVED) else ():
             if mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind}"), name) >= 0:
                 own = f"names that begin with {', '.join(RESERVED)} are smc_mujoco's own"
-                raise ScenarioError(f"{label} has a {kind.lower()} {name!r}, and {own}: give it another")
+                raise ScenarioError(
+                    f"{label} has a {kind.lower()} {name!r}, and {own}: give it another"
+                )

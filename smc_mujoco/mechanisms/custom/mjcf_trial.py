@@ -1,4 +1,5 @@
-"""Reading and compiling a model, and its first accelerations, in the process of `common.guard`, which it may crash.
+"""Reading and compiling a model, and its first accelerations, in the process of `common.guard`,
+which it may crash.
 
 It calls MuJoCo through ctypes, so that it takes some hundredths of a second.
 """
@@ -17,7 +18,10 @@ HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_char_p)
 
 
 def attempt(order: Mapping[str, Any], say: Callable) -> None:
-    """Try the model that an order describes: library, plugins, path or text with assets. `say` reports a stage."""
+    """Try the model that an order describes: library, plugins, path or text with assets.
+
+    `say` reports a stage.
+    """
 
     def fail(message: bytes | None) -> None:
         say(FAULT, *(message or b"").decode(errors="replace").split())
@@ -47,7 +51,9 @@ def attempt(order: Mapping[str, Any], say: Callable) -> None:
         for name, place in order["assets"].items():
             content = Path(place).read_bytes()
             library.mj_addBufferVFS(files, name.encode(), content, len(content))
-        spec = library.mj_parseXMLString(Path(order["text"]).read_bytes(), files, error, MESSAGE_SIZE)
+        spec = library.mj_parseXMLString(
+            Path(order["text"]).read_bytes(), files, error, MESSAGE_SIZE
+        )
     if not spec:
         fail(error.value)
     say("compiling")

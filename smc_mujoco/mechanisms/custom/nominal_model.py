@@ -1,26 +1,28 @@
-"""The nominal model of a user's own MJCF: f and g of every channel from MuJoCo itself, at the measured state.
+"""The nominal model of a user's own MJCF: f and g of every channel from MuJoCo itself, at the
+measured state.
 
-With M the mass matrix and tau what gravity, gyration, springs, dampers and the model's other actuators exert, MuJoCo's
-x'' = M^-1 (tau + u). The nominal model of channel i is
+With M the mass matrix and tau what gravity, gyration, springs, dampers and the model's other
+actuators exert, MuJoCo's x'' = M^-1 (tau + u). The nominal model of channel i is
 
     x_i'' = f_i + g_i u_i,    g_i = (M^-1)_ii,    f_i = (M^-1 tau)_i + sum over j != i of (M^-1)_ij u_j,
 
-with u_j the latest command of channel j: that of this sample for j < i, that of the sample before for j > i. The laws
-of the channels run one after the other, so each sample is one Gauss-Seidel sweep on the equations of all channels. The
-sweeps converge for every positive definite M. A joint q without an actuator that moves with channel i has g =
-(M^-1)_qi.
+with u_j the latest command of channel j: that of this sample for j < i, that of the sample before
+for j > i. The laws of the channels run one after the other, so each sample is one Gauss-Seidel
+sweep on the equations of all channels. The sweeps converge for every positive definite M. A joint q
+without an actuator that moves with channel i has g = (M^-1)_qi.
 
-The compiled path calls MuJoCo's own functions by name, with a copy of the model that has the nominal parameters and
-an mjData for each simulation.
+The compiled path calls MuJoCo's own functions by name, with a copy of the model that has the
+nominal parameters and an mjData for each simulation.
 
 Laws of many joints see the mechanism as a whole instead,
 
     M x'' + h = u,    h = qfrc_bias - qfrc_passive - qfrc_actuator at ctrl = 0,    g = h at v = 0,
 
-and C(x, v) w = (qfrc_bias(x, v + w) - qfrc_bias(x, v - w)) / 4: gravity cancels, and the rest is quadratic in v.
+and C(x, v) w = (qfrc_bias(x, v + w) - qfrc_bias(x, v - w)) / 4: gravity cancels, and the rest is
+quadratic in v.
 
-Constraints are left out: contacts, limits, dry friction. Joints that are not measured, all in other kinematic
-trees, are assumed to be in the model's initial state.
+Constraints are left out: contacts, limits, dry friction. Joints that are not measured, all in other
+kinematic trees, are assumed to be in the model's initial state.
 """
 
 import contextlib
@@ -46,21 +48,63 @@ from smc_mujoco.common.jit import Function, floats, pointer, record_at
 from smc_mujoco.common.process import free_after_fork
 from smc_mujoco.mechanisms import plant, rotation
 from smc_mujoco.mechanisms.hardware.part import dof_ids, drive_ids, free_joint, joint_ids
-from smc_mujoco.mechanisms.plant import SEEN, Dynamics, Field, Native, Values, compiled_for_runs, write
+from smc_mujoco.mechanisms.plant import (
+    SEEN,
+    Dynamics,
+    Field,
+    Native,
+    Values,
+    compiled_for_runs,
+    write,
+)
 
 _DISABLED = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT.value | mujoco.mjtDisableBit.mjDSBL_CONTACT.value
-# Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom; addresses of model and
-# data, of their arrays, and of arrays of this simulation's own: the channels' places, the state that was evaluated, a
-# unit force and its acceleration.
+# Parameters of the C functions: numbers of channels, of driven ones and of degrees of freedom;
+# addresses of model and data, of their arrays, and of arrays of this simulation's own: the
+# channels' places, the state that was evaluated, a unit force and its acceleration.
 NOMINAL = floats(
-    ("n", "driven", "nv", "model", "data", "qpos", "qvel", "ctrl", "acceleration", "places", "x", "v", "unit", "moved")
+    (
+        "n",
+        "driven",
+        "nv",
+        "model",
+        "data",
+        "qpos",
+        "qvel",
+        "ctrl",
+        "acceleration",
+        "places",
+        "x",
+        "v",
+        "unit",
+        "moved",
+    )
 )
-# The same for M, h and g; then the tip's site or -1, whether h is of passive forces alone, and whether to compute g.
+# The same for M, h and g; then the tip's site or -1, whether h is of passive forces alone, and
+# whether to compute g.
 DYNAMICS = floats(
-    ("n", "nv", "model", "data", "qpos", "qvel", "bias", "passive", "actuator", "places", "dense", "v", "moves",
-     "site", "alone", "at_rest", "quaternion")
-)  # fmt: skip
-# Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels come first.
+    (
+        "n",
+        "nv",
+        "model",
+        "data",
+        "qpos",
+        "qvel",
+        "bias",
+        "passive",
+        "actuator",
+        "places",
+        "dense",
+        "v",
+        "moves",
+        "site",
+        "alone",
+        "at_rest",
+        "quaternion",
+    )
+)
+# Indices of a channel in qpos, qvel and ctrl; the last is -1 without an actuator. Driven channels
+# come first.
 PLACE = np.dtype([(name, "i8") for name in ("qpos", "qvel", "ctrl")])
 nominal_at, dynamics_at, seen_at, place_at = map(record_at, (NOMINAL, DYNAMICS, SEEN, PLACE))
 _SLEEP = mujoco.mjtEnableBit.mjENBL_SLEEP.value
@@ -70,7 +114,9 @@ free_after_fork(_lock)
 
 @dataclasses.dataclass(frozen=True)
 class NominalModel:
-    """The nominal model of a user's plant: f and g computed by MuJoCo from the model without mismatch."""
+    """The nominal model of a user's plant: f and g computed by MuJoCo from the model without
+    mismatch.
+    """
 
     build: Callable[[int], mujoco.MjSpec]
     fields: Callable[[mujoco.MjModel, Values], Iterator[Field]]
@@ -82,7 +128,10 @@ class NominalModel:
         with self._placed(x, p) as (model, places, data):
             data.qvel[places["qvel"]], ctrl = v, driven(places)
             j = i % len(ctrl)  # the driven channel that moves channel i
-            data.ctrl[ctrl] = 0.0 if u is None else np.asarray(u)[: len(ctrl)]
+            if u is None:
+                data.ctrl[ctrl] = 0.0
+            else:
+                data.ctrl[ctrl] = np.asarray(u)[: len(ctrl)]
             data.ctrl[ctrl[j]] = 0.0
             mujoco.mj_fwdVelocity(model, data)
             mujoco.mj_fwdActuation(model, data)
@@ -94,8 +143,12 @@ class NominalModel:
             return float(data.qacc_smooth[dof]), float(moved[0, dof])
 
     @contextlib.contextmanager
-    def _placed(self, x: np.ndarray, p: Any) -> Iterator[tuple[mujoco.MjModel, np.ndarray, mujoco.MjData]]:
-        """Yield the model, its channels' indices and an mjData at rest at positions x, which no other thread has."""
+    def _placed(
+        self, x: np.ndarray, p: Any
+    ) -> Iterator[tuple[mujoco.MjModel, np.ndarray, mujoco.MjData]]:
+        """Yield the model, its channels' indices and an mjData at rest at positions x, which no
+        other thread has.
+        """
         model, places, data, _ = prepared(self, frozen(vars(p)))
         with _lock:
             data.qpos[:], data.qvel[:], data.ctrl[:] = model.qpos0, 0.0, 0.0
@@ -109,17 +162,27 @@ class NominalModel:
     def native(self, parameters: Mapping[str, float]) -> Native:
         """Return the C function, and the addresses of one simulation's model, data and arrays."""
         model, places, borrowed = self._borrow(parameters)
-        data, seen, solved = borrowed.data, np.full((2, len(places)), np.nan), np.zeros((2, model.nv))
+        data, seen, solved = (
+            borrowed.data,
+            np.full((2, len(places)), np.nan),
+            np.zeros((2, model.nv)),
+        )
         arrays = data.qpos, data.qvel, data.ctrl, data.qacc_smooth, places, *seen, *solved
         addresses = (model._address, data._address, *(array.ctypes.data for array in arrays))
         sizes = len(places), len(driven(places)), model.nv
-        return Native(native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays))
+        return Native(
+            native().address, tuple(map(float, (*sizes, *addresses))), (model, borrowed, *arrays)
+        )
 
-    def _borrow(self, parameters: Mapping[str, float]) -> "tuple[mujoco.MjModel, np.ndarray, BorrowedData]":
+    def _borrow(
+        self, parameters: Mapping[str, float]
+    ) -> "tuple[mujoco.MjModel, np.ndarray, BorrowedData]":
         """Return the model, its channels' indices, and an mjData for one simulation."""
         model, places, _, spare = prepared(self, frozen(parameters))
         try:
-            data = spare.pop()  # used before, but a simulation writes every field before it reads it
+            data = (
+                spare.pop()
+            )  # used before, but a simulation writes every field before it reads it
         except IndexError:
             data = mujoco.MjData(model)
         return model, places, BorrowedData(data, spare)
@@ -133,7 +196,9 @@ class NominalModel:
                 data.qvel[places["qvel"]] = velocity
                 mujoco.mj_fwdVelocity(model, data)
                 mujoco.mj_fwdActuation(model, data)
-                forces[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[places["qvel"]]
+                forces[name] = (data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator)[
+                    places["qvel"]
+                ]
         return Dynamics(dense[np.ix_(places["qvel"], places["qvel"])], forces["h"], forces["g"])
 
     def coriolis(self, x: np.ndarray, v: np.ndarray, w: np.ndarray, p: Any) -> np.ndarray:
@@ -153,8 +218,13 @@ class NominalModel:
             mujoco.mj_jacSite(model, data, rows, None, model.site(tip).id)
         return rows[:, places["qvel"]]
 
-    def native_dynamics(self, parameters: Mapping[str, float], tip: str, at_rest: bool = True) -> Native:
-        """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest. The tip is a site or ""."""
+    def native_dynamics(
+        self, parameters: Mapping[str, float], tip: str, at_rest: bool = True
+    ) -> Native:
+        """Return the C function of `dynamics` for one simulation; g is NaN unless at_rest.
+
+        The tip is a site or "".
+        """
         model, places, borrowed = self._borrow(parameters)
         data = borrowed.data
         data.ctrl[:] = data.qfrc_actuator[:] = 0.0
@@ -166,12 +236,17 @@ class NominalModel:
         values = (len(places), model.nv, *addresses, site, passive_alone(model), at_rest)
         free = free_joint(model)
         values += (model.jnt_qposadr[free] + 3 if free >= 0 else -1,)
-        return Native(native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays))
+        return Native(
+            native_dynamics().address, tuple(map(float, values)), (model, borrowed, *arrays)
+        )
 
 
 @dataclasses.dataclass(eq=False)
 class BorrowedData:
-    """An MjData borrowed from a pool, to which it returns when this is deleted. A new one costs a run 0.7 ms."""
+    """An MjData borrowed from a pool, to which it returns when this is deleted.
+
+    A new one costs a run 0.7 ms.
+    """
 
     data: mujoco.MjData
     spare: list[mujoco.MjData]
@@ -184,7 +259,9 @@ class BorrowedData:
 def prepared(
     nominal: NominalModel, parameters: Mapping[str, float]
 ) -> tuple[mujoco.MjModel, np.ndarray, mujoco.MjData, list[mujoco.MjData]]:
-    """Return the model with nominal parameters, its channels' indices, an MjData for Python, and the pool."""
+    """Return the model with nominal parameters, its channels' indices, an MjData for Python, and
+    the pool.
+    """
     model = compiled_for_runs(nominal.build(0), 0)
     model.opt.disableflags |= _DISABLED
     model.opt.enableflags &= ~_SLEEP
@@ -192,7 +269,9 @@ def prepared(
     data = mujoco.MjData(model)
     mujoco.mj_setConst(model, data)
     mujoco.mj_resetData(model, data)
-    data.warning.number[:] = 1  # MuJoCo tells only the first; telling it inside a control callback would never end
+    data.warning.number[:] = (
+        1  # MuJoCo tells only the first; telling it inside a control callback would never end
+    )
     joints = joint_ids(model)
     ctrl, places = model.actuator_ctrladr[drive_ids(model)], np.full(len(joints), -1, PLACE)
     places["qpos"], places["qvel"] = model.jnt_qposadr[joints], dof_ids(model)
@@ -208,23 +287,30 @@ def driven(places: np.ndarray) -> np.ndarray:
 
 
 def _mujoco(name: str, more: int = 0) -> Callable:
-    """Return a function of MuJoCo's library for compiled code. It takes the addresses of model, data and `more`.
+    """Return a function of MuJoCo's library for compiled code.
 
-    Compiled code has its name, not its address, so that another process can load the code from the disk.
+    It takes the addresses of model, data and `more`.
+
+    Compiled code has its name, not its address, so that another process can load the code from the
+    disk.
     """
     binding.add_symbol(name, ctypes.cast(libmujoco.library()[name], ctypes.c_void_p).value)
     return types.ExternalFunction(name, types.void(*[types.int64] * (2 + more)))
 
 
 def _on_disk(native: Callable) -> Function:
-    """Return a C function of this file, kept on disk under a hash of the sources that it is made of."""
+    """Return a C function of this file, kept on disk under a hash of the sources that it is made
+    of.
+    """
     modules = sys.modules[__name__], jit, plant, rotation
     sources = b"".join(Path(str(module.__file__)).read_bytes() for module in modules)
     return Function(native, ("nominal-model", hashlib.sha256(sources).hexdigest()))
 
 
 def passive_alone(model: mujoco.MjModel) -> bool:
-    """Return whether h is of inertia and passive forces alone: without tendons, and actuators that act at ctrl = 0."""
+    """Return whether h is of inertia and passive forces alone: without tendons, and actuators that
+    act at ctrl = 0.
+    """
     moving = model.actuator_dyntype != mujoco.mjtDyn.mjDYN_NONE.value
     biased = model.actuator_biastype != mujoco.mjtBias.mjBIAS_NONE.value
     return not (np.any(moving | biased) or model.ntendon or np.any(model.jnt_actgravcomp))
@@ -232,14 +318,22 @@ def passive_alone(model: mujoco.MjModel) -> bool:
 
 @functools.cache
 def native_dynamics() -> Function:
-    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN. Without `at_rest` g is NaN.
+    """Return the C function of M (n, n), h and g, (n,) each, from a record SEEN.
 
-    If h is of passive forces alone, it computes no more than M and h need. With that and without g, it takes a law on
-    the Panda three quarters of the time.
+    Without `at_rest` g is NaN.
+
+    If h is of passive forces alone, it computes no more than M and h need. With that and without g,
+    it takes a law on the Panda three quarters of the time.
     """
-    positions, velocities, actuation = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation"))
+    positions, velocities, actuation = map(
+        _mujoco, ("mj_fwdPosition", "mj_fwdVelocity", "mj_fwdActuation")
+    )
     kinematics, centres, inertia = map(_mujoco, ("mj_kinematics", "mj_comPos", "mj_makeM"))
-    rates, passives, newton_euler = _mujoco("mj_comVel"), _mujoco("mj_passive"), _mujoco("mj_rne", 2)
+    rates, passives, newton_euler = (
+        _mujoco("mj_comVel"),
+        _mujoco("mj_passive"),
+        _mujoco("mj_rne", 2),
+    )
     full = _mujoco("mj_fullM", 1)
 
     def native(y, p, m, out):
@@ -247,15 +341,27 @@ def native_dynamics() -> Function:
         n, nv, model, data = int(at.n), int(at.nv), int(at.model), int(at.data)
         x, v, kept, places = pointer(read.x), pointer(read.v), pointer(int(at.v)), int(at.places)
         qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (nv,))
-        bias, passive = carray(pointer(int(at.bias)), (nv,)), carray(pointer(int(at.passive)), (nv,))
-        actuator, dense = carray(pointer(int(at.actuator)), (nv,)), carray(pointer(int(at.dense)), (nv, nv))
-        M, h, g = carray(pointer(out), (n, n)), pointer(out + 8 * n * n), pointer(out + 8 * (n * n + n))
+        bias, passive = (
+            carray(pointer(int(at.bias)), (nv,)),
+            carray(pointer(int(at.passive)), (nv,)),
+        )
+        actuator, dense = (
+            carray(pointer(int(at.actuator)), (nv,)),
+            carray(pointer(int(at.dense)), (nv, nv)),
+        )
+        M, h, g = (
+            carray(pointer(out), (n, n)),
+            pointer(out + 8 * n * n),
+            pointer(out + 8 * (n * n + n)),
+        )
         for j in range(n):
             kept[j] = v[j]
             qpos[place_at(places, j).qpos] = x[j]
         if at.quaternion >= 0.0:
             first = int(at.quaternion)
-            qpos[first], qpos[first + 1], qpos[first + 2], qpos[first + 3] = rotation.quaternion(x[3], x[4], x[5])
+            qpos[first], qpos[first + 1], qpos[first + 2], qpos[first + 3] = rotation.quaternion(
+                x[3], x[4], x[5]
+            )
         if at.alone != 0.0:
             kinematics(model, data)
             centres(model, data)
@@ -268,7 +374,9 @@ def native_dynamics() -> Function:
                 M[i, j] = dense[place_at(places, i).qvel, place_at(places, j).qvel]
         for j in range(n):
             g[j] = math.nan
-        for part in range(0 if at.at_rest else 1, 2):  # g, then h, so that the last velocities are those of the sample
+        for part in range(
+            0 if at.at_rest else 1, 2
+        ):  # g, then h, so that the last velocities are those of the sample
             for j in range(n):
                 qvel[place_at(places, j).qvel] = part * v[j]
             if at.alone != 0.0:
@@ -289,8 +397,15 @@ def native_dynamics() -> Function:
 
 @functools.cache
 def native_coriolis() -> Function:
-    """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`. Its input is w, (n,)."""
-    rates, newton_euler, velocities = _mujoco("mj_comVel"), _mujoco("mj_rne", 2), _mujoco("mj_fwdVelocity")
+    """Return the C function of C(x, v) w, at the state of the last call of `native_dynamics`.
+
+    Its input is w, (n,).
+    """
+    rates, newton_euler, velocities = (
+        _mujoco("mj_comVel"),
+        _mujoco("mj_rne", 2),
+        _mujoco("mj_fwdVelocity"),
+    )
 
     def native(y, p, m, out):
         at = dynamics_at(p, 0)
@@ -318,7 +433,9 @@ def native_coriolis() -> Function:
 
 @functools.cache
 def native_jacobian() -> Function:
-    """Return the C function of the tip's Jacobian, (3, n), at the state of the last call of `native_dynamics`."""
+    """Return the C function of the tip's Jacobian, (3, n), at the state of the last call of
+    `native_dynamics`.
+    """
     of_site = _mujoco("mj_jacSite", 3)
 
     def native(y, p, m, out):
@@ -338,22 +455,35 @@ def native_jacobian() -> Function:
 
 @functools.cache
 def native() -> Function:
-    """Return the C function of the nominal model. Its input is a record SEEN, its outputs are f and g of channel i."""
+    """Return the C function of the nominal model.
+
+    Its input is a record SEEN, its outputs are f and g of channel i.
+    """
     positions, velocities = map(_mujoco, ("mj_fwdPosition", "mj_fwdVelocity"))
-    actuation, accelerations, solve = map(_mujoco, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3))
+    actuation, accelerations, solve = map(
+        _mujoco, ("mj_fwdActuation", "mj_fwdAcceleration", "mj_solveM"), (0, 0, 3)
+    )
 
     def native(y, p, m, out):
         read, at = seen_at(y, 0), nominal_at(p, 0)
         i, n, driven, nv = read.i, int(at.n), int(at.driven), int(at.nv)
         x, v, u = pointer(read.x), pointer(read.v), pointer(read.u)
         model, data, places = int(at.model), int(at.data), int(at.places)
-        qpos, qvel = carray(pointer(int(at.qpos)), (1 << 40,)), carray(pointer(int(at.qvel)), (1 << 40,))
-        ctrl, qacc = carray(pointer(int(at.ctrl)), (1 << 40,)), carray(pointer(int(at.acceleration)), (nv,))
+        qpos, qvel = (
+            carray(pointer(int(at.qpos)), (1 << 40,)),
+            carray(pointer(int(at.qvel)), (1 << 40,)),
+        )
+        ctrl, qacc = (
+            carray(pointer(int(at.ctrl)), (1 << 40,)),
+            carray(pointer(int(at.acceleration)), (nv,)),
+        )
         last_x, last_v = carray(pointer(int(at.x)), (n,)), carray(pointer(int(at.v)), (n,))
         unit, moved = carray(pointer(int(at.unit)), (nv,)), carray(pointer(int(at.moved)), (nv,))
         fresh = False
         for j in range(n):
-            if last_x[j] != x[j] or last_v[j] != v[j]:  # NaN, the initial value, differs from everything
+            if (
+                last_x[j] != x[j] or last_v[j] != v[j]
+            ):  # NaN, the initial value, differs from everything
                 fresh, last_x[j], last_v[j] = True, x[j], v[j]
         if fresh:  # the first channel of a sample; the others have the same state
             for j in range(n):
@@ -361,7 +491,10 @@ def native() -> Function:
             positions(model, data)
             velocities(model, data)
         for j in range(driven):
-            ctrl[place_at(places, j).ctrl] = 0.0 if j == i % driven else u[j]
+            if j == i % driven:
+                ctrl[place_at(places, j).ctrl] = 0.0
+            else:
+                ctrl[place_at(places, j).ctrl] = u[j]
         actuation(model, data)
         accelerations(model, data)
         for j in range(nv):

@@ -1,14 +1,17 @@
-"""A plant from any MJCF: the user names the joints that are its channels, and the model supplies the rest.
+"""A plant from any MJCF: the user names the joints that are its channels, and the model supplies
+the rest.
 
     arm = smc.plant_from("arm.xml", channels=["shoulder", "elbow"])
-    trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0), model="nominal"))
+    trace = smc.run(smc.Scenario(plant=arm, law=smc.law("computed_torque", kp=100.0, kd=20.0),
+    model="nominal"))
 
-A channel's command u is the force on its joint, N m or N. Its motor gets gear 1. |u| is bounded by the scenario's u_max
-and by what the motor's ranges and the joint's actuatorfrcrange allow in both directions; a law reads the bound in
-y.limit. The model's sensors are replaced by a position and a velocity sensor per channel. Other actuators stay at ctrl
-= 0, and joints without a channel move as the model says. Integrator, step and initial state are the scenario's.
-Disturbances act on the joints themselves. The parameters are m in kg, the mass of all that moves, which scales all
-masses and inertias, and grav in m/s^2.
+A channel's command u is the force on its joint, N m or N. Its motor gets gear 1. |u| is bounded by
+the scenario's u_max and by what the motor's ranges and the joint's actuatorfrcrange allow in both
+directions; a law reads the bound in y.limit. The model's sensors are replaced by a position and a
+velocity sensor per channel. Other actuators stay at ctrl = 0, and joints without a channel move as
+the model says. Integrator, step and initial state are the scenario's. Disturbances act on the
+joints themselves. The parameters are m in kg, the mass of all that moves, which scales all masses
+and inertias, and grav in m/s^2.
 """
 
 import base64
@@ -39,7 +42,9 @@ if TYPE_CHECKING:
 UNNAMED = mujoco.MjSpec().modelname  # name of a model whose file gives none
 SENSORS = mujoco.mjtDisableBit.mjDSBL_SENSOR.value
 WITHOUT_MODEL = "give a law without a model"
-DCMOTOR = mujoco.mjtDyn.mjDYN_DCMOTOR.value  # dynamics of an actuator whose state changes even at ctrl = 0
+DCMOTOR = (
+    mujoco.mjtDyn.mjDYN_DCMOTOR.value
+)  # dynamics of an actuator whose state changes even at ctrl = 0
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,20 +56,35 @@ class UserModel:
     channels: Pairs
     motors: tuple[Motor, ...]
     tip: str = ""
-    thrusters: tuple[int, ...] = ()  # indices of the actuators of a free joint, which is then the only channel
+    thrusters: tuple[
+        int, ...
+    ] = ()  # indices of the actuators of a free joint, which is then the only channel
 
     def __call__(self, n: int) -> mujoco.MjSpec:
         """Return the model with a motor and two sensors per channel."""
         spec = self.source.read()
-        while named := [*spec.tuples, *spec.sensors]:  # tuples may name sensors and motors that are deleted
-            spec.delete(named[0])  # MuJoCo 4 also deletes the tuples that name it, so list them again
+        while named := [
+            *spec.tuples,
+            *spec.sensors,
+        ]:  # tuples may name sensors and motors that are deleted
+            spec.delete(
+                named[0]
+            )  # MuJoCo 4 also deletes the tuples that name it, so list them again
         if self.thrusters:
             own.add_pose(spec, self.channels[0][0], self.thrusters)
         else:
             own.add_motors(spec, self.motors)
         for joint in () if self.thrusters else own.joints_of(self.channels):
-            for letter, kind in (("x", mujoco.mjtSensor.mjSENS_JOINTPOS), ("v", mujoco.mjtSensor.mjSENS_JOINTVEL)):
-                spec.add_sensor(name=f"{letter}:{joint}", type=kind, objtype=mujoco.mjtObj.mjOBJ_JOINT, objname=joint)
+            for letter, kind in (
+                ("x", mujoco.mjtSensor.mjSENS_JOINTPOS),
+                ("v", mujoco.mjtSensor.mjSENS_JOINTVEL),
+            ):
+                spec.add_sensor(
+                    name=f"{letter}:{joint}",
+                    type=kind,
+                    objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                    objname=joint,
+                )
         for key in list(spec.keys):
             if key.name != self.keyframe or self.keyframe is None:
                 spec.delete(key)
@@ -77,31 +97,46 @@ class UserModel:
     @property
     def argument(self) -> str:
         """The model as written on the command line, such as arm.xml:shoulder+elbow@home."""
-        path = os.path.relpath(self.source.path) if self.source.path else "FILE.xml"
+        if self.source.path:
+            path = os.path.relpath(self.source.path)
+        else:
+            path = "FILE.xml"
         joints = "+".join(own.as_text(joint, channel) for joint, channel in self.channels)
         return f"{path}:{joints}{'' if self.keyframe is None else '@' + self.keyframe}"
 
     def about(self) -> dict:
         """Return the arguments with which `restored` makes this plant again, as plain data."""
         channels = {joint: dataclasses.asdict(channel) for joint, channel in self.channels}
-        data = {"path": self.source.path, "sha256": self.source.sha256, "keyframe": self.keyframe, "channels": channels}
+        data = {
+            "path": self.source.path,
+            "sha256": self.source.sha256,
+            "keyframe": self.keyframe,
+            "channels": channels,
+        }
         data |= {"tip": self.tip} if self.tip else {}
         if not self.source.path:
-            assets = {name: base64.b64encode(content).decode() for name, content in self.source.assets}
+            assets = {}
+            for name, content in self.source.assets:
+                assets[name] = base64.b64encode(content).decode()
             data |= {"text": self.source.text, "assets": assets}
         return data
 
 
 @dataclasses.dataclass(frozen=True)
 class UserFields:
-    """The fields that m and grav set: Plant.fields. They scale all masses and inertias, and gravity."""
+    """The fields that m and grav set:
+
+    Plant.fields. They scale all masses and inertias, and gravity.
+    """
 
     mass: float
     gravity: float
 
     def __call__(self, model, p):
         scale = np.ones(model.nbody)
-        scale[[not model.body(i).name.startswith(ROTOR) for i in range(model.nbody)]] = p.m / self.mass
+        scale[[not model.body(i).name.startswith(ROTOR) for i in range(model.nbody)]] = (
+            p.m / self.mass
+        )
         yield Field("body_mass", slice(None), model.body_mass * scale)
         yield Field("body_inertia", slice(None), model.body_inertia * scale[:, None])
         if self.gravity:
@@ -121,40 +156,50 @@ def plant_from(
     """Make a plant of an MJCF model.
 
     Args:
-      path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a mjcf.RootElement of dm_control.
-      channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of joints' names. The
-        plant's channels have the same order. A free joint without a name has that of its body.
-      name: name of the plant, and title of its pictures; default: the file's, with the model's own name as the title.
-      keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0. Runs start at rest,
-        unless the scenario has a v0.
+      path: of an MJCF file; or the model itself: its text, an MjSpec as it is now, or a
+        mjcf.RootElement of dm_control.
+      channels: joint -> Channel, a dict of its fields, or None for the defaults; or a list of
+        joints' names. The plant's channels have the same order. A free joint without a name has
+        that of its body.
+      name: name of the plant, and title of its pictures; default: the file's, with the model's own
+        name as the title.
+      keyframe: name of the model's keyframe with the initial positions; default: the model's qpos0.
+        Runs start at rest, unless the scenario has a v0.
       assets: name -> content of the files that a text names, bytes or text.
-      tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many joints may read its
-        Jacobian.
+      tip: name of the site that films trace and `smc.metrics.tip_scores` scores; laws of many
+        joints may read its Jacobian.
       timeout: s that MuJoCo may take to compile the model, first in a child process.
 
     Raises:
-      ScenarioError: a model that cannot be read, crashes MuJoCo, or takes more time or memory (4 GiB) than allowed; a
-        number in it that is NaN, infinite or beyond 1e15; an unknown or unsuitable joint, actuator or keyframe; or an
-        x0 outside its joint's range.
+      ScenarioError: a model that cannot be read, crashes MuJoCo, or takes more time or memory (4
+        GiB) than allowed; a number in it that is NaN, infinite or beyond 1e15; an unknown or
+        unsuitable joint, actuator or keyframe; or an x0 outside its joint's range.
 
-    A scenario may have model="nominal" if every joint that moves with the channels is a channel or a partner, and no
-    equality constraint acts; `plant.unmodelled` says why not. Films show the model in its own colours; those of
-    several laws are mixed with the laws' colours.
+    A scenario may have model="nominal" if every joint that moves with the channels is a channel or
+    a partner, and no equality constraint acts; `plant.unmodelled` says why not. Films show the
+    model in its own colours; those of several laws are mixed with the laws' colours.
     """
     source = mjcf.source(path, assets)
     mjcf.tried(source, timeout)
-    if name is not None and catalogue().taken(errors.name("name", name)):  # laws and gains refer to plants by name
+    if name is not None and catalogue().taken(
+        errors.name("name", name)
+    ):  # laws and gains refer to plants by name
         raise ScenarioError(f"name is {shown(name)}: give one that is none of smc.plants()")
     return _plant(source, own.coerce(channels), name, keyframe, tip)
 
 
-def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None, tip: str | None) -> Plant:
+def _plant(
+    source: Source, pairs: Pairs, name: str | None, keyframe: str | None, tip: str | None
+) -> Plant:
     """Return the plant of a model, see `plant_from`."""
     label, spec = source.label, source.read()
     model, title = source.compiled(spec), spec.modelname
     mjcf.check_model(label, model)
     scenarios = own.suggested(pairs)
-    pairs = tuple((joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED))) for joint, channel in pairs)
+    pairs = tuple(
+        (joint, dataclasses.replace(channel, **dict.fromkeys(own.SUGGESTED)))
+        for joint, channel in pairs
+    )
     joints = own.joints_of(pairs)
     own.check(label, model, pairs)
     if keyframe is not None:
@@ -162,25 +207,43 @@ def _plant(source: Source, pairs: Pairs, name: str | None, keyframe: str | None,
     if tip is not None:
         mjcf.pick(label, "site", tip, [model.site(i).name for i in range(model.nsite)])
     pose = own.is_free(model, joints[0])
-    motors = () if pose else tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
-    thrusters = tuple(own.thrusters(model, joints[0])) if pose else ()
+    if pose:
+        motors = ()
+    else:
+        motors = tuple(own.motor_of(label, model, joint, channel) for joint, channel in pairs)
+    if pose:
+        thrusters = tuple(own.thrusters(model, joints[0]))
+    else:
+        thrusters = ()
     build = UserModel(source, keyframe, pairs, motors, tip or "", thrusters)
     mass = float(model.body_mass[model.body_weldid != 0].sum())
     gravity = float(np.linalg.norm(model.opt.gravity))
     fields, limits = UserFields(mass, gravity), tuple(motor.limit for motor in motors)
     if pose and (tip or scenarios):
-        cure = "leave the tip out" if tip else f"give {', '.join(scenarios)} to the scenario"
+        if tip:
+            cure = "leave the tip out"
+        else:
+            cure = f"give {', '.join(scenarios)} to the scenario"
         raise ScenarioError(f"joint {joints[0]!r} of {label} is a free joint: {cure}")
     if pose:
         limits = own.reach_of(label, model, joints[0])
     kinds = [mujoco.mjtJoint(model.joint(joint).type[0]) for joint in joints]
-    units = ("m",) * 3 + ("rad",) * 3 if pose else tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
+    if pose:
+        units = ("m",) * 3 + ("rad",) * 3
+    else:
+        units = tuple(own.UNIT_OF_JOINT[kind] for kind in kinds)
     why_not, file = missing(model, joints, motors), label.removesuffix(".xml")
     file = label if catalogue().taken(file) else file  # a plant of the library has this name
     plant_name = file if name is None else name
-    start, checked = ({}, []) if pose else own.starts(model, joints, pairs, keyframe)
+    if pose:
+        start, checked = ({}, [])
+    else:
+        start, checked = own.starts(model, joints, pairs, keyframe)
     check_ranges(plant_name, checked, [start[joint] for joint, _, _ in checked])
-    x0 = own.pose_at_start(model, joints[0], keyframe) if pose else tuple(start.values())
+    if pose:
+        x0 = own.pose_at_start(model, joints[0], keyframe)
+    else:
+        x0 = tuple(start.values())
     return Plant(
         name=plant_name,
         parameters={"m": mass} | ({"grav": gravity} if gravity else {}),
@@ -214,7 +277,9 @@ def without_model(x, v, i, p):
 
 
 def smooth(model: mujoco.MjModel) -> bool:
-    """Return whether the model can have no constraint: no limits, dry friction, contacts or equalities."""
+    """Return whether the model can have no constraint: no limits, dry friction, contacts or
+    equalities.
+    """
     flags = mujoco.mjtDisableBit
     if model.opt.disableflags & flags.mjDSBL_CONSTRAINT.value:
         return True
@@ -232,22 +297,39 @@ def smooth(model: mujoco.MjModel) -> bool:
 def missing(model: mujoco.MjModel, joints: list[str], motors: tuple[Motor, ...]) -> str:
     """Return why there is no nominal model of the channels, or ""."""
     if np.any(model.eq_active0):
-        return "equality constraints hold its joints together, and a nominal model has none: " + WITHOUT_MODEL
+        return (
+            "equality constraints hold its joints together, and a nominal model has none: "
+            + WITHOUT_MODEL
+        )
     if model.nplugin or model.nflex:
         return "it has plugins or flexible bodies: " + WITHOUT_MODEL
-    channel_dofs = [dof for dof in range(model.nv) if model.joint(int(model.dof_jntid[dof])).name in joints]
+    channel_dofs = []
+    for dof in range(model.nv):
+        if model.joint(int(model.dof_jntid[dof])).name in joints:
+            channel_dofs.append(dof)
     idle = np.ones(model.nactuator, bool)
     if own.is_free(model, joints[0]):
         idle[own.thrusters(model, joints[0])] = False
     idle[[actuator for motor in motors for actuator in motor.replaced]] = False
     if np.any(model.actuator_dyntype[idle] == DCMOTOR):
-        return "a dcmotor among its other actuators has a current that is not measured: " + WITHOUT_MODEL
-    across = model.ntendon or np.any(~np.isin(model.actuator_trntype[idle], own.ONE_JOINT))  # may couple trees
-    near = range(model.nv) if across else np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))
+        return (
+            "a dcmotor among its other actuators has a current that is not measured: "
+            + WITHOUT_MODEL
+        )
+    across = model.ntendon or np.any(
+        ~np.isin(model.actuator_trntype[idle], own.ONE_JOINT)
+    )  # may couple trees
+    if across:
+        near = range(model.nv)
+    else:
+        near = np.flatnonzero(np.isin(model.dof_treeid, model.dof_treeid[channel_dofs]))
     loose = [model.joint(model.dof_jntid[dof]) for dof in near if dof not in channel_dofs]
     if not loose:
         return ""
-    named = f"joint {loose[0].name!r}" if loose[0].name else "a joint without a name"
+    if loose[0].name:
+        named = f"joint {loose[0].name!r}"
+    else:
+        named = "a joint without a name"
     cure = "make it a channel, or the partner of one if nothing drives it"
     return f"{named} moves with its channels and is not measured: {cure}, or {WITHOUT_MODEL}"
 
@@ -263,5 +345,7 @@ def restored(data: Mapping, name: str) -> Plant:
             raise ScenarioError(f"its model {model} is not there: put it back")
         source = mjcf.source(model)
         if source.sha256 != data["sha256"]:
-            raise ScenarioError(f"its model {model}, or a file that it names, has changed since the run: put it back")
+            raise ScenarioError(
+                f"its model {model}, or a file that it names, has changed since the run: put it back"
+            )
     return _plant(source, own.coerce(data["channels"]), name, data["keyframe"], data.get("tip"))

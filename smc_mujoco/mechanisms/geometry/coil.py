@@ -1,4 +1,7 @@
-"""Drawings of springs and dampers: a helix of wire or a tube whose ends follow two bodies. No mass, no force."""
+"""Drawings of springs and dampers: a helix of wire or a tube whose ends follow two bodies.
+
+No mass, no force.
+"""
 
 import numpy as np
 
@@ -9,8 +12,9 @@ STEPS_PER_TURN = 12  # of the wire
 def draw(spec, name, start, end, *, radius, turns, wire, material):
     """Add a coil spring of whole turns to spec, as the skin `name`; radii of coil and wire in m.
 
-    start, end: (body, position of the body, position of the wire's end), metres in the world with every joint at 0. A
-    point at s in [0, 1] between them follows the bodies with weights 1 - s and s, so the coil stretches evenly.
+    start, end: (body, position of the body, position of the wire's end), metres in the world with
+    every joint at 0. A point at s in [0, 1] between them follows the bodies with weights 1 - s and
+    s, so the coil stretches evenly.
     """
     first, last, axis, up = _line(start, end)
     s = np.linspace(0.0, 1.0, turns * STEPS_PER_TURN + 1)
@@ -23,7 +27,9 @@ def draw(spec, name, start, end, *, radius, turns, wire, material):
 
 
 def tube(spec, name, start, end, *, span, radius, material):
-    """Add a round tube to spec, on the part `span`, (from, to) in [0, 1], of the line from start to end; see `draw`."""
+    """Add a round tube to spec, on the part `span`, (from, to) in [0, 1], of the line from start to
+    end; see `draw`.
+    """
     first, last, axis, up = _line(start, end)
     s = np.array([span[0], span[0], span[1], span[1]])
     around = 2 * np.pi * np.arange(SIDES)[:, None] / SIDES
@@ -40,7 +46,9 @@ def _line(start, end):
 
 
 def _skin(spec, name, start, end, material, vertices, s):
-    """Add a skin of rings of vertices (rings, SIDES, 3) that follow the bodies with weights 1 - s and s, (rings,)."""
+    """Add a skin of rings of vertices (rings, SIDES, 3) that follow the bodies with weights 1 - s
+    and s, (rings,).
+    """
     ring = np.arange(len(s) - 1)[:, None] * SIDES
     a, b = ring + np.arange(SIDES), ring + (np.arange(SIDES) + 1) % SIDES
     faces = np.stack([a, b, a + SIDES, b, b + SIDES, a + SIDES], axis=-1)

@@ -1,15 +1,16 @@
-"""A chain of pendulums on one shaft: one body attached n times, neighbours joined by torsion springs.
+"""A chain of pendulums on one shaft: one body attached n times, neighbours joined by torsion
+springs.
 
-Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs are fixed
-tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are free; the shaft that
-carries the pendulums transmits nothing.
+Channel i is the joint p<i>/hinge, the actuator p<i>/u and the sensors p<i>/x, p<i>/v. The springs
+are fixed tendons of length x[i+1] - x[i] and stiffness kc: exact, and linear in n. The ends are
+free; the shaft that carries the pendulums transmits nothing.
 
-Contact `bobs` puts the pivots side by side in the plane of motion: hanging bobs nearly touch, as in Newton's cradle.
-The torsion springs still act, with torques carried from pivot to pivot.
+Contact `bobs` puts the pivots side by side in the plane of motion: hanging bobs nearly touch, as in
+Newton's cradle. The torsion springs still act, with torques carried from pivot to pivot.
 
-Mechanism `springs` joins neighbouring rods by a real spring at a = `HOOK_ARM` from their pivots: k = kc / a^2. If the
-pivots are one behind the other, its rest length is 0 and its torque kc sin(x_j - x_i). If they are side by side, its
-rest length is the pitch.
+Mechanism `springs` joins neighbouring rods by a real spring at a = `HOOK_ARM` from their pivots: k
+= kc / a^2. If the pivots are one behind the other, its rest length is 0 and its torque kc sin(x_j -
+x_i). If they are side by side, its rest length is the pitch.
 """
 
 import itertools
@@ -24,16 +25,21 @@ PITCH = 0.22  # m between neighbours: chosen, so that bobs of 0.13 m pass each o
 HEIGHT = 0.8  # m, the shaft above the floor, as for the single pendulum
 HUB = 0.02  # m, half the length of a hub, where a spring's wire ends
 COUPLING = 0.5  # N m/rad: chosen for the paper study
-MAX_DRAWN = 50  # pendulums; springs of longer chains are not drawn, for each has a thousand vertices
+MAX_DRAWN = (
+    50  # pendulums; springs of longer chains are not drawn, for each has a thousand vertices
+)
 HOOK_ARM = 0.25  # m from pivot to real spring: chosen, half a rod
 
-ROW_PITCH = 0.16  # m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
+# m between pivots side by side: chosen, so that hanging bobs of 0.13 m leave a gap of 0.03 m
+ROW_PITCH = 0.16
 BOB_RESTITUTION = 0.95  # of steel balls, chosen: 0.9 to 0.97 in Newton's cradles
 BEAM_Y = (0.085, 0.125)  # m, y of the beam behind the bobs that carries the pivots side by side
 
 
 def compose(single, n, x0):
-    """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (repeated) in keyframe `home`."""
+    """Return the MjSpec of n pendulums taken from the model file `single`, at x0 (repeated) in
+    keyframe `home`.
+    """
     source = mujoco.MjSpec.from_file(str(model_path(single)))
     spec = mujoco.MjSpec.from_file(str(model_path("common/theme.xml")))
     spec.modelname = f"{n}_{source.modelname}s"
@@ -55,20 +61,36 @@ def compose(single, n, x0):
         spring.wrap_joint(f"p{i}/hinge", -1.0)
         spring.wrap_joint(f"p{i + 1}/hinge", 1.0)
         near, far = pivot(spec, i), pivot(spec, i + 1)
-        draw_spring(spec, i, (0.0, near[1] + HUB, HEIGHT), (0.0, far[1] - HUB, HEIGHT), radius=0.022, turns=8)
+        draw_spring(
+            spec,
+            i,
+            (0.0, near[1] + HUB, HEIGHT),
+            (0.0, far[1] - HUB, HEIGHT),
+            radius=0.022,
+            turns=8,
+        )
     return spec
 
 
 def strip(source, pendulum):
-    """Delete everything but the pendulum from `source`, and return geom name -> the material it had.
+    """Delete everything but the pendulum from `source`, and return geom name -> the material it
+    had.
 
-    An attached body brings its file's assets and keyframes, so a thousand copies would bring a thousand floors.
+    An attached body brings its file's assets and keyframes, so a thousand copies would bring a
+    thousand floors.
     """
     material = {geom.name: geom.material for geom in pendulum.geoms}
     for geom in pendulum.geoms:
         geom.material = ""
     scenery = [geom for geom in source.geoms if geom.name not in material]
-    for item in [*scenery, *source.cameras, *source.lights, *source.materials, *source.textures, *source.keys]:
+    for item in [
+        *scenery,
+        *source.cameras,
+        *source.lights,
+        *source.materials,
+        *source.textures,
+        *source.keys,
+    ]:
         source.delete(item)
     return material
 
@@ -90,7 +112,13 @@ def stand(spec, n):
     bar(machine, "shaft", ((0.0, -PITCH, HEIGHT), (0.0, length + PITCH, HEIGHT)), 0.008, "steel")
     for end, y in (("front", -PITCH), ("back", length + PITCH)):
         post(machine, end, 0.0, y, HEIGHT)
-        bar(machine, f"{end}_bearing", ((0.0, y - 0.03, HEIGHT), (0.0, y + 0.03, HEIGHT)), 0.042, "steel")
+        bar(
+            machine,
+            f"{end}_bearing",
+            ((0.0, y - 0.03, HEIGHT), (0.0, y + 0.03, HEIGHT)),
+            0.042,
+            "steel",
+        )
     return machine
 
 
@@ -107,11 +135,18 @@ def pivot(spec, i):
 
 
 def draw_spring(spec, i, start, end, radius, turns):
-    """Draw the spring between pendulums i and i + 1, from `start` to `end` in m, unless there are too many."""
+    """Draw the spring between pendulums i and i + 1, from `start` to `end` in m, unless there are
+    too many.
+    """
     if len(spec.keys[0].qpos) > MAX_DRAWN:
         return
-    near, far = (f"p{i}/pendulum", pivot(spec, i), start), (f"p{i + 1}/pendulum", pivot(spec, i + 1), end)
-    coil.draw(spec, f"spring{i}", near, far, radius=radius, turns=turns, wire=0.0045, material="brass")
+    near, far = (
+        (f"p{i}/pendulum", pivot(spec, i), start),
+        (f"p{i + 1}/pendulum", pivot(spec, i + 1), end),
+    )
+    coil.draw(
+        spec, f"spring{i}", near, far, radius=radius, turns=turns, wire=0.0045, material="brass"
+    )
 
 
 def fields(model, p):
@@ -135,7 +170,10 @@ def pendulum_fields(model, p):
 
 
 def size(model):
-    """Return the number of pendulums in a chain's model. It counts bodies, because a Backlash adds joints."""
+    """Return the number of pendulums in a chain's model.
+
+    It counts bodies, because a Backlash adds joints.
+    """
     return sum(model.body(i).name.endswith("/pendulum") for i in range(model.nbody))
 
 
@@ -157,8 +195,12 @@ def bobs(spec):
     for skin in list(spec.skins):
         spec.delete(skin)
     for i in range(n - 1):
-        for pair in itertools.product((f"p{i}/bob", f"p{i}/rod"), (f"p{i + 1}/bob", f"p{i + 1}/rod")):
-            hit(spec, pair, BOB_RESTITUTION, both_move=True)  # beyond 54 degrees bobs pass each other, and meet rods
+        for pair in itertools.product(
+            (f"p{i}/bob", f"p{i}/rod"), (f"p{i + 1}/bob", f"p{i + 1}/rod")
+        ):
+            hit(
+                spec, pair, BOB_RESTITUTION, both_move=True
+            )  # beyond 54 degrees bobs pass each other, and meet rods
         draw_between_rods(spec, i, side * (HOOK_ARM if hooked else 0.10))
 
 
@@ -171,7 +213,9 @@ def springs(spec):
         body = spec.body(f"p{i}/pendulum")
         body.add_site(name=f"p{i}/hook", pos=(0.0, 0.0, side * HOOK_ARM))
     for i in range(n - 1):
-        spring = spec.add_tendon(name=f"coupling{i}", springlength=(0.0, 0.0), group=5, rgba=(0, 0, 0, 0))
+        spring = spec.add_tendon(
+            name=f"coupling{i}", springlength=(0.0, 0.0), group=5, rgba=(0, 0, 0, 0)
+        )
         spring.wrap_site(f"p{i}/hook")
         spring.wrap_site(f"p{i + 1}/hook")
         draw_between_rods(spec, i, side * HOOK_ARM)
@@ -193,9 +237,17 @@ def draw_between_rods(spec, i, up):
 
 
 def stand_row(spec, n, width):
-    """Add a beam behind the row between two posts, and a camera that looks at the row from the front."""
+    """Add a beam behind the row between two posts, and a camera that looks at the row from the
+    front.
+    """
     machine, end = spec.body("machine"), width / 2 + 0.20
-    box(machine, "beam", (-end, BEAM_Y[0], HEIGHT - 0.030), (end, BEAM_Y[1], HEIGHT + 0.030), "graphite")
+    box(
+        machine,
+        "beam",
+        (-end, BEAM_Y[0], HEIGHT - 0.030),
+        (end, BEAM_Y[1], HEIGHT + 0.030),
+        "graphite",
+    )
     for i in range(n):
         x = i * ROW_PITCH - width / 2
         bar(machine, f"axle{i}", ((x, -0.03, HEIGHT), (x, BEAM_Y[0], HEIGHT)), 0.010, "steel")

@@ -1,4 +1,7 @@
-"""Backlash: play between a rotor, which the actuator drives, and the channel's joint. Its stops are MuJoCo's limits."""
+"""Backlash: play between a rotor, which the actuator drives, and the channel's joint.
+
+Its stops are MuJoCo's limits.
+"""
 
 import dataclasses
 import math
@@ -24,25 +27,28 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 BRASS = (0.80, 0.62, 0.28, 1.0)
 MIN_INERTIA = 1e-9  # kg m^2 (kg): a lighter rotor is lost in rounding
-# Time constant, s, and damping ratio of the stops: with a ratio of 1 a flank rebounds at up to 25 % of its speed,
-# according to where in its step it strikes, at any step; with 8 at up to 0.4 %. Steps of 0.125 ms let penetration fade.
+# Time constant, s, and damping ratio of the stops: with a ratio of 1 a flank rebounds at up to 25 %
+# of its speed, according to where in its step it strikes, at any step; with 8 at up to 0.4 %. Steps
+# of 0.125 ms let penetration fade.
 STOP_SOLREF = (HARD_SOLREF[0], 8.0)
-MIN_ARM = 1e-6  # m, from a hinge to the centre of mass: a shorter one gives its pointer no direction
+MIN_ARM = (
+    1e-6  # m, from a hinge to the centre of mass: a shorter one gives its pointer no direction
+)
 
 
 @dataclasses.dataclass(frozen=True)
 class Backlash(Actuator):
     """Play between a rotor, which the actuator drives, and the joint: |rotor - joint| <= gap/2.
 
-    The stops of the play are MuJoCo's limits, as hard as it allows and damped so much that the flanks do not bounce:
-    they rebound at less than 1 % of their speed. The default physics step is 0.125 ms, as penetration fades slowly.
-    The rotor starts in the middle of the play. With gap 0 the rotor is rigid on the joint, and adds its inertia and
-    damping to it.
+    The stops of the play are MuJoCo's limits, as hard as it allows and damped so much that the
+    flanks do not bounce: they rebound at less than 1 % of their speed. The default physics step is
+    0.125 ms, as penetration fades slowly. The rotor starts in the middle of the play. With gap 0
+    the rotor is rigid on the joint, and adds its inertia and damping to it.
 
     Attributes:
       gap: rad (m), the whole play; 0 or more.
-      rotor_inertia: kg m^2 (kg) at the joint, 1e-9 or more; that of a DCMotor is added. The default is chosen: 1 % of
-        the pendulums' 0.125.
+      rotor_inertia: kg m^2 (kg) at the joint, 1e-9 or more; that of a DCMotor is added. The default
+        is chosen: 1 % of the pendulums' 0.125.
       rotor_damping: N m s/rad (N s/m), 0 or more.
     """
 
@@ -66,18 +72,26 @@ class Backlash(Actuator):
             actuator.target = ROTOR + joint.name
         for key in spec.keys:
             if len(key.qpos) == rigid.nq:
-                start = {rigid.joint(i).name: key.qpos[rigid.jnt_qposadr[i]] for i in range(rigid.njnt)}
+                start = {}
+                for i in range(rigid.njnt):
+                    start[rigid.joint(i).name] = key.qpos[rigid.jnt_qposadr[i]]
                 key.qpos = [start[joint.name.removeprefix(ROTOR)] for joint in spec.joints]
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         names = [model.joint(i).name for i in driven_ids(model)]
         rotors = [model.joint(ROTOR + name).dofadr[0] for name in names]
-        yield Field("tendon_range", [model.tendon(PLAY + name).id for name in names], (-self.gap / 2, self.gap / 2))
+        yield Field(
+            "tendon_range",
+            [model.tendon(PLAY + name).id for name in names],
+            (-self.gap / 2, self.gap / 2),
+        )
         yield Field("dof_armature", rotors, self.rotor_inertia, adds=True)
         yield Field("dof_damping", rotors, self.rotor_damping)
 
 
-def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjModel, pose: mujoco.MjData) -> None:
+def _add_rotor(
+    spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjModel, pose: mujoco.MjData
+) -> None:
     """Add a rotor on the joint's own axis, with a pointer that shows where in the play it is."""
     i = rigid.joint(joint.name).id
     body = rigid.jnt_bodyid[i]
@@ -93,9 +107,17 @@ def _add_rotor(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, rigid: mujoco.MjMode
         if np.linalg.norm(arm) < MIN_ARM:  # a wheel: any direction across its axis does
             arm = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
         away = arm / np.linalg.norm(arm)
-        face = axis * math.copysign(0.045, -axis[1])  # in front of the hub, towards the camera at -y
+        face = axis * math.copysign(
+            0.045, -axis[1]
+        )  # in front of the hub, towards the camera at -y
         ends = (*face, *(face + 0.16 * away))
     else:
         ends = (0.0, -0.05, 0.155, 0.0, 0.05, 0.155)  # across the cart's top
-    look = {"fromto": ends, "size": (0.008, 0.0, 0.0), "rgba": BRASS, "contype": 0, "conaffinity": 0}
+    look = {
+        "fromto": ends,
+        "size": (0.008, 0.0, 0.0),
+        "rgba": BRASS,
+        "contype": 0,
+        "conaffinity": 0,
+    }
     rotor.add_geom(name=ROTOR + joint.name, type=mujoco.mjtGeom.mjGEOM_CAPSULE, **look)

@@ -1,22 +1,25 @@
 """Contact: obstacles that a mechanism hits, falls on or slides over, with friction and restitution.
 
-A plant offers kinds of contact; each is an edit of its MjSpec that brings obstacles and explicit contact pairs, made
+A plant offers kinds of contact; each is an edit of its MjSpec that brings obstacles and explicit
+contact pairs, made
 with the helpers below. Two sorts of pair:
 
-- `hit:...`: a blow along the normal. MuJoCo's contact with constant impedance is a spring and dashpot that only push:
-  r'' = -2 zeta w r' - w^2 r, with r the depth, as long as this pushes. The bodies part when the force is zero, with the
-  share e = exp(-2 a cot a) of the speed before, where cos a = zeta (for zeta > 1: cosh): T. Schwager and T. Poeschel,
-  Coefficient of restitution and linear-dashpot model revisited, Granular Matter 9, 2007. The depth is sqrt(e)/w per
-  m/s. The wanted e gives zeta; w is chosen for a depth of 5 mm per m/s, 1.5 mm between bobs, at any e.
-- `rub:...`: sliding under a normal force with Coulomb friction and the elliptic cone. Friction that holds by the
-  acceleration b v at a speed v also pushes a sliding block off the surface, by mu b v. Above g (1 - d) / d the block
-  hops. So the normal is soft (impedance d = 0.01), and impratio makes friction stiff: it is mu m g within 1 % up to mu
-  v = 0.4 m/s, and within 4 % up to 1 m/s. A stuck block creeps at 2.5e-7 s times the acceleration that friction holds
-  back. Below the speed mu g / b, 5 mm/s for mu = 0.1, friction is viscous.
+- `hit:...`: a blow along the normal. MuJoCo's contact with constant impedance is a spring and
+  dashpot that only push: r'' = -2 zeta w r' - w^2 r, with r the depth, as long as this pushes. The
+  bodies part when the force is zero, with the share e = exp(-2 a cot a) of the speed before, where
+  cos a = zeta (for zeta > 1: cosh): T. Schwager and T. Poeschel, Coefficient of restitution and
+  linear-dashpot model revisited, Granular Matter 9, 2007. The depth is sqrt(e)/w per m/s. The
+  wanted e gives zeta; w is chosen for a depth of 5 mm per m/s, 1.5 mm between bobs, at any e.
+- `rub:...`: sliding under a normal force with Coulomb friction and the elliptic cone. Friction that
+  holds by the acceleration b v at a speed v also pushes a sliding block off the surface, by mu b v.
+  Above g (1 - d) / d the block hops. So the normal is soft (impedance d = 0.01), and impratio makes
+  friction stiff: it is mu m g within 1 % up to mu v = 0.4 m/s, and within 4 % up to 1 m/s. A stuck
+  block creeps at 2.5e-7 s times the acceleration that friction holds back. Below the speed mu g /
+  b, 5 mm/s for mu = 0.1, friction is viscous.
 
-MuJoCo's contact spring sets an acceleration: its stiffness is proportional to the mass that the blow meets. If this
-mass changes during the blow, as between two swinging bobs that graze each other, such a spring would create energy.
-With a low impedance it sets a force instead.
+MuJoCo's contact spring sets an acceleration: its stiffness is proportional to the mass that the
+blow meets. If this mass changes during the blow, as between two swinging bobs that graze each
+other, such a spring would create energy. With a low impedance it sets a force instead.
 """
 
 import dataclasses
@@ -36,22 +39,37 @@ from smc_mujoco.mechanisms.plant import Field, Plant
 Pair = tuple[float, float]
 Ends = tuple[Sequence[float], Sequence[float]]  # of a bar
 HIT, RUB = "hit:", "rub:"
-DEPTH = 0.005  # m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is met within 4 % at h = 0.25 ms
-# m per m/s: chosen, so that no rod of a falling chain passes through a bob. With h = 0.25 ms such a short blow meets e
-# within 5 % if e >= 0.5; it is up to 9 % too low at e = 0.2, and up to 12 % at 0.1.
+# m per m/s of a blow: chosen, so that 2 m/s goes 1 cm deep; e is met within 4 % at h = 0.25 ms
+DEPTH = 0.005
+# m per m/s: chosen, so that no rod of a falling chain passes through a bob. With h = 0.25 ms such a
+# short blow meets e within 5 % if e >= 0.5; it is up to 9 % too low at e = 0.2, and up to 12 % at
+# 0.1.
 DEPTH_OF_BOBS = 0.0015
-MAX_RESTITUTION = 0.98  # largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
+# largest restitution: above, a blow could gain energy, by the integrator's error of 1e-3 of it
+MAX_RESTITUTION = 0.98
 MIN_RESTITUTION = 0.01  # used for smaller ones, whose dashpot is too stiff for a step of 1 ms
 MAX_FRICTION = 10.0  # chosen; rubber on rubber reaches 2
-# Constant impedances d: firm for blows on a fixed obstacle, soft for blows between bobs and for sliding. The spring
-# carries 1 - d of a steady load. At 0.95 a body that leans on an obstacle rests within 0.1 mm; at 0.99 it rattles.
+# Constant impedances d: firm for blows on a fixed obstacle, soft for blows between bobs and for
+# sliding. The spring carries 1 - d of a steady load. At 0.95 a body that leans on an obstacle rests
+# within 0.1 mm; at 0.99 it rattles.
 FIRM_IMPEDANCE, SOFT_IMPEDANCE = 0.95, 0.01
 REST_OF_SOLIMP = (0.001, 0.5, 2.0)  # no effect if d is constant
-SOLREF_RUB = (0.008, 1.0)  # s and damping ratio of the normal: 8 steps of 1 ms; with fewer the block trembles
-STICKING_RATE = 200.0  # 1/s, b: chosen; half doubles the creep of the block, twice varies friction 4 times as much
-SOLREF_SLIDE = (2.0 / (SOFT_IMPEDANCE * STICKING_RATE), 1.0)  # s and damping ratio across the normal
+SOLREF_RUB = (
+    0.008,
+    1.0,
+)  # s and damping ratio of the normal: 8 steps of 1 ms; with fewer the block trembles
+# 1/s, b: chosen; half doubles the creep of the block, twice varies friction 4 times as much
+STICKING_RATE = 200.0
+SOLREF_SLIDE = (
+    2.0 / (SOFT_IMPEDANCE * STICKING_RATE),
+    1.0,
+)  # s and damping ratio across the normal
 IMPRATIO = 5e3 / SOFT_IMPEDANCE  # how much stiffer friction is than the normal
-TURNING_FRICTION = (0.005, 0.0001, 0.0001)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
+TURNING_FRICTION = (
+    0.005,
+    0.0001,
+    0.0001,
+)  # MuJoCo's torsional and rolling friction: unused by contacts of dimension 3
 SLIDING_FRICTION = slice(0, 2)  # of a pair's five friction coefficients
 
 
@@ -62,8 +80,8 @@ class Contact(Part):
     Attributes:
       kind: its name, or "none".
       friction: coefficient of Coulomb friction where bodies slide, 0 .. 10. None: the plant's own.
-      restitution: ratio of the speeds after and before a blow, 0 .. 0.98; values below 0.01 count as 0.01. None: the
-        plant's own.
+      restitution: ratio of the speeds after and before a blow, 0 .. 0.98; values below 0.01 count
+        as 0.01. None: the plant's own.
     """
 
     kind: str
@@ -73,7 +91,9 @@ class Contact(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.kind, str):
-            raise ScenarioError(f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'")
+            raise ScenarioError(
+                f"contact is {shown(self.kind)}: give the name of a kind, such as 'floor'"
+            )
 
     def check(self, plant: Plant) -> None:
         """Check that the plant offers this contact."""
@@ -81,8 +101,12 @@ class Contact(Part):
             raise unknown(f"contact of {plant.name}", self.kind, ["none", *plant.contacts])
         given = [name for name in ("friction", "restitution") if getattr(self, name) is not None]
         for name in given:
-            if self.kind == "none" or name not in _takes(plant.build, plant.sizes[0], plant.contacts[self.kind]):
-                raise ScenarioError(f"contact {self.kind!r} of {plant.name} has no {name}: leave it out")
+            if self.kind == "none" or name not in _takes(
+                plant.build, plant.sizes[0], plant.contacts[self.kind]
+            ):
+                raise ScenarioError(
+                    f"contact {self.kind!r} of {plant.name} has no {name}: leave it out"
+                )
 
     def edit_on(self, plant: Plant, spec: mujoco.MjSpec) -> None:
         """Add to the plant's mechanism the obstacles and contact pairs of this kind."""
@@ -106,7 +130,9 @@ def _pairs(model: mujoco.MjModel, sort: str) -> list[int]:
 
 
 @functools.cache
-def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco.MjSpec], None]) -> set[str]:
+def _takes(
+    build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco.MjSpec], None]
+) -> set[str]:
     """Return which of friction and restitution the pairs of a contact have."""
     spec = build(n)
     edit(spec)
@@ -116,12 +142,17 @@ def _takes(build: Callable[[int], mujoco.MjSpec], n: int, edit: Callable[[mujoco
 
 def damping_ratio(restitution: float) -> float:
     """Return the damping ratio zeta of a spring and dashpot with this restitution, 0.01 .. 1."""
-    aim = -0.5 * math.log(max(restitution, MIN_RESTITUTION))  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
+    aim = -0.5 * math.log(
+        max(restitution, MIN_RESTITUTION)
+    )  # wanted `_loss`, which grows with zeta: 0 at 0, 1 at 1
     low, high = 0.0, 1.0 + aim
     high *= high
     while high - low > 1e-12 * high:
         zeta = 0.5 * (low + high)
-        low, high = (zeta, high) if _loss(zeta) < aim else (low, zeta)
+        if _loss(zeta) < aim:
+            low, high = (zeta, high)
+        else:
+            low, high = (low, zeta)
     return 0.5 * (low + high)
 
 
@@ -135,25 +166,34 @@ def _loss(zeta: float) -> float:
 
 
 def solref(restitution: float, impedance: float) -> tuple[float, float]:
-    """Return solref, MuJoCo's time constant in s and damping ratio, for a restitution of bodies that move on a line.
+    """Return solref, MuJoCo's time constant in s and damping ratio, for a restitution of bodies
+    that move on a line.
 
-    The acceleration is a = a0 + A f, with A the inverse mass that the blow meets. MuJoCo sets f = (aref - a0) / (A + R)
-    with R = A' (1 - d) / d. Its estimate A' of A is the mean over three directions, here A / 3. So the spring and the
-    dashpot act with the share A / (d A + (1 - d) A').
+    The acceleration is a = a0 + A f, with A the inverse mass that the blow meets. MuJoCo sets f =
+    (aref - a0) / (A + R) with R = A' (1 - d) / d. Its estimate A' of A is the mean over three
+    directions, here A / 3. So the spring and the dashpot act with the share A / (d A + (1 - d) A').
     """
     e = max(restitution, MIN_RESTITUTION)
     zeta = max(damping_ratio(e), 1e-6)  # MuJoCo divides by it
     share = 1.0 / (impedance + (1.0 - impedance) / 3.0)
-    depth = DEPTH_OF_BOBS if impedance == SOFT_IMPEDANCE else DEPTH
+    if impedance == SOFT_IMPEDANCE:
+        depth = DEPTH_OF_BOBS
+    else:
+        depth = DEPTH
     return share * depth / (math.sqrt(e) * zeta), zeta / math.sqrt(share)
 
 
 # helpers for plants: pairs and obstacles
 
 
-def hit(spec: mujoco.MjSpec, geoms: tuple[str, str], restitution: float, both_move: bool = False) -> None:
+def hit(
+    spec: mujoco.MjSpec, geoms: tuple[str, str], restitution: float, both_move: bool = False
+) -> None:
     """Let two geoms hit each other, without friction."""
-    impedance = SOFT_IMPEDANCE if both_move else FIRM_IMPEDANCE
+    if both_move:
+        impedance = SOFT_IMPEDANCE
+    else:
+        impedance = FIRM_IMPEDANCE
     _pair(spec, HIT, geoms, solref(restitution, impedance), impedance, 0.0)
 
 
@@ -162,7 +202,9 @@ def rub(spec: mujoco.MjSpec, geoms: tuple[str, str], friction: float) -> None:
     _pair(spec, RUB, geoms, SOLREF_RUB, SOFT_IMPEDANCE, friction)
 
 
-def _pair(spec: mujoco.MjSpec, sort: str, geoms: tuple[str, str], normal: Pair, d: float, friction: float) -> None:
+def _pair(
+    spec: mujoco.MjSpec, sort: str, geoms: tuple[str, str], normal: Pair, d: float, friction: float
+) -> None:
     """Add a contact pair with the solref of its normal, its impedance d and its friction."""
     spec.option.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_CONTACT.value
     if sort == RUB:
@@ -185,13 +227,27 @@ def solid(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[
     block.group, block.rgba = 5, (0.0, 0.0, 0.0, 0.0)
 
 
-def box(body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str) -> mujoco.MjsGeom:
+def box(
+    body: mujoco.MjsBody, name: str, low: Sequence[float], high: Sequence[float], material: str
+) -> mujoco.MjsGeom:
     """Add a box between two corners, m in the body's frame, and return its geom."""
     a, b, kind = np.array(low, float), np.array(high, float), mujoco.mjtGeom.mjGEOM_BOX
     return body.add_geom(name=name, type=kind, pos=(a + b) / 2, size=(b - a) / 2, material=material)
 
 
-def bar(body: mujoco.MjsBody, name: str, ends: Ends, radius: float, material: str, round_ends: bool = False) -> None:
+def bar(
+    body: mujoco.MjsBody,
+    name: str,
+    ends: Ends,
+    radius: float,
+    material: str,
+    round_ends: bool = False,
+) -> None:
     """Add a round bar between two points, m in the body's frame."""
-    kind = mujoco.mjtGeom.mjGEOM_CAPSULE if round_ends else mujoco.mjtGeom.mjGEOM_CYLINDER
-    body.add_geom(name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material)
+    if round_ends:
+        kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+    else:
+        kind = mujoco.mjtGeom.mjGEOM_CYLINDER
+    body.add_geom(
+        name=name, type=kind, fromto=(*ends[0], *ends[1]), size=(radius, 0, 0), material=material
+    )

@@ -1,15 +1,17 @@
-"""Drives, which turn a law's command u, in N m (N on a slide), into force: lag, rate limit, DC motor.
+"""Drives, which turn a law's command u, in N m (N on a slide), into force: lag, rate limit, DC
+motor.
 
 A scenario takes one drive, or a Lag and another drive in series, and a Backlash after them.
 
-The callback simulates Lag, RateLimit and the winding of a DCMotor (`DriveStep`) and gives MuJoCo the mean of their
-force over each physics step. So the velocities at the ends of the steps are those of the equations, whatever the step
-is, and any integrator may be used; only a RateLimit behind a Lag is not exact, see there. A state that MuJoCo
-integrates would give each step the force of its end. This lead of half a step would take away a part
-of the delay that a limit cycle depends on: behind one lag, most of it.
+The callback simulates Lag, RateLimit and the winding of a DCMotor (`DriveStep`) and gives MuJoCo
+the mean of their force over each physics step. So the velocities at the ends of the steps are those
+of the equations, whatever the step is, and any integrator may be used; only a RateLimit behind a
+Lag is not exact, see there. A state that MuJoCo integrates would give each step the force of its
+end. This lead of half a step would take away a part of the delay that a limit cycle depends on:
+behind one lag, most of it.
 
-A winding also feels the joint's speed, which only MuJoCo knows within a step. `winding_step` is exact for a speed that
-changes linearly there.
+A winding also feels the joint's speed, which only MuJoCo knows within a step. `winding_step` is
+exact for a speed that changes linearly there.
 """
 
 # pyright: reportIncompatibleVariableOverride=false
@@ -24,11 +26,21 @@ import numpy as np
 
 from smc_mujoco.common.constraints import Bound, Number, OneOf
 from smc_mujoco.common.errors import ScenarioError
-from smc_mujoco.mechanisms.hardware.part import Actuator, Natural, NominalDrive, Offset, Positive, drive_ids, drives
+from smc_mujoco.mechanisms.hardware.part import (
+    Actuator,
+    Natural,
+    NominalDrive,
+    Offset,
+    Positive,
+    drive_ids,
+    drives,
+)
 from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field
 
 # Where a dcmotor's numbers lie in the compiled model:
-WINDING = slice(0, 2)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
+WINDING = slice(
+    0, 2
+)  # of actuator_gainprm: resistance, ohm, and torque constant, N m/A at the joint
 MIN_WINDING_TIME = 1e-12  # s: a winding with a shorter time constant counts as instantaneous
 MIN_RESISTANCE = 1e-9  # ohm: with less, the voltage of a command is lost in rounding
 MAX_TIME_CONSTANTS = 1e9  # of a lag in a physics step: more count as this many
@@ -36,15 +48,19 @@ SHORT_STEP = 1e-3  # time constants: the series in `winding_step` errs by less t
 MIN_SHARE = 1e-9  # of a winding's drag that MuJoCo gets, so that it does not divide by 0
 MIN_CONSTANT = 1e-9  # N m/A at the joint, of the weakest motor
 COMMANDS = ("torque", "voltage")
-COGGING = slice(0, 2)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
+COGGING = slice(
+    0, 2
+)  # of actuator_biasprm: amplitude, N m at the joint, and periods a radian of it
 
 
 @dataclasses.dataclass(frozen=True)
 class Lag(Actuator):
-    """First-order lag, tau f' = u - f, from f = 0. The mean force over each physics step is exact for a held u.
+    """First-order lag, tau f' = u - f, from f = 0.
 
-    Two in series, `actuator=(Lag(mu), Lag(mu))`, are the parasitic actuator of the literature, u / (mu p + 1)^2: exact
-    for a held u too. A Lag may stand before a RateLimit or a DCMotor as well.
+    The mean force over each physics step is exact for a held u.
+
+    Two in series, `actuator=(Lag(mu), Lag(mu))`, are the parasitic actuator of the literature, u /
+    (mu p + 1)^2: exact for a held u too. A Lag may stand before a RateLimit or a DCMotor as well.
 
     Attributes:
       tau: s, 0 (no lag) or more.
@@ -64,8 +80,9 @@ class Lag(Actuator):
 class RateLimit(Actuator):
     """A force that follows u no faster than `rate`, from 0: f(t + h) = u clipped to f(t) +- rate h.
 
-    The mean force over each physics step is exact for a held u. Behind a Lag it errs in the steps in which the force
-    meets the lag's output, at most by the change of that output in the step: little, if the step is short beside tau.
+    The mean force over each physics step is exact for a held u. Behind a Lag it errs in the steps
+    in which the force meets the lag's output, at most by the change of that output in the step:
+    little, if the step is short beside tau.
 
     Attributes:
       rate: N m/s (N/s), greater than 0; math.inf for no limit.
@@ -83,26 +100,32 @@ class RateLimit(Actuator):
 
 @dataclasses.dataclass(frozen=True)
 class DCMotor(Actuator):
-    """Motor and gearbox on a voltage amplifier: V = scale u, the voltage whose stall torque is u; or V = u.
+    """Motor and gearbox on a voltage amplifier:
+
+    V = scale u, the voltage whose stall torque is u; or V = u.
 
         L i' = V - R i - gear k v        |V| <= voltage; x, v: of the joint
         torque = gear k i + gear cogging sin(gear poles x)        |torque| <= gear k current
         inertia added at the joint: gear^2 rotor_inertia
 
-    The law does not know it: back-EMF takes (gear k)^2/R v, inductance delays by L/R. Without limits, the torque tends
-    to u as gear k goes to 0. The current's limit cuts the torque, not i, which is back within a few L/R.
+    The law does not know it: back-EMF takes (gear k)^2/R v, inductance delays by L/R. Without
+    limits, the torque tends to u as gear k goes to 0. The current's limit cuts the torque, not i,
+    which is back within a few L/R.
 
-    With command="voltage" u is the voltage itself, in V, as on a rig whose amplifier takes volts. |u| is then bounded
-    by `voltage`, too, and the nominal model of a law is per volt: gear k/R is part of its g, and the back-EMF of its
-    f. The law's model never has the inductance, the cogging, the ripple, and the limit of the current.
+    With command="voltage" u is the voltage itself, in V, as on a rig whose amplifier takes volts.
+    |u| is then bounded by `voltage`, too, and the nominal model of a law is per volt: gear k/R is
+    part of its g, and the back-EMF of its f. The law's model never has the inductance, the cogging,
+    the ripple, and the limit of the current.
 
-    Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C 12:1, exactly
-    49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most, 0.46 N m s/rad of back-EMF. On a
-    slide gear is in rad/m: a pinion of 82 mm. The gearbox has no losses: add a friction. A scenario warns of a motor
-    whose torque at rest, `stall`, is less than a joint needs to stay at its initial position.
+    Defaults: maxon RE 40, 24 V, number 148867 (data sheet; ironless: no cogging), gearhead GP 42 C
+    12:1, exactly 49:4, the 30 A peak of an ESCON 70/10 amplifier: 11.1 N m and 65 rad/s at most,
+    0.46 N m s/rad of back-EMF. On a slide gear is in rad/m: a pinion of 82 mm. The gearbox has no
+    losses: add a friction. A scenario warns of a motor whose torque at rest, `stall`, is less than
+    a joint needs to stay at its initial position.
 
-    A commutator shorts a coil whenever one of its two brushes bridges two bars. Then V - gear k v drives more current,
-    and the torque of that current grows by a share, the sum over both brushes of
+    A commutator shorts a coil whenever one of its two brushes bridges two bars. Then V - gear k v
+    drives more current, and the torque of that current grows by a share, the sum over both brushes
+    of
 
         ripple exp((cos(bars (gear x - brush)) - 1) / (bars bridge)^2)
 
@@ -116,9 +139,11 @@ class DCMotor(Actuator):
       poles: periods of cogging per turn of the motor, 0 or more; the default is chosen.
       voltage: V, the supply, greater than 0; math.inf for no limit.
       current: A, the amplifier's limit, greater than 0; math.inf for none.
-      ripple: share of the torque that a brush adds, 0 or more; 0 for an even torque. It needs inductance 0.
+      ripple: share of the torque that a brush adds, 0 or more; 0 for an even torque. It needs
+        inductance 0.
       bars: of the commutator, greater than 0; the default is chosen.
-      bridge, bridge_2: rad at the motor, over which each brush bridges two bars, greater than 0; chosen.
+      bridge, bridge_2: rad at the motor, over which each brush bridges two bars, greater than 0;
+        chosen.
       brush, brush_2: rad at the motor, an angle at which each brush bridges two bars; chosen.
       command: what u is: "torque", N m (N) at the joint, or "voltage", V.
     """
@@ -144,10 +169,17 @@ class DCMotor(Actuator):
         super().__post_init__()
         if self.ripple and self.delay:
             both = f"ripple {self.ripple:g} and inductance {self.inductance:g} H"
-            raise ScenarioError(f"DCMotor has {both}, and ripple is of a current without delay: give inductance=0")
-        if not self.constant >= MIN_CONSTANT or not self.resistance / self.constant <= MAX_PARAMETER:
+            raise ScenarioError(
+                f"DCMotor has {both}, and ripple is of a current without delay: give inductance=0"
+            )
+        if (
+            not self.constant >= MIN_CONSTANT
+            or not self.resistance / self.constant <= MAX_PARAMETER
+        ):
             weak = f"gear {self.gear:g} times torque_constant {self.torque_constant:g} N m/A is too weak"
-            raise ScenarioError(f"DCMotor's {weak} for a resistance of {self.resistance:g} ohm: give a stronger motor")
+            raise ScenarioError(
+                f"DCMotor's {weak} for a resistance of {self.resistance:g} ohm: give a stronger motor"
+            )
 
     @property
     def constant(self) -> float:
@@ -157,7 +189,9 @@ class DCMotor(Actuator):
     @property
     def scale(self) -> float:
         """V per unit of u: per N m (N) of stall torque, or 1 if u is the voltage."""
-        return 1.0 if self.command == "voltage" else self.resistance / self.constant
+        if self.command == "voltage":
+            return 1.0
+        return self.resistance / self.constant
 
     @property
     def unit(self) -> str:
@@ -166,10 +200,14 @@ class DCMotor(Actuator):
 
     @property
     def nominal(self) -> NominalDrive:
-        """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is the torque."""
+        """Torque per unit of u and of velocity, N m/V and N m s/rad, if u is the voltage; else u is
+        the torque.
+        """
         per_volt = self.constant / self.resistance
         by_voltage = NominalDrive(per_volt, per_volt * self.constant)
-        return by_voltage if self.command == "voltage" else NominalDrive()
+        if self.command == "voltage":
+            return by_voltage
+        return NominalDrive()
 
     @property
     def stall(self) -> float:
@@ -186,12 +224,19 @@ class DCMotor(Actuator):
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         ids = drive_ids(model)
         torque = self.constant * self.current
-        share, voltage = 1.0, math.inf if self.ripple else self.voltage  # `rippled` bounds it before the ripple
+        share, voltage = (
+            1.0,
+            math.inf if self.ripple else self.voltage,
+        )  # `rippled` bounds it before the ripple
         if self.delay:  # the callback simulates the winding, and bounds its voltage
             rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
             share, voltage = winding_step(model.opt.timestep / self.delay, rk4)[1], math.inf
-        yield Field("actuator_gainprm", (ids, WINDING), (share * self.resistance, share * self.constant))
-        yield Field("actuator_biasprm", (ids, COGGING), (self.gear * self.cogging, self.gear * self.poles))
+        yield Field(
+            "actuator_gainprm", (ids, WINDING), (share * self.resistance, share * self.constant)
+        )
+        yield Field(
+            "actuator_biasprm", (ids, COGGING), (self.gear * self.cogging, self.gear * self.poles)
+        )
         yield Field("actuator_ctrlrange", ids, (-voltage, voltage))
         yield Field("actuator_forcerange", ids, (-torque, torque))
         driven = model.jnt_dofadr[model.actuator_trnid[ids, 0]]
@@ -200,16 +245,18 @@ class DCMotor(Actuator):
     @property
     def delay(self) -> float:
         """L/R in s, the winding's time constant; below MIN_WINDING_TIME it counts as 0."""
-        return self.inductance / self.resistance if self.inductance > MIN_WINDING_TIME * self.resistance else 0.0
+        if self.inductance > MIN_WINDING_TIME * self.resistance:
+            return self.inductance / self.resistance
+        return 0.0
 
 
 class DriveStep(NamedTuple):
     """Effect of a physics step on the drives that the callback simulates.
 
-    `first` is the output of the first lag. `second` is that of the second lag, or the force behind a RateLimit, or the
-    torque of a winding's current, plus `drag` times the speed. All are in the unit of u, in which a winding's torque is
-    that of a rotor at rest. All factors without a unit are shares of a state's distance from u. v is the speed at the
-    start of the step.
+    `first` is the output of the first lag. `second` is that of the second lag, or the force behind
+    a RateLimit, or the torque of a winding's current, plus `drag` times the speed. All are in the
+    unit of u, in which a winding's torque is that of a rotor at rest. All factors without a unit
+    are shares of a state's distance from u. v is the speed at the start of the step.
     """
 
     force_first: float = 0.0  # of `first` in the mean force over the step
@@ -218,9 +265,12 @@ class DriveStep(NamedTuple):
     second_first: float = 0.0  # of `first` in `second` at the end of the step
     second_left: float = 0.0  # of `second` in itself there
     lagged: float = 0.0  # 1 with a lag, 0 without one
-    reach: float = 0.0  # largest change of the force in a step, in the unit of u; 0 without a RateLimit
+    reach: float = (
+        0.0  # largest change of the force in a step, in the unit of u; 0 without a RateLimit
+    )
     voltage: float = 0.0  # bound on a winding's voltage, in the unit of u; 0 without a winding
-    drag: float = 0.0  # of a winding, times v, in the unit of u: what it takes from `second` to make it the torque
+    # of a winding, times v, in the unit of u: what it takes from `second` to make it the torque
+    drag: float = 0.0
     force_drag: float = 0.0  # the same: from the mean force, beside MuJoCo's own share of the drag
     second_drag: float = 0.0  # the same: from `second` at the end of the step
     ripple: float = 0.0  # this and all after it: of a DCMotor, see `rippled`; 0 for an even torque
@@ -231,25 +281,42 @@ class DriveStep(NamedTuple):
     sharpness_2: float = 0.0
     supply: float = 0.0
     constant: float = 0.0
-    rise_first: float = 0.0  # of `first` in the rise of the force within an RK4 step, from its middle to its last stage
+    # of `first` in the rise of the force within an RK4 step, from its middle to its last stage
+    rise_first: float = 0.0
 
     def start(self, v: Any) -> np.ndarray:
-        """Return both states at the start of a run at the speeds v, (2, ...): no force, and no current."""
+        """Return both states at the start of a run at the speeds v, (2, ...): no force, and no
+        current.
+        """
         return np.array([np.zeros_like(v), self.drag * v])
 
-    def __call__(self, u: np.ndarray, first: np.ndarray, second: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the mean force over a step, and both states at its end; all have the shape of u and the speeds v."""
+    def __call__(
+        self, u: np.ndarray, first: np.ndarray, second: np.ndarray, v: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """Return the mean force over a step, and both states at its end; all have the shape of u
+        and the speeds v.
+        """
         a, b = first - u, second - u
         force, first_after = u + self.force_first * a, u + self.first_left * a
         if self.voltage:
             torque, mean = second - self.drag * v, np.clip(force, -self.voltage, self.voltage)
             end = np.clip(u + self.second_first * a, -self.voltage, self.voltage)
             force = mean + self.force_second * (torque - mean) - self.force_drag * v
-            return force, first_after, end + self.second_left * (torque - end) - self.second_drag * v
+            return (
+                force,
+                first_after,
+                end + self.second_left * (torque - end) - self.second_drag * v,
+            )
         if not self.reach:
-            return force + self.force_second * b, first_after, u + self.second_first * a + self.second_left * b
+            return (
+                force + self.force_second * b,
+                first_after,
+                u + self.second_first * a + self.second_left * b,
+            )
         end = np.clip(first_after, second - self.reach, second + self.reach)
-        gap = np.clip(u + self.lagged * a - second, -self.reach, self.reach)  # closed at the limit's rate
+        gap = np.clip(
+            u + self.lagged * a - second, -self.reach, self.reach
+        )  # closed at the limit's rate
         passing = force - 0.5 * gap * np.abs(gap) / self.reach
         return np.where(end == first_after, passing, 0.5 * (second + end)), first_after, end
 
@@ -259,7 +326,9 @@ class DriveStep(NamedTuple):
 
 
 def rippled(motor, V, x, v):
-    """Return the voltage at which an even motor has the torque of a motor with ripple, at V, x and v of its joint."""
+    """Return the voltage at which an even motor has the torque of a motor with ripple, at V, x and
+    v of its joint.
+    """
     V = min(max(V, -motor.supply), motor.supply)
     share = math.exp(motor.sharpness * (math.cos(motor.turns * x - motor.angle) - 1.0))
     share += math.exp(motor.sharpness_2 * (math.cos(motor.turns * x - motor.angle_2) - 1.0))
@@ -267,20 +336,32 @@ def rippled(motor, V, x, v):
 
 
 def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveStep | None:
-    """Return the effect of a physics step of `step` s, of RK4 or another integrator; None if MuJoCo needs only u."""
+    """Return the effect of a physics step of `step` s, of RK4 or another integrator; None if MuJoCo
+    needs only u.
+    """
     drives = [part for part in actuator if part.drives]
-    lags = [min(step / part.tau, MAX_TIME_CONSTANTS) for part in drives if isinstance(part, Lag) and part.tau]
+    lags = []
+    for part in drives:
+        if isinstance(part, Lag) and part.tau:
+            lags.append(min(step / part.tau, MAX_TIME_CONSTANTS))
     rate = next((part.rate for part in drives if isinstance(part, RateLimit)), None)
-    motor = next((part for part in drives if isinstance(part, DCMotor) and (part.delay or part.ripple)), None)
+    motor = next(
+        (part for part in drives if isinstance(part, DCMotor) and (part.delay or part.ripple)), None
+    )
     if not lags and motor is None and rate is None:
         return None
     if motor is not None and motor.ripple:
         n = motor.bars
         return DriveStep(
-            ripple=motor.ripple, turns=n * motor.gear, angle=n * motor.brush, angle_2=n * motor.brush_2,
-            sharpness=(n * motor.bridge) ** -2, sharpness_2=(n * motor.bridge_2) ** -2, supply=motor.voltage,
+            ripple=motor.ripple,
+            turns=n * motor.gear,
+            angle=n * motor.brush,
+            angle_2=n * motor.brush_2,
+            sharpness=(n * motor.bridge) ** -2,
+            sharpness_2=(n * motor.bridge_2) ** -2,
+            supply=motor.voltage,
             constant=motor.constant,
-        )  # fmt: skip
+        )
     a = lags[0] if lags else math.inf
     made = DriveStep(force_first=_mean(a), first_left=math.exp(-a), lagged=float(bool(lags)))
     if rk4 and len(lags) == 1 and rate is None and motor is None:
@@ -294,15 +375,20 @@ def drive_step(actuator: tuple[Actuator, ...], step: float, rk4: bool) -> DriveS
     b = lags[1]
     passed = _passed(a, b)
     return made._replace(
-        force_first=_mean(a) - passed / b, force_second=_mean(b), second_first=passed, second_left=math.exp(-b)
+        force_first=_mean(a) - passed / b,
+        force_second=_mean(b),
+        second_first=passed,
+        second_left=math.exp(-b),
     )
 
 
 def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) -> DriveStep:
-    """Return the effect of a step on a motor's winding behind a lag; the step is `a` of the lag's time constants long.
+    """Return the effect of a step on a motor's winding behind a lag; the step is `a` of the lag's
+    time constants long.
 
-    Behind a lag, the winding gets two voltages that are held over the step: one that gives the mean of its torque, and
-    one that gives its end. So both are exact, unless the supply's bound cuts the lag's output within the step.
+    Behind a lag, the winding gets two voltages that are held over the step: one that gives the mean
+    of its torque, and one that gives its end. So both are exact, unless the supply's bound cuts the
+    lag's output within the step.
     """
     b = step / motor.delay
     (drag, share), left = winding_step(b, rk4), math.exp(-b)
@@ -321,15 +407,20 @@ def _wound(made: DriveStep, motor: DCMotor, a: float, step: float, rk4: bool) ->
 
 
 def winding_step(b: float, rk4: bool) -> tuple[float, float]:
-    """Return the effect of the speed, which changes linearly, on a winding in a physics step of b time constants.
+    """Return the effect of the speed, which changes linearly, on a winding in a physics step of b
+    time constants.
 
-    The first number is the weight of a constant speed in the mean torque, and of the speed's change in the torque at
-    the end. The second is the share of the drag of a motor without inductance that MuJoCo gets, so that the speed's
-    change in the step has its effect on the mean torque. A change by 1 has the effect `late` there. RK4 applies a
-    drag at the mean speed, so at half of the change, and implicit integrators at the speed at the end.
+    The first number is the weight of a constant speed in the mean torque, and of the speed's change
+    in the torque at the end. The second is the share of the drag of a motor without inductance that
+    MuJoCo gets, so that the speed's change in the step has its effect on the mean torque. A change
+    by 1 has the effect `late` there. RK4 applies a drag at the mean speed, so at half of the
+    change, and implicit integrators at the speed at the end.
     """
     drag = 1.0 - _mean(b)
-    late = b / 6.0 - b**2 / 24.0 if b < SHORT_STEP else 0.5 - drag / b
+    if b < SHORT_STEP:
+        late = b / 6.0 - b**2 / 24.0
+    else:
+        late = 0.5 - drag / b
     return drag, max(2.0 * late if rk4 else late, MIN_SHARE)
 
 
@@ -339,10 +430,11 @@ def _mean(a: float) -> float:
 
 
 def _rise(a: float) -> float:
-    """Return the rise that gives RK4's stages the first moment of a force exp(-t) over a step of 0 .. a.
+    """Return the rise that gives RK4's stages the first moment of a force exp(-t) over a step of 0
+    .. a.
 
-    With mean m and moment p = integral of (1 - s) f over the step s = 0 .. 1, stages of m - b, m, m, m + b with
-    b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
+    With mean m and moment p = integral of (1 - s) f over the step s = 0 .. 1, stages of m - b, m,
+    m, m + b with b = 6 (m / 2 - p) change speed and position as the force does, to RK4's order.
     """
     if a < SHORT_STEP:
         return -a / 2.0 + a**2 / 4.0 - 3.0 * a**3 / 40.0
@@ -351,6 +443,8 @@ def _rise(a: float) -> float:
 
 
 def _passed(a: float, b: float) -> float:
-    """Return the second lag's output after a step of a and b time constants, from 1 in the first lag at its start."""
+    """Return the second lag's output after a step of a and b time constants, from 1 in the first
+    lag at its start.
+    """
     apart = abs(b - a)
     return b * math.exp(-min(a, b)) * (_mean(apart) if apart else 1.0)

@@ -4,9 +4,9 @@ The controller reads a channel's position x as
 
     x_j = q round((x(t_j) + noise + bias) / q),    q = 2 pi / counts rad  or  1 / counts m,
 
-every `period`, each `delay` later; j counts the readings. If one is lost, the one before it stays. MuJoCo's sensors
-have the period and the delay; the callback rounds and drops readings. An encoder measures no velocity: by default the
-controller differentiates the positions.
+every `period`, each `delay` later; j counts the readings. If one is lost, the one before it stays.
+MuJoCo's sensors have the period and the delay; the callback rounds and drops readings. An encoder
+measures no velocity: by default the controller differentiates the positions.
 """
 
 import dataclasses
@@ -21,10 +21,12 @@ from smc_mujoco.common.errors import ScenarioError, number
 from smc_mujoco.mechanisms.hardware.part import Part, joint_ids
 from smc_mujoco.mechanisms.plant import Field
 
-# Share of a physics step by which readings are taken early, because MuJoCo compares times, which have rounding errors.
+# Share of a physics step by which readings are taken early, because MuJoCo compares times, which
+# have rounding errors.
 EARLY_SHARE = 0.5
 MAX_READINGS = 100_000  # under way in a delay: chosen, 6 MB per channel
-READINGS_STEP = 64  # readings in a history are a multiple of this, so that runs with other delays share a model; chosen
+# readings in a history are a multiple of this, so that runs with other delays share a model; chosen
+READINGS_STEP = 64
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,14 +37,17 @@ class Encoder(Part):
       counts: per revolution of a hinge, or per metre of a slide; math.inf for no quantisation.
       bias: zero error, added to every reading, rad or m.
       dropout: probability that a reading is lost, 0 .. 1; the first is never lost.
-      period: s between readings, greater than 0, a whole number of physics steps. None: one at every control sample.
-      delay: s until a reading arrives, 0 or more, a whole number of physics steps. Until the first arrives, the
-        controller reads x0.
+      period: s between readings, greater than 0, a whole number of physics steps. None: one at
+        every control sample.
+      delay: s until a reading arrives, 0 or more, a whole number of physics steps. Until the first
+        arrives, the controller reads x0.
 
-      skew: s, 0 or more, a whole number of physics steps: a reading of each channel is older by it than that of the
-        channel before, as on a bus on which the last channel is read first. Not with `period`.
+      skew: s, 0 or more, a whole number of physics steps: a reading of each channel is older by it
+        than that of the channel before, as on a bus on which the last channel is read first. Not
+        with `period`.
 
-    With the velocity estimator "measured" there is also a tachometer, with the same period, delay and losses.
+    With the velocity estimator "measured" there is also a tachometer, with the same period, delay
+    and losses.
     """
 
     counts: Annotated[float, Whole(low=2, high=2**32, infinite=True)] = 4096
@@ -55,14 +60,20 @@ class Encoder(Part):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.skew and self.period:
-            raise ScenarioError(f"Encoder has period {self.period:g} and skew {self.skew:g} s: give one of them")
+            raise ScenarioError(
+                f"Encoder has period {self.period:g} and skew {self.skew:g} s: give one of them"
+            )
 
     def quantum(self, hinge: bool) -> float:
         """Return one count, rad of a hinge or m of a slide; 0 without quantisation."""
-        return 0.0 if self.counts == math.inf else (2.0 * math.pi if hinge else 1.0) / self.counts
+        if self.counts == math.inf:
+            return 0.0
+        return (2.0 * math.pi if hinge else 1.0) / self.counts
 
     def readings(self, step: float, channels: int = 1) -> int:
-        """Return how many readings MuJoCo must keep at physics steps of `step` s; 0 without delay, skew and period."""
+        """Return how many readings MuJoCo must keep at physics steps of `step` s; 0 without delay,
+        skew and period.
+        """
         longest = self.delay + (channels - 1) * self.skew
         if not longest and not self.period:
             return 0
@@ -70,12 +81,18 @@ class Encoder(Part):
         return READINGS_STEP * math.ceil(needed / READINGS_STEP)
 
     def check(self, step: float) -> None:
-        """Raise ScenarioError for a time that is not a whole number of physics steps, or too many delayed readings."""
+        """Raise ScenarioError for a time that is not a whole number of physics steps, or too many
+        delayed readings.
+        """
         number("step", step, above=0.0)
         if self.delay / (self.period or step) > MAX_READINGS:
             long = f"{self.delay:g} s is more than {MAX_READINGS:,} readings long"
             raise ScenarioError(f"Encoder's delay {long}: give a shorter one")
-        for name, time in (("delay", self.delay), ("skew", self.skew), ("period", self.period or 0.0)):
+        for name, time in (
+            ("delay", self.delay),
+            ("skew", self.skew),
+            ("period", self.period or 0.0),
+        ):
             count = time / step
             if math.isinf(count) or abs(count - round(count)) > 1e-6 or 0.0 < count < 0.5:
                 steps = f"a whole number of physics steps of {step:g} s: give a physics_step that divides it"
@@ -86,23 +103,39 @@ class Encoder(Part):
         if model.nhistory:
             at = sensor_ids(model)
             channels = joint_ids(model).tolist()
-            delays = self.delay + self.skew * np.array([channels.index(joint) for joint in model.sensor_objid[at]])
-            yield Field("sensor_delay", at, np.maximum(0.0, delays - EARLY_SHARE * model.opt.timestep))
+            delays = self.delay + self.skew * np.array(
+                [channels.index(joint) for joint in model.sensor_objid[at]]
+            )
+            yield Field(
+                "sensor_delay", at, np.maximum(0.0, delays - EARLY_SHARE * model.opt.timestep)
+            )
             yield Field("sensor_interval", (at, 0), self.period or 0.0)
 
 
 def sensor_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' position and velocity sensors, (2n,)."""
-    kinds = np.isin(model.sensor_type, [mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL])
+    kinds = np.isin(
+        model.sensor_type, [mujoco.mjtSensor.mjSENS_JOINTPOS, mujoco.mjtSensor.mjSENS_JOINTVEL]
+    )
     return np.flatnonzero(kinds & np.isin(model.sensor_objid, joint_ids(model)))
 
 
 def remember(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Fill the histories with the present readings, so that a delayed sensor starts with the initial state."""
+    """Fill the histories with the present readings, so that a delayed sensor starts with the
+    initial state.
+    """
     for sensor in sensor_ids(model):
         count = int(model.sensor_history[sensor, 0])
         interval = float(model.sensor_interval[sensor, 0]) or model.opt.timestep
-        joint, position = model.sensor_objid[sensor], model.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTPOS
-        value = data.qpos[model.jnt_qposadr[joint]] if position else data.qvel[model.jnt_dofadr[joint]]
+        joint, position = (
+            model.sensor_objid[sensor],
+            model.sensor_type[sensor] == mujoco.mjtSensor.mjSENS_JOINTPOS,
+        )
+        if position:
+            value = data.qpos[model.jnt_qposadr[joint]]
+        else:
+            value = data.qvel[model.jnt_dofadr[joint]]
         times, values = interval * np.arange(-count, 0.0), np.full((count, 1), value)
-        mujoco.mj_initSensorHistory(model, data, sensor, times, values, -interval - EARLY_SHARE * model.opt.timestep)
+        mujoco.mj_initSensorHistory(
+            model, data, sensor, times, values, -interval - EARLY_SHARE * model.opt.timestep
+        )

@@ -1,7 +1,8 @@
 """Friction on every channel's joint: viscous, Coulomb, and LuGre, which sticks without creep.
 
-MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor` actuator. Under RK4
-the callback simulates Coulomb friction on joints that move alone, see `coulomb_step`.
+MuJoCo simulates all three: a joint's damping, its `frictionloss`, and the bristles of a `dcmotor`
+actuator. Under RK4 the callback simulates Coulomb friction on joints that move alone, see
+`coulomb_step`.
 """
 
 import dataclasses
@@ -53,15 +54,18 @@ class Viscous(Friction):
 
 @dataclasses.dataclass(frozen=True)
 class Coulomb(Friction):
-    """Dry friction: -level sign(v) on a sliding joint; on a joint at rest, the force up to level that holds it.
+    """Dry friction: -level sign(v) on a sliding joint; on a joint at rest, the force up to level
+    that holds it.
 
-    On joints that move alone, behind no drive but lags and rate limits, RK4's stages get its mean and first moment over
-    the step, as `Scenario.exact_friction` says. Such a joint stops, sticks and turns back within a step.
+    On joints that move alone, behind no drive but lags and rate limits, RK4's stages get its mean
+    and first moment over the step, as `Scenario.exact_friction` says. Such a joint stops, sticks
+    and turns back within a step.
 
-    Elsewhere it is MuJoCo's. In a step in which a joint stops or turns back, friction then has one direction for all of
-    it. It is a soft constraint, so a stuck joint creeps at (1 - d) tc/2 a0, with impedance d, time constant tc, and a0
-    the acceleration that friction holds back. With the hardest constraint that is 1e-4 h a0 for a physics step h:
-    2e-7 rad/s for a pendulum of 0.125 kg m^2 that holds 1 N m at h = 0.25 ms.
+    Elsewhere it is MuJoCo's. In a step in which a joint stops or turns back, friction then has one
+    direction for all of it. It is a soft constraint, so a stuck joint creeps at (1 - d) tc/2 a0,
+    with impedance d, time constant tc, and a0
+    the acceleration that friction holds back. With the hardest constraint that is 1e-4 h a0 for a
+    physics step h: 2e-7 rad/s for a pendulum of 0.125 kg m^2 that holds 1 N m at h = 0.25 ms.
 
     Attributes:
       level: N m, N on a slide; 0 (none) or more.
@@ -79,7 +83,8 @@ class Coulomb(Friction):
 
 
 def coulomb_step(v, smooth, level, mobility, h):
-    """Return what dry friction does to a joint that moves alone, in a step of h s in which no other force changes.
+    """Return what dry friction does to a joint that moves alone, in a step of h s in which no other
+    force changes.
 
     Within the step, the joint slides, stops, and then sticks or turns back.
 
@@ -91,8 +96,9 @@ def coulomb_step(v, smooth, level, mobility, h):
       h: s.
 
     Returns:
-      The mean of the friction over the step, N m (N); the rise that gives RK4's stages its first moment, see
-      `drives._rise`; and the time for which it holds the joint at rest, s, which is the last of the step.
+      The mean of the friction over the step, N m (N); the rise that gives RK4's stages its first
+      moment, see `drives._rise`; and the time for which it holds the joint at rest, s, which is the
+      last of the step.
     """
     left, mean, moment, held = h, 0.0, 0.0, 0.0
     while left > 0.0:
@@ -115,32 +121,37 @@ def coulomb_step(v, smooth, level, mobility, h):
 
 @dataclasses.dataclass(frozen=True)
 class LuGre(Friction):
-    """Friction of elastic bristles: stiction, the Stribeck drop with speed, and a stuck joint that does not creep.
+    """Friction of elastic bristles: stiction, the Stribeck drop with speed, and a stuck joint that
+    does not creep.
 
         z' = v - stiffness |v| / g(v) z                           z: bend of the bristles, rad
         g(v) = coulomb + (static - coulomb) exp(-(v / stribeck)^2)
         friction = -(stiffness z + damping z')
 
-    Source: C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, A new model for control of systems with
-    friction, IEEE Transactions on Automatic Control 40(3), 1995, eqs. (1) to (4) without the viscous term, which is
-    `Viscous`. MuJoCo integrates z exactly for v held over a step, and computes the force from z and v at its start.
+    Source: C. Canudas de Wit, H. Olsson, K. J. Astrom and P. Lischinsky, A new model for control of
+    systems with friction, IEEE Transactions on Automatic Control 40(3), 1995, eqs. (1) to (4)
+    without the viscous term, which is `Viscous`. MuJoCo integrates z exactly for v held over a
+    step, and computes the force from z and v at its start.
 
-    Limits: implicitfast or Euler; under RK4 z is explicit and diverges at stiffness |v| h > 2.8 coulomb. The bristles
-    start unbent: after a jump of speed, such as an initial v0, the friction of the first step is damping v0.
+    Limits: implicitfast or Euler; under RK4 z is explicit and diverges at stiffness |v| h > 2.8
+    coulomb. The bristles start unbent: after a jump of speed, such as an initial v0, the friction
+    of the first step is damping v0.
 
     Attributes:
       coulomb: N m (N): friction when sliding fast; greater than 0.
       static: N m (N): friction at which the joint breaks away; coulomb or more.
-      stribeck: rad/s (m/s): the speed at which friction falls from static to coulomb; greater than 0.
-      stiffness: N m/rad (N/m), greater than 0. The default is chosen: a hundredth of the paper's 1e5, whose bristles
-        would oscillate at up to 900 rad/s on these plants. At up to 89 rad/s they are stable and resolved even at h = 1
-        ms. They bend by 0.1 mrad under 0.1 N m.
-      damping: N m s/rad (N s/m), 0 or more. It should be more than stiffness h, because MuJoCo bends bristles a step
-        late and they would oscillate. None: 0.2 sqrt(stiffness inertia), with each joint's inertia at the plant's
-        default parameters: 2.2 for the pendulum. This is a fifth of the paper's rule, chosen because implicitfast
-        counts damping h as inertia, 0.4 % of the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too
-        long.
-      driven: whether only joints with an actuator have it, such as the arm that a cable with hysteresis bends.
+      stribeck: rad/s (m/s): the speed at which friction falls from static to coulomb; greater than
+        0.
+      stiffness: N m/rad (N/m), greater than 0. The default is chosen: a hundredth of the paper's
+        1e5, whose bristles would oscillate at up to 900 rad/s on these plants. At up to 89 rad/s
+        they are stable and resolved even at h = 1 ms. They bend by 0.1 mrad under 0.1 N m.
+      damping: N m s/rad (N s/m), 0 or more. It should be more than stiffness h, because MuJoCo
+        bends bristles a step late and they would oscillate. None: 0.2 sqrt(stiffness inertia), with
+        each joint's inertia at the plant's default parameters: 2.2 for the pendulum. This is a
+        fifth of the paper's rule, chosen because implicitfast counts damping h as inertia, 0.4 % of
+        the pendulum's at h = 0.25 ms. With half of it, bristles oscillate too long.
+      driven: whether only joints with an actuator have it, such as the arm that a cable with
+        hysteresis bends.
     """
 
     bristles = True
@@ -169,14 +180,28 @@ class LuGre(Friction):
             spec.add_actuator(name=name, target=joint.name, trntype=on_joint).set_to_dcmotor(
                 motorconst=(1e-9, 1e-9),  # a dcmotor needs a motor constant: too small to notice
                 resistance=1.0,
-                lugre=(self.stiffness, self.damping or 1.0, self.coulomb, self.static, self.stribeck),
+                lugre=(
+                    self.stiffness,
+                    self.damping or 1.0,
+                    self.coulomb,
+                    self.static,
+                    self.stribeck,
+                ),
                 ctrlspec=int(mujoco.mjtCtrlInput.mjINPUT_NONE),
             )
 
     def fields(self, model: mujoco.MjModel) -> Iterator[Field]:
         count = len(drive_ids(model)) if self.driven else None
-        bristles = [model.actuator(PASSIVE + model.joint(joint).name).id for joint in joint_ids(model)[:count]]
+        bristles = []
+        for joint in joint_ids(model)[:count]:
+            bristles.append(model.actuator(PASSIVE + model.joint(joint).name).id)
         yield Field("actuator_dynprm", (bristles, STIFFNESS), self.stiffness)
         damping = RELATIVE_DAMPING * np.sqrt(self.stiffness * model.dof_M0[dof_ids(model)[:count]])
-        yield Field("actuator_dynprm", (bristles, DAMPING), damping if self.damping is None else self.damping)
-        yield Field("actuator_biasprm", (bristles, LEVELS), (self.coulomb, self.static, self.stribeck))
+        yield Field(
+            "actuator_dynprm",
+            (bristles, DAMPING),
+            damping if self.damping is None else self.damping,
+        )
+        yield Field(
+            "actuator_biasprm", (bristles, LEVELS), (self.coulomb, self.static, self.stribeck)
+        )

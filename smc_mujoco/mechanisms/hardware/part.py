@@ -1,11 +1,12 @@
 """Parts that make a mechanism realistic: edits of its model, and numbers in the model's fields.
 
-A part is frozen data. `edit` adds objects to an MjSpec, such as a rotor, a stop, or an actuator that acts as friction.
-`fields` yields the fields of the compiled model that the part's numbers set, so that simulations with different numbers
-share one model in a Batch. MuJoCo simulates the parts, without any code of this package.
+A part is frozen data. `edit` adds objects to an MjSpec, such as a rotor, a stop, or an actuator
+that acts as friction. `fields` yields the fields of the compiled model that the part's numbers set,
+so that simulations with different numbers share one model in a Batch. MuJoCo simulates the parts,
+without any code of this package.
 
-Names: an actuator `passive:<joint>` belongs to a part and takes no command. `rotor:<joint>` is the joint that a
-channel's actuator drives, if it is not the channel's joint itself.
+Names: an actuator `passive:<joint>` belongs to a part and takes no command. `rotor:<joint>` is the
+joint that a channel's actuator drives, if it is not the channel's joint itself.
 """
 
 import dataclasses
@@ -23,13 +24,21 @@ from smc_mujoco.mechanisms.plant import MAX_PARAMETER, Field, Plant
 
 PASSIVE, ROTOR = "passive:", "rotor:"
 PLAY = "play:"  # a tendon of length rotor - joint
-# The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two steps.
+# The hardest constraint that MuJoCo offers: it reads a time constant of less than two steps as two
+# steps.
 HARD_SOLREF = (1e-9, 1.0)  # time constant in s, damping ratio
-HARD_SOLIMP = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance at and away from zero; equal, so the rest has no effect
+HARD_SOLIMP = (
+    0.9999,
+    0.9999,
+    0.001,
+    0.5,
+    2.0,
+)  # impedance at and away from zero; equal, so the rest has no effect
 POSE = "smc:pose"  # site at the origin of a free body whose pose is the channels
 START = "smc:start"  # keyframe with the initial positions of joints without a channel
 
-# A pose: the position in the axes of the world, m, and the rotation vector of the attitude, rad, see rotation.py
+# A pose: the position in the axes of the world, m, and the rotation vector of the attitude, rad,
+# see rotation.py
 PLACES = "x", "y", "z", "rx", "ry", "rz"
 
 # Numbers of parts
@@ -54,7 +63,9 @@ class Part:
         yield from ()
 
     def structure(self) -> Hashable:
-        """Return a key that is equal for parts whose `edit` does the same: their simulations share a model."""
+        """Return a key that is equal for parts whose `edit` does the same: their simulations share
+        a model.
+        """
         return type(self)
 
 
@@ -62,17 +73,22 @@ class Part:
 class Friction(Part):
     """Base of frictions, which resist a channel's joint beside the plant's own damping."""
 
-    # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most one friction may.
+    # Whether it holds a joint at rest by bristles, which RK4 would not make more accurate. At most
+    # one friction may.
     bristles: ClassVar[bool] = False
     forces: ClassVar[tuple[str, ...]] = ()  # fields that its force is proportional to
 
     def scaled(self, factor: float) -> "Friction":
         """Return this friction with a factor on its force."""
         if not self.forces:
-            raise ScenarioError(f"{type(self).__name__} cannot be scaled: name its fields that are forces in `forces`")
+            raise ScenarioError(
+                f"{type(self).__name__} cannot be scaled: name its fields that are forces in `forces`"
+            )
         values = {name: getattr(self, name) for name in self.forces}
         given = {name: np.asarray(value) for name, value in values.items() if value is not None}
-        return dataclasses.replace(self, **{name: (factor * value).tolist() for name, value in given.items()})
+        return dataclasses.replace(
+            self, **{name: (factor * value).tolist() for name, value in given.items()}
+        )
 
     def check(self, plant: Plant) -> None:
         """Raise ScenarioError if it does not suit the plant."""
@@ -87,13 +103,17 @@ class NominalDrive(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Actuator(Part):
-    """Base of actuators, which stand between the command u, the wanted force or a voltage, and the joint."""
+    """Base of actuators, which stand between the command u, the wanted force or a voltage, and the
+    joint.
+    """
 
     drives: ClassVar[bool] = True  # whether it turns u into force; else it stands after a drive
     in_callback: ClassVar[bool] = False  # whether the callback simulates all of it
 
     scale: ClassVar[float] = 1.0  # control of the model's actuator per unit of u
-    delay: ClassVar[float] = 0.0  # s, time constant with which the force follows a held u; 0 for none
+    delay: ClassVar[float] = (
+        0.0  # s, time constant with which the force follows a held u; 0 for none
+    )
     limited: ClassVar[bool] = False  # whether the rate of the force is limited
     unit: ClassVar[str] = ""  # of u; "" for that of the joint's force
     nominal: ClassVar[NominalDrive] = NominalDrive()  # what the law's model knows of it
@@ -109,27 +129,43 @@ def joints(spec: mujoco.MjSpec) -> list[mujoco.MjsJoint]:
     if (site := spec.site(POSE)) is not None:
         return [site.parent.joints[0]] * len(PLACES)
     names = [actuator.target.removeprefix(ROTOR) for actuator in drives(spec)]
-    measured = [sensor.objname for sensor in spec.sensors if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS]
-    return [spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]]
+    measured = []
+    for sensor in spec.sensors:
+        if sensor.type == mujoco.mjtSensor.mjSENS_JOINTPOS:
+            measured.append(sensor.objname)
+    return [
+        spec.joint(name) for name in [*names, *(name for name in measured if name not in names)]
+    ]
 
 
 def drive_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the actuators that take commands, (driven,)."""
-    return np.array([i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int)
+    return np.array(
+        [i for i in range(model.nactuator) if not model.actuator(i).name.startswith(PASSIVE)], int
+    )
 
 
 def free_joint(model: mujoco.MjModel) -> int:
-    """Return the index of the free joint whose pose is the channels; -1 if each channel has a joint of its own."""
+    """Return the index of the free joint whose pose is the channels; -1 if each channel has a joint
+    of its own.
+    """
     site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, POSE)
-    return -1 if site < 0 else int(model.body_jntadr[model.site_bodyid[site]])
+    if site < 0:
+        return -1
+    return int(model.body_jntadr[model.site_bodyid[site]])
 
 
 def exerted(model: mujoco.MjModel, joint: int, drives: Sequence[int]) -> np.ndarray:
-    """Return force and torque on a free joint, in the body's axes, for each actuator's unit of force, (drives, 6)."""
+    """Return force and torque on a free joint, in the body's axes, for each actuator's unit of
+    force, (drives, 6).
+    """
     data, place, dof = mujoco.MjData(model), model.jnt_qposadr[joint], model.jnt_dofadr[joint]
     data.qpos[place : place + 7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     mujoco.mj_forward(model, data)
-    moments, rows = np.zeros((model.nout, model.nv)), (data.moment_rownnz, data.moment_rowadr, data.moment_colind)
+    moments, rows = (
+        np.zeros((model.nout, model.nv)),
+        (data.moment_rownnz, data.moment_rowadr, data.moment_colind),
+    )
     mujoco.mju_sparse2dense(moments, data.actuator_moment, *rows)
     return moments[model.actuator_outadr[drives], dof : dof + 6]
 
@@ -143,7 +179,9 @@ def driven_ids(model: mujoco.MjModel) -> np.ndarray:
 
 
 def joint_ids(model: mujoco.MjModel) -> np.ndarray:
-    """Return the indices of the channels' joints, (n,): first the driven ones, then those that are only measured."""
+    """Return the indices of the channels' joints, (n,): first the driven ones, then those that are
+    only measured.
+    """
     first = driven_ids(model)
     if free_joint(model) >= 0:
         return first
@@ -156,12 +194,15 @@ def joint_names(plant: Plant) -> tuple[str, ...]:
     """Return the name of each channel's joint, (n,)."""
     model = compiled(plant.spec())
     names = tuple(model.joint(int(joint)).name for joint in joint_ids(model))
-    return tuple(f"{name}_{place}" for name, place in zip(names, PLACES, strict=True)) if plant.pose else names
+    if plant.pose:
+        return tuple(f"{name}_{place}" for name, place in zip(names, PLACES, strict=True))
+    return names
 
 
 @functools.lru_cache(maxsize=32)
 def moves_alone(plant: Plant) -> bool:
-    """Return whether each joint of a plant has its own equation: constant inertia, a motor, and no constraint.
+    """Return whether each joint of a plant has its own equation: constant inertia, a motor, and no
+    constraint.
 
     Springs and dampers may join the joints, because their forces are smooth.
     """
@@ -171,25 +212,39 @@ def moves_alone(plant: Plant) -> bool:
     )
     motors &= np.all(model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE)
     motors &= np.all(model.actuator_dyntype == mujoco.mjtDyn.mjDYN_NONE)
-    motors &= model.nactuator == plant.driven and not np.any(model.jnt_actgravcomp)  # u is within the motors' ranges
-    alone = model.nv == model.njnt == plant.n and np.all(model.dof_parentid < 0) and not np.any(model.tendon_armature)
+    motors &= model.nactuator == plant.driven and not np.any(
+        model.jnt_actgravcomp
+    )  # u is within the motors' ranges
+    alone = (
+        model.nv == model.njnt == plant.n
+        and np.all(model.dof_parentid < 0)
+        and not np.any(model.tendon_armature)
+    )
     return bool(plant.smooth and alone and motors)
 
 
 def column_ends(plant: Plant) -> tuple[str, ...]:
-    """Return what follows x, v, u, ... in the name of each channel's column: "", or 0, 1, ..., or _shoulder, ..."""
+    """Return what follows x, v, u, ... in the name of each channel's column: "", or 0, 1, ..., or
+    _shoulder, ...
+    """
     if plant.n == 1:
         return ("",)
-    return tuple(f"_{name}" for name in joint_names(plant)) if plant.direct else tuple(map(str, range(plant.n)))
+    if plant.direct:
+        return tuple(f"_{name}" for name in joint_names(plant))
+    return tuple(map(str, range(plant.n)))
 
 
 def dof_ids(model: mujoco.MjModel) -> np.ndarray:
     """Return the indices of the channels' degrees of freedom, (n,)."""
     dofs = model.jnt_dofadr[joint_ids(model)]
-    return dofs if free_joint(model) < 0 else dofs + np.arange(len(PLACES))
+    if free_joint(model) < 0:
+        return dofs
+    return dofs + np.arange(len(PLACES))
 
 
 def initial_pose(compiled: mujoco.MjModel) -> np.ndarray:
-    """Return the pose from which joints without a channel start, (nq,): the model's start keyframe, or else qpos0."""
+    """Return the pose from which joints without a channel start, (nq,): the model's start keyframe,
+    or else qpos0.
+    """
     key = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_KEY, START)
     return (compiled.qpos0 if key < 0 else compiled.key_qpos[key]).copy()

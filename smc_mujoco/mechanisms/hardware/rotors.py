@@ -1,20 +1,26 @@
-"""Rotors of a free body, and the air that it flies through: what MuJoCo's actuators and fluids do not have.
+"""Rotors of a free body, and the air that it flies through: what MuJoCo's actuators and fluids do
+not have.
 
-A rotor turns at the speed W, rad/s. It is told the speed c that gives the wanted thrust, and follows it by
+A rotor turns at the speed W, rad/s. It is told the speed c that gives the wanted thrust, and
+follows it by
 
     W' = rise (c - W) + rise2 (c^2 - W^2),    with fall and fall2 instead while it slows down,
     thrust = (1 - fade) (linear W + square W^2),    0 at least,
 
-and its angular momentum h = sum of inertia spin W, along the body's third axis, acts on the body with
--w x (0, 0, h) - (0, 0, h'). spin is 1 counter-clockwise seen from above; the drag of a rotor's blades turns the body
-the other way, which is in the gear of its actuator. The supply sags: c is less by the share `sag` times the sum of all
-thrusts at the start of the physics step. The body's drag is -R diag(drag) R' (v - wind), at its origin.
+and its angular momentum h = sum of inertia spin W, along the body's third axis, acts on the body
+with
+-w x (0, 0, h) - (0, 0, h'). spin is 1 counter-clockwise seen from above; the drag of a rotor's
+blades turns the body the other way, which is in the gear of its actuator. The supply sags: c is
+less by the share `sag` times the sum of all thrusts at the start of the physics step. The body's
+drag is -R diag(drag) R' (v - wind), at its origin.
 
-The callback does this at every stage of a physics step, by the closed solution of W' under a constant c. So the speed
-is exact for whatever step, and RK4 keeps its order. Other integrators get the thrust at the middle of the step. The
-torque of h' is that at the stages: a rotor with inertia whose lag is shorter than some steps gets too much of it.
+The callback does this at every stage of a physics step, by the closed solution of W' under a
+constant c. So the speed is exact for whatever step, and RK4 keeps its order. Other integrators get
+the thrust at the middle of the step. The torque of h' is that at the stages: a rotor with inertia
+whose lag is shorter than some steps gets too much of it.
 
-A model has its numbers in `actuator_user` (ROTOR) and `body_user` (drag), where a text `smc:rotors` says so.
+A model has its numbers in `actuator_user` (ROTOR) and `body_user` (drag), where a text `smc:rotors`
+says so.
 """
 
 import functools
@@ -30,9 +36,24 @@ from smc_mujoco.mechanisms.hardware.part import drive_ids
 from smc_mujoco.mechanisms.plant import Plant
 
 ROTORS_TEXT = "smc:rotors"  # name of a text in models whose actuators are rotors
-# linear [N s/rad], square [N s^2/rad^2], rise and fall [1/s], rise2 and fall2 [1/rad], inertia [kg m^2], spin [1 or
+# linear [N s/rad], square [N s^2/rad^2], rise and fall [1/s], rise2 and fall2 [1/rad], inertia [kg
+# m^2], spin [1 or
 # -1], fade [1], sag [1/N], start: the speed at which a run begins [rad/s]
-ROTOR = floats(("linear", "square", "rise", "rise2", "fall", "fall2", "inertia", "spin", "fade", "sag", "start"))
+ROTOR = floats(
+    (
+        "linear",
+        "square",
+        "rise",
+        "rise2",
+        "fall",
+        "fall2",
+        "inertia",
+        "spin",
+        "fade",
+        "sag",
+        "start",
+    )
+)
 DRAG_AXES = 3  # numbers in `body_user`: drag along the axes of the body, N s/m
 rotor_at = record_at(ROTOR)
 
@@ -67,14 +88,22 @@ def spun(rotor, W, c, t):
 
     z = W - c obeys z' = -(first + second z) z, with first = a + 2 b c and second = b.
     """
-    a, b = (rotor.rise, rotor.rise2) if c >= W else (rotor.fall, rotor.fall2)
+    if c >= W:
+        a, b = (rotor.rise, rotor.rise2)
+    else:
+        a, b = (rotor.fall, rotor.fall2)
     z, first = W - c, a + 2.0 * b * c
     left = math.exp(-first * t)
-    passed = t if first == 0.0 else -math.expm1(-first * t) / first
+    if first == 0.0:
+        passed = t
+    else:
+        passed = -math.expm1(-first * t) / first
     z *= left / (1.0 + b * z * passed)
     return c + z, -(first + b * z) * z
 
 
 def speeds_at_start(model: mujoco.MjModel, numbers: np.ndarray) -> list[float]:
-    """Return the speeds of the rotors of a model at the start of a run, (drives,) rad/s, from its `actuator_user`."""
+    """Return the speeds of the rotors of a model at the start of a run, (drives,) rad/s, from its
+    `actuator_user`.
+    """
     return [float(row.view(ROTOR)["start"][0]) for row in numbers[drive_ids(model)]]

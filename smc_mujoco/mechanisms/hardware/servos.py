@@ -1,13 +1,16 @@
-"""Servos whose friction grows with the load on their gearbox: models M1 to M6; Dynamixel MX-64 and MX-106 as presets.
+"""Servos whose friction grows with the load on their gearbox: models M1 to M6; Dynamixel MX-64 and
+MX-106 as presets.
 
     servo = smc.hardware.servo("mx106", "m4")
-    scenario = smc.Scenario(plant="pendulum", law=..., actuator=servo.motor, friction=servo.friction)
+    scenario = smc.Scenario(plant="pendulum", law=..., actuator=servo.motor,
+    friction=servo.friction)
 
-The load of a gearbox is the two torques on its sides, that of its motor and that from outside, and not their sum: if a
-motor holds a weight, the sum is 0 and the gearbox is loaded. The callback reads both torques before a physics step. The
-motor's torque is that of the joint's drive in the step before. The torque from outside is -qfrc_bias (gravity and
-gyration) + qfrc_spring + disturbances of the joint + qfrc_constraint (contacts and limits, of the step before). It has
-no `Push` and no inertia of what the joint moves. The published code reads the same torques; it has no springs and
+The load of a gearbox is the two torques on its sides, that of its motor and that from outside, and
+not their sum: if a motor holds a weight, the sum is 0 and the gearbox is loaded. The callback reads
+both torques before a physics step. The motor's torque is that of the joint's drive in the step
+before. The torque from outside is -qfrc_bias (gravity and gyration) + qfrc_spring + disturbances of
+the joint + qfrc_constraint (contacts and limits, of the step before). It has no `Push` and no
+inertia of what the joint moves. The published code reads the same torques; it has no springs and
 disturbances.
 """
 
@@ -27,25 +30,30 @@ LOAD_FACTORS = ("km", "ke", "kms", "kes", "kmq", "keq")  # factors on the two to
 
 @dataclasses.dataclass(frozen=True)
 class ServoFriction(Sliding):
-    """Friction of a servo by model M6. Models M1 to M5 are M6 with some numbers 0, or equal to each other.
+    """Friction of a servo by model M6.
+
+    Models M1 to M5 are M6 with some numbers 0, or equal to each other.
 
         F(v) = (kc + |km m - ke e| + w (kcs + |kms m - kes e| + q)) sgn(v) + kv v,    w = exp(-|v/vs|^alpha)
         q = keq e^2 if |m| > |e|,  kmq m^2 if |m| < |e|,  0 if m and e have the same sign or size
 
-    m is the motor's torque, e that from outside: see the module's docstring. Friction differs between a servo that
-    drives its load against e and one that e drives back. At rest, friction holds up to |F| for v to 0.
+    m is the motor's torque, e that from outside: see the module's docstring. Friction differs
+    between a servo that drives its load against e and one that e drives back. At rest, friction
+    holds up to |F| for v to 0.
 
         M1  kc, kv                M3  M1 and km = ke                    M5  km, ke, kms and kes differ
         M2  M1 and kcs, vs, alpha M4  M2 and km = ke, kms = kes         M6  M5 and kmq, keq
 
-    Source: M. Duclusaud, G. Passault, V. Padois and O. Ly, Extended friction models for the physics simulation of servo
-    actuators, arXiv 2410.08650, 2024; signs and q as in their code, Rhoban/bam (Apache-2.0), bam/model.py, where q has
-    m if the load drives. Their simulator holds a joint by the torque that stops it within a step.
+    Source: M. Duclusaud, G. Passault, V. Padois and O. Ly, Extended friction models for the physics
+    simulation of servo actuators, arXiv 2410.08650, 2024; signs and q as in their code, Rhoban/bam
+    (Apache-2.0), bam/model.py, where q has m if the load drives. Their simulator holds a joint by
+    the torque that stops it within a step.
 
     Attributes:
       kv: viscous friction, N m s/rad, 0 or more.
       kc, kcs: dry friction at every speed, and what is added to it near rest, N m, 0 or more.
-      km, ke: dry friction for each N m of the motor's torque and of the torque from outside, at every speed, 0 or more.
+      km, ke: dry friction for each N m of the motor's torque and of the torque from outside, at
+        every speed, 0 or more.
       kms, kes: the same for what is added near rest, 0 or more.
       kmq, keq: friction added near rest for the squares of these torques, 1/(N m), 0 or more.
       vs: speed at which the additions have fallen to 1/e, rad/s, greater than 0.
@@ -92,25 +100,42 @@ def servo(name: str, model: str = "m4", command: str = "torque") -> Servo:
 
     Args:
       name: "mx64" or "mx106", for Dynamixel MX-64 and MX-106.
-      model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of the motor.
+      model: "m1" to "m6", see `ServoFriction`. Each was fitted on its own, with its own numbers of
+        the motor.
       command: what u is, as in `DCMotor`: "torque" or "voltage".
     """
     models = find("servo", name, SERVOS)
     fitted = find(f"model of {name}", model, models)
     limits = {"voltage": VOLTAGE, "current": math.inf, "command": command}
-    motor = DCMotor(fitted["R"], 0.0, fitted["kt"], gear=1.0, rotor_inertia=fitted["armature"], **limits)
-    numbers = {ours: fitted[theirs] for theirs, several in BAM_FIELDS.items() if theirs in fitted for ours in several}
+    motor = DCMotor(
+        fitted["R"], 0.0, fitted["kt"], gear=1.0, rotor_inertia=fitted["armature"], **limits
+    )
+    numbers = {}
+    for theirs, several in BAM_FIELDS.items():
+        if theirs in fitted:
+            for ours in several:
+                numbers[ours] = fitted[theirs]
     return Servo(motor, ServoFriction(**numbers))
 
 
 VOLTAGE = 15.0 * 0.9625  # V: the supply times the largest duty cycle; bam/dynamixel/actuator.py
 BAM_FIELDS = {  # name of a number in Rhoban/bam -> fields of ServoFriction
-    "friction_viscous": ("kv",), "friction_base": ("kc",), "friction_stribeck": ("kcs",),
-    "load_friction_base": ("km", "ke"), "load_friction_stribeck": ("kms", "kes"), "load_friction_motor": ("km",),
-    "load_friction_external": ("ke",), "load_friction_motor_stribeck": ("kms",),
-    "load_friction_external_stribeck": ("kes",), "load_friction_motor_quad": ("kmq",),
-    "load_friction_external_quad": ("keq",), "dtheta_stribeck": ("vs",), "alpha": ("alpha",),
-}  # fmt: skip
-# Servo -> model -> numbers of Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: kt in N m/A, R in ohm, armature in
-# kg m^2, and the keys of BAM_FIELDS in the units of ServoFriction.
-SERVOS: Mapping[str, Mapping[str, Mapping[str, float]]] = read_json(Path(__file__).with_name("servos.json"))
+    "friction_viscous": ("kv",),
+    "friction_base": ("kc",),
+    "friction_stribeck": ("kcs",),
+    "load_friction_base": ("km", "ke"),
+    "load_friction_stribeck": ("kms", "kes"),
+    "load_friction_motor": ("km",),
+    "load_friction_external": ("ke",),
+    "load_friction_motor_stribeck": ("kms",),
+    "load_friction_external_stribeck": ("kes",),
+    "load_friction_motor_quad": ("kmq",),
+    "load_friction_external_quad": ("keq",),
+    "dtheta_stribeck": ("vs",),
+    "alpha": ("alpha",),
+}
+# Servo -> model -> numbers of Rhoban/bam (Apache-2.0), params/mx64 and params/mx106: kt in N m/A, R
+# in ohm, armature in kg m^2, and the keys of BAM_FIELDS in the units of ServoFriction.
+SERVOS: Mapping[str, Mapping[str, Mapping[str, float]]] = read_json(
+    Path(__file__).with_name("servos.json")
+)

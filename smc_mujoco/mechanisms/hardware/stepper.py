@@ -1,10 +1,13 @@
-"""A stepper motor behind a pulse generator: the command is an acceleration, and the motor follows a field that steps.
+"""A stepper motor behind a pulse generator: the command is an acceleration, and the motor follows a
+field that steps.
 
-    u, in rad/s^2 -> speed -> rate of steps -> queue of steps -> the motor's field -> torque ~ sin(field - shaft)
+    u, in rad/s^2 -> speed -> rate of steps -> queue of steps -> the motor's field -> torque ~
+    sin(field - shaft)
 
-Three functions simulate it, compiled in the callback and as they are in the reference loop: `command` is the firmware's
-part at a control sample, `advance` fills the queue, and `field` turns the field. They know no MuJoCo. g, the state of
-one motor, is a record of GENERATOR; p is a `Pulsing`; the queue has two numbers for a step, its time and its direction.
+Three functions simulate it, compiled in the callback and as they are in the reference loop:
+`command` is the firmware's part at a control sample, `advance` fills the queue, and `field` turns
+the field. They know no MuJoCo. g, the state of one motor, is a record of GENERATOR; p is a
+`Pulsing`; the queue has two numbers for a step, its time and its direction.
 """
 
 import dataclasses
@@ -28,33 +31,38 @@ ROUNDING = 1e-9  # steps/s: a rate that is less than this below a whole number i
 
 @dataclasses.dataclass(frozen=True)
 class Stepper(Actuator):
-    """Stepper motor, driver and pulse generator: u is the wanted acceleration of the joint, rad/s^2 (m/s^2).
+    """Stepper motor, driver and pulse generator: u is the wanted acceleration of the joint, rad/s^2
+    (m/s^2).
 
-    At each control sample the firmware adds u times the time since the last sample to a speed. Below the stop band it
-    asks for a stop, else for steps at this rate, in whole steps/s. If the sign changes while steps are wanted, it asks
-    for a stop first, and for the other direction at the next sample.
+    At each control sample the firmware adds u times the time since the last sample to a speed.
+    Below the stop band it asks for a stop, else for steps at this rate, in whole steps/s. If the
+    sign changes while steps are wanted, it asks for a stop first, and for the other direction at
+    the next sample.
 
-    The generator looks at this wish every `refill`, and adds steps to a queue until `queue` is filled. A step in the
-    queue does not change any more, and its whole period is committed with it: a new rate acts after the queue, and up
-    to a period later. A counter n of the steps with which it became faster shapes its ramp. A faster step has the
-    period max(1/rate, 1/sqrt(2 ramp (n + 1))), no longer than the last; a slower one 1/rate, as far as `ramp` allows
-    it, and n - 1, at least 1. To stop it makes n more steps at the last period, and only then turns back. This is the
-    logic of FastAccelStepper 0.33.9 (MIT) on an ATmega2560, as far as its sources tell; how it slows down above the
-    speed sqrt(2 ramp) is chosen.
+    The generator looks at this wish every `refill`, and adds steps to a queue until `queue` is
+    filled. A step in the queue does not change any more, and its whole period is committed with it:
+    a new rate acts after the queue, and up to a period later. A counter n of the steps with which
+    it became faster shapes its ramp. A faster step has the period max(1/rate, 1/sqrt(2 ramp (n +
+    1))), no longer than the last; a slower one 1/rate, as far as `ramp` allows it, and n - 1, at
+    least 1. To stop it makes n more steps at the last period, and only then turns back. This is the
+    logic of FastAccelStepper 0.33.9 (MIT) on an ATmega2560, as far as its sources tell; how it
+    slows down above the speed sqrt(2 ramp) is chosen.
 
-    The driver spreads a step of the field over the interval before it, as drivers with finer microsteps do. The field
+    The driver spreads a step of the field over the interval before it, as drivers with finer
+    microsteps do. The field
     holds the rotor by a magnetic spring, which slips by itself if the load is too large:
 
         torque = gear torque sin(teeth gear (field - x)) - gear^2 damping v
 
-    A law's nominal model is x'' = u. There is no model of currents: the torque does not fall with speed.
+    A law's nominal model is x'' = u. There is no model of currents: the torque does not fall with
+    speed.
 
-    Defaults: a NEMA 17 motor of 1.8 degrees at 8 microsteps, typical numbers; damping is chosen. Speeds and
-    accelerations are those of the joint, in rad or m.
+    Defaults: a NEMA 17 motor of 1.8 degrees at 8 microsteps, typical numbers; damping is chosen.
+    Speeds and accelerations are those of the joint, in rad or m.
 
     Attributes:
-      steps: per turn of the motor, with microsteps; math.inf: the field turns at the commanded speed at once, without a
-        generator.
+      steps: per turn of the motor, with microsteps; math.inf: the field turns at the commanded
+        speed at once, without a generator.
       teeth: of the rotor, periods of the torque per turn of the motor; greater than 0.
       torque: N m at the motor, the largest that the field holds; greater than 0.
       damping: N m s/rad at the motor, 0 or more.
@@ -62,12 +70,16 @@ class Stepper(Actuator):
       gear: turns of the motor per turn of the joint, rad/m on a slide; greater than 0.
       speed: bound on the commanded speed, rad/s (m/s), greater than 0.
       ramp: rad/s^2 (m/s^2), of the generator's ramp, and the default of u_max; greater than 0.
-      stop_band: rad/s (m/s): a slower command means stop; 0 or more. A rate below 1 step/s does, too.
+      stop_band: rad/s (m/s): a slower command means stop; 0 or more. A rate below 1 step/s does,
+        too.
       queue: s of steps that are queued, 0 or more.
-      refill: s between two looks of the generator at its queue, 0 or more, and not between 0 and 1e-5. The first comes
-        after a part of it that depends on the seed. If it is 0, each step is computed when due, whatever `queue` is.
-      spread: share of the last interval over which the driver spreads a step, 0 .. 1; a step is a jump if it is 0.
-      longest_spread: s, the longest interval that the driver measures, 0 or more; chosen: a step at 50 Hz.
+      refill: s between two looks of the generator at its queue, 0 or more, and not between 0 and
+        1e-5. The first comes after a part of it that depends on the seed. If it is 0, each step is
+        computed when due, whatever `queue` is.
+      spread: share of the last interval over which the driver spreads a step, 0 .. 1; a step is a
+        jump if it is 0.
+      longest_spread: s, the longest interval that the driver measures, 0 or more; chosen: a step at
+        50 Hz.
     """
 
     steps: Annotated[float, Whole(low=1, high=10**9, infinite=True)] = 1600
@@ -88,17 +100,25 @@ class Stepper(Actuator):
         super().__post_init__()
         if self.queued > MAX_QUEUED:
             long = f"queue {self.queue:g} s at a speed of {self.speed:g} is {self.queued:,} steps"
-            raise ScenarioError(f"Stepper's {long}: give at most {MAX_QUEUED:,}, by a shorter queue or a lower speed")
+            raise ScenarioError(
+                f"Stepper's {long}: give at most {MAX_QUEUED:,}, by a shorter queue or a lower speed"
+            )
         if self.steps < math.inf and self.speed * self.per_unit > MAX_RATE:
             fast = f"speed {self.speed:g} is {self.speed * self.per_unit:g} steps/s"
-            raise ScenarioError(f"Stepper's {fast}: give at most {MAX_RATE:g}, by a lower speed or fewer steps")
+            raise ScenarioError(
+                f"Stepper's {fast}: give at most {MAX_RATE:g}, by a lower speed or fewer steps"
+            )
         if 0.0 < self.refill < MIN_REFILL:
-            raise ScenarioError(f"Stepper's refill is {self.refill:g} s: give 0, or {MIN_REFILL:g} or more")
+            raise ScenarioError(
+                f"Stepper's refill is {self.refill:g} s: give 0, or {MIN_REFILL:g} or more"
+            )
 
     @property
     def per_unit(self) -> float:
         """Steps per rad (m) of the joint; rad of the motor without steps."""
-        return self.gear if self.steps == math.inf else self.gear * self.steps / math.tau
+        if self.steps == math.inf:
+            return self.gear
+        return self.gear * self.steps / math.tau
 
     @property
     def queued(self) -> int:
@@ -140,27 +160,54 @@ class Pulsing(NamedTuple):
     torque: float = 0.0  # at the joint, N m (N)
 
 
-# The state of a motor: the commanded speed and when it was commanded; the direction that the firmware wants, 0 for a
-# stop, and its rate; of the generator the phase and number of its looks at the queue, the direction of its steps, its
-# ramp's counter, the period of the last step, and the end of this period; numbers of the queue's first step and of the
-# one behind its last; of the field the position of the driver's, the position wanted, its speed and when it ends, and
-# the time of the last step; the joint's position at the start; the field's mean over a physics step, and its rise from
-# the middle of the step to its end.
+# The state of a motor: the commanded speed and when it was commanded; the direction that the
+# firmware wants, 0 for a stop, and its rate; of the generator the phase and number of its looks at
+# the queue, the direction of its steps, its ramp's counter, the period of the last step, and the
+# end of this period; numbers of the queue's first step and of the one behind its last; of the field
+# the position of the driver's, the position wanted, its speed and when it ends, and the time of the
+# last step; the joint's position at the start; the field's mean over a physics step, and its rise
+# from the middle of the step to its end.
 GENERATOR = (
-    "speed", "commanded", "wanted", "rate", "phase", "looks", "direction", "n", "period", "free", "head", "tail",
-    "position", "target", "slope", "until", "stepped", "origin", "middle", "rise",
-)  # fmt: skip
+    "speed",
+    "commanded",
+    "wanted",
+    "rate",
+    "phase",
+    "looks",
+    "direction",
+    "n",
+    "period",
+    "free",
+    "head",
+    "tail",
+    "position",
+    "target",
+    "slope",
+    "until",
+    "stepped",
+    "origin",
+    "middle",
+    "rise",
+)
 
 
 def pulsing(stepper: Stepper) -> Pulsing:
     """Return a Stepper as its functions read it."""
     unit = stepper.per_unit
     return Pulsing(
-        per_unit=unit, top=stepper.speed * unit, ramp=stepper.ramp * unit, band=stepper.stop_band * unit,
-        queue=stepper.queue, refill=stepper.refill, spread=stepper.spread, longest=stepper.longest_spread,
-        slots=stepper.queued, steady=float(stepper.steps == math.inf), sharpness=stepper.teeth * stepper.gear,
+        per_unit=unit,
+        top=stepper.speed * unit,
+        ramp=stepper.ramp * unit,
+        band=stepper.stop_band * unit,
+        queue=stepper.queue,
+        refill=stepper.refill,
+        spread=stepper.spread,
+        longest=stepper.longest_spread,
+        slots=stepper.queued,
+        steady=float(stepper.steps == math.inf),
+        sharpness=stepper.teeth * stepper.gear,
         torque=stepper.gear * stepper.torque,
-    )  # fmt: skip
+    )
 
 
 def command(g, p, u, t):
@@ -177,7 +224,10 @@ def command(g, p, u, t):
 def advance(g, p, queue, start, end):
     """Queue the steps of all looks of the generator from `start` to before `end`, s."""
     while p.steady == 0.0:
-        now = (g.looks + g.phase) * p.refill if p.refill > 0.0 else max(g.free, start)
+        if p.refill > 0.0:
+            now = (g.looks + g.phase) * p.refill
+        else:
+            now = max(g.free, start)
         if now >= end:
             return
         while g.free <= now or (p.refill > 0.0 and g.free - now < p.queue):
@@ -212,23 +262,33 @@ def next_step(g, p):
     elif period > g.period:
         g.n -= 1.0
         slowest = g.period**-2 - 2.0 * p.ramp
-        g.period = min(period, 1.0 / math.sqrt(slowest)) if slowest > 0.0 else period
+        if slowest > 0.0:
+            g.period = min(period, 1.0 / math.sqrt(slowest))
+        else:
+            g.period = period
     g.n = max(g.n, 1.0)
     return g.direction
 
 
 def field(g, p, queue, start, end):
-    """Turn the field from `start` to `end`, s, and keep its mean, and its rise as `drives._rise` defines it."""
+    """Turn the field from `start` to `end`, s, and keep its mean, and its rise as `drives._rise`
+    defines it.
+    """
     t, mean, moment = start, 0.0, 0.0
     if p.steady != 0.0:
         g.slope, g.until = g.speed, math.inf
     while t < end:
-        step_time = queue[2 * int(g.head % p.slots)] if g.head < g.tail else math.inf
+        if g.head < g.tail:
+            step_time = queue[2 * int(g.head % p.slots)]
+        else:
+            step_time = math.inf
         reached = g.until if g.slope != 0.0 else math.inf
         after = max(min(step_time, reached, end), t)
         span, left = after - t, end - t
         mean += span * (g.position + 0.5 * g.slope * span)
-        moment += span * (g.position * (left - 0.5 * span) + g.slope * span * (0.5 * left - span / 3.0))
+        moment += span * (
+            g.position * (left - 0.5 * span) + g.slope * span * (0.5 * left - span / 3.0)
+        )
         g.position += g.slope * span
         t = after
         if t == reached:

@@ -1,12 +1,13 @@
 """Duffing oscillator: M x'' = -delta x' - alpha x - beta x^3 + u + d  (alpha < 0: two wells).
 
 The joint's polynomial spring is the restoring force, exactly. Wells at +-sqrt(-alpha/beta).
-Source: G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz, 1918. Numbers: chosen for the
-paper study, so that the wells lie at +-1 m.
+Source: G. Duffing, Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz, 1918. Numbers: chosen
+for the paper study, so that the wells lie at +-1 m.
 
-Mechanism `springs`: two springs of stiffness k and rest length L from the cart to anchors at a distance a on either
-side, V = k (sqrt(x^2 + a^2) - L)^2, which snaps through. L^2 = a^2 - alpha/beta and k = beta L^2 give the wells their
-positions and their stiffness -2 alpha. The hill between them is 19 % too high for a = 1.5 m.
+Mechanism `springs`: two springs of stiffness k and rest length L from the cart to anchors at a
+distance a on either side, V = k (sqrt(x^2 + a^2) - L)^2, which snaps through. L^2 = a^2 -
+alpha/beta and k = beta L^2 give the wells their positions and their stiffness -2 alpha. The hill
+between them is 19 % too high for a = 1.5 m.
 """
 
 import mujoco
@@ -16,9 +17,13 @@ from smc_mujoco.mechanisms.geometry import cart, coil
 from smc_mujoco.mechanisms.hardware.contact import bar
 from smc_mujoco.mechanisms.plant import Field, Plant, Variant, model_path
 
-ANCHOR_Y = 1.5  # m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
+# m, a: chosen, so that the springs are visible and the wells have nearly the equation's shape
+ANCHOR_Y = 1.5
 SPRING_Z = 0.45  # m, height of the springs above the floor, over the block and the landscape
-STOP_X, PEG_X = 1.7, 0.5  # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
+STOP_X, PEG_X = (
+    1.7,
+    0.5,
+)  # m, |x| at the end stops and x at the post: chosen, outside x0, and between x0 and 0
 HALF_RAIL = 2.07  # m, half the length of the rail between its posts
 
 
@@ -73,10 +78,15 @@ def add_springs(spec):
 
 
 def spring_fields(model, p):
-    rest = ANCHOR_Y**2 - p.alpha / p.beta if p.beta > 0.0 else 0.0
+    if p.beta > 0.0:
+        rest = ANCHOR_Y**2 - p.alpha / p.beta
+    else:
+        rest = 0.0
     if rest <= 0.0:
         given = f"alpha {p.alpha:g} with beta {p.beta:g}"
-        raise ScenarioError(f"duffing has no springs for {given}: give beta > 0 and alpha < {ANCHOR_Y**2:g} beta")
+        raise ScenarioError(
+            f"duffing has no springs for {given}: give beta > 0 and alpha < {ANCHOR_Y**2:g} beta"
+        )
     springs = [model.tendon("front_spring").id, model.tendon("back_spring").id]
     yield from body_fields(model, p)
     yield Field("tendon_stiffness", springs, p.beta * rest)

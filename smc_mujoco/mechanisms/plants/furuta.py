@@ -1,4 +1,5 @@
-"""Furuta pendulum: an inverted pendulum on the end of an arm that u turns about the vertical: two joints, one torque.
+"""Furuta pendulum: an inverted pendulum on the end of an arm that u turns about the vertical: two
+joints, one torque.
 
     (J + m L^2 + Jp sin(q)^2) x'' + m L l cos(q) q'' + 2 Jp sin(q) cos(q) x' q' - m L l sin(q) q'^2
          = u + d - k x - b x' - cf sgn(x') + m grav (L w(x) - l sin(q) (tx sin(x) - ty cos(x)))
@@ -6,17 +7,18 @@
         = m grav l (tz sin(q) + w(x) cos(q)) - bq q' - cfq sgn(q')
     w(x) = tx cos(x) + ty sin(x),    tz = sqrt(1 - tx^2 - ty^2),    Jp = Jc + m l^2
 
-Channel 0 is the arm's angle x in rad about the vertical. Channel 1, which is only measured, is the angle q in rad of
-the pendulum from upright, positive towards growing x; pi is hanging. J is the inertia of arm and rotor about the
-vertical, L the arm's length, l the pendulum's centre of mass from its hinge and Jc its inertia about this centre. It
-has none about its length. tx and ty are the slopes of the table on which the base stands: gravity pulls the pendulum
-towards growing x at x = 0 by tx, and at x = 90 degrees by ty. k is the spring of a cable between base and arm, unbent
-at x = 0. Slopes, spring and the friction b, bq, cf, cfq are 0 by default.
-The dry friction is left out of the nominal f and g.
-Source: Quanser's QUBE-Servo 2 with the rotary pendulum, its published numbers: rotor 4e-6 kg m^2, arm 0.095 kg of
-0.085 m, pendulum 0.024 kg of 0.129 m, uniform. The arm's inertia is m r^2/12 as in BlueRiverTech's
-quanser-openai-driver; Quanser's own file for the QUBE-Servo 3 has m r^2/3. The motor gives at most k V / R = 0.05 N m
-at rest, with k = 0.042 N m/A, R = 8.4 ohm and V = 10 V.
+Channel 0 is the arm's angle x in rad about the vertical. Channel 1, which is only measured, is the
+angle q in rad of the pendulum from upright, positive towards growing x; pi is hanging. J is the
+inertia of arm and rotor about the vertical, L the arm's length, l the pendulum's centre of mass
+from its hinge and Jc its inertia about this centre. It has none about its length. tx and ty are the
+slopes of the table on which the base stands: gravity pulls the pendulum towards growing x at x = 0
+by tx, and at x = 90 degrees by ty. k is the spring of a cable between base and arm, unbent at x =
+0. Slopes, spring and the friction b, bq, cf, cfq are 0 by default. The dry friction is left out of
+the nominal f and g. Source: Quanser's QUBE-Servo 2 with the rotary pendulum, its published numbers:
+rotor 4e-6 kg m^2, arm 0.095 kg of 0.085 m, pendulum 0.024 kg of 0.129 m, uniform. The arm's inertia
+is m r^2/12 as in BlueRiverTech's quanser-openai-driver; Quanser's own file for the QUBE-Servo 3 has
+m r^2/3. The motor gives at most k V / R = 0.05 N m at rest, with k = 0.042 N m/A, R = 8.4 ohm and V
+= 10 V.
 """
 
 from math import cos, sin, sqrt
@@ -55,7 +57,9 @@ def nominal(x, v, i, p):
     weight, tz = p.m * p.grav, sqrt(max(0.0, 1.0 - p.tx * p.tx - p.ty * p.ty))
     w, out = p.tx * cos(x[0]) + p.ty * sin(x[0]), p.tx * sin(x[0]) - p.ty * cos(x[0])
     around, lever = p.J + p.m * p.L * p.L + Jp * s * s, p.m * p.L * p.l * c
-    along = p.m * p.L * p.l * s * v[1] * v[1] - 2.0 * Jp * s * c * v[0] * v[1] - p.b * v[0] - p.k * x[0]
+    along = (
+        p.m * p.L * p.l * s * v[1] * v[1] - 2.0 * Jp * s * c * v[0] * v[1] - p.b * v[0] - p.k * x[0]
+    )
     along += weight * (p.L * w - p.l * s * out)
     about = Jp * s * c * v[0] * v[0] + weight * p.l * (tz * s + w * c) - p.bq * v[1]
     determinant = around * Jp - lever * lever
@@ -69,8 +73,19 @@ FURUTA = Plant(
     label="Furuta pendulum",
     # kg m^2, m, kg, m, kg m^2, N m s/rad, N m s/rad, N m, N m, N m/rad, m/s^2, 1, 1
     parameters={
-        "J": 4e-6 + 0.095 * 0.085**2 / 12, "L": 0.085, "m": 0.024, "l": 0.129 / 2, "Jc": 0.024 * 0.129**2 / 12,
-        "b": 0.0, "bq": 0.0, "cf": 0.0, "cfq": 0.0, "k": 0.0, "grav": 9.81, "tx": 0.0, "ty": 0.0,
+        "J": 4e-6 + 0.095 * 0.085**2 / 12,
+        "L": 0.085,
+        "m": 0.024,
+        "l": 0.129 / 2,
+        "Jc": 0.024 * 0.129**2 / 12,
+        "b": 0.0,
+        "bq": 0.0,
+        "cf": 0.0,
+        "cfq": 0.0,
+        "k": 0.0,
+        "grav": 9.81,
+        "tx": 0.0,
+        "ty": 0.0,
     },
     mass="m",
     unit="rad",
@@ -84,4 +99,4 @@ FURUTA = Plant(
     underactuated=True,
     limits=(STALL_TORQUE,),
     dry=("cf", "cfq"),
-)  # fmt: skip
+)

@@ -1,10 +1,11 @@
 """Inverted pendulum: m l^2 x'' = m grav l sin x - b x' + u + d, x the angle from upright.
 
-A point mass on a massless rod, driven at the pivot: the pendulum of H. K. Khalil, Nonlinear Systems, 2002,
-section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
+A point mass on a massless rod, driven at the pivot: the pendulum of H. K. Khalil, Nonlinear
+Systems, 2002, section 1.2.1, its angle counted from the top. Numbers: chosen for the paper study.
 
-Contacts, with a geometry for l = 0.5 m: the `floor` that a failed pendulum falls on, padded `stops`, a hard `wall` on
-the right, and a `peg` on the dial that the rod hits on its way up from the right.
+Contacts, with a geometry for l = 0.5 m: the `floor` that a failed pendulum falls on, padded
+`stops`, a hard `wall` on the right, and a `peg` on the dial that the rod hits on its way up from
+the right.
 """
 
 from math import asin, cos, sin
@@ -20,7 +21,12 @@ LENGTH, BOB_RADIUS, ROD_RADIUS, HINGE_Z = 0.5, 0.065, 0.012, 0.8  # m
 FLOOR_ANGLE, FLOOR_RESTITUTION = 2.44, 0.3  # rad (140 degrees), of the bob on the floor; chosen
 STOP_ANGLE, STOP_RESTITUTION = 1.0, 0.4  # rad; restitution of rubber; both chosen
 WALL_ANGLE, WALL_RESTITUTION = 0.7, 0.8  # rad; both chosen
-PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = 0.2, 0.30, 0.020, 0.4  # rad; m from the hinge; m; chosen
+PEG_ANGLE, PEG_ARM, PEG_RADIUS, PEG_RESTITUTION = (
+    0.2,
+    0.30,
+    0.020,
+    0.4,
+)  # rad; m from the hinge; m; chosen
 
 
 def build(n):
@@ -59,16 +65,40 @@ def stops(spec):
     machine = spec.body("machine")
     outer = asin(0.110 / LENGTH)  # rad, from the stopped bob to the arm that holds the pad
     for side, sign in (("left", -1), ("right", 1)):
-        stop = machine.add_body(name=f"{side}_stop", pos=(0, 0, HINGE_Z), quat=turned(sign * STOP_ANGLE))
+        stop = machine.add_body(
+            name=f"{side}_stop", pos=(0, 0, HINGE_Z), quat=turned(sign * STOP_ANGLE)
+        )
         face = sorted((sign * BOB_RADIUS, sign * (BOB_RADIUS + 0.022)))
         plate = sorted((sign * (BOB_RADIUS + 0.022), sign * (BOB_RADIUS + 0.032)))
-        box(stop, f"{side}_pad", (face[0], -0.045, LENGTH - 0.045), (face[1], 0.045, LENGTH + 0.045), "ink")
-        box(stop, f"{side}_plate", (plate[0], -0.055, LENGTH - 0.055), (plate[1], 0.055, LENGTH + 0.055), "steel")
-        bar(stop, f"{side}_finger", ((sign * 0.110, -0.02, LENGTH), (sign * 0.110, 0.12, LENGTH)), 0.018, "steel")
-        arm = machine.add_body(name=f"{side}_arm", pos=(0, 0, HINGE_Z), quat=turned(sign * (STOP_ANGLE + outer)))
+        box(
+            stop,
+            f"{side}_pad",
+            (face[0], -0.045, LENGTH - 0.045),
+            (face[1], 0.045, LENGTH + 0.045),
+            "ink",
+        )
+        box(
+            stop,
+            f"{side}_plate",
+            (plate[0], -0.055, LENGTH - 0.055),
+            (plate[1], 0.055, LENGTH + 0.055),
+            "steel",
+        )
+        bar(
+            stop,
+            f"{side}_finger",
+            ((sign * 0.110, -0.02, LENGTH), (sign * 0.110, 0.12, LENGTH)),
+            0.018,
+            "steel",
+        )
+        arm = machine.add_body(
+            name=f"{side}_arm", pos=(0, 0, HINGE_Z), quat=turned(sign * (STOP_ANGLE + outer))
+        )
         box(arm, f"{side}_beam", (-0.018, 0.080, 0.0), (0.018, 0.110, LENGTH + 0.04), "graphite")
         deep = sorted((sign * BOB_RADIUS, sign * (BOB_RADIUS + STOP_DEPTH)))
-        solid(stop, f"{side}_solid", (deep[0], -0.045, LENGTH - 0.20), (deep[1], 0.045, LENGTH + 0.10))
+        solid(
+            stop, f"{side}_solid", (deep[0], -0.045, LENGTH - 0.20), (deep[1], 0.045, LENGTH + 0.10)
+        )
         hit(spec, (f"{side}_solid", "bob"), STOP_RESTITUTION)
 
 
@@ -78,7 +108,13 @@ def wall(spec):
     box(machine, "wall", (face, -0.15, 0.0), (face + 0.05, 0.15, 1.36), "ivory")
     for y in (-0.11, 0.11):
         edge = "front" if y < 0 else "back"
-        box(machine, f"wall_{edge}_rib", (face + 0.05, y - 0.02, 0.0), (face + 0.09, y + 0.02, 1.30), "graphite")
+        box(
+            machine,
+            f"wall_{edge}_rib",
+            (face + 0.05, y - 0.02, 0.0),
+            (face + 0.09, y + 0.02, 1.30),
+            "graphite",
+        )
     solid(machine, "wall_solid", (face, -0.15, 0.0), (face + STOP_DEPTH, 0.15, 1.36))
     hit(spec, ("wall_solid", "bob"), WALL_RESTITUTION)
 

@@ -1,7 +1,8 @@
-"""Inverted pendulums in a chain: m l^2 x_i'' = m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i + x_(i+1)) + u_i + d.
+"""Inverted pendulums in a chain: m l^2 x_i'' = m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i +
+x_(i+1)) + u_i + d.
 
-i = 0 .. n-1 with free ends. They stand on one shaft, neighbours joined by torsion springs kc: the coupling is -kc times
-the path graph's Laplacian. Numbers: chosen for the paper study.
+i = 0 .. n-1 with free ends. They stand on one shaft, neighbours joined by torsion springs kc: the
+coupling is -kc times the path graph's Laplacian. Numbers: chosen for the paper study.
 """
 
 from math import sin
@@ -28,7 +29,13 @@ def nominal(x, v, i, p):
 
 INVERTED_PENDULUM_NETWORK = Plant(
     name="inverted_pendulum_network",
-    parameters={"m": 0.5, "l": 0.5, "b": 0.02, "grav": 9.81, "kc": 0.5},  # kg, m, N m s/rad, m/s^2, N m/rad
+    parameters={
+        "m": 0.5,
+        "l": 0.5,
+        "b": 0.02,
+        "grav": 9.81,
+        "kc": 0.5,
+    },  # kg, m, N m s/rad, m/s^2, N m/rad
     mass="m",
     unit="rad",
     x0=X0,

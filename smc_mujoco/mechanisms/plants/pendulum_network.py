@@ -1,7 +1,9 @@
-"""Hanging pendulums in a chain: m l^2 x_i'' = -m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i + x_(i+1)) + u_i + d.
+"""Hanging pendulums in a chain: m l^2 x_i'' = -m grav l sin x_i - b x_i' + kc (x_(i-1) - 2 x_i +
+x_(i+1)) + u_i + d.
 
-i = 0 .. n-1 with free ends. They hang on one shaft, neighbours joined by torsion springs kc: the coupling is -kc times
-the path graph's Laplacian. Numbers: chosen for the paper study, those of `inverted_pendulum_network`.
+i = 0 .. n-1 with free ends. They hang on one shaft, neighbours joined by torsion springs kc: the
+coupling is -kc times the path graph's Laplacian. Numbers: chosen for the paper study, those of
+`inverted_pendulum_network`.
 """
 
 import dataclasses

@@ -1,4 +1,6 @@
-"""What the evaluator of J promises: the same J as the runs of `smc.run`, on the instances that are asked for."""
+"""What the evaluator of J promises: the same J as the runs of `smc.run`, on the instances that are
+asked for.
+"""
 
 import dataclasses
 
@@ -25,10 +27,14 @@ def objective_of(traces):
 def test_objectives_are_those_of_each_law_on_its_own_unseen_instance():
     laws = [smc.law("classical", k=k) for k in (2.0, 4.0, 2.0)]
     found = objectives("duffing", laws, BRIEF)
-    expected = [objective_of(smc.run(BRIEF.unseen("duffing", law, i))) for i, law in enumerate(laws)]
+    expected = []
+    for i, law in enumerate(laws):
+        expected.append(objective_of(smc.run(BRIEF.unseen("duffing", law, i))))
     assert found == pytest.approx(expected, rel=1e-12)
     assert found[0] != found[2]
-    assert objectives("duffing", laws[:1], BRIEF, instances=[2]) == pytest.approx(found[2:], rel=1e-12)
+    assert objectives("duffing", laws[:1], BRIEF, instances=[2]) == pytest.approx(
+        found[2:], rel=1e-12
+    )
 
 
 def test_instances_of_objectives_belong_to_no_search_and_no_study():
@@ -37,7 +43,10 @@ def test_instances_of_objectives_belong_to_no_search_and_no_study():
     assert len(unseen) == 100
     assert min(unseen) >= GRID_SEEDS
     searches = [(seed, search) for seed in (0, 1, 10**9) for search in (0, 1, 999)]
-    seen = [case.seed for one in searches for case in BRIEF.scenarios("duffing", law, *one)]
+    seen = []
+    for one in searches:
+        for case in BRIEF.scenarios("duffing", law, *one):
+            seen.append(case.seed)
     assert len(set(seen)) == len(seen)
     assert not {*seen} & unseen
     assert min(seen) >= GRID_SEEDS
@@ -79,26 +88,41 @@ def uncompiled(y, gains, memory):
 
 
 def cases_of(plant, law, goal=SECOND):
-    given = gain_sets.law(plant, law) if isinstance(law, str) else law
+    if isinstance(law, str):
+        given = gain_sets.law(plant, law)
+    else:
+        given = law
     return goal.scenarios(plant, given, 3)
 
 
 def by_runs(cases, names, gains, goal=SECOND):
     """J of gains by the public way, in the same runs."""
-    law = dataclasses.replace(cases[0].law, gains={**cases[0].law.gains, **dict(zip(names, gains, strict=True))})
-    return goal.evaluation(cases[0], smc.run([dataclasses.replace(case, law=law) for case in cases])).objective
+    law = dataclasses.replace(
+        cases[0].law, gains={**cases[0].law.gains, **dict(zip(names, gains, strict=True))}
+    )
+    return goal.evaluation(
+        cases[0], smc.run([dataclasses.replace(case, law=law) for case in cases])
+    ).objective
 
 
 CONTINUOUS = [
-    ("duffing", "observer_free"), ("inverted_pendulum", "pid"), ("van_der_pol", MINE),
-    ("pendulum_network", "extended_state"), ("inverted_pendulum_network", "boundary_layer"),
-]  # fmt: skip
-CHATTERING = [("duffing", "twisting"), ("inverted_pendulum", "classical"), ("van_der_pol", "super_twisting")]
+    ("duffing", "observer_free"),
+    ("inverted_pendulum", "pid"),
+    ("van_der_pol", MINE),
+    ("pendulum_network", "extended_state"),
+    ("inverted_pendulum_network", "boundary_layer"),
+]
+CHATTERING = [
+    ("duffing", "twisting"),
+    ("inverted_pendulum", "classical"),
+    ("van_der_pol", "super_twisting"),
+]
 
 
 @pytest.mark.parametrize("by_equation", [True, False], ids=[EQUATION, MUJOCO])
 @pytest.mark.parametrize(
-    ("plant", "law", "tolerance"), [(*one, 1e-9) for one in CONTINUOUS] + [(*one, 1e-2) for one in CHATTERING]
+    ("plant", "law", "tolerance"),
+    [(*one, 1e-9) for one in CONTINUOUS] + [(*one, 1e-2) for one in CHATTERING],
 )
 def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_equation):
     cases = cases_of(plant, law)
@@ -107,7 +131,9 @@ def test_either_engine_has_the_objective_of_the_runs(plant, law, tolerance, by_e
     evaluate = Evaluator(SECOND, cases, names, threads=2, by_equation=by_equation, slots=2)
     assert evaluate.engine == (EQUATION if by_equation else MUJOCO)
     found = [one.objective for one in evaluate(candidates)]
-    assert found == pytest.approx([by_runs(cases, names, gains) for gains in candidates], rel=tolerance)
+    assert found == pytest.approx(
+        [by_runs(cases, names, gains) for gains in candidates], rel=tolerance
+    )
 
 
 @pytest.mark.parametrize("by_equation", [True, False], ids=[EQUATION, MUJOCO])
@@ -122,7 +148,9 @@ def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_
     goal = Objective(conditions=conditions, duration=3.0, u_max=1e9 if law.name == "pumps" else 6.0)
     cases = goal.scenarios("van_der_pol", law, 1)
     names = tuple(law.gains)
-    candidates = [tuple(k * value for value in law.gains.values()) for k in (1.0, 1e9, 2.5, 0.01, 1.3)]
+    candidates = []
+    for k in (1.0, 1e9, 2.5, 0.01, 1.3):
+        candidates.append(tuple(k * value for value in law.gains.values()))
     options = {"threads": 1, "by_equation": by_equation}
     evaluate = Evaluator(goal, cases, names, slots=3, **options)
     together = evaluate(candidates)
@@ -130,20 +158,28 @@ def test_an_objective_does_not_depend_on_the_candidates_before(law, failure, by_
     assert Evaluator(goal, cases, names, slots=1, **options)(candidates) == together
     expected = [by_runs(cases, names, gains, goal) for gains in candidates]
     assert [one.objective for one in together] == pytest.approx(expected, rel=1e-9)
-    assert [one.failed for one in together] == [failure != "" and gains[0] > 5.0 for gains in candidates]
+    assert [one.failed for one in together] == [
+        failure != "" and gains[0] > 5.0 for gains in candidates
+    ]
     for case in cases:
         trace = smc.run(dataclasses.replace(case, law=evaluate.law(candidates[1])))
         assert failure in (trace.failure or "")
 
 
 def test_what_is_more_than_its_equation_is_run_by_mujoco():
-    for plant, condition in (("duffing", "coulomb"), ("duffing", "encoder"), ("double_pendulum", "nominal")):
+    for plant, condition in (
+        ("duffing", "coulomb"),
+        ("duffing", "encoder"),
+        ("double_pendulum", "nominal"),
+    ):
         goal = Objective(conditions=("nominal", condition), duration=0.2)
         law = smc.law("observer_free")
         evaluate = Evaluator(goal, goal.scenarios(plant, law), ("lam",), by_equation=True)
         assert evaluate.engine == MUJOCO
         cases = evaluate.cases
-        assert evaluate([(5.0,)])[0].objective == pytest.approx(by_runs(cases, ("lam",), (5.0,), goal), rel=1e-12)
+        assert evaluate([(5.0,)])[0].objective == pytest.approx(
+            by_runs(cases, ("lam",), (5.0,), goal), rel=1e-12
+        )
 
 
 @pytest.mark.filterwarnings("ignore:.*does not compile")
@@ -159,7 +195,9 @@ def test_without_constraints_no_limit_acts():
     """A pendulum that falls on a stop: with constraints it rests there."""
     goal = Objective(conditions=("contact",), duration=1.0)
     cases = goal.scenarios("inverted_pendulum", smc.law("observer_free", lam=0.001))
-    with_stop, without = (Evaluator(goal, cases, ("lam",), constraints=one)([(0.001,)])[0] for one in (True, False))
+    with_stop, without = (
+        Evaluator(goal, cases, ("lam",), constraints=one)([(0.001,)])[0] for one in (True, False)
+    )
     assert without.objective > 1.1 * with_stop.objective
 
 

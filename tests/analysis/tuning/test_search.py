@@ -1,4 +1,6 @@
-"""What tuning promises: one rule for every law, the same gains for the same seed, never worse for a larger budget."""
+"""What tuning promises: one rule for every law, the same gains for the same seed, never worse for a
+larger budget.
+"""
 
 import dataclasses
 import json
@@ -47,18 +49,25 @@ def test_the_same_seed_gives_the_same_gains_to_the_last_bit_at_any_thread_count(
 
 def test_more_searches_repeat_those_of_fewer_and_share_nothing(found, monkeypatch):
     drawn, draw = [], np.random.default_rng
-    monkeypatch.setattr(search.np.random, "default_rng", lambda seed: drawn.append(seed) or draw(seed))
+    monkeypatch.setattr(
+        search.np.random, "default_rng", lambda seed: drawn.append(seed) or draw(seed)
+    )
     first = tune("duffing", "observer_free", budget=16, seed=3, objective=SHORT, searches=1)
     assert first.searches == found.searches[:1]
     assert [3, 0] in drawn
     gains = [{one.gains for one in made.history} for made in found.searches]
     assert not gains[0] & gains[1]
-    seeds = [case.seed for i in range(3) for case in search._task("duffing", found.law, SHORT, 16, 3, 1).cases(i)]
+    seeds = []
+    for i in range(3):
+        for case in search._task("duffing", found.law, SHORT, 16, 3, 1).cases(i):
+            seeds.append(case.seed)
     assert len(set(seeds)) == len(seeds) == 21
 
 
 @pytest.mark.parametrize("killed_in", [1, 2])
-def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(found, killed_in, monkeypatch, tmp_path):
+def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(
+    found, killed_in, monkeypatch, tmp_path
+):
     made, real = [], search.Task.search
 
     def one(task, i, *rest):
@@ -69,12 +78,20 @@ def test_a_tuning_that_is_killed_goes_on_and_ends_with_the_same_bytes(found, kil
         return real(task, i, *rest)
 
     monkeypatch.setattr(search.Task, "search", one)
-    again = {"budget": 16, "seed": 3, "objective": SHORT, "searches": 3, "folder": tmp_path / "kept"}
+    again = {
+        "budget": 16,
+        "seed": 3,
+        "objective": SHORT,
+        "searches": 3,
+        "folder": tmp_path / "kept",
+    }
     with pytest.raises(KeyboardInterrupt):
         tune("duffing", "observer_free", **again)
     tuned = tune("duffing", "observer_free", **again)
     assert made == [*range(killed_in), "killed", *range(killed_in, 3)]
-    whole, resumed = (one.save(tmp_path / name) for one, name in ((found, "whole.json"), (tuned, "resumed.json")))
+    whole, resumed = (
+        one.save(tmp_path / name) for one, name in ((found, "whole.json"), (tuned, "resumed.json"))
+    )
     assert whole.read_bytes() == resumed.read_bytes()
     tune("duffing", "observer_free", **again)
     assert len(made) == 4
@@ -97,7 +114,9 @@ def test_the_gains_of_search_i_are_set_i_and_the_law_has_those_of_the_least_obje
 def test_each_objective_on_record_is_that_of_the_runs_of_its_own_search(found):
     traces = []
     for i, one in enumerate(found.searches):
-        law = dataclasses.replace(found.law, gains=dict(zip(found.bounds, one.best.gains, strict=True)))
+        law = dataclasses.replace(
+            found.law, gains=dict(zip(found.bounds, one.best.gains, strict=True))
+        )
         traces = smc.run(found.definition.scenarios(found.plant, law, found.seed, i))
         again = sum(itae(t) / abs(t.x[0, 0]) + 1e-3 * tv(t) / (6.0 * 0.5) for t in traces)
         assert again == pytest.approx(one.best.objective, rel=1e-12)
@@ -116,7 +135,12 @@ def test_a_search_whose_equation_differs_from_mujoco_is_made_again_by_mujoco(fou
     assert found.searches[0].engine == EQUATION
     assert tuned.searches[0].best.objective < 1.1 * found.searches[0].best.objective
     monkeypatch.setattr(search, "AGREEMENT", math.inf)
-    assert tune(wrong, "observer_free", budget=16, seed=3, objective=SHORT, searches=1).searches[0].engine == EQUATION
+    assert (
+        tune(wrong, "observer_free", budget=16, seed=3, objective=SHORT, searches=1)
+        .searches[0]
+        .engine
+        == EQUATION
+    )
 
 
 def _of_twice_the_force(x, v, i, p):
@@ -132,14 +156,23 @@ def test_gains_as_good_are_those_of_sets_within_three_percent(found):
 
 
 def test_a_search_has_three_stages_and_screens_at_less_cost(monkeypatch):
-    """Behind friction MuJoCo makes all of them: with one step a control period, until a descent begins."""
+    """Behind friction MuJoCo makes all of them: with one step a control period, until a descent
+    begins.
+    """
     goal = Objective(conditions=("coulomb",), duration=0.1)
     made = []
-    monkeypatch.setattr(search, "Evaluator", lambda *args, **named: made.append(Evaluator(*args, **named)) or made[-1])
+    monkeypatch.setattr(
+        search,
+        "Evaluator",
+        lambda *args, **named: made.append(Evaluator(*args, **named)) or made[-1],
+    )
     tuned = tune("duffing", "observer_free", objective=goal, searches=1)
     by_equation, accurate, cheap = made
     assert [one.engine for one in made] == [MUJOCO] * 3
-    stepping = [(one.cases[0].resolved.integrator, one.cases[0].resolved.physics_step) for one in (accurate, cheap)]
+    stepping = [
+        (one.cases[0].resolved.integrator, one.cases[0].resolved.physics_step)
+        for one in (accurate, cheap)
+    ]
     assert stepping == [("RK4", 1e-3), ("implicitfast", 1e-3)]
     assert by_equation.cases == accurate.cases
     (one,) = tuned.searches
@@ -150,7 +183,11 @@ def test_a_search_has_three_stages_and_screens_at_less_cost(monkeypatch):
 
 @pytest.mark.parametrize(
     ("plant", "fields", "constraints"),
-    [("duffing", {}, False), ("duffing", {"friction": smc.Coulomb(0.3)}, True), ("pendubot", {}, False)],
+    [
+        ("duffing", {}, False),
+        ("duffing", {"friction": smc.Coulomb(0.3)}, True),
+        ("pendubot", {}, False),
+    ],
 )
 def test_constraints_are_left_out_only_where_they_are_limits(plant, fields, constraints):
     assert search._only_limits(smc.Scenario(plant=plant, law="none", **fields)) is not constraints
@@ -160,7 +197,10 @@ def test_what_needs_a_shorter_step_keeps_its_own():
     late = smc.Scenario(plant="duffing", law="none", friction=smc.Viscous(0.3), input_delay=5e-4)
     assert search._coarse(late) is late
     dry = search._coarse(smc.Scenario(plant="duffing", law="none", friction=smc.Coulomb(0.3)))
-    assert (dry.resolved.integrator, dry.resolved.physics_step) == ("implicitfast", 1e-3)  # MuJoCo's friction
+    assert (dry.resolved.integrator, dry.resolved.physics_step) == (
+        "implicitfast",
+        1e-3,
+    )  # MuJoCo's friction
     plain = search._coarse(smc.Scenario(plant="duffing", law="none"))
     assert plain.resolved.integrator == "Euler"
 
@@ -175,7 +215,9 @@ def test_a_search_stops_at_its_budget_and_no_set_of_gains_is_paid_for_twice(budg
 
 @pytest.mark.parametrize(("slope", "least", "most"), [(1e-5, 13, 13), (1.0, 14, 60)])
 def test_a_descent_ends_when_it_gains_too_little(slope, least, most):
-    """With two gains after 2 (2 n + 2) evaluations and the first, unless J falls: it ends at the least J then."""
+    """With two gains after 2 (2 n + 2) evaluations and the first, unless J falls: it ends at the
+    least J then.
+    """
     costs = []
 
     class Bowl:
@@ -189,7 +231,9 @@ def test_a_descent_ends_when_it_gains_too_little(slope, least, most):
 
 
 def test_a_law_of_one_gain_is_tuned():
-    law = smc.law_function(gains={"k": Gain(1.0, Unit(force=1, position=-1, time=1), positive=True)})(one_gain)
+    law = smc.law_function(
+        gains={"k": Gain(1.0, Unit(force=1, position=-1, time=1), positive=True)}
+    )(one_gain)
     tuned = tune("duffing", law, objective=LEAN, searches=1)
     assert tuned.objective < tuned.before
 
@@ -198,7 +242,9 @@ def test_the_front_is_what_no_other_evaluation_beats(found):
     front = found.front
     assert found.searches[0].chosen in front
     for e in front:
-        assert not any(o.tracking <= e.tracking and o.variation < e.variation for o in found.history)
+        assert not any(
+            o.tracking <= e.tracking and o.variation < e.variation for o in found.history
+        )
     assert [e.variation for e in front] == sorted((e.variation for e in front), reverse=True)
 
 
@@ -222,7 +268,9 @@ def test_a_law_is_searched_about_the_bound_on_its_command():
         assert task.scales == {"X": 0.5, "F": F, "M": pytest.approx(M), "T": pytest.approx(T)}
         assert task.goal.u_max == F
         assert math.sqrt(math.prod(task.box["kp"])) == pytest.approx(F / 0.5)
-    with pytest.raises(smc.ScenarioError, match=r"commands in N and m/s\^2: tune for each drive alone"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"commands in N and m/s\^2: tune for each drive alone"
+    ):
         search._task("duffing", smc.law("pid"), Objective(conditions=("nominal", stepper)), 8, 0, 1)
 
 
@@ -244,7 +292,11 @@ def test_a_gain_is_searched_three_decades_wide_about_its_scale():
     scales = {"X": 2.0, "F": 6.0, "M": 1.0, "T": 0.5}
     box = search_space.box(smc.law("super_twisting"), scales)
     middle = {name: math.sqrt(low * high) for name, (low, high) in box.items()}
-    assert middle == {"k1": pytest.approx(6.0 / 4.0**0.5), "k2": pytest.approx(12.0), "c": pytest.approx(2.0)}
+    assert middle == {
+        "k1": pytest.approx(6.0 / 4.0**0.5),
+        "k2": pytest.approx(12.0),
+        "c": pytest.approx(2.0),
+    }
     assert [high / low for low, high in box.values()] == pytest.approx([1000.0] * 3)
     low, high = box["c"]
     assert search_space.widened(box)["c"] == pytest.approx((low / 10, 10 * high))
@@ -271,7 +323,10 @@ TWIN = {"a": Gain(3.0, FORCE, positive=True), "tau": Gain(0.4, TIME, positive=Tr
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
 def test_a_law_written_with_other_gains_ends_as_well(plant):
-    """-lam tanh(s) as -2 a tanh(s), with tau = 1 / k1. Where |u| <= 6 held lam, the second won 12 of 17 blocks."""
+    """-lam tanh(s) as -2 a tanh(s), with tau = 1 / k1.
+
+    Where |u| <= 6 held lam, the second won 12 of 17 blocks.
+    """
     goal = Objective(conditions=("nominal", "noise", "constant"), duration=3.0)
     other = smc.law_function(gains=TWIN)(twin)
     one, two = (tune(plant, law, objective=goal, searches=3) for law in ("observer_free", other))
@@ -281,7 +336,11 @@ def test_a_law_written_with_other_gains_ends_as_well(plant):
 
 
 def test_a_gain_is_divided_by_one_that_the_law_has(refused):
-    refused(lambda: smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(lambda y, gains, memory: (0.0, 0.0)))
+    refused(
+        lambda: smc.law_function(gains={"k": Gain(1.0, over="B"), "b": 1.0})(
+            lambda y, gains, memory: (0.0, 0.0)
+        )
+    )
 
 
 def test_a_held_gain_keeps_its_value():
@@ -291,26 +350,37 @@ def test_a_held_gain_keeps_its_value():
 
 
 def test_the_search_knows_nothing_of_the_gains_it_is_given():
-    one, other = (tune("duffing", smc.law("classical", k=k), budget=10, objective=LEAN, searches=1) for k in (0.5, 5.0))
+    one, other = (
+        tune("duffing", smc.law("classical", k=k), budget=10, objective=LEAN, searches=1)
+        for k in (0.5, 5.0)
+    )
     assert one.history == other.history
     assert one.before != other.before
 
 
 def test_gains_without_units_are_searched_about_their_defaults_with_a_warning():
-    with pytest.warns(smc.errors.ScenarioWarning, match=r"failing's when and k have no unit.*Gain\("):
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"failing's when and k have no unit.*Gain\("
+    ):
         tuned = tune("duffing", failing(), budget=2, objective=LEAN, searches=1)
     for name, (low, high) in tuned.bounds.items():
         assert low * high == pytest.approx(failing().gains[name] ** 2)
 
 
 def test_a_gain_without_a_unit_that_is_not_positive_is_refused(refused):
-    refused(lambda: tune("duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN))
+    refused(
+        lambda: tune(
+            "duffing", smc.law_function(one_gain, gains={"k": 0.0})(), budget=5, objective=LEAN
+        )
+    )
 
 
 @pytest.mark.slow
 def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     own = catalogue()["observer_free"]
-    odd = dataclasses.replace(own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)})
+    odd = dataclasses.replace(
+        own, gains=dict(own.gains) | {"lam": Gain(6.0, Unit(force=-2), positive=True)}
+    )
     goal = Objective(conditions=("nominal",), duration=1.5)
     tuned = tune("duffing", odd, objective=goal, searches=1)
     low, high = tuned.bounds["lam"]
@@ -319,7 +389,9 @@ def test_a_search_leaves_a_box_that_lacks_the_optimum_by_a_decade_and_says_so():
     assert tuned.at_bound == {"lam": "upper"}
 
 
-@pytest.mark.parametrize(("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")])
+@pytest.mark.parametrize(
+    ("gain", "side"), [(1.14, "lower"), (1.16, None), (860.0, None), (880.0, "upper")]
+)
 def test_near_a_bound_is_within_two_percent_of_its_decades(gain, side):
     assert search_space.at_bound({"k": gain}, {"k": (1.0, 1000.0)}).get("k") == side
 
@@ -369,35 +441,68 @@ def test_a_tuning_is_saved_and_read_back_as_it_was(found, tmp_path):
     held = json.loads(path.read_text())
     assert held["budget"] == 16
     assert list(found.gains.values()) in held["record"]["sets"]
-    assert held["definition"]["conditions"] == ["nominal", "noise", "delay_10ms", "sine", "constant", "light", "heavy"]
+    assert held["definition"]["conditions"] == [
+        "nominal",
+        "noise",
+        "delay_10ms",
+        "sine",
+        "constant",
+        "light",
+        "heavy",
+    ]
     assert set(held["versions"]) == {"smc_mujoco", "mujoco", "numba", "numpy", "scipy", "cmaes"}
 
 
-def test_a_tuning_says_each_gain_its_range_and_whether_it_is_at_a_bound_or_searches_disagree(found, tmp_path):
+def test_a_tuning_says_each_gain_its_range_and_whether_it_is_at_a_bound_or_searches_disagree(
+    found, tmp_path
+):
     gains = {"lam": 2.0, "k1": 3.0}, {"lam": 600.0, "k1": 1e-3}
-    plain, extreme = (dataclasses.replace(found, law=dataclasses.replace(found.law, gains=one)) for one in gains)
+    plain, extreme = (
+        dataclasses.replace(found, law=dataclasses.replace(found.law, gains=one)) for one in gains
+    )
     alone = dataclasses.replace(plain, searches=found.searches[:1])
     far = found.searches[0].best._replace(objective=7.0 * found.objective)
-    apart = dataclasses.replace(plain, searches=(dataclasses.replace(found.searches[0], best=far), *found.searches[1:]))
+    apart = dataclasses.replace(
+        plain, searches=(dataclasses.replace(found.searches[0], best=far), *found.searches[1:])
+    )
     tables = {
         name: one.tables[0]
-        for name, one in {"plain": plain, "extreme": extreme, "alone": alone, "apart": apart}.items()
+        for name, one in {
+            "plain": plain,
+            "extreme": extreme,
+            "alone": alone,
+            "apart": apart,
+        }.items()
     }
     for name, table in tables.items():
         assert [row[0] for row in table.rows] == ["lam", "k1"]
-        assert [bool(row[-1]) for row in table.rows] == [False, name == "extreme"]  # at its lower bound
+        assert [bool(row[-1]) for row in table.rows] == [
+            False,
+            name == "extreme",
+        ]  # at its lower bound
         assert len(table.headings) == len(table.rows[0])
     notes = {name: " ".join(table.notes) for name, table in tables.items()}
     assert "J up to 7 times the least" in notes["apart"]
     assert notes["alone"] != notes["plain"] != notes["apart"]
     assert "lam=2" in repr(plain)
-    goal, free = Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")), Objective(weight=0.0)
-    assert all(part in str(goal) for part in ("nominal, sine", "0.001 TV", "|u| <= 12", "chattering of s <= 0.01"))
+    goal, free = (
+        Objective(u_max=12.0, chattering=0.01, conditions=("nominal", "sine")),
+        Objective(weight=0.0),
+    )
+    assert all(
+        part in str(goal)
+        for part in ("nominal, sine", "0.001 TV", "|u| <= 12", "chattering of s <= 0.01")
+    )
     assert not any(part in str(free) for part in ("|u| <=", "chattering", "0.001 TV"))
     assert goal.describe() == {
-        "chattering": 0.01, "conditions": ["nominal", "sine"], "control_period": 0.001, "duration": 5.0,
-        "starts": {"by": 0.0, "spread": 0.2, "x0": None}, "u_max": 12.0, "weight": 0.001,
-    }  # fmt: skip
+        "chattering": 0.01,
+        "conditions": ["nominal", "sine"],
+        "control_period": 0.001,
+        "duration": 5.0,
+        "starts": {"by": 0.0, "spread": 0.2, "x0": None},
+        "u_max": 12.0,
+        "weight": 0.001,
+    }
     names = "at_bound before bounds budget definition record rule scales scenario searched searches seed versions"
     assert sorted(json.loads(found.save(tmp_path / "a.json").read_text())) == names.split()
 
@@ -425,7 +530,13 @@ def test_bad_input_is_one_sentence(refused):
         {"objective": "best"},
         {"threads": 0},
     ]:
-        given = {"plant": "duffing", "law": "classical", "budget": 5, "objective": LEAN, "searches": 1} | changed
+        given = {
+            "plant": "duffing",
+            "law": "classical",
+            "budget": 5,
+            "objective": LEAN,
+            "searches": 1,
+        } | changed
         refused(lambda given=given: tune(**given))
 
 
@@ -439,10 +550,16 @@ def mistyped(y, gains, memory):
 
 @pytest.mark.filterwarnings("ignore:.*does not compile", "ignore:.* no unit")
 @pytest.mark.parametrize("function", [not_yet, mistyped])
-def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(function, monkeypatch, tmp_path, refused):
+def test_a_law_that_fails_by_itself_is_not_searched_and_says_why(
+    function, monkeypatch, tmp_path, refused
+):
     law = smc.law_function(gains={"k": 3.0})(function)
     monkeypatch.setattr(search.Task, "search", None)
-    refused(lambda: Trial([], [], 1.0, None, tmp_path, None, False).gains_on(smc.plant("duffing"), [law]))
+    refused(
+        lambda: Trial([], [], 1.0, None, tmp_path, None, False).gains_on(
+            smc.plant("duffing"), [law]
+        )
+    )
 
 
 @pytest.mark.filterwarnings("ignore:.* no unit")
@@ -478,7 +595,9 @@ def test_warns_if_and_only_if_the_laws_own_gains_are_better():
         again = tune("duffing", first.law, budget=1, objective=SHORT, searches=1)
     assert again.objective > again.before
     assert [Path(one.filename).name for one in caught] == ["test_search.py"]
-    tune("duffing", first.law, objective=SHORT, searches=1)  # as good as its own: a warning would be an error
+    tune(
+        "duffing", first.law, objective=SHORT, searches=1
+    )  # as good as its own: a warning would be an error
 
 
 LAGGING = smc.condition("lagging", actuator=smc.Lag(0.01))
@@ -502,6 +621,8 @@ def test_gains_are_tuned_within_a_bound_on_predicted_chattering():
 @pytest.mark.usefixtures("coarse_grid")
 @pytest.mark.filterwarnings("ignore:no set of gains")
 def test_it_warns_if_all_gains_tried_chatter_too_much():
-    with pytest.warns(smc.errors.ScenarioWarning, match="are predicted to chatter with more than 1e-12"):
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match="are predicted to chatter with more than 1e-12"
+    ):
         tuned = tune("duffing", "classical", 2, objective=LAGGED, chattering=1e-12, searches=1)
     assert tuned.objective > 2.0 * FAILURE_COST

@@ -1,8 +1,9 @@
-"""Units of gains: a law whose gains are converted by their units does the same in every system of units.
+"""Units of gains: a law whose gains are converted by their units does the same in every system of
+units.
 
-The plant is x'' = f + g u (with one integrator more for laws of degree 3), in units of force, position and time and
-again in others; gains, forces, positions and times are converted. Laws that have a number with a unit in their formula
-are held to the systems in which this number is the same.
+The plant is x'' = f + g u (with one integrator more for laws of degree 3), in units of force,
+position and time and again in others; gains, forces, positions and times are converted. Laws that
+have a number with a unit in their formula are held to the systems in which this number is the same.
 """
 
 import dataclasses
@@ -18,7 +19,8 @@ from smc_mujoco.control import units
 from smc_mujoco.control.law import catalogue
 
 ALONE = dict.fromkeys(
-    ("hierarchical", "rotary_swing_up"), "its plants have a free joint, and `search_space.scales` refuses them"
+    ("hierarchical", "rotary_swing_up"),
+    "its plants have a free joint, and `search_space.scales` refuses them",
 )
 LAWS = [name for name in catalogue() if name not in ALONE]
 
@@ -29,24 +31,41 @@ FIXED = {
     "barrier_adaptive": (units.FORCE, "K = |s| / (eps - |s|) is a force"),
     "nested_third_order": (units.POSITION, "the powers of e and de are added"),
     "observer_free_third": (units.ACCELERATION, "the width of tanh is 1 in s"),
-} | {name: TANH for name in LAWS if name.startswith("observer_free") and name != "observer_free_third"}
+} | {
+    name: TANH
+    for name in LAWS
+    if name.startswith("observer_free") and name != "observer_free_third"
+}
 WITHOUT_MODEL = dict.fromkeys(
     (
-        "discrete_time", "implicit_first_order", "implicit_super_twisting", "integral", "nonsingular_fast_terminal",
-        "nonsingular_terminal", "prescribed_time", "proper_conditioned_super_twisting", "proper_super_twisting",
+        "discrete_time",
+        "implicit_first_order",
+        "implicit_super_twisting",
+        "integral",
+        "nonsingular_fast_terminal",
+        "nonsingular_terminal",
+        "prescribed_time",
+        "proper_conditioned_super_twisting",
+        "proper_super_twisting",
         "terminal",
     ),
     G_IS_1,
-)  # fmt: skip
+)
 
 
-VISIBLE = {"N": 5.0, "least": 3.0, "bound": 0.3, "w_max": 0.5}  # so that they act in a run as short as these
+VISIBLE = {
+    "N": 5.0,
+    "least": 3.0,
+    "bound": 0.3,
+    "w_max": 0.5,
+}  # so that they act in a run as short as these
 
 
 def systems(law, fixed, model, rng):
     """Systems of units in which a unit is 1; with the model laws speak in accelerations.
 
-    They are powers of 4, so that roots are exact and rounding, which a switching law magnifies, is the same.
+    They are powers of 4, so that roots are exact and rounding, which a switching law magnifies, is
+    the same.
     """
     found = []
     while len(found) < 2:
@@ -59,7 +78,10 @@ def systems(law, fixed, model, rng):
 
 def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
     """x / X and u / F over 150 samples, in a system of units."""
-    plant, n = (plant_c, 3) if law.relative_degree == 3 else (plant_b, 2)
+    if law.relative_degree == 3:
+        plant, n = (plant_c, 3)
+    else:
+        plant, n = (plant_b, 2)
     start = [value * X / T**i for i, value in enumerate((1.0, 0.4, -0.2)[:n])]
     done = plant(
         law,
@@ -77,19 +99,27 @@ def run(law, X=1.0, T=1.0, F=1.0, model=0.0):
 def given(name, rng):
     """The law with gains near its own; a gain of 0 or inf, which has no unit, is given a size."""
     law = catalogue()[name].bind({})
-    law = dataclasses.replace(law, gains={gain: VISIBLE.get(gain, value) for gain, value in law.gains.items()})
+    law = dataclasses.replace(
+        law, gains={gain: VISIBLE.get(gain, value) for gain, value in law.gains.items()}
+    )
     exact = {gain for gain in law.gains if search_space.unit(law, gain) is None}
-    sized = {
-        gain: value if gain in exact else rng.uniform(0.8, 1.25) * (value if value and math.isfinite(value) else 0.7)
-        for gain, value in law.gains.items()
-    }
+    sized = {}
+    for gain, value in law.gains.items():
+        if gain in exact:
+            sized[gain] = value
+        else:
+            sized[gain] = rng.uniform(0.8, 1.25) * (
+                value if value and math.isfinite(value) else 0.7
+            )
     return dataclasses.replace(law, gains=sized)
 
 
 def converted(law, system):
     """The law with its gains in another system of units."""
     known = {gain: search_space.unit(law, gain) or units.Unit() for gain in law.gains}
-    return dataclasses.replace(law, gains={g: v * known[g].of(system) for g, v in law.gains.items()})
+    return dataclasses.replace(
+        law, gains={g: v * known[g].of(system) for g, v in law.gains.items()}
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in LAWS if name != "swing_up"])
@@ -116,13 +146,18 @@ def test_a_wrong_unit_of_any_gain_would_be_seen(name):
     runs = {model: np.concatenate(run(law, model=model)) for model in (0.0, 1.0)}
     for gain, value in law.gains.items():
         other = dataclasses.replace(law, gains=dict(law.gains) | {gain: 2.0 * value})
-        assert max(abs(np.concatenate(run(other, model=m)) - plain).max() for m, plain in runs.items()) > 1e-6, gain
+        assert (
+            max(abs(np.concatenate(run(other, model=m)) - plain).max() for m, plain in runs.items())
+            > 1e-6
+        ), gain
 
 
 def test_every_gain_has_a_unit_and_a_law_with_gains_can_be_tuned():
     for name in LAWS:
         law = smc.law(name)
-        assert all(search_space.unit(law, gain) or catalogue()[name].gains[gain].held for gain in law.gains), name
+        assert all(
+            search_space.unit(law, gain) or catalogue()[name].gains[gain].held for gain in law.gains
+        ), name
         if name != "none":
             assert search_space.box(law, {"F": 6.0, "X": 1.5, "M": 1.0, "T": 0.5}), name
 

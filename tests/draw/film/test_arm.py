@@ -1,4 +1,6 @@
-"""What films show of an arm: its tip's path until now, torques against their limits, forces of contact, and blows."""
+"""What films show of an arm: its tip's path until now, torques against their limits, forces of
+contact, and blows.
+"""
 
 import dataclasses
 from types import SimpleNamespace
@@ -27,7 +29,9 @@ def project(points):
 def trace():
     law = smc.law("computed_torque_sliding", c=8.0)
     bounds = [4.0, 2.0, 9.0]
-    scenario = smc.Scenario(plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, u_max=bounds, duration=0.5)
+    scenario = smc.Scenario(
+        plant=arms.arm(), law=law, reference=smc.Sine(0.3, 4.0), x0=0.2, u_max=bounds, duration=0.5
+    )
     return smc.run(scenario)
 
 
@@ -38,7 +42,9 @@ def struck(trace, **fields):
 def overlay(trace, edges=EDGES, body=(9.0, 0.0, 9.0)):
     """What is drawn over an arm at the origin, of which every body is at one place, m."""
     find = lambda k, name: np.array(body)  # noqa: E731
-    stage = SimpleNamespace(where=np.zeros((1, 3)), project=project, size=SIZE, scale=1.0, find=find)
+    stage = SimpleNamespace(
+        where=np.zeros((1, 3)), project=project, size=SIZE, scale=1.0, find=find
+    )
     return arm.Overlay([trace], [COLOUR], stage, edges, np.array([[100.0, 150.0, 300.0, 210.0]]))
 
 
@@ -66,8 +72,12 @@ def test_a_trail_is_drawn_until_now():
         (late, 45, 34, False),
     ):
         assert (picture[y, x].tolist() == list(style.rgb(COLOUR))) is inked
-    assert (drawn(arm.Trail(points, times, COLOUR, 3.0), 2.0) == late).all()  # at once or part by part
-    assert (drawn(arm.Trail(points - 1000.0, times, COLOUR, 3.0), 2.0) == 255).all()  # outside the picture
+    assert (
+        drawn(arm.Trail(points, times, COLOUR, 3.0), 2.0) == late
+    ).all()  # at once or part by part
+    assert (
+        drawn(arm.Trail(points - 1000.0, times, COLOUR, 3.0), 2.0) == 255
+    ).all()  # outside the picture
 
 
 def test_no_path_is_drawn_below_the_floor(trace, monkeypatch):
@@ -96,23 +106,37 @@ def test_the_trail_of_an_arm_is_its_tips_path(trace):
 
 def test_bars_are_shares_of_each_joints_limit(trace):
     assert arm.has_bars(trace)
-    assert not arm.has_bars(struck(trace, actuator=smc.DCMotor(command="voltage", gear=50.0), u_max=None))  # volts
+    assert not arm.has_bars(
+        struck(trace, actuator=smc.DCMotor(command="voltage", gear=50.0), u_max=None)
+    )  # volts
     bars = overlay(trace)
     expected = trace.applied[:20].mean(axis=0) / np.array([4.0, 2.0, 9.0])
     assert bars.shares is not None
     np.testing.assert_allclose(bars.shares[0][0], expected, atol=0.05)
     beyond = np.where(trace.t[:, None] < EDGES[1], 1.5, -1.5) * [4.0, 2.0, 9.0]
-    np.testing.assert_array_equal(overlay(dataclasses.replace(trace, applied=beyond)).shares, [[[1.0] * 3, [-1.0] * 3]])
+    np.testing.assert_array_equal(
+        overlay(dataclasses.replace(trace, applied=beyond)).shares, [[[1.0] * 3, [-1.0] * 3]]
+    )
     bars.shares[0][0] = (0.5, -1.0, 0.0)
     image = bars.over(paper() // 2, 0)
     zero = 150.0 + arm.LABEL_GAP + arm.BAR_HEIGHT / 2
-    middles = [round(100.0 + arm.BAR_GAP + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2) for i in range(3)]
+    middles = []
+    for i in range(3):
+        middles.append(
+            round(100.0 + arm.BAR_GAP + i * (arm.BAR_WIDTH + arm.BAR_GAP) + arm.BAR_WIDTH / 2)
+        )
     quarter = round(arm.BAR_HEIGHT / 8)
     up, down = round(zero) - quarter, round(zero) + quarter
     assert image[up, middles[0]].tolist() == list(style.rgb(COLOUR))
     assert image[down, middles[0]].tolist() == list(style.rgb(style.PAPER))
-    assert image[down, middles[1]].tolist() == list(style.rgb(style.FAILED))  # all that the motor has
-    assert image[up, middles[2]].tolist() == image[down, middles[2]].tolist() == list(style.rgb(style.PAPER))
+    assert image[down, middles[1]].tolist() == list(
+        style.rgb(style.FAILED)
+    )  # all that the motor has
+    assert (
+        image[up, middles[2]].tolist()
+        == image[down, middles[2]].tolist()
+        == list(style.rgb(style.PAPER))
+    )
 
 
 def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
@@ -124,7 +148,9 @@ def test_a_blow_is_an_arrow_that_ends_before_its_body(trace):
     y, x = np.nonzero((during == hue).all(axis=2) & ~(before == hue).all(axis=2))
     assert 250 - 100 * arm.BLOW_DISTANCE - 3 <= x.max() <= 250 - 100 * arm.BLOW_DISTANCE + 1
     assert abs(np.median(y) - 100) <= 1
-    edges = np.array([0.0, 0.02, 0.03, 0.14, 0.16, 0.18])  # s, of frames; it is seen until 0.12 s after its end
+    edges = np.array(
+        [0.0, 0.02, 0.03, 0.14, 0.16, 0.18]
+    )  # s, of frames; it is seen until 0.12 s after its end
     frames = [overlay(hit, edges, body).over(paper(), frame) for frame in range(5)]
     assert [(each[y, x] == hue).all() for each in frames] == [False, True, True, True, False]
 
@@ -160,5 +186,9 @@ def test_a_film_of_arms_tells_of_the_tip(trace):
     early, late = frames
     assert early.shape == (540, 960, 3)
     (colour, _) = style.law_colours([trace.scenario.law] * 2)
-    inks = [np.abs(picture[:220].astype(int) - style.rgb(colour)).sum(axis=2) < 12 for picture in (early, late)]
-    assert inks[1].sum() > inks[0].sum() + 5  # the path, without the links, which shade, and the bars below
+    inks = []
+    for picture in (early, late):
+        inks.append(np.abs(picture[:220].astype(int) - style.rgb(colour)).sum(axis=2) < 12)
+    assert (
+        inks[1].sum() > inks[0].sum() + 5
+    )  # the path, without the links, which shade, and the bars below

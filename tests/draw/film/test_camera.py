@@ -31,7 +31,9 @@ LAMPS = """<light name="own" type="directional" dir="0 0.3 -1"/><light name="lam
 def trace(request, tmp_path_factory) -> smc.Trace:
     path = tmp_path_factory.mktemp("arm") / "arm.xml"
     path.write_text(MODEL.format(lights=request.param))
-    return smc.run(smc.Scenario(plant=smc.plant_from(path, ["j"]), law="none", x0=0.3, duration=0.4))
+    return smc.run(
+        smc.Scenario(plant=smc.plant_from(path, ["j"]), law="none", x0=0.3, duration=0.4)
+    )
 
 
 def test_angles_are_those_of_mujoco_s_free_camera():
@@ -45,22 +47,31 @@ def test_angles_are_those_of_mujoco_s_free_camera():
 @pytest.mark.parametrize(
     ("chosen", "sentence"),
     [
-        ((1.0,), "give the name of a camera"), ((1.0, 2.0, 3.0), "give the name of a camera"),
-        ((0.0, 91.0), "camera's elevation is 91"), (("a", 0.0), "camera's azimuth"), (3.0, "give a list"),
+        ((1.0,), "give the name of a camera"),
+        ((1.0, 2.0, 3.0), "give the name of a camera"),
+        ((0.0, 91.0), "camera's elevation is 91"),
+        (("a", 0.0), "camera's azimuth"),
+        (3.0, "give a list"),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_camera_is_refused(chosen, sentence):
     with pytest.raises(smc.ScenarioError, match=sentence):
         camera.checked(chosen)
     with pytest.raises(smc.ScenarioError, match=sentence):
-        smc.Scene(title="a", conditions={"b": {"c": smc.Scenario(plant="duffing", law="none")}}, camera=chosen)
+        smc.Scene(
+            title="a",
+            conditions={"b": {"c": smc.Scenario(plant="duffing", law="none")}},
+            camera=chosen,
+        )
 
 
 def test_an_own_model_s_camera_is_found_by_its_name(trace):
     side = scene.turn(trace.scenario, "side")
     assert -side[:, 2] == pytest.approx([-1.0, 0.0, 0.0])
     azimuth, down = -scene.turn(trace.scenario)[:2, 2], -scene.turn(trace.scenario)[2, 2]
-    assert azimuth / np.linalg.norm(azimuth) == pytest.approx([0.0, 1.0])  # the first that stands still, which
+    assert azimuth / np.linalg.norm(azimuth) == pytest.approx(
+        [0.0, 1.0]
+    )  # the first that stands still, which
     assert down == pytest.approx(np.sin(np.radians(scene.LOW_ELEVATION)))  # looks along the floor
     with pytest.raises(smc.ScenarioError, match="sid"):
         scene.turn(trace.scenario, "sid")
@@ -94,7 +105,9 @@ def test_links_without_a_colour_have_the_law_s_and_other_bodies_their_own(trace,
     with Stage([trace] * machines, ["#0072B2", "#D55E00"][:machines], SIZE, ROOM) as shown:
         (link,) = shown.links[0]
         ball = next(i for i in range(shown.model.ngeom) if shown.model.geom_rgba[i, 1] > 0.8)
-        assert shown.model.geom_rgba[link, 2] > 2 * shown.model.geom_rgba[link, 0]  # blue, not MuJoCo's grey
+        assert (
+            shown.model.geom_rgba[link, 2] > 2 * shown.model.geom_rgba[link, 0]
+        )  # blue, not MuJoCo's grey
         assert shown.model.geom_rgba[ball, :3] == pytest.approx([0.2, 0.9, 0.2])
 
 
@@ -108,15 +121,22 @@ def test_joints_without_a_channel_move_as_in_the_run(trace):
     assert motion.poses[:, 3] == pytest.approx(2.0 - 9.81 * times**2 / 2, abs=1e-2)
     assert motion.at(0.2)[3] == motion.poses[1, 3]
     shown = puppet.Puppet(trace.scenario)
-    assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx([1.0, motion.poses[2, 3]])
+    assert shown.qpos(np.array([1.0]), rest=motion.poses[2])[[0, 3]] == pytest.approx(
+        [1.0, motion.poses[2, 3]]
+    )
     low = shown.reach(trace, motion)[:, 2].min()
-    assert low == pytest.approx(motion.poses[:, 3].min() - 0.1, abs=0.2)  # the ball is in the picture
+    assert low == pytest.approx(
+        motion.poses[:, 3].min() - 0.1, abs=0.2
+    )  # the ball is in the picture
 
 
 @pytest.mark.parametrize(
-    ("place", "half", "seen"), [(3.9, 0.01, True), (4.1, 0.01, False), (0, 1.9, True), (0, 2.1, False)]
+    ("place", "half", "seen"),
+    [(3.9, 0.01, True), (4.1, 0.01, False), (0, 1.9, True), (0, 2.1, False)],
 )
-def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_leave_the_picture(place, half, seen):
+def test_fixed_things_that_are_farther_or_larger_than_four_times_what_moves_may_leave_the_picture(
+    place, half, seen
+):
     """The ball that moves is 1 m thick, and does not move away."""
     plant = smc.plant_from(
         f"""<mujoco><worldbody><body pos="0 0 3"><joint name="j" axis="0 1 0"/><geom size=".5"/></body>

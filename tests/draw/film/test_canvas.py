@@ -22,7 +22,10 @@ def stage(plant: str, **fields) -> Stage:
 
 def poses(shown: Stage, count: int = 6) -> list[tuple[np.ndarray, ...]]:
     """Positions of two machines, of which the second moves."""
-    return [(np.full(shown.shown[0], 0.2), np.full(shown.shown[1], 0.2 + 0.15 * k)) for k in range(count)]
+    return [
+        (np.full(shown.shown[0], 0.2), np.full(shown.shown[1], 0.2 + 0.15 * k))
+        for k in range(count)
+    ]
 
 
 def pictures(shown: Stage, push: bool) -> list[np.ndarray]:
@@ -67,7 +70,9 @@ def test_rectangles_are_joined_where_one_takes_less_time_than_two():
 
 def test_two_machines_that_move_far_apart_are_drawn_in_two_rectangles(monkeypatch):
     drawn, render = [], Canvas.render
-    monkeypatch.setattr(Canvas, "render", lambda self, area, *rest: drawn.append(area) or render(self, area, *rest))
+    monkeypatch.setattr(
+        Canvas, "render", lambda self, area, *rest: drawn.append(area) or render(self, area, *rest)
+    )
     with stage("overhead_crane", law=smc.law("hierarchical")) as shown:
         for x in (0.2, 0.25):
             for k in range(2):
@@ -163,6 +168,8 @@ def test_a_ghost_stands_where_the_reference_is_and_inside_a_machine_that_is_ther
         assert ghost.sum() > 100
         assert columns.max() < SIZE[0] / 2
         shown.aim(0, np.array([1.5]))
-        assert (np.abs(shown.render().astype(int) - alone).max(axis=2) > 20).sum() < 0.1 * ghost.sum()
+        assert (
+            np.abs(shown.render().astype(int) - alone).max(axis=2) > 20
+        ).sum() < 0.1 * ghost.sum()
         shown.aim(0, None)
         assert (np.abs(shown.render().astype(int) - alone).max(axis=2) > SEEN).mean() < 3e-4

@@ -1,4 +1,6 @@
-"""Films: the right frames, moving machines in their laws' colours, arrows that push, failures that show."""
+"""Films: the right frames, moving machines in their laws' colours, arrows that push, failures that
+show.
+"""
 
 import contextlib
 import dataclasses
@@ -30,7 +32,9 @@ SIZE = (480, 270)
 renders = pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
 
 
-def runs(plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration: float = 0.3) -> list[smc.Trace]:
+def runs(
+    plant: str = "duffing", condition: str = "nominal", laws=LAWS, duration: float = 0.3
+) -> list[smc.Trace]:
     return smc.run(list(smc.paper.comparison(plant, condition, laws, duration=duration).values()))
 
 
@@ -59,7 +63,10 @@ def machines(picture: np.ndarray) -> np.ndarray:
 
 def share(picture: np.ndarray, colour: str) -> float:
     """Share of pixels whose hue is that of a colour, whatever the light."""
-    pixels, wanted = machines(picture).reshape(-1, 3).astype(float), np.array(style.rgb(colour), float)
+    pixels, wanted = (
+        machines(picture).reshape(-1, 3).astype(float),
+        np.array(style.rgb(colour), float),
+    )
     pixels, wanted = pixels - pixels.min(axis=1, keepdims=True), wanted - wanted.min()
     strong = pixels.max(axis=1) > 60
     alike = pixels @ wanted > 0.985 * np.linalg.norm(pixels, axis=1) * np.linalg.norm(wanted)
@@ -73,7 +80,11 @@ def test_arrows_are_to_scale_and_a_bar_shows_switching():
     arrow, bar, push = arrows(acting, 1, 0, Scale(6.0, 0.2), "#0072B2")
     assert arrow.high == pytest.approx(0.25, abs=0.02)
     assert (bar.low, bar.high, bar.head) == (-0.5, 1.0, False)
-    assert [part.layer for part in (arrow, bar, push)] == [0, 0, 1]  # each arrow is beyond the one before
+    assert [part.layer for part in (arrow, bar, push)] == [
+        0,
+        0,
+        1,
+    ]  # each arrow is beyond the one before
     assert push.high == pytest.approx(np.sin(5 * trace.t[101:201]).mean(), abs=0.02)
 
 
@@ -88,7 +99,10 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
     with Stage([trace], ["#0072B2"], (640, 360), camera.Room(200, 100, 440, 300)) as scene:
         scene.pose(0, np.array([0.0]))
         upright = scene.render().astype(int)
-        left, right = (column(scene.render([(0, 0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))])) for end in (-1.0, 1.0))
+        left, right = (
+            column(scene.render([(0, 0, Arrow(0.0, end, (1.0, 0.0, 0.0, 1.0)))]))
+            for end in (-1.0, 1.0)
+        )
         scene.pose(0, np.array([0.4]))
         leaning = column(scene.render())
     assert leaning * right > 0.0 > leaning * left
@@ -98,7 +112,9 @@ def test_a_torque_s_arrow_points_to_where_it_moves_the_pendulum():
 def test_a_failed_machine_turns_grey_stays_where_it_was_and_has_no_goal(monkeypatch):
     good, bad = runs("inverted_pendulum", laws=LAWS[:2])
     goals = []
-    monkeypatch.setattr(Stage, "aim", lambda stage, k, r: goals.append((k, r is None or r[0] - traces[k].r[0, 0])))
+    monkeypatch.setattr(
+        Stage, "aim", lambda stage, k, r: goals.append((k, r is None or r[0] - traces[k].r[0, 0]))
+    )
     traces = good, bad
     before, after, later = pictures([good, failed(bad, 150)], [0.1, 0.2, 0.3])
     assert goals == [(0, 0.0), (1, 0.0), *[(0, 0.0), (1, True)] * 2]
@@ -191,14 +207,18 @@ def test_a_film_shows_all_that_a_scenario_s_mechanism_has(plant, field, name):
     model = scene.compose([scenario] * 2, np.array([[0.0, 0, 0], [0, 9, 0]]), SIZE)
     shown = {model.geom(i).name for i in range(model.ngeom)}
     wanted = [geom.name for geom in models.spec(scenario).geoms if geom.name not in ("", "floor")]
-    assert [f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown] == []
+    assert [
+        f"m{k}/{geom}" for k in range(2) for geom in wanted if f"m{k}/{geom}" not in shown
+    ] == []
     assert model.nskin == 2 * len(models.spec(scenario).skins)
 
 
 def stood(scenarios) -> np.ndarray:
     """Where machines stand."""
     found = [puppet.Puppet(scenario) for scenario in scenarios]
-    reaches = [each.reach(smc.run(scenario)) for each, scenario in zip(found[:1], scenarios, strict=False)]
+    reaches = []
+    for each, scenario in zip(found[:1], scenarios, strict=False):
+        reaches.append(each.reach(smc.run(scenario)))
     return stage.standing_places(found, reaches * len(found), scene.turn(scenarios[0]))
 
 
@@ -210,17 +230,26 @@ def test_machines_side_by_side_keep_apart(plant, field, name):
     low, high = corners.min(axis=1), corners.max(axis=1)
     step = stood([scenario] * 3)[1, :2] - stood([scenario] * 3)[0, :2]
     for by in (step, 2 * step):
-        apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(axis=2)
+        apart = np.maximum(low[:, None] + by - high[None], low[None] - high[:, None] - by).max(
+            axis=2
+        )
         assert apart.min() >= 0.0
 
 
-def test_realistic_carts_stand_so_far_behind_each_other_that_no_part_of_one_meets_another(monkeypatch):
+def test_realistic_carts_stand_so_far_behind_each_other_that_no_part_of_one_meets_another(
+    monkeypatch,
+):
     """One reaches from y = -0.45 to 0.82 m, the two parts of the other from -0.5 to 1.42 m."""
     cart = smc.Scenario(plant="duffing", law="none", contact="stops", x0=0.5)
     turn = scene.turn(cart)
     bounds = [[(-0.45, 0.82)], [(-0.5, -0.3), (0.1, 1.42)]]
-    boxes = [np.array([[(0.0, low, 9.0), (1.0, high, 8.0)] for low, high in machine]) for machine in bounds]
-    for order, apart in (((0, 1), 1.37), ((0, 1, 0), 1.92)):  # 0.82 + 0.5 and 1.42 + 0.45, and a gap of 5 cm
+    boxes = []
+    for machine in bounds:
+        boxes.append(np.array([[(0.0, low, 9.0), (1.0, high, 8.0)] for low, high in machine]))
+    for order, apart in (
+        ((0, 1), 1.37),
+        ((0, 1, 0), 1.92),
+    ):  # 0.82 + 0.5 and 1.42 + 0.45, and a gap of 5 cm
         machines = iter(boxes[k] for k in order)
         monkeypatch.setattr(scene, "fixed_boxes", lambda model, machines=machines: next(machines))
         monkeypatch.setattr(models, "compile_model", lambda scenario: None)
@@ -229,7 +258,9 @@ def test_realistic_carts_stand_so_far_behind_each_other_that_no_part_of_one_meet
 
 def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them():
     (trace,) = runs(laws=LAWS[:1])
-    assert np.diff(stood([trace.scenario] * 2), axis=0) == pytest.approx(np.array([trace.scenario.plant.lane]))
+    assert np.diff(stood([trace.scenario] * 2), axis=0) == pytest.approx(
+        np.array([trace.scenario.plant.lane])
+    )
     assert moods(trace) == [(None, 10)]
     assert scales([trace])[driven([trace])].reaction == 0.0
     assert not any("violet" in words for words in key([trace], scales([trace])))
@@ -237,7 +268,9 @@ def test_ideal_machines_stand_where_their_plant_says_and_nothing_is_told_of_them
 
 def test_a_cart_rests_beside_the_speed_of_carts_and_not_of_its_pole():
     trace = smc.run(smc.Scenario(plant="cart_pole", law="none", x0=0.0, duration=0.01))
-    fast = dataclasses.replace(trace, v=np.column_stack([np.full(11, 0.05), np.linspace(100.0, 0.0, 11)]))
+    fast = dataclasses.replace(
+        trace, v=np.column_stack([np.full(11, 0.05), np.linspace(100.0, 0.0, 11)])
+    )
     assert not states.at_rest(fast)[:, 0].any()
     assert states.at_rest(fast)[:, 1].tolist() == [False] * 10 + [True]
 
@@ -272,7 +305,11 @@ def test_touch_is_where_the_stop_pushes_and_there_only(hit):
 
 def test_a_gear_that_crosses_too_often_to_be_read_rattles():
     t = np.arange(1001) * 1e-3
-    for flank, side in ((np.where(np.arange(1001) // 20 % 2, 1.0, -1.0), 2), (np.ones(1001), 1), (np.zeros(1001), 0)):
+    for flank, side in (
+        (np.where(np.arange(1001) // 20 % 2, 1.0, -1.0), 2),
+        (np.ones(1001), 1),
+        (np.zeros(1001), 0),
+    ):
         assert (states.backlash_side(flank, t, states.MIN_STATE_TIME)[200:] == side).all()
 
 
@@ -281,13 +318,24 @@ def test_what_is_held_lasts_and_has_no_short_gaps():
     on = np.zeros(100, bool)
     on[[10, 40, 70]] = True
     assert np.flatnonzero(np.diff(states.extended(on, t, 0.16).astype(int))).tolist() == [9, 85]
-    assert np.flatnonzero(np.diff(states.extended(on, t, 0.1).astype(int))).tolist() == [9, 19, 39, 49, 69, 79]
+    assert np.flatnonzero(np.diff(states.extended(on, t, 0.1).astype(int))).tolist() == [
+        9,
+        19,
+        39,
+        49,
+        69,
+        79,
+    ]
     assert not states.extended(on & False, t, 0.15).any()
 
 
 def test_words_never_flicker():
     rng, times = np.random.default_rng(0), np.arange(300) / 30
-    names = [states.State("a", states.CALM), states.State("b", states.STUCK), states.State("hit", states.STRUCK)]
+    names = [
+        states.State("a", states.CALM),
+        states.State("b", states.STUCK),
+        states.State("hit", states.STRUCK),
+    ]
     found = [names[i] for i in rng.choice(3, 300, p=(0.48, 0.48, 0.04))]
     shown = states.debounced(found, times, states.MIN_STATE_TIME)
     runs = [(now, len(list(run))) for now, run in itertools.groupby(shown)]
@@ -364,14 +412,19 @@ def test_a_blow_is_cut_at_the_control_s_scale_and_the_key_says_so(hit):
 )
 def test_a_brief_peak_of_a_channel_does_not_set_the_longest_arrow(peak, samples, longest, words):
     """One of three pendulums is driven with 2 N m; brief is up to 2 % of its 1001 samples."""
-    (trace,) = smc.run([smc.Scenario(plant=smc.plant("pendulum_network", n=3), law="none", duration=1.0)])
+    (trace,) = smc.run(
+        [smc.Scenario(plant=smc.plant("pendulum_network", n=3), law="none", duration=1.0)]
+    )
     force = np.zeros((1001, 3))
     force[:, 1] = np.where(np.arange(1001) < samples, -peak, 2.0)
     found = scales([dataclasses.replace(trace, applied=force, d=force)])
     scale = found[driven([trace])]
     assert (scale.control, scale.disturbance) == (longest, longest)
     said = key([trace], found)
-    assert {f"arrow: mean control, longest {words}", f"dark arrow: disturbance, longest {words}"} <= {*said}
+    assert {
+        f"arrow: mean control, longest {words}",
+        f"dark arrow: disturbance, longest {words}",
+    } <= {*said}
 
 
 def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
@@ -386,11 +439,15 @@ def test_behind_a_drive_the_force_is_shown_and_the_command_pale():
     assert "pale arrow: command" in key([slow], found)
     strong = scales([dataclasses.replace(slow, force=3.0 * slow.applied)])[driven([slow])]
     assert strong.control == pytest.approx(3.0 * np.abs(slow.applied).max())
-    assert not any("pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1]))))
+    assert not any(
+        "pale" in words for words in key(runs(laws=LAWS[:1]), scales(runs(laws=LAWS[:1])))
+    )
 
 
 def test_an_arm_of_many_joints_is_shown_whole():
-    (trace,) = smc.run([smc.Scenario(plant=smc.plant("pendulum_network", n=8), law="none", duration=0.01)])
+    (trace,) = smc.run(
+        [smc.Scenario(plant=smc.plant("pendulum_network", n=8), law="none", duration=0.01)]
+    )
     assert any("first 6 of 8 pendulums" in words for words in key([trace], scales([trace])))
     arm = dataclasses.replace(trace.scenario.plant, direct=True)
     mine = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, plant=arm))

@@ -55,7 +55,9 @@ def test_an_error_of_the_encoder_ends_the_film_in_one_sentence_and_soon(tmp_path
             raise RuntimeError("Error writing: no space\nleft on device")
 
     monkeypatch.setattr(mediapy.VideoWriter, "add_image", broken)
-    with pytest.raises(smc.ScenarioError, match="cannot write mp4: Error writing: no space left on device"):
+    with pytest.raises(
+        smc.ScenarioError, match="cannot write mp4: Error writing: no space left on device"
+    ):
         encode(tmp_path, 10_000)
     assert len(calls) <= 3 + MAX_WAITING  # none that came later
 
@@ -69,7 +71,9 @@ def test_an_error_with_the_last_picture_is_not_lost(tmp_path, monkeypatch):
         encode(tmp_path, 1)
 
 
-def test_ctrl_c_ends_a_film_as_itself_though_ffmpeg_complains_of_half_a_picture(tmp_path, monkeypatch):
+def test_ctrl_c_ends_a_film_as_itself_though_ffmpeg_complains_of_half_a_picture(
+    tmp_path, monkeypatch
+):
     close = mediapy.VideoWriter.close
 
     def complain(self):

@@ -1,4 +1,6 @@
-"""Charts of films: the time until all rest has most of the width, and settling and agreement are said."""
+"""Charts of films: the time until all rest has most of the width, and settling and agreement are
+said.
+"""
 
 import dataclasses
 
@@ -19,13 +21,17 @@ def resting(law, rate):
     """A run of 4 s whose x decays from 0.5."""
     trace = made(smc.Scenario(plant="inverted_pendulum", law=law, duration=4.0, x0=0.5))
     zero = np.zeros_like(trace.x)
-    return dataclasses.replace(trace, x=0.5 * np.exp(-rate * trace.t)[:, None], r=zero, d=zero, u=zero)
+    return dataclasses.replace(
+        trace, x=0.5 * np.exp(-rate * trace.t)[:, None], r=zero, d=zero, u=zero
+    )
 
 
 @pytest.fixture(scope="module")
 def charts():
     traces = [resting(law, rate) for law, rate in zip(LAWS, (8.0, 16.0), strict=True)]
-    return Charts(traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0), traces
+    return Charts(
+        traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0
+    ), traces
 
 
 def test_the_time_until_all_rest_has_most_of_the_width_and_the_rest_is_grey(charts):
@@ -59,7 +65,13 @@ def test_a_mark_says_when_each_law_has_settled(charts):
 
 def test_dots_in_one_place_are_one_in_ink(charts):
     drawn, traces = charts
-    same = Charts([traces[0], dataclasses.replace(traces[1], x=traces[0].x)], LAWS, style_of(traces), SIZE, 1.0)
+    same = Charts(
+        [traces[0], dataclasses.replace(traces[1], x=traces[0].x)],
+        LAWS,
+        style_of(traces),
+        SIZE,
+        1.0,
+    )
     for made_of, ink in ((drawn, False), (same, True)):
         left, _, right, _ = made_of.frames[0]
         now = round(left + (right - left) * float(made_of.share(0.1)))

@@ -1,4 +1,6 @@
-"""What films of made-up motion draw: letters and badges, charts, arrows, bars, and the words for states."""
+"""What films of made-up motion draw: letters and badges, charts, arrows, bars, and the words for
+states.
+"""
 
 import contextlib
 import dataclasses
@@ -38,7 +40,9 @@ def pen(monkeypatch):
 
 def machine(plant: str, law: str = "classical", **fields) -> smc.Trace:
     trace = made(smc.Scenario(plant=plant, law=law, **{"duration": 1.0} | fields))
-    return trace if trace.scenario.realistic else dataclasses.replace(trace, reaction=0.0 * trace.reaction)
+    if trace.scenario.realistic:
+        return trace
+    return dataclasses.replace(trace, reaction=0.0 * trace.reaction)
 
 
 def paper(size=SIZE) -> np.ndarray:
@@ -47,27 +51,50 @@ def paper(size=SIZE) -> np.ndarray:
 
 def apart(boxes: np.ndarray) -> bool:
     """Whether no two boxes (left, top, right, bottom) overlap."""
-    gaps = [max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3]) for a, b in itertools.combinations(boxes, 2)]
+    gaps = []
+    for a, b in itertools.combinations(boxes, 2):
+        gaps.append(max(a[0] - b[2], b[0] - a[2], a[1] - b[3], b[1] - a[3]))
     return min(gaps) >= -1e-9
 
 
 @pytest.mark.parametrize("row", [True, False])
-def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_their_machines(row, pen):
+def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_their_machines(
+    row, pen
+):
     jump = smc.Jump(0.2, {"mass": 2.0})
-    parts = {"jump": jump, "friction": smc.Coulomb(0.2), "contact": "stops", "actuator": smc.Lag(0.02)}
+    parts = {
+        "jump": jump,
+        "friction": smc.Coulomb(0.2),
+        "contact": "stops",
+        "actuator": smc.Lag(0.02),
+    }
     first = machine("duffing", **parts)
-    traces = [first, failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no")]
+    traces = [
+        first,
+        failed(machine("duffing", "adaptive", **parts), 600, "the law raised ValueError: no"),
+    ]
     told = [[State("sticks", STUCK)], [State("slides", CALM), State("contact", STRUCK)]]
-    caption = Caption(traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), told, row)
+    caption = Caption(
+        traces, ["one", "other"], COLOURS, None, SIZE, 0.7, arrows.scales(traces), told, row
+    )
     machines = np.array([[90.0, 80, 190, 180], [140, 120, 340, 230]])
     caption.place(machines)
     boxes = np.concatenate([caption.pills, caption.badges])
     assert apart(boxes)
     assert (boxes >= 0.0).all()
     assert (boxes[:, 2:] <= SIZE).all()
-    assert (caption.pills[:, 1].min() > machines[:, 3].max()) if row else (caption.pills[:, 0].min() < machines[0, 0])
+    assert (
+        (caption.pills[:, 1].min() > machines[:, 3].max())
+        if row
+        else (caption.pills[:, 0].min() < machines[0, 0])
+    )
     said = []
-    for time, gone, speed in ((0.1, False, 1.0), (0.3, False, 0.125), (1.7, False, 0.2), (1.9, True, 4.0)):
+    for time, gone, speed in (
+        (0.1, False, 1.0),
+        (0.3, False, 0.125),
+        (1.7, False, 0.2),
+        (1.9, True, 4.0),
+    ):
         pen.clear()
         caption.sheet.cache_clear()
         caption.over(paper(), time, (False, gone), (told[0][0], told[1][gone]), speed)
@@ -84,18 +111,30 @@ def test_labels_and_badges_are_apart_inside_the_picture_and_below_or_beside_thei
     ):
         assert clock in picture
         assert (pace_words in picture) != (pace_words == "real time")
-        assert all(words in picture for words in ("'one'", other, f"fill={fill!r}", "'sticks'", f"'{state}'"))
+        assert all(
+            words in picture
+            for words in ("'one'", other, f"fill={fill!r}", "'sticks'", f"'{state}'")
+        )
         assert ("mass × 2 since 0.2 s" in picture) is changed
 
 
 def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_apart(pen):
     sensor = smc.Encoder(counts=64, delay=0.05, bias=-0.2)
     trace = machine("inverted_pendulum", sensor=sensor)
-    caption = Caption([trace], ["one"], COLOURS[:1], "A title", SIZE, 1.0, arrows.scales([trace]), [[None]])
+    caption = Caption(
+        [trace], ["one"], COLOURS[:1], "A title", SIZE, 1.0, arrows.scales([trace]), [[None]]
+    )
     caption.place(np.array([[200.0, 60, 420, 220]]))
     caption.over(paper(), 0.25, (False,), (None,))
-    lines = [[float(x) for x in note[6:].split(")")[0].split(",")] for note in pen if note.startswith("line (")]
-    *_, dot = [[float(x) for x in note[9:].split(")")[0].split(",")] for note in pen if note.startswith("ellipse (")]
+    lines = []
+    for note in pen:
+        if note.startswith("line ("):
+            lines.append([float(x) for x in note[6:].split(")")[0].split(",")])
+    *_, dot = [
+        [float(x) for x in note[9:].split(")")[0].split(",")]
+        for note in pen
+        if note.startswith("ellipse (")
+    ]
     count, step = 2.0 * math.pi / 64, 110 / 6  # rad, and px of the strip, which has six counts
     now, then = np.interp([0.25, 0.2], trace.t, trace.x[:, 0]) / count
     left, _, right, _ = caption.badges[0]
@@ -104,12 +143,16 @@ def test_the_dot_of_an_encoder_s_strip_is_where_it_reads_and_ticks_are_a_count_a
     assert np.diff(ticks) == pytest.approx(step, abs=0.7)
     assert (ticks[0] - middle) / step % 1.0 == pytest.approx(-now % 1.0, abs=0.05)
     assert any("counts of the encoder" in words for words in caption.key)
-    assert (dot[0] + dot[2]) / 2 == pytest.approx(middle + (round(then - 0.2 / count) - now) * step, abs=0.6)
+    assert (dot[0] + dot[2]) / 2 == pytest.approx(
+        middle + (round(then - 0.2 / count) - now) * step, abs=0.6
+    )
 
 
 def test_a_network_says_how_much_of_it_is_shown_and_a_long_label_is_cut_to_the_picture(pen):
     many = machine(smc.plant("pendulum_network", n=8))
-    caption = Caption([many], ["a far too long label " * 5], COLOURS[:1], None, SIZE, 1.0, arrows.scales([many]))
+    caption = Caption(
+        [many], ["a far too long label " * 5], COLOURS[:1], None, SIZE, 1.0, arrows.scales([many])
+    )
     caption.place(np.array([[20.0, 60, 120, 220]]))
     caption.over(paper(), 0.25, (False,))
     assert any("the first 6 of 8" in note for note in pen)
@@ -118,12 +161,16 @@ def test_a_network_says_how_much_of_it_is_shown_and_a_long_label_is_cut_to_the_p
 
 
 @pytest.mark.parametrize("limits", [[0.4, 0.2, 0.9], math.inf])
-def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares_of_limits(limits, pen, monkeypatch):
+def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares_of_limits(
+    limits, pen, monkeypatch
+):
     monkeypatch.setattr(tip, "knows_contacts", lambda scenario: True)
     monkeypatch.setattr(tip, "contacts", lambda trace: SimpleNamespace(push=20.0 * trace.x))
     push = smc.Push("hand", y=30.0, z=40.0, time=0.1, width=0.02)
     trace = machine(arms.arm(), "none", u_max=limits, reference=smc.Sine(0.3, 4.0), duration=0.3)
-    trace = dataclasses.replace(trace, scenario=dataclasses.replace(trace.scenario, disturbance=push))
+    trace = dataclasses.replace(
+        trace, scenario=dataclasses.replace(trace.scenario, disturbance=push)
+    )
     edges, low = np.array([0.08, 0.1, 0.11, 0.24]), np.array([[100.0, 220.0, 260.0, 290.0]])
 
     def project(points):
@@ -139,12 +186,16 @@ def test_an_arm_tells_its_blow_its_contact_how_far_its_tip_is_off_and_the_shares
         over.over(paper(), frame)
         said = "\n".join(pen)
         assert "'50 N'" in said  # hypot(30, 40), seen for a while after it
-        (touch,) = [float(note.split("'")[1][:-2]) for note in pen if " N'" in note and "'50 N'" not in note]
+        (touch,) = [
+            float(note.split("'")[1][:-2]) for note in pen if " N'" in note and "'50 N'" not in note
+        ]
         assert touch == pytest.approx(force, abs=1.0)
         assert f"{1e3 * np.ravel(over.errors)[frame]:.0f} mm'" in said
         boxes = [note for note in pen if note.startswith("rectangle") and style.RULE in note]
         assert len(boxes) == (0 if limits == math.inf else 3)
-    assert np.ravel(over.errors) == pytest.approx([tip.tip_error(trace)[frame].mean() for frame in within], rel=0.02)
+    assert np.ravel(over.errors) == pytest.approx(
+        [tip.tip_error(trace)[frame].mean() for frame in within], rel=0.02
+    )
     words = " ".join(arm.key([trace]))
     assert ("bars" in words) == (limits != math.inf)
     assert all(part in words for part in ("path of the tip", "blow", "touches"))
@@ -161,7 +212,9 @@ def test_charts_are_uncovered_up_to_the_clock_with_a_dot_where_each_run_is():
         image = shown.at(time)
         for (left, top, right, bottom), paths in zip(shown.frames, shown.paths, strict=True):
             now = round(left + (right - left) * time)
-            assert (image[top:bottom, left : now - 8] == shown.full[top:bottom, left : now - 8]).all()
+            assert (
+                image[top:bottom, left : now - 8] == shown.full[top:bottom, left : now - 8]
+            ).all()
             assert (image[:, now + 8 : right] == shown.faint[:, now + 8 : right]).all()
             column = image[:, now].astype(int)
             for colour, (t, y) in zip(COLOURS, paths, strict=True):
@@ -184,12 +237,14 @@ HINGES = """
 KINDS = {
     "rails behind each other": {"plant": "van_der_pol"},
     "pendulums on a gear": {
-        "plant": "inverted_pendulum", "actuator": smc.Backlash(0.2), "jump": smc.Jump(0.5, {"l": 1.5}),
+        "plant": "inverted_pendulum",
+        "actuator": smc.Backlash(0.2),
+        "jump": smc.Jump(0.5, {"l": 1.5}),
     },
     "network": {"plant": "pendulum_network"},
     "carts with poles": {"plant": "cart_pole"},
     "a model of one's own": {"plant": smc.plant_from(HINGES, ["j", "k"], name="own")},
-}  # fmt: skip
+}
 
 
 @pytest.mark.skipif(gl.missing() is not None, reason=str(gl.missing()))
@@ -206,52 +261,76 @@ def test_two_machines_stand_apart_in_their_room_with_their_arrows(kind):
         assert (np.diff(stage.where, axis=0) != 0.0).any()
         assert (stage.boxes[:, :2] >= np.array(room[:2]) - 1).all()
         assert (stage.boxes[:, 2:] <= np.array(room[2:]) + 1).all()
-        assert set(np.concatenate(stage.links)).isdisjoint(np.flatnonzero(stage.model.geom_group > 2))
-        drawn = [(0, 0, arrows.Arrow(0.0, 0.8, red)), (1, 0, arrows.Arrow(-0.7, 0.3, red, 1, 0.65, head=False))]
-        stage.pose(0, np.linspace(0.25, 0.3, first))
-        red_parts = [
-            (picture[:, :, 0] > 120 + picture[:, :, 1:].max(axis=2).astype(int)).sum()
-            for picture in map(np.asarray, (before, stage.render(drawn)))
+        assert set(np.concatenate(stage.links)).isdisjoint(
+            np.flatnonzero(stage.model.geom_group > 2)
+        )
+        drawn = [
+            (0, 0, arrows.Arrow(0.0, 0.8, red)),
+            (1, 0, arrows.Arrow(-0.7, 0.3, red, 1, 0.65, head=False)),
         ]
+        stage.pose(0, np.linspace(0.25, 0.3, first))
+        red_parts = []
+        for picture in map(np.asarray, (before, stage.render(drawn))):
+            red_parts.append(
+                (picture[:, :, 0] > 120 + picture[:, :, 1:].max(axis=2).astype(int)).sum()
+            )
         assert red_parts[0] == 0
         assert red_parts[1] > 20
 
 
 def test_a_model_without_round_shapes_has_no_radii():
-    box = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom type='box' size='1 1 1'/></worldbody></mujoco>")
+    box = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><geom type='box' size='1 1 1'/></worldbody></mujoco>"
+    )
     assert roundness(box).tolist() == [0.0, 0.0]
 
 
 GEAR, RUB = {"actuator": smc.Backlash(0.2)}, {"friction": smc.Coulomb(0.2)}
 FLANKS = {"left flank", "right flank"}
-STATES = [  # parts, words while it moves, rests and touches; whether it has dry friction, and contact
+# parts, words while it moves, rests and touches; whether it has dry friction, and contact
+STATES = [
     (RUB, {"slides"}, {"sticks"}, {"slides"}, True, False),
     (GEAR, FLANKS, FLANKS, None, False, False),
-    (RUB | GEAR, {"slides, left flank", "slides, right flank"}, {"sticks, right flank"}, None, True, False),
+    (
+        RUB | GEAR,
+        {"slides, left flank", "slides, right flank"},
+        {"sticks, right flank"},
+        None,
+        True,
+        False,
+    ),
     ({"contact": "stops"}, {None}, {None}, {"contact"}, False, True),
     ({"contact": "stops"} | GEAR, FLANKS, FLANKS, {"contact"}, False, True),
     ({"friction": smc.Viscous(1.0)} | GEAR, FLANKS, FLANKS, None, False, False),
     ({}, {None}, {None}, {None}, False, False),
-]  # fmt: skip
+]
 
 
-@pytest.mark.parametrize(("parts", "moving", "resting", "touching", "dry", "stops"), STATES, ids=range(len(STATES)))
+@pytest.mark.parametrize(
+    ("parts", "moving", "resting", "touching", "dry", "stops"), STATES, ids=range(len(STATES))
+)
 def test_a_machine_is_told_to_slide_stick_touch_or_lie_on_a_flank_when_it_does(
     parts, moving, resting, touching, dry, stops
 ):
     """It moves in even seconds, rests in odd ones, and touches a stop at the start of each."""
     trace = made(smc.Scenario(plant="duffing", law="none", duration=4.0, **parts))
     still = (trace.t % 2.0 > 1.0)[:, None]
-    pushes = (np.sign(np.sin(3.0 * trace.t)) * ((trace.t % 1.0 > 0.2) | (trace.t % 1.0 < 0.01)))[:, None]
+    pushes = (np.sign(np.sin(3.0 * trace.t)) * ((trace.t % 1.0 > 0.2) | (trace.t % 1.0 < 0.01)))[
+        :, None
+    ]
     x = np.where(trace.t % 1.0 < 0.01, 2.0, 0.1)[:, None]
     moved = {"x": x, "v": np.where(still, 0.0, 1.0), "reaction": pushes, "force": -pushes}
     times = np.arange(0.0, 4.0, 1 / 30)
     told = states.timeline(dataclasses.replace(trace, **moved), times)
     words = [now and now.words for now in told]
     for second, expected in ((0, moving), (1, resting), (2, moving), (3, resting)):
-        assert {word for word, t in zip(words, times, strict=True) if second + 0.4 < t < second + 0.95} <= expected
+        assert {
+            word for word, t in zip(words, times, strict=True) if second + 0.4 < t < second + 0.95
+        } <= expected
     if touching:
-        assert {word for word, t in zip(words, times, strict=True) if 1.02 < t < 1.1} <= touching | resting
+        assert {
+            word for word, t in zip(words, times, strict=True) if 1.02 < t < 1.1
+        } <= touching | resting
     assert ("contact" in words) is stops
     assert states.has_dry_friction(trace.scenario) is dry
     assert states.has_contact(trace.scenario) is stops
@@ -271,7 +350,17 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
 
     def blank(frames):
         times = frames.clock.times
-        asked.append((times[0], times[-1], len(times), frames.labels, frames.title, frames.size, frames.camera))
+        asked.append(
+            (
+                times[0],
+                times[-1],
+                len(times),
+                frames.labels,
+                frames.title,
+                frames.size,
+                frames.camera,
+            )
+        )
         yield from (paper(frames.size) - np.uint8(40 * k % 256) for k in range(len(times)))
 
     @contextlib.contextmanager
@@ -294,7 +383,9 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     film.film(trace, tmp_path / "first.mp4")
     film.film(trace, tmp_path / "a.png", at=0.5)
     film.film(trace, tmp_path / "a.webp", size=size)
-    assert [one[3:] for one in asked] == [(None, None, (1280, 720), None)] * 2 + [(None, None, size, None)]
+    assert [one[3:] for one in asked] == [(None, None, (1280, 720), None)] * 2 + [
+        (None, None, size, None)
+    ]
     assert asked[0][:2] == (0.0, 5.0)
     assert asked[1][:3] == (0.5, 0.5, 1)
     assert asked[2][1] < 5.0  # a clip ends where little happens any more
@@ -302,12 +393,24 @@ def test_arguments_reach_a_film_s_frames_and_its_file(monkeypatch, tmp_path):
     assert set(told) == {1}
     with Image.open(tmp_path / "b.webp") as clip, Image.open(tmp_path / "b.png") as still:
         assert (clip.n_frames, clip.size, still.size) == (6, size, size)
-    assert {path.name for path in tmp_path.iterdir()} == {"a.mp4", "a.png", "a.webp", "b.png", "b.webp", "first.mp4"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "a.mp4",
+        "a.png",
+        "a.webp",
+        "b.png",
+        "b.webp",
+        "first.mp4",
+    }
 
 
-@pytest.mark.parametrize("options", [
-    {"span": (1.0,)}, {"span": (9.0, 9.5)}, {"span": (0.0, 4.0), "fps": 120.0, "speed": 0.5},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"span": (1.0,)},
+        {"span": (9.0, 9.5)},
+        {"span": (0.0, 4.0), "fps": 120.0, "speed": 0.5},
+    ],
+)
 def test_a_part_that_cannot_be_filmed_leaves_no_file(options, refused, tmp_path):
     trace = machine("duffing", duration=5.0)
     refused(lambda: film.film(trace, tmp_path / "c.webp", **options))

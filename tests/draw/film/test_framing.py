@@ -1,4 +1,6 @@
-"""Films show what moves and its arrows, as large as the picture allows, each machine in its own place."""
+"""Films show what moves and its arrows, as large as the picture allows, each machine in its own
+place.
+"""
 
 import contextlib
 import itertools
@@ -40,7 +42,9 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
     made_by = stage.Stage
     with without_charts, monkeypatch.context() as patch:
         patch.setattr(stage, "Stage", lambda *given: seen.setdefault("stage", made_by(*given)))
-        patch.setattr(film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given)))
+        patch.setattr(
+            film, "Caption", lambda *given: seen.setdefault("caption", caption.Caption(*given))
+        )
         frames = film.Frames(traces, size=SIZE, at=0.0)
         frames.clock = Clock(np.array(times), np.ones(len(times)))
         made_of = iter(frames)
@@ -50,7 +54,8 @@ def filmed(traces, monkeypatch, times=(0.1, 0.2)):
 
 
 @pytest.mark.parametrize(
-    "plant", ["inverted_pendulum", "cart_pole", "furuta", "pendulum_network", "overhead_crane", "panda"]
+    "plant",
+    ["inverted_pendulum", "cart_pole", "furuta", "pendulum_network", "overhead_crane", "panda"],
 )
 def test_machines_fill_the_height_or_the_width(plant, monkeypatch):
     law = {"furuta": "rotary_swing_up", "panda": "none"}.get(
@@ -67,7 +72,9 @@ def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypat
     """The cart stays within 1 m of 0 on a rail of 4.2 m."""
     with filmed(two("cart_pole"), monkeypatch) as (shown, _):
         whole, cut = smc.plant("cart_pole").load(), shown.model
-        rail, post, mark = (cut.geom(f"m0/{name}").id for name in ("front_rail", "left_post", "half5"))
+        rail, post, mark = (
+            cut.geom(f"m0/{name}").id for name in ("front_rail", "left_post", "half5")
+        )
         assert cut.geom_size[rail, 1] < 0.7 * whole.geom("front_rail").size[1]
         end = shown.data.geom_xpos[rail, 0] - cut.geom_size[rail, 1]
         assert shown.data.geom_xpos[post, 0] == pytest.approx(end)
@@ -76,7 +83,9 @@ def test_a_rail_is_cut_to_what_moves_and_its_posts_and_marks_stay_true(monkeypat
         assert shown.data.geom_xpos[board, 0] == pytest.approx(shown.data.geom_xpos[rail, 0])
         rod = cut.geom("m0/rod").id
         ends = shown.data.geom_xpos[rod] + np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
-        assert np.ptp(shown.project(ends)[:, 1]) > 120.0  # px of a pole of 1 m: 81 with the whole rail
+        assert (
+            np.ptp(shown.project(ends)[:, 1]) > 120.0
+        )  # px of a pole of 1 m: 81 with the whole rail
 
 
 def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeypatch):
@@ -91,7 +100,9 @@ def test_the_foot_of_a_pendulum_is_in_the_picture_and_its_label_is_below(monkeyp
 
 def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
     plant = smc.plant_from(CRATE, {"arm": smc.Channel(x0=0.5)})
-    traces = [smc.run(smc.Scenario(plant=plant, law=law, duration=0.3)) for law in ("super_twisting", "pid")]
+    traces = []
+    for law in ("super_twisting", "pid"):
+        traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3)))
     with filmed(traces, monkeypatch) as (shown, _):
         crates = np.array([shown.data.body(f"m{k}/crate").xpos for k in range(2)])
         assert crates - shown.where == pytest.approx(np.array([[0.5, 0.0, 0.1]] * 2), abs=0.01)
@@ -100,7 +111,9 @@ def test_free_bodies_stand_beside_their_own_machines(monkeypatch):
 
 def test_a_still_is_framed_by_all_of_the_way_of_a_free_body_as_the_film_is(monkeypatch):
     """The crate starts far above the arm, and falls."""
-    plant = smc.plant_from(CRATE.replace('pos=".5 0 .1"', 'pos=".5 0 1.5"'), {"arm": smc.Channel(x0=0.5)})
+    plant = smc.plant_from(
+        CRATE.replace('pos=".5 0 .1"', 'pos=".5 0 1.5"'), {"arm": smc.Channel(x0=0.5)}
+    )
     traces = [smc.run(smc.Scenario(plant=plant, law="pid", duration=0.5))]
     boxes = []
     for times in (np.array([0.5]), np.linspace(0.0, 0.5, 16)):
@@ -111,20 +124,28 @@ def test_a_still_is_framed_by_all_of_the_way_of_a_free_body_as_the_film_is(monke
 
 def test_bent_arrows_are_small_and_no_arrow_crosses_the_key(monkeypatch):
     plant = smc.plant_from(TWO_LINKS, ["a", "b"])
-    traces = [smc.run(smc.Scenario(plant=plant, law=law, duration=0.3, x0=0.1)) for law in ("super_twisting", "pid")]
+    traces = []
+    for law in ("super_twisting", "pid"):
+        traces.append(smc.run(smc.Scenario(plant=plant, law=law, duration=0.3, x0=0.1)))
     with filmed(traces, monkeypatch) as (shown, words):
         for mount in [mount for its in shown.mounts for mount in its]:
             for part in (-1.0, 1.0):
-                line, _ = arrows.path(shown.model, shown.data, mount, arrows.Arrow(0.0, part, (0.0,) * 4)) or (None, 0)
+                line, _ = arrows.path(
+                    shown.model, shown.data, mount, arrows.Arrow(0.0, part, (0.0,) * 4)
+                ) or (None, 0)
                 assert line is not None
                 anchor = shown.project(shown.data.xanchor[[mount.joint]])
                 radius = np.linalg.norm(shown.project(line) - anchor, axis=1)
                 assert radius.max() <= 0.08 * STAGE + 1.0
-                assert shown.project(line)[:, 1].min() > caption.KEY_TOP + caption.KEY_PITCH * len(words.key)
+                assert shown.project(line)[:, 1].min() > caption.KEY_TOP + caption.KEY_PITCH * len(
+                    words.key
+                )
 
 
 def test_what_stands_in_the_world_of_a_model_of_one_s_own_stands_beside_each_machine(monkeypatch):
-    xml = TWO_LINKS.replace("<worldbody>", '<worldbody><geom name="target" size=".05" pos=".2 0 1.5"/>')
+    xml = TWO_LINKS.replace(
+        "<worldbody>", '<worldbody><geom name="target" size=".05" pos=".2 0 1.5"/>'
+    )
     with filmed(two(smc.plant_from(xml, ["a", "b"])), monkeypatch) as (shown, _):
         places = [shown.data.geom(f"m{k}/target").xpos for k in range(2)]
         assert np.array(places) - shown.where == pytest.approx(np.array([[0.2, 0.0, 1.5]] * 2))
@@ -134,7 +155,9 @@ def test_the_key_is_shown_for_two_seconds(monkeypatch):
     with filmed(two("inverted_pendulum"), monkeypatch) as (_, words):
         paper = np.full((STAGE, SIZE[0], 3), 255, np.uint8)
         line = slice(caption.KEY_TOP, caption.KEY_TOP + 20), slice(24, 400)
-        inks = [words.over(paper, 0.1, (False, False), shown=time)[line].min() for time in (0.0, 1.9, 2.2, 2.5)]
+        inks = []
+        for time in (0.0, 1.9, 2.2, 2.5):
+            inks.append(words.over(paper, 0.1, (False, False), shown=time)[line].min())
         assert inks[0] == inks[1] < inks[2] < inks[3] == 255
 
 

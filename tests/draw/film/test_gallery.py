@@ -1,4 +1,6 @@
-"""The clips of the gallery are what the code would make today: of each, a few pictures are made anew."""
+"""The clips of the gallery are what the code would make today: of each, a few pictures are made
+anew.
+"""
 
 import importlib.util
 from pathlib import Path
@@ -11,7 +13,9 @@ from smc_mujoco.common import gl
 
 GALLERY = Path(__file__).parents[3] / "videos" / "gallery.py"
 BLOCK = 15  # px
-MAX_DIFFERENCE = 14.0  # of 255, of the mean of a block: WebP changes it by up to 8.5; letters 4 px off, by 34
+MAX_DIFFERENCE = (
+    14.0  # of 255, of the mean of a block: WebP changes it by up to 8.5; letters 4 px off, by 34
+)
 made = importlib.util.spec_from_file_location("gallery", GALLERY)
 assert made is not None
 assert made.loader is not None
@@ -22,7 +26,11 @@ made.loader.exec_module(gallery)
 def blocks(picture):
     """Return the mean of each block of a picture, (rows, columns, 3)."""
     height, width = (size - size % BLOCK for size in picture.shape[:2])
-    return picture[:height, :width].reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).mean(axis=(1, 3))
+    return (
+        picture[:height, :width]
+        .reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3)
+        .mean(axis=(1, 3))
+    )
 
 
 def test_each_file_is_a_clip():
@@ -42,4 +50,6 @@ def test_a_clip_is_what_the_code_would_make(name):
             *_, new = frames
             kept.seek(k)
             old = np.asarray(kept.convert("RGB"), float)
-            assert np.abs(blocks(old) - blocks(new.astype(float))).max() < MAX_DIFFERENCE, f"{name}: make gallery"
+            assert np.abs(blocks(old) - blocks(new.astype(float))).max() < MAX_DIFFERENCE, (
+                f"{name}: make gallery"
+            )

@@ -1,4 +1,6 @@
-"""Where bands of several laws would hide each other, each law's u has a lane, which says how far it swings."""
+"""Where bands of several laws would hide each other, each law's u has a lane, which says how far it
+swings.
+"""
 
 import dataclasses
 import itertools
@@ -27,8 +29,12 @@ def drawn(monkeypatch):
     said = []
     plain = charts.swings
     monkeypatch.setattr(charts, "swings", lambda rows: (plain(rows), said.append(rows)))
-    traces = [swinging(law, amplitude) for law, amplitude in zip(LAWS, (0.0, 2.0, 6.0), strict=True)]
-    made_of = charts.Charts(traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0)
+    traces = []
+    for law, amplitude in zip(LAWS, (0.0, 2.0, 6.0), strict=True):
+        traces.append(swinging(law, amplitude))
+    made_of = charts.Charts(
+        traces, LAWS, style.law_colours([trace.scenario.law for trace in traces]), SIZE, 1.0
+    )
     return made_of, said[0]
 
 
@@ -42,13 +48,17 @@ def test_each_law_has_a_lane_that_says_its_swing(drawn):
 
 
 def test_two_laws_that_chatter_are_told_apart(drawn):
-    """In the middle of each lane the height of the band is in proportion to the swing, in the law's colour."""
+    """In the middle of each lane the height of the band is in proportion to the swing, in the law's
+    colour.
+    """
     made_of, rows = drawn
     picture = made_of.at(1.0).astype(int)
     heights = []
     for lane, _, (colour,) in rows:
         box = lane.get_window_extent()
-        column = picture[int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))]
+        column = picture[
+            int(SIZE[1] - box.y1) : int(SIZE[1] - box.y0), int(0.5 * (box.x0 + box.x1))
+        ]
         paper, ink = np.array([255.0] * 3), np.array(style.rgb(colour), float)
         wanted = paper + charts.LANE_BAND * (ink - paper)
         heights.append(int((np.abs(column - wanted).max(axis=1) < 12).sum()))

@@ -24,7 +24,8 @@ FOREIGN = Path(SUITE.submodule_search_locations[0]) / "suite"
 
 
 @pytest.mark.parametrize(
-    ("group", "floor", "words"), [(3, "", "shows no part that moves"), (0, '<geom type="box" size="9 9 .1"/>', None)]
+    ("group", "floor", "words"),
+    [(3, "", "shows no part that moves"), (0, '<geom type="box" size="9 9 .1"/>', None)],
 )
 @without_charts
 def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
@@ -32,7 +33,9 @@ def test_a_picture_that_shows_nothing_is_told(tmp_path, group, floor, words):
       <mujoco><worldbody>{floor}<body pos="0 0 .5"><joint name="j" axis="0 1 0"/>
         <geom size=".1" pos="0 0 .3" group="{group}"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
-    trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
+    trace = smc.run(
+        smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1)
+    )
     if words:
         with pytest.warns(smc.errors.ScenarioWarning, match=words):
             smc.film([trace], tmp_path / "a.png", at=0.1, size=(320, 180))
@@ -51,21 +54,25 @@ def test_a_view_that_shows_nothing_is_framed_again(tmp_path):
         <geom type="box" pos="0 -.5 1" size="2 .1 2"/><body pos="0 0 .5"><joint name="j" axis="0 1 0"/>
         <geom size=".1" pos="0 0 .3" rgba="1 0 0 1"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
-    trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
+    trace = smc.run(
+        smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1)
+    )
     for chosen in (None, "eye"):
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
             path = smc.film([trace], tmp_path / "a.png", at=0.1, size=(640, 360), camera=chosen)
         picture = np.asarray(Image.open(path)).astype(int)[:230]
         assert (picture[..., 0] - picture[..., 1] > 60).sum() > 50
-        assert [str(one.message).partition(":")[0] for one in told] == ["camera 'eye' shows nothing of one"] * bool(
-            chosen
-        )
+        assert [str(one.message).partition(":")[0] for one in told] == [
+            "camera 'eye' shows nothing of one"
+        ] * bool(chosen)
 
 
 @pytest.mark.slow
 def test_arrows_of_a_foreign_cart_are_seen_and_its_rail_is_cut_to_what_moves():
-    """The arrow lies before the pole, which stands where it begins; the rail is longer than what moves on it."""
+    """The arrow lies before the pole, which stands where it begins; the rail is longer than what
+    moves on it.
+    """
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
     with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
@@ -85,12 +92,16 @@ def test_arrows_of_a_foreign_cart_are_seen_and_its_rail_is_cut_to_what_moves():
 
 
 def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp_path):
-    """The body is wide and centred on a vertical axis: an arrow along the arc of its centre has no place."""
+    """The body is wide and centred on a vertical axis: an arrow along the arc of its centre has no
+    place.
+    """
     (tmp_path / "one.xml").write_text("""
       <mujoco><worldbody><body pos="0 0 .5"><joint name="j" axis="0 0 1"/>
         <geom type="cylinder" size=".3 .1"/><geom size=".1" pos=".5 0 0"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
-    trace = smc.run(smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1))
+    trace = smc.run(
+        smc.Scenario(plant=smc.plant_from(tmp_path / "one.xml", ["j"]), law="none", duration=0.1)
+    )
     with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340)) as scene:
         centre = scene.project(scene.data.xanchor[:1])[0]
         for push in (0.8, -0.8):
@@ -98,7 +109,9 @@ def test_the_torque_of_a_foreign_hinge_bends_around_its_axis_before_its_body(tmp
             x = np.nonzero(red)[1]
             assert red.sum() > 100
             assert np.abs(x.mean() - centre[0]) < 100
-            assert (x.mean() > centre[0]) == (push > 0.0)  # seen from the front, the near side goes right
+            assert (x.mean() > centre[0]) == (
+                push > 0.0
+            )  # seen from the front, the near side goes right
 
 
 def test_an_arrow_that_points_at_the_camera_is_not_drawn():
@@ -109,7 +122,9 @@ def test_an_arrow_that_points_at_the_camera_is_not_drawn():
     )
     trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.1))
     push = (0, 0, Arrow(0.0, 0.8, (1.0, 0.0, 0.0, 1.0)))
-    with Stage([trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340), (0.0, 0.0)) as scene:
+    with Stage(
+        [trace], ["#0072B2"], (640, 360), camera.Room(20, 20, 620, 340), (0.0, 0.0)
+    ) as scene:
         bare = scene.render()
         assert (scene.render([push]) != bare).any()
         scene.project = lambda points: np.full((len(points), 2), 100.0)  # exactly at it
@@ -118,7 +133,9 @@ def test_an_arrow_that_points_at_the_camera_is_not_drawn():
 
 def test_the_key_names_what_pushes_a_foreign_model_of_its_own_accord():
     plant = smc.plant_from(FOREIGN / "cartpole.xml", {"slider": smc.Channel(partner="hinge_1")})
-    trace = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0)))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law="none", duration=0.3, x0=(1.79, 0.0), v0=(2.0, 0.0))
+    )
     assert trace.reaction.any()  # the joint's limit
     words = [word for word in key([trace], scales([trace])) if "violet" in word]
     assert len(words) == 1

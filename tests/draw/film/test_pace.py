@@ -1,4 +1,6 @@
-"""Playback speed: slow where things move fast and at blows, faster where they rest, real time where asked."""
+"""Playback speed: slow where things move fast and at blows, faster where they rest, real time where
+asked.
+"""
 
 import dataclasses
 from types import SimpleNamespace
@@ -28,9 +30,14 @@ def moving(base: smc.Trace, x) -> smc.Trace:
 
 def at(trace_s, times) -> list[float]:
     """The playback speeds at times."""
-    traces = trace_s if isinstance(trace_s, list) else [trace_s]
+    if isinstance(trace_s, list):
+        traces = trace_s
+    else:
+        traces = [trace_s]
     found = pace.clock(traces, FPS)
-    return [float(found.speeds[np.searchsorted(found.times, t + 1e-9, side="right") - 1]) for t in times]
+    return [
+        float(found.speeds[np.searchsorted(found.times, t + 1e-9, side="right") - 1]) for t in times
+    ]
 
 
 def test_a_number_is_the_speed_of_the_whole_film(base):
@@ -43,7 +50,9 @@ def test_a_number_is_the_speed_of_the_whole_film(base):
 
 
 def test_a_jump_of_position_is_slow_and_a_rest_fast(base):
-    """1 m in 0.1 s is a third of the range a frame; 2 s of rest are shown four times as fast, except at its ends."""
+    """1 m in 0.1 s is a third of the range a frame; 2 s of rest are shown four times as fast,
+    except at its ends.
+    """
     trace = moving(base, lambda t: np.clip((t - 2.0) / 0.1, 0.0, 1.0))
     assert at(trace, (0.5, 1.8, 2.05, 2.3, 3.0)) == [4.0, 1.0, 0.125, 1.0, 4.0]
 
@@ -56,14 +65,19 @@ def test_a_thing_takes_fifty_frames_or_more_to_cross_its_range(base, seconds, sp
 
 
 def test_the_fastest_machine_and_its_own_channel_s_range_count(base):
-    slow, quick = moving(base, lambda t: 5.0 * t / 4.0), moving(base, lambda t: 1e-3 * np.clip(t / 0.1, 0.0, 1.0))
+    slow, quick = (
+        moving(base, lambda t: 5.0 * t / 4.0),
+        moving(base, lambda t: 1e-3 * np.clip(t / 0.1, 0.0, 1.0)),
+    )
     assert at([slow], (0.05,)) == [1.0]
     assert at([slow, quick], (0.05,)) == [1.0]  # a thousandth of what is in view
     assert at([quick], (0.05,)) == [0.125]
 
 
 def test_films_have_a_longest_duration(base, monkeypatch):
-    trace = moving(base, lambda t: np.sin(20.0 * t))  # more than a fifth of its range a frame, all the time
+    trace = moving(
+        base, lambda t: np.sin(20.0 * t)
+    )  # more than a fifth of its range a frame, all the time
     found = pace.clock([trace], FPS)
     assert 4.0 < len(found.times) / FPS <= 8.1
     assert set(found.speeds) == {0.5}
@@ -80,7 +94,9 @@ def test_frames_ascend_from_start_to_end_and_tell_their_speed(base):
 
 
 def test_impacts_are_slowest(monkeypatch):
-    trace = smc.run(smc.Scenario(plant="duffing", law="observer_free", contact="stops", v0=3.0, duration=1.0))
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law="observer_free", contact="stops", v0=3.0, duration=1.0)
+    )
     touch = trace.t[states.in_contact(trace)[:, 0]]
     first = float(touch[0])
     assert pace.impacts([trace])[0] == pytest.approx(first)
@@ -92,7 +108,11 @@ def test_impacts_are_slowest(monkeypatch):
 def test_frames_whose_middle_is_near_that_of_a_push_are_slowest(base, monkeypatch):
     monkeypatch.setattr(style, "pushes", lambda runs: [SimpleNamespace(time=2.0, width=0.1)])
     grid, found = pace.speeds([moving(base, np.zeros_like)], FPS)
-    assert (FPS * grid[found == 0.125]).round().tolist() == [60, 61, 62]  # of middles 2.017, 2.05 and 2.083 s
+    assert (FPS * grid[found == 0.125]).round().tolist() == [
+        60,
+        61,
+        62,
+    ]  # of middles 2.017, 2.05 and 2.083 s
 
 
 def test_a_diverged_run_does_not_make_the_others_rest(base):
@@ -104,12 +124,18 @@ def test_a_diverged_run_does_not_make_the_others_rest(base):
 
 def test_most_frames_of_a_settling_run_show_motion():
     traces = smc.run(
-        list(smc.paper.comparison("van_der_pol", laws=("observer_free", "classical"), duration=10.0).values())
+        list(
+            smc.paper.comparison(
+                "van_der_pol", laws=("observer_free", "classical"), duration=10.0
+            ).values()
+        )
     )
     shares = []
     for speed in (1.0, None):
         found = pace.clock(traces, FPS, speed)
-        shares.append((pace.travel_of(traces, found.times) > pace.REST_TRAVEL * found.speeds[:-1]).mean())
+        shares.append(
+            (pace.travel_of(traces, found.times) > pace.REST_TRAVEL * found.speeds[:-1]).mean()
+        )
     assert shares[0] < 0.3
     assert shares[1] > 0.6
 

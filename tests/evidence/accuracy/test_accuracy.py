@@ -1,4 +1,6 @@
-"""What `smc.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for every other one."""
+"""What `smc.accuracy` promises: the textbook's order of laws, theory's exponents, and a reason for
+every other one.
+"""
 
 import dataclasses
 import math
@@ -36,15 +38,25 @@ def pushing_away(y, gains, memory):
 
 
 def test_every_law_states_its_order_of_accuracy():
-    orders = {(name, q): law.order(q, law.defaults) for name, law in known_laws().items() for q in ("s", "e")}
-    assert {which: order for which, order in orders.items() if order is None or not order >= 0.0} == {}
+    orders = {}
+    for name, law in known_laws().items():
+        for q in ("s", "e"):
+            orders[(name, q)] = law.order(q, law.defaults)
+    assert {
+        which: order for which, order in orders.items() if order is None or not order >= 0.0
+    } == {}
 
 
 @pytest.mark.slow
 def test_dry_friction_orders_the_laws_as_textbooks_do():
     laws = ["observer_free", "classical", "super_twisting", "twisting"]
     table = smc.accuracy(laws, "duffing", periods=(4e-3, 2e-3), conditions="coulomb", seeds=1)
-    assert [row.law for row in table] == ["super_twisting", "twisting", "classical", "observer_free"]
+    assert [row.law for row in table] == [
+        "super_twisting",
+        "twisting",
+        "classical",
+        "observer_free",
+    ]
     by_law = {row.law: row.e for row in table}
     assert by_law["classical"].as_promised
     assert by_law["observer_free"].as_promised
@@ -72,7 +84,9 @@ def test_relays_are_of_first_order_and_layers_of_none():
 @pytest.mark.slow
 def test_gains_that_cannot_hold_the_disturbance_are_said_to_limit_the_error():
     load = smc.condition("load", disturbance=smc.Sine(1.0, 3.0))
-    table = defaults([smc.law("super_twisting", k1=3.0, k2=0.5), smc.law("twisting")], conditions=load)
+    table = defaults(
+        [smc.law("super_twisting", k1=3.0, k2=0.5), smc.law("twisting")], conditions=load
+    )
     weak = next(row.s for row in table if row.law == "super_twisting")
     assert not weak.as_promised
     assert "these gains, not sampling, limit it" in weak.why
@@ -80,7 +94,9 @@ def test_gains_that_cannot_hold_the_disturbance_are_said_to_limit_the_error():
 
 
 def test_laws_that_fail_come_last_and_say_so():
-    table = defaults([pushing_away, "boundary_layer"], duration=4.0, starts=smc.starts(x0=1e6 - 10.0))
+    table = defaults(
+        [pushing_away, "boundary_layer"], duration=4.0, starts=smc.starts(x0=1e6 - 10.0)
+    )
     failing = table[-1]
     assert failing.law == "pushing_away"
     assert failing.failed == failing.runs == 4
@@ -99,20 +115,31 @@ def test_theory_promises_nothing_behind_a_drive():
 
 def test_every_period_has_every_start_and_one_run_more_has_half_the_step():
     fine = smc.condition("fine", physics_step=2.5e-4)
-    setup = accuracy._setup(smc.plant("duffing"), fine, "twisting", (4e-3, 2e-3), (3, 5), "tuned", 1.5, None)
-    runs = [(one.seed, one.control_period, one.physics_step, one.duration) for one in setup.scenarios]
-    steps = [(seed, period, 2.5e-4, 1.5) for seed in (3, 5) for period in (4e-3, 2e-3)]
+    setup = accuracy._setup(
+        smc.plant("duffing"), fine, "twisting", (4e-3, 2e-3), (3, 5), "tuned", 1.5, None
+    )
+    runs = []
+    for one in setup.scenarios:
+        runs.append((one.seed, one.control_period, one.physics_step, one.duration))
+    steps = []
+    for seed in (3, 5):
+        for period in (4e-3, 2e-3):
+            steps.append((seed, period, 2.5e-4, 1.5))
     assert runs == [*steps, (3, 2e-3, 1.25e-4, 1.5)]
     assert (setup.periods, setup.starts) == ((4e-3, 2e-3), 2)
 
 
 def test_laws_without_tuned_gains_get_their_defaults_and_the_table_says_so():
-    table = smc.accuracy(["hierarchical"], "cart_pole", (4e-3, 2e-3), "nominal", seeds=2, duration=1.0)
+    table = smc.accuracy(
+        ["hierarchical"], "cart_pole", (4e-3, 2e-3), "nominal", seeds=2, duration=1.0
+    )
     assert table[0].gains == "default"
     assert "nominal: |e| in m, gains: default" in str(table)
     assert "default gains" not in str(table), "no law beside it is tuned"
     beside = type(table)([table[0], dataclasses.replace(table[0], law="pid", gains="shipped")])
-    assert "hierarchical has its default gains, pid is tuned: tune it too" in " ".join(str(beside).split())
+    assert "hierarchical has its default gains, pid is tuned: tune it too" in " ".join(
+        str(beside).split()
+    )
 
 
 @pytest.mark.slow
@@ -120,7 +147,9 @@ def test_a_table_reads_as_text_html_data_and_file(tmp_path):
     plants = [double_integrator(), "van_der_pol"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        table = smc.accuracy(["classical", "observer_free"], plants, (4e-3, 2e-3, 1e-3), seeds=2, duration=4.0)
+        table = smc.accuracy(
+            ["classical", "observer_free"], plants, (4e-3, 2e-3, 1e-3), seeds=2, duration=4.0
+        )
     text = str(table)
     assert max(map(len, text.splitlines())) <= 80
     assert repr(table) == text
@@ -139,7 +168,10 @@ def test_a_table_reads_as_text_html_data_and_file(tmp_path):
         ({"periods": (1e-3,)}, "give two or more different ones in s"),
         ({"periods": (1e-3, 1e-3)}, "give two or more different ones in s"),
         ({"periods": (0.0, 1e-3)}, "a period is 0: give a number greater than 0"),
-        ({"conditions": "period_10ms"}, "condition 'period_10ms' sets control_period, which accuracy varies"),
+        (
+            {"conditions": "period_10ms"},
+            "condition 'period_10ms' sets control_period, which accuracy varies",
+        ),
         (
             {"plants": dataclasses.replace(smc.plant("double_pendulum"), mixed=("m", "rad"))},
             "double_pendulum has driven channels in m and rad: give a plant with one unit",
@@ -153,7 +185,9 @@ def test_what_cannot_be_measured_is_one_sentence(options, message):
         smc.accuracy(**{"laws": "classical", "plants": "duffing"} | options)
 
 
-def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(tmp_path, monkeypatch, capsys):
+def test_the_command_prints_a_table_that_fits_and_writes_what_was_asked(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     options = "--law classical,pid(kp=20) --periods 0.004,0.002 --seeds 1 --duration 1 --json a.json --out a.pdf"

@@ -1,4 +1,6 @@
-"""Orders of accuracy from errors alone: the slope, an interval that covers, and what does not count."""
+"""Orders of accuracy from errors alone: the slope, an interval that covers, and what does not
+count.
+"""
 
 import math
 
@@ -74,12 +76,18 @@ def test_an_order_below_the_promised_one_has_a_reason():
     assert measured(H, theory=2.0, saturated="u is at its bound").why == (
         "levels off (order 1 at the shortest periods): these gains, not sampling, limit it; u is at its bound"
     )
-    assert measured(np.array([H**2, 0.0 * H + 1e-4])).why == "its interval contains 0 and 2: the order cannot be told"
+    assert (
+        measured(np.array([H**2, 0.0 * H + 1e-4])).why
+        == "its interval contains 0 and 2: the order cannot be told"
+    )
     assert measured(np.array([H**3, 0.0 * H + 1e-4]), theory=1.5).why.endswith(
         "contains 0 and 1.5: the order cannot be told"
     )
     assert measured(H**1.7, theory=2.0).why == "no reason seen"
-    assert measured(H**2, theory=1.0, saturated="u is at its bound").why == "falls faster than promised"
+    assert (
+        measured(H**2, theory=1.0, saturated="u is at its bound").why
+        == "falls faster than promised"
+    )
     assert measured(H, theory=None, saturated="u is at its bound").why == ""
 
 
@@ -89,8 +97,18 @@ def test_a_picture_writes_orders_at_the_ends_of_lines_and_draws_none_that_tells_
 
     def law(name, e, low, high):
         errors = ((8.0**e, 4.0**e, 2.0**e, 1.0),)
-        scalings = {q: Scaling(errors=errors, used=h, order=e, low=low, high=high, theory=2.0, why="") for q in "es"}
-        about = {"plant": "duffing", "condition": "constant", "gains": "shipped", "unit": "m", "floor": 1e-9}
+        scalings = {}
+        for q in "es":
+            scalings[q] = Scaling(
+                errors=errors, used=h, order=e, low=low, high=high, theory=2.0, why=""
+            )
+        about = {
+            "plant": "duffing",
+            "condition": "constant",
+            "gains": "shipped",
+            "unit": "m",
+            "floor": 1e-9,
+        }
         return Accuracy(law=name, periods=h, runs=4, failed=0, **about, **scalings)
 
     told, untold = law("twisting", 1.75, 1.25, 2.25), law("super_twisting", 1.14, -0.21, 2.49)

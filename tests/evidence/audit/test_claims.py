@@ -53,13 +53,23 @@ UNIVERSALS = {"11", "18", "19", "20", "24", "50", "59"}
 
 
 def test_a_check_holds_just_where_its_relation_does():
-    for relation, below, at, above in (("<", 1, 0, 0), ("<=", 1, 1, 0), (">", 0, 0, 1), (">=", 0, 1, 1)):
-        assert [check("x", value, relation, 2.0).holds for value in (1.0, 2.0, 3.0)] == [below, at, above]
+    for relation, below, at, above in (
+        ("<", 1, 0, 0),
+        ("<=", 1, 1, 0),
+        (">", 0, 0, 1),
+        (">=", 0, 1, 1),
+    ):
+        assert [check("x", value, relation, 2.0).holds for value in (1.0, 2.0, 3.0)] == [
+            below,
+            at,
+            above,
+        ]
 
 
 @pytest.mark.parametrize("relation", ["<", "<=", ">", ">="])
 @pytest.mark.parametrize(
-    ("value", "limit"), [(math.nan, 1.0), (1.0, math.nan), (math.nan, math.nan), (math.inf, math.inf)]
+    ("value", "limit"),
+    [(math.nan, 1.0), (1.0, math.nan), (math.nan, math.nan), (math.inf, math.inf)],
 )
 def test_what_cannot_be_compared_never_holds(relation, value, limit):
     assert not check("x", value, relation, limit).holds
@@ -96,11 +106,16 @@ YES, NO, ASIDE = check("yes", 1.0, "<", 2.0), check("no", 3.0, "<", 2.0), Beside
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
-        ([YES], SUPPORTED), ([YES, check("also", 1.0, ">", 0.0)], SUPPORTED), ([NO], REFUTED), ([YES, NO], REFUTED),
-        ([], NOT_TESTABLE), ([ASIDE], NOT_TESTABLE), ([NO, ASIDE], REFUTED),
+        ([YES], SUPPORTED),
+        ([YES, check("also", 1.0, ">", 0.0)], SUPPORTED),
+        ([NO], REFUTED),
+        ([YES, NO], REFUTED),
+        ([], NOT_TESTABLE),
+        ([ASIDE], NOT_TESTABLE),
+        ([NO, ASIDE], REFUTED),
         ([check("x", math.nan, "<", 1.0)], REFUTED),
     ],
-)  # fmt: skip
+)
 def test_the_verdict_is_of_the_checks_alone(found, expected):
     assert verdict(found) == expected
 
@@ -112,12 +127,17 @@ OTHER = YES._replace(what="other", sentence="b")
 @pytest.mark.parametrize(
     ("found", "quantifier", "expected"),
     [
-        ([YES, NO], UNIVERSAL, REFUTED), ([YES, NO], EXISTENTIAL, SUPPORTED), ([NO], EXISTENTIAL, NOT_SHOWN),
-        ([*ABOUT, OTHER], NAMED, PARTLY), ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
+        ([YES, NO], UNIVERSAL, REFUTED),
+        ([YES, NO], EXISTENTIAL, SUPPORTED),
+        ([NO], EXISTENTIAL, NOT_SHOWN),
+        ([*ABOUT, OTHER], NAMED, PARTLY),
+        ([*ABOUT, OTHER], EXISTENTIAL, SUPPORTED),
         ([ABOUT[1], OTHER], UNIVERSAL, PARTLY),
     ],
-)  # fmt: skip
-def test_a_sentence_holds_with_all_its_checks_and_an_existential_one_with_one(found, quantifier, expected):
+)
+def test_a_sentence_holds_with_all_its_checks_and_an_existential_one_with_one(
+    found, quantifier, expected
+):
     assert verdict(found, quantifier) == expected
 
 
@@ -128,8 +148,14 @@ def test_one_counter_example_refutes_what_is_said_of_all_gains():
     assert combined(found, NAMED)[:2] == (PARTLY, True)
     assert combined({"study": PARTLY, "tuned": SUPPORTED}, UNIVERSAL)[0] == PARTLY
     assert combined(found, over="all")[:2] == (REFUTED, True)
-    assert "is of all gains, so that one set of gains decides: supported with study" in combined(found, over="all")[2]
-    assert combined({"study": SUPPORTED, "tuned": NOT_SHOWN}, UNIVERSAL, over="some")[:2] == (SUPPORTED, True)
+    assert (
+        "is of all gains, so that one set of gains decides: supported with study"
+        in combined(found, over="all")[2]
+    )
+    assert combined({"study": SUPPORTED, "tuned": NOT_SHOWN}, UNIVERSAL, over="some")[:2] == (
+        SUPPORTED,
+        True,
+    )
 
 
 def test_universal_claims_are_those_of_the_list():
@@ -143,7 +169,9 @@ def test_two_numbers_of_one_name_are_refused():
 
 def entry(id="900", found=(YES,), note=""):
     told = {"text": "text", "where": "here", "measured": "this", "holds_if": "< 2", "note": note}
-    return Entry(id=id, evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found, **told)
+    return Entry(
+        id=id, evidence=lambda runs: found[runs.gains] if isinstance(found, dict) else found, **told
+    )
 
 
 @pytest.fixture
@@ -160,8 +188,14 @@ def only(monkeypatch):
 def test_a_claim_says_what_it_depends_on(only):
     only(entry(found={"study": [YES, ASIDE], "tuned": [NO]}, note="Mind the gap."))
     (one,) = claims(gains=["study", "tuned"])
-    assert (one.verdict, one.flips, one.verdicts) == (PARTLY, True, {"study": SUPPORTED, "tuned": REFUTED})
-    assert one.numbers["study"] == {"yes": {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True, "sentence": ""}}
+    assert (one.verdict, one.flips, one.verdicts) == (
+        PARTLY,
+        True,
+        {"study": SUPPORTED, "tuned": REFUTED},
+    )
+    assert one.numbers["study"] == {
+        "yes": {"value": 1.0, "relation": "<", "limit": 2.0, "holds": True, "sentence": ""}
+    }
     assert one.beside == {"study": {"theory": 7.0}, "tuned": {}}
     assert one.note.startswith("Mind the gap. The verdict depends on the gains")
     assert one.checks("tuned") == [NO]
@@ -169,7 +203,12 @@ def test_a_claim_says_what_it_depends_on(only):
 
 
 @pytest.mark.parametrize(
-    "decisive", [check("worst", 9.0, "<", 2.0), check("never", math.inf, "<", 2.0), check("none", math.nan, "<", 2.0)]
+    "decisive",
+    [
+        check("worst", 9.0, "<", 2.0),
+        check("never", math.inf, "<", 2.0),
+        check("none", math.nan, "<", 2.0),
+    ],
 )
 def test_the_check_that_fails_by_most_decides(only, decisive):
     only(entry(found=[YES, NO, check("worse", 30.0, "<", 20.0), decisive]))
@@ -185,7 +224,9 @@ def test_if_all_checks_hold_the_nearest_to_its_limit_decides(only):
 def test_claims_are_json_without_loss(only):
     only(entry(found=[check("a", math.inf, "<", 1.0), check("b", math.nan, "<", -math.inf), ASIDE]))
     text = audit.document(claims(gains="study"))
-    told = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))["claims"][0]
+    told = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))[
+        "claims"
+    ][0]
     assert float(told["numbers"]["study"]["a"]["value"]) == math.inf
     assert math.isnan(float(told["numbers"]["study"]["b"]["value"]))
     assert told["beside"] == {"study": {"theory": 7.0}}
@@ -210,9 +251,13 @@ def test_unknown_claims_and_sets_are_refused():
 
 def test_late_claims_come_last_and_every_one_is_reported(only):
     order, told = [], []
-    late = dataclasses.replace(entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES])
+    late = dataclasses.replace(
+        entry("1"), late=True, evidence=lambda runs: order.append("1") or [YES]
+    )
     only(late, dataclasses.replace(entry("2"), evidence=lambda runs: order.append("2") or [YES]))
-    made = audit.audit(gains=["study", "tuned"], report=lambda done, whole: told.append((done, whole)))
+    made = audit.audit(
+        gains=["study", "tuned"], report=lambda done, whole: told.append((done, whole))
+    )
     assert [one.id for one in made.claims] == ["1", "2"]
     assert order == ["2", "1", "2", "1"]
     assert told == [(done, 4) for done in range(1, 5)]
@@ -237,7 +282,9 @@ def short(runs, name="duffing", **changes):
 def test_a_run_is_made_once(runs, monkeypatch):
     made = []
     stream = claim_runs.stream
-    monkeypatch.setattr(claim_runs, "stream", lambda some, threads: made.extend(some) or stream(some, threads))
+    monkeypatch.setattr(
+        claim_runs, "stream", lambda some, threads: made.extend(some) or stream(some, threads)
+    )
     first = runs.scores([short(runs), short(runs), short(runs, seed=1)])
     assert first[0] == first[1]
     assert runs.scores([short(runs, seed=1), short(runs)]) == [first[2], first[0]]
@@ -290,7 +337,9 @@ def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
     made = (law, *(variant(law, name) for name in ("reversed", "zero", "squeezed")))
     traces = runs.traces([short(runs, law=one) for one in made])
     for trace, gain in zip(
-        traces, (lambda x: 1.0, lambda x: -1.0, lambda x: 0.0, lambda x: 1 / (1 + x**2)), strict=True
+        traces,
+        (lambda x: 1.0, lambda x: -1.0, lambda x: 0.0, lambda x: 1 / (1 + x**2)),
+        strict=True,
     ):
         assert np.array_equal(trace.s, traces[0].s) is (trace is traces[0])
         expected = -law.gains["lam"] * np.tanh(trace.v + law.gains["k1"] * trace.x) * gain(trace.x)
@@ -299,7 +348,10 @@ def test_an_input_gain_multiplies_the_command_at_each_sample(runs):
 
 def test_each_variant_of_each_law_has_its_own_file_in_numba_s_cache():
     laws = [smc.law(name) for name in ("classical", "pid")]
-    made = [variant(law, name) for law in laws for name in VARIANTS]
+    made = []
+    for law in laws:
+        for name in VARIANTS:
+            made.append(variant(law, name))
     assert len({getattr(variant.function, "__qualname__", "") for variant in made}) == len(made)
 
 
@@ -318,7 +370,12 @@ def along(name, period):
     plant, lam, k1 = find_plant(name), 2.5, 4.0
     x0 = [0.6] * plant.n  # a network synchronised
     scenario = smc.Scenario(
-        plant=plant, law=smc.law(OURS, lam=lam, k1=k1), x0=x0, v0=-1.0, duration=0.5, control_period=period
+        plant=plant,
+        law=smc.law(OURS, lam=lam, k1=k1),
+        x0=x0,
+        v0=-1.0,
+        duration=0.5,
+        control_period=period,
     )
     trace = smc.run(scenario)
     x, v = trace.x[:, 0], trace.v[:, 0]
@@ -332,7 +389,9 @@ def along(name, period):
 def test_the_map_is_the_slope_of_v_along_trajectories(name):
     coarse, fine = along(name, 1e-3), along(name, 2.5e-4)
     assert fine < 0.01
-    assert 3.0 < coarse / fine < 5.0  # what is left is the command's being held, first order in the control period
+    assert (
+        3.0 < coarse / fine < 5.0
+    )  # what is left is the command's being held, first order in the control period
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -360,7 +419,9 @@ def test_a_plant_on_which_the_claim_is_true_shows_no_rise():
 
 def about(plants, **options):
     """Runs of claim 24, of these plants."""
-    return Runs(GABER, "study", **options).of(dataclasses.replace(GABER.claims["24"], plants=plants))
+    return Runs(GABER, "study", **options).of(
+        dataclasses.replace(GABER.claims["24"], plants=plants)
+    )
 
 
 def test_the_smallest_lambda_found_is_that_of_the_sampled_linear_theory():
@@ -392,7 +453,9 @@ def test_a_law_without_effect_stabilises_what_hangs_alone():
 
 
 def test_the_same_audit_twice_gives_the_same():
-    first, again = (claims(only=["18"], gains="study", quick=True, threads=threads) for threads in (None, 1))
+    first, again = (
+        claims(only=["18"], gains="study", quick=True, threads=threads) for threads in (None, 1)
+    )
     assert again == first
 
 
@@ -419,7 +482,9 @@ def test_a_folder_is_no_file_to_write(terminal, tmp_path):
     assert "it is a folder" in done.stderr
 
 
-@pytest.mark.parametrize(("quick", "told"), [(True, "; here, quickly, 51 x 51 points"), (False, "one pendulum")])
+@pytest.mark.parametrize(
+    ("quick", "told"), [(True, "; here, quickly, 51 x 51 points"), (False, "one pendulum")]
+)
 def test_a_quick_audit_tells_what_it_measures_instead(quick, told):
     (claim,) = claims(only=["18"], gains="study", quick=quick)
     assert claim.measured.endswith(told)

@@ -1,4 +1,6 @@
-"""The evidence of an audit: written twice it is the same, it leads from claims to runs, and its seal shows changes."""
+"""The evidence of an audit: written twice it is the same, it leads from claims to runs, and its
+seal shows changes.
+"""
 
 import colorsys
 import dataclasses
@@ -97,7 +99,11 @@ def test_a_clean_process_writes_the_same_file_of_another_folder(done, folder, tm
         (copy / file.name).write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
     code = "import sys, smc_mujoco as smc; smc.audit(sys.argv[1], threads=1).save(sys.argv[2])"
     there = tmp_path / "there.json"
-    subprocess.run([sys.executable, "-c", code, str(copy), str(there)], check=True, cwd=Path(__file__).parents[3])
+    subprocess.run(
+        [sys.executable, "-c", code, str(copy), str(there)],
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
     assert here.read_bytes() == there.read_bytes()
 
 
@@ -119,10 +125,21 @@ def test_a_claim_leads_to_its_runs_numbers_threshold_and_verdict(told):
 
 
 def test_it_holds_what_is_recorded(told, snapshot):
-    """Its fields and words. Hashes, numbers of runs, versions and the order of runs, by their hashes, are left out."""
-    runs = sorted(told["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]]))
-    lines = [f"claim {json.dumps(one)}" for one in told["claims"]] + [f"run {json.dumps(one)}" for one in runs]
-    lines += [f"{name} {json.dumps(one)}" for name, one in told.items() if name not in ("claims", "runs", "software")]
+    """Its fields and words.
+
+    Hashes, numbers of runs, versions and the order of runs, by their hashes, are left out.
+    """
+    runs = sorted(
+        told["runs"].values(), key=lambda run: json.dumps([run["condition"], run["gains"]])
+    )
+    lines = [f"claim {json.dumps(one)}" for one in told["claims"]] + [
+        f"run {json.dumps(one)}" for one in runs
+    ]
+    lines += [
+        f"{name} {json.dumps(one)}"
+        for name, one in told.items()
+        if name not in ("claims", "runs", "software")
+    ]
     text = "\n".join([*lines, f"software {' '.join(told['software'])}"])
     text = re.sub('"[0-9a-f]{16}(?:[0-9a-f]{48})?"', '"HASH"', text)
     assert re.sub(r'("(?:value|k|c)": )[\d.e-]+', r"\1#", text) == snapshot
@@ -138,13 +155,19 @@ def test_nothing_of_the_machine_is_in_it(told, folder):
 def test_a_run_has_one_name_with_all_versions_and_under_all_names_of_its_condition(monkeypatch):
     scenario = smc.Scenario(plant="duffing", law="classical", duration=0.1)
     name = portable_key(scenario)
-    monkeypatch.setattr(serialise, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"})
+    monkeypatch.setattr(
+        serialise, "_versions", lambda: {"mujoco": "another", "arithmetic": "another"}
+    )
     assert portable_key(scenario) == portable_key(scenario.named("calm")) == name
     assert portable_key(dataclasses.replace(scenario, seed=1)) != name
 
 
 def test_a_run_tells_the_parameters_and_the_size_that_differ_from_the_suite_s():
-    plants = smc.plant("pendulum_network"), smc.plant("pendulum_network", n=3), smc.plant("duffing", beta=0.75)
+    plants = (
+        smc.plant("pendulum_network"),
+        smc.plant("pendulum_network", n=3),
+        smc.plant("duffing", beta=0.75),
+    )
     runs = [evidence._run(smc.Scenario(plant=plant, law="none")) for plant in plants]
     assert [run["parameters"] for run in runs] == [{}, {"n": 3}, {"beta": 0.75}]
 
@@ -186,7 +209,9 @@ def test_an_audit_draws_and_shows_its_claims(done, tmp_path):
     (head,) = done.figure(tmp_path / "checks.svg", size=(9.0, 6.0)).legends
     assert head.get_title().get_text() == "Claims of A. Nobody: Small"
     assert (tmp_path / "checks.svg").is_file()
-    assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == figure.badge("small", done.claims)
+    assert done.badge(tmp_path / "badge.svg").read_text(encoding="utf-8") == figure.badge(
+        "small", done.claims
+    )
     quick = dataclasses.replace(done, quick=True).badge(tmp_path / "quick.svg")
     assert quick.read_text(encoding="utf-8") == figure.badge("small, quick audit", done.claims)
     assert done._repr_html_() == done.claims._repr_html_()
@@ -197,7 +222,9 @@ def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_anothe
         answers = {colours[answer] for answer in ANSWERS.values()}
         assert len(answers) == 1
         assert len({colours[verdict] for verdict in VERDICTS} | answers) == 5
-    refuted, partly, supported = (colorsys.rgb_to_hls(*style.rgb(figure.COLOURS[v]))[0] for v in VERDICTS[2::-1])
+    refuted, partly, supported = (
+        colorsys.rgb_to_hls(*style.rgb(figure.COLOURS[v]))[0] for v in VERDICTS[2::-1]
+    )
     assert 0.0 < refuted < 0.05 < partly < 0.15 < supported < 0.4  # red, amber, green
 
 
@@ -206,13 +233,23 @@ def test_verdicts_have_colours_of_their_own_from_green_to_red_and_answers_anothe
 
 def test_the_command_writes_evidence_and_badge_and_checks_the_seal(folder, tmp_path):
     files = tmp_path / "evidence.json", tmp_path / "badge.svg"
-    words = ["claims", "--paper", str(folder), "--evidence", str(files[0]), "--badge", str(files[1])]
+    words = [
+        "claims",
+        "--paper",
+        str(folder),
+        "--evidence",
+        str(files[0]),
+        "--badge",
+        str(files[1]),
+    ]
     written = CliRunner().invoke(main.app, words)
     assert written.exit_code == 0, written.output
     assert "the law is calm" in written.stdout
     assert all(file.is_file() for file in files)
     asked = CliRunner().invoke(main.app, ["claims", "1", "--paper", str(folder), "--mutants"])
-    assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), asked.output
+    assert (asked.exit_code, "Every claim is lost by a mutant" in asked.stdout) == (0, True), (
+        asked.output
+    )
     without = CliRunner().invoke(main.app, ["claims", "2", "--paper", str(folder), "--mutants"])
     assert (without.exit_code, "claim 2 names no law" in without.stderr) == (2, True)
     checked = CliRunner().invoke(main.app, ["claims", "--check", str(files[0])])

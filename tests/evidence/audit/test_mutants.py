@@ -76,12 +76,17 @@ def winding(y, gains, memory):
 def test_mutants_reverse_the_command_drop_it_forget_or_switch():
     scenario = smc.Scenario(plant="duffing", law=winding(), duration=0.05)
     laws = [variant(winding(), name) for name in MUTANTS]
-    true, *broken = smc.run([scenario, *(smc.Scenario(plant="duffing", law=law, duration=0.05) for law in laws)])
+    true, *broken = smc.run(
+        [scenario, *(smc.Scenario(plant="duffing", law=law, duration=0.05) for law in laws)]
+    )
     wrong, without, forgetful, relay = broken
     assert true.u[0, 0] == -wrong.u[0, 0] < 0.0
     assert not without.u.any()
     assert set(np.unique(relay.u)) == {-6.0}
-    ends = [smc.Scenario(plant="duffing", law=laws[-1], x0=x, v0=0.0, duration=0.002) for x in (-0.5, 0.0)]
+    ends = [
+        smc.Scenario(plant="duffing", law=laws[-1], x0=x, v0=0.0, duration=0.002)
+        for x in (-0.5, 0.0)
+    ]
     assert [trace.u[-1, 0] for trace in smc.run(ends)] == [6.0, 0.0]
     x = forgetful.x[:, 0]
     np.testing.assert_allclose(forgetful.u[:, 0], -3.0 * x * 1e-3, rtol=1e-12)
@@ -90,9 +95,16 @@ def test_mutants_reverse_the_command_drop_it_forget_or_switch():
 
 @pytest.mark.parametrize(
     ("function", "asked", "kept"),
-    [("end", "< 1.49", None), ("constant", "< 2", KEPT), ("constant", "> 2", BLIND), ("end", "> 2", None),
-     ("moved", "> 2", None), ("picky", "< 2", None), ("named", "< 2", KEPT)],
-)  # fmt: skip
+    [
+        ("end", "< 1.49", None),
+        ("constant", "< 2", KEPT),
+        ("constant", "> 2", BLIND),
+        ("end", "> 2", None),
+        ("moved", "> 2", None),
+        ("picky", "< 2", None),
+        ("named", "< 2", KEPT),
+    ],
+)
 def test_a_claim_that_no_mutant_loses_is_found(paper, function, asked, kept):
     done = []
     told = lambda done_now, whole: done.append((done_now, whole))  # noqa: E731
@@ -107,8 +119,12 @@ def test_a_mutant_that_loses_one_sentence_and_gains_another_loses_the_claim(pape
     assert survivors(file.parent) == {}
 
 
-@pytest.mark.parametrize(("asked", "other", "kept"), [("< 2", "< 2", KEPT), ("< 4", "> 9", KEPT), ("< 1", "> 9", None)])
-def test_what_holds_under_one_set_of_gains_or_in_one_sentence_is_lost_by_it_not_by_a_number(paper, asked, other, kept):
+@pytest.mark.parametrize(
+    ("asked", "other", "kept"), [("< 2", "< 2", KEPT), ("< 4", "> 9", KEPT), ("< 1", "> 9", None)]
+)
+def test_what_holds_under_one_set_of_gains_or_in_one_sentence_is_lost_by_it_not_by_a_number(
+    paper, asked, other, kept
+):
     file = paper("weak", "ASKED") / "paper.toml"
     two = f'size = {{ asked = "{asked}", sentence = "weak" }}, other = {{ asked = "{other}", sentence = "it acts" }}'
     gains = "[gains.strong]\nclassical = { k = 3.0, c = 1.0 }\n[gains.weak]\nclassical = { k = 1.0, c = 1.0 }\n"

@@ -1,4 +1,6 @@
-"""A paper is a folder: its template runs, its thresholds decide, and what is wrong with it is one sentence."""
+"""A paper is a folder: its template runs, its thresholds decide, and what is wrong with it is one
+sentence.
+"""
 
 import math
 import re
@@ -55,18 +57,32 @@ def folder(tmp_path):
 @pytest.mark.parametrize(
     ("text", "value", "holds"),
     [
-        ("< 2", 1.9, True), ("< 2", 2.0, False), ("<= 2", 2.0, True), ("> 2", 2.0, False), (">= 2", 2.0, True),
-        ("2 +- 0.1", 2.05, True), ("2 +- 0.1", 1.95, True), ("2 +- 0.1", 2.11, False), ("2 ± 0.1", 1.89, False),
-        ("2 to 15", 2.0, True), ("2 to 15", 15.5, False), ("2 to 15", 1.5, False), ("-1e-3 to .5", 0.0, True),
-        ("< inf", 1e300, True), ("2 +- 0.1", math.nan, False), ("2 to 15", math.nan, False),
+        ("< 2", 1.9, True),
+        ("< 2", 2.0, False),
+        ("<= 2", 2.0, True),
+        ("> 2", 2.0, False),
+        (">= 2", 2.0, True),
+        ("2 +- 0.1", 2.05, True),
+        ("2 +- 0.1", 1.95, True),
+        ("2 +- 0.1", 2.11, False),
+        ("2 ± 0.1", 1.89, False),
+        ("2 to 15", 2.0, True),
+        ("2 to 15", 15.5, False),
+        ("2 to 15", 1.5, False),
+        ("-1e-3 to .5", 0.0, True),
+        ("< inf", 1e300, True),
+        ("2 +- 0.1", math.nan, False),
+        ("2 to 15", math.nan, False),
         ("2 to 15", math.inf, False),
     ],
-)  # fmt: skip
+)
 def test_a_threshold_decides(text, value, holds):
     first, *beside = Threshold.read("size", text).evidence({"": value})
     assert isinstance(first, Check)
     assert first.holds == holds
-    assert [one.value for one in beside] == ([] if text[0] in "<>" else [pytest.approx(value, nan_ok=True)])
+    assert [one.value for one in beside] == (
+        [] if text[0] in "<>" else [pytest.approx(value, nan_ok=True)]
+    )
 
 
 @pytest.mark.parametrize("text", ["2", "== 2", "2 +- ", "15 to 2", "a to b", "", 2, None, "< 2 %"])
@@ -76,7 +92,9 @@ def test_what_is_no_threshold_is_refused(text):
 
 
 def test_each_case_has_its_check():
-    checks = list(Threshold.read("size", "2 +- 0.1", "first").evidence({"duffing": 2.0, "arm": 3.0}))
+    checks = list(
+        Threshold.read("size", "2 +- 0.1", "first").evidence({"duffing": 2.0, "arm": 3.0})
+    )
     assert [type(one) for one in checks] == [Check, Beside] * 2
     assert [one.what for one in checks if isinstance(one, Beside)] == ["duffing: size", "arm: size"]
     assert {one.sentence for one in checks if isinstance(one, Check)} == {"first"}
@@ -92,7 +110,9 @@ def test_the_template_runs_and_the_wrong_sign_loses_its_claims(tmp_path):
     assert (found.name, list(found.claims), list(found.sets)) == ("levant", ["1", "2"], ["paper"])
     first, second = claims(paper=found)
     assert [first.verdict, second.verdict] == ["yes", SUPPORTED]  # a question, and a sentence
-    assert list(first.numbers["paper"]) == [f"{plant}: ultimate bound / |x0|" for plant in found.claims["1"].plants]
+    assert list(first.numbers["paper"]) == [
+        f"{plant}: ultimate bound / |x0|" for plant in found.claims["1"].plants
+    ]
     assert list(second.numbers["paper"]) == ["exponent, distance from 2"]
     assert list(second.beside["paper"]) == ["exponent"] + [
         f"{k}: largest |s|" for k in found.claims["2"].values["periods"]
@@ -112,17 +132,28 @@ def {}(y, gains, memory):
 
 
 def test_a_law_of_the_paper_has_the_gains_of_the_set_and_its_mutants(folder):
-    data = MINIMAL + 'plants = ["duffing"]\nlaws = ["soft"]\n[gains.hard.duffing]\nsoft = { k = 7.0 }\n[gains.own]'
-    code = OWN.format("soft") + "def small(runs):\n    return {'size': runs.law('duffing', 'soft').gains['k'] / 4.0}\n"
+    data = (
+        MINIMAL
+        + 'plants = ["duffing"]\nlaws = ["soft"]\n[gains.hard.duffing]\nsoft = { k = 7.0 }\n[gains.own]'
+    )
+    code = (
+        OWN.format("soft")
+        + "def small(runs):\n    return {'size': runs.law('duffing', 'soft').gains['k'] / 4.0}\n"
+    )
     (one,) = claims(paper=folder(data, code))
     assert one.numbers["hard"]["size"]["value"] == 7.0 / 4.0
     assert one.numbers["own"]["size"]["value"] == 1.0
-    mutants = Runs(paper(folder(data, code)), "own", substitute={"soft": lambda law: with_gains(law, k=12.0)})
+    mutants = Runs(
+        paper(folder(data, code)), "own", substitute={"soft": lambda law: with_gains(law, k=12.0)}
+    )
     assert mutants.law("duffing", "soft").gains["k"] == 12.0
 
 
 def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(folder):
-    data = MINIMAL + '[plants]\nbent = { plant = "duffing", beta = 0.75 }\n[gains.paper]\nclassical = { k = 3.0 }\n'
+    data = (
+        MINIMAL
+        + '[plants]\nbent = { plant = "duffing", beta = 0.75 }\n[gains.paper]\nclassical = { k = 3.0 }\n'
+    )
     code = OWN.format("soft") + "made = soft(k=5.0)\n" + SMALL
     found = paper(folder("sets = ['paper', 'tuned', 'default']\n" + data, code))
     gains = lambda *names: dict(found.law(*names).gains)  # noqa: E731
@@ -130,24 +161,40 @@ def test_laws_plants_and_conditions_are_the_paper_s_the_suite_s_or_written_out(f
     assert gains("duffing", "fixed_time", "tuned") == gains("duffing", "fixed_time", "default")
     assert gains("duffing", "classical", "tuned") != gains("duffing", "classical", "default")
     with pytest.raises(
-        ScenarioError, match=r"the gains 'paper' of classical lack some.*write in .gains.paper. what.* c = "
+        ScenarioError,
+        match=r"the gains 'paper' of classical lack some.*write in .gains.paper. what.* c = ",
     ):
         found.law("duffing", "classical", "paper")
-    assert (found.plant("bent").parameters["beta"], found.plant("duffing").name) == (0.75, "duffing")
+    assert (found.plant("bent").parameters["beta"], found.plant("duffing").name) == (
+        0.75,
+        "duffing",
+    )
     assert found.condition("noise").name == "noise"
     assert found.condition("far: x0=0.25").on(found.plant("bent"), 1.0)["x0"] == 0.25
     assert found.contents == "1 of its sentences; full text read"
 
 
 def test_fields_are_the_paper_s_then_the_condition_s_the_claim_s_and_the_changes(folder):
-    data = 'runs = "duration=1.0, seed=1, x0=0.1, u_max=1.0"\n' + MINIMAL + 'runs = "seed=3, u_max=3.0"\n'
+    data = (
+        'runs = "duration=1.0, seed=1, x0=0.1, u_max=1.0"\n'
+        + MINIMAL
+        + 'runs = "seed=3, u_max=3.0"\n'
+    )
     found = paper(folder(data + '[conditions]\nfar = "x0=0.2, u_max=2.0"'))
     one = Runs(found, "default").of(found.claims["1"]).scenario("duffing", "pid", "far", u_max=4.0)
-    assert (one.duration, one.x0, one.seed, one.u_max, one.condition) == (1.0, (0.2,), 3, 4.0, "far")
+    assert (one.duration, one.x0, one.seed, one.u_max, one.condition) == (
+        1.0,
+        (0.2,),
+        3,
+        4.0,
+        "far",
+    )
 
 
 def test_claims_may_import_other_files_of_their_folder(folder):
-    home = folder(MINIMAL, "from .shared import VALUE\ndef small(runs):\n    return {'size': VALUE * 1.5}\n")
+    home = folder(
+        MINIMAL, "from .shared import VALUE\ndef small(runs):\n    return {'size': VALUE * 1.5}\n"
+    )
     (home / "shared.py").write_text("VALUE = 1.0\n")
     (one,) = claims(paper=home)
     assert one.numbers["default"]["size"]["value"] == 1.5
@@ -157,24 +204,51 @@ def test_claims_may_import_other_files_of_their_folder(folder):
 # broken folders
 
 BROKEN = [
-    (None, SMALL), (MINIMAL, None), (MINIMAL.replace('"p. 1"', "p. 1"), SMALL), (MINIMAL, "def small(runs)\n    pass"),
-    (MINIMAL, "import sys\nsys.exit(3)"), (MINIMAL, OWN.format("pid") + SMALL), (MINIMAL, "import numppy\n" + SMALL),
+    (None, SMALL),
+    (MINIMAL, None),
+    (MINIMAL.replace('"p. 1"', "p. 1"), SMALL),
+    (MINIMAL, "def small(runs)\n    pass"),
+    (MINIMAL, "import sys\nsys.exit(3)"),
+    (MINIMAL, OWN.format("pid") + SMALL),
+    (MINIMAL, "import numppy\n" + SMALL),
     (MINIMAL, "import smc_mujoco as smc\nsmc.plant('dufing')\n" + SMALL),
-]  # fmt: skip
+]
 ADDED = [  # to the minimal paper.toml
-    'over = "many"', 'over = "all"', 'laws = ["pid"]\nover = "some"', 'read = "some"', "late = 1", 'values = "1"',
-    'plants = ["dufing"]', 'laws = ["clasical"]', 'conditions = ["noisy"]',
+    'over = "many"',
+    'over = "all"',
+    'laws = ["pid"]\nover = "some"',
+    'read = "some"',
+    "late = 1",
+    'values = "1"',
+    'plants = ["dufing"]',
+    'laws = ["clasical"]',
+    'conditions = ["noisy"]',
     'plants = ["hevy"]\n[plants]\nheavy = { plant = "duffing" }',
-    'conditions = ["farr"]\n[conditions]\nfar = "x0=2.0"', 'conditions = ["friction=Coulom(1)+"]',
-    'plants = "duffing"', 'plants = [["duffing"]]', 'quantifier = "every"', 'runs = "durations=1"',
-    'runs = "duration 1"', 'runs = "friction=Coulom(1)"', '[conditions]\nnoise = "seed=1"', "[conditions]\nfar = 2.0",
-    '[conditions]\nworn = "friction=Coulom(1)"', '[plants]\nlight = { plant = "duffing", m = 1 }',
-    "[plants]\nlight = { delta = 1 }", "[plants]\nlight = 3", '[plants]\narm = { plant = "arm.xml:elbow" }',
-    "[gains.tuned]\npid = { kp = 1 }", "[gains.mine]\npid = 3", "[gains]\nmine = 3",
+    'conditions = ["farr"]\n[conditions]\nfar = "x0=2.0"',
+    'conditions = ["friction=Coulom(1)+"]',
+    'plants = "duffing"',
+    'plants = [["duffing"]]',
+    'quantifier = "every"',
+    'runs = "durations=1"',
+    'runs = "duration 1"',
+    'runs = "friction=Coulom(1)"',
+    '[conditions]\nnoise = "seed=1"',
+    "[conditions]\nfar = 2.0",
+    '[conditions]\nworn = "friction=Coulom(1)"',
+    '[plants]\nlight = { plant = "duffing", m = 1 }',
+    "[plants]\nlight = { delta = 1 }",
+    "[plants]\nlight = 3",
+    '[plants]\narm = { plant = "arm.xml:elbow" }',
+    "[gains.tuned]\npid = { kp = 1 }",
+    "[gains.mine]\npid = 3",
+    "[gains]\nmine = 3",
     'plants = ["duffing"]\nlaws = ["twisting"]\n[gains.paper]\ntwisting = { r1 = 5 }',
-    'plants = ["duffing"]\nlaws = ["pid"]\n[gains.paper]\npid = { kq = 1 }', "[allowed]\npid = 3",
-    "[allowed.pdi]\nkp = [1.0, 2.0]", "[allowed.pid]\nkq = [1.0, 2.0]", '[allowed.pid]\nmargins = "larg"',
-]  # fmt: skip
+    'plants = ["duffing"]\nlaws = ["pid"]\n[gains.paper]\npid = { kq = 1 }',
+    "[allowed]\npid = 3",
+    "[allowed.pdi]\nkp = [1.0, 2.0]",
+    "[allowed.pid]\nkq = [1.0, 2.0]",
+    '[allowed.pid]\nmargins = "larg"',
+]
 WRONG = [  # of paper.toml
     MINIMAL.replace('title = "t"', ""),
     MINIMAL.replace('source = "s"', 'source = " "'),
@@ -185,7 +259,10 @@ WRONG = [  # of paper.toml
     MINIMAL.split("[[claim]]", maxsplit=1)[0],
     MINIMAL.split("[[claim]]", maxsplit=1)[0] + "claim = 3",
     MINIMAL.split("[[claim]]", maxsplit=1)[0] + "claim = [3]",
-    *(re.sub(f"\n{field} = .*", "", MINIMAL) for field in ("id", "text", "whose", "where", "function", "holds_if")),
+    *(
+        re.sub(f"\n{field} = .*", "", MINIMAL)
+        for field in ("id", "text", "whose", "where", "function", "holds_if")
+    ),
     MINIMAL.replace("{ size", "{ } # { size"),
     MINIMAL.replace("< 2", "small"),
     MINIMAL.replace('"< 2"', '{ aske = "< 2" }'),
@@ -196,7 +273,10 @@ WRONG = [  # of paper.toml
     MINIMAL + MINIMAL.partition('s"\n')[2],
     'sets = ["mine"]\n' + MINIMAL,
     'quick_sets = ["mine"]\n' + MINIMAL,
-    *(MINIMAL + f"[allowed.pid]\nkp = {ends}" for ends in ("[2.0, 1.0]", "[1, 1]", "[0, 1]", "[1]", '["a", 1]', "3")),
+    *(
+        MINIMAL + f"[allowed.pid]\nkp = {ends}"
+        for ends in ("[2.0, 1.0]", "[1, 1]", "[0, 1]", "[1]", '["a", 1]', "3")
+    ),
     *(MINIMAL + added for added in ADDED),
 ]
 
@@ -207,8 +287,20 @@ def test_a_broken_folder_is_one_sentence(folder, refused):
 
 
 def test_a_function_that_fails_is_one_sentence(folder, refused):
-    returned = ("1 / 0", "None", "[1.0]", "{}", "{'sizes': 1.0, 3: 2.0}", "{'size': {}}", "{'size': 'large'}")
-    returned += ("{'size': {'arm': None}}", "runs.scenario('dufing', 'pid')", "runs.law('duffing', 'pid', kq=1)")
+    returned = (
+        "1 / 0",
+        "None",
+        "[1.0]",
+        "{}",
+        "{'sizes': 1.0, 3: 2.0}",
+        "{'size': {}}",
+        "{'size': 'large'}",
+    )
+    returned += (
+        "{'size': {'arm': None}}",
+        "runs.scenario('dufing', 'pid')",
+        "runs.law('duffing', 'pid', kq=1)",
+    )
     returned += ("runs.check('sise', 'it', 1)",)
     for one in returned:
         refused(lambda one=one: claims(paper=folder(code=f"def small(runs):\n    return {one}\n")))
@@ -218,22 +310,27 @@ def test_a_text_as_threshold_needs_checks(folder):
     data = MINIMAL.replace('{ size = "< 2" }', '"small"')
     with pytest.raises(ScenarioError, match="it returns numbers, and holds_if is a text"):
         claims(paper=folder(data))
-    code = (
-        "from smc_mujoco.evidence.audit.verdict import check\ndef small(runs):\n    return [check('size', 3, '<', 2)]\n"
-    )
+    code = "from smc_mujoco.evidence.audit.verdict import check\ndef small(runs):\n    return [check('size', 3, '<', 2)]\n"
     assert claims(paper=folder(data, code))[0].verdict == REFUTED
-    with pytest.raises(ScenarioError, match="it returns checks, and none for 'size' of holds_if: return numbers, or"):
+    with pytest.raises(
+        ScenarioError,
+        match="it returns checks, and none for 'size' of holds_if: return numbers, or",
+    ):
         claims(paper=folder(code=code))
 
 
 def test_a_check_takes_its_limit_from_the_file_and_may_be_relative_to_a_run(folder):
     data = MINIMAL.replace(
-        '{ size = "< 2" }', '{ size = { asked = "< 2", sentence = "small" } }\nwords = "small, or so"'
+        '{ size = "< 2" }',
+        '{ size = { asked = "< 2", sentence = "small" } }\nwords = "small, or so"',
     )
     code = "def small(runs):\n    return [runs.check('size', 'it', 5, times=3.0), runs.check('size', 'other', 3)]\n"
     (one,) = claims(paper=folder(data, code))
     assert one.holds_if == "small, or so"
-    assert (one.numbers["default"]["it"]["limit"], one.numbers["default"]["other"]["limit"]) == (6.0, 2.0)
+    assert (one.numbers["default"]["it"]["limit"], one.numbers["default"]["other"]["limit"]) == (
+        6.0,
+        2.0,
+    )
     assert {check.sentence for check in one.checks("default")} == {"small"}
     assert [check.holds for check in one.checks("default")] == [True, False]
     with pytest.raises(ScenarioError, match="unknown threshold 'sise'"):

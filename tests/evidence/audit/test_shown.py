@@ -22,17 +22,26 @@ from smc_mujoco.evidence.audit.verdict import (
     summary,
 )
 
-NEAR, FAR = check("duffing: ripple, m", 0.25, "<", 1.0), check("duffing: settling time, s", math.inf, "<", 3.0)
-LOST, NONE = check("arm: deviation", math.inf, "<=", 0.02), check("arm: rate, 1/s", math.nan, ">", 4.0)
+NEAR, FAR = (
+    check("duffing: ripple, m", 0.25, "<", 1.0),
+    check("duffing: settling time, s", math.inf, "<", 3.0),
+)
+LOST, NONE = (
+    check("arm: deviation", math.inf, "<=", 0.02),
+    check("arm: rate, 1/s", math.nan, ">", 4.0),
+)
 EXPONENT, SHARE = Threshold.read("exponent", "2 +- 0.25"), Threshold.read("share", "2 to 15")
 BESIDE = Beside("theory", 7.0)
 
 
 def claim(id, evidence, **about):
     told = {
-        "text": f"sentence {id} of <this> & $that$", "where": "p. 1", "measured": "m", "holds_if": "h",
+        "text": f"sentence {id} of <this> & $that$",
+        "where": "p. 1",
+        "measured": "m",
+        "holds_if": "h",
         "read": "abstract",
-    }  # fmt: skip
+    }
     return judged(Statement(id=id, **told | about), evidence)
 
 
@@ -42,8 +51,19 @@ def claims():
     return Claims(
         [
             claim("1", {"slow": [NEAR, BESIDE], "tuned": [NEAR]}),
-            claim("2", {"slow": [NEAR], "tuned": [NEAR, FAR]}, note="Mind <the> gap.", read="full text"),
-            claim("3", {"slow": [NEAR], "tuned": [LOST, NONE]}, quantifier=UNIVERSAL, whose=DERIVED, how="by (3)"),
+            claim(
+                "2",
+                {"slow": [NEAR], "tuned": [NEAR, FAR]},
+                note="Mind <the> gap.",
+                read="full text",
+            ),
+            claim(
+                "3",
+                {"slow": [NEAR], "tuned": [LOST, NONE]},
+                quantifier=UNIVERSAL,
+                whose=DERIVED,
+                how="by (3)",
+            ),
             claim("4", {"slow": [FAR], "tuned": [NEAR]}, quantifier=EXISTENTIAL),
             claim("5", {"slow": both, "tuned": list(EXPONENT.evidence({"": 2.0}))}),
             claim("6", {"slow": [NEAR], "tuned": [NEAR._replace(sentence="a"), LOST]}, whose=OURS),
@@ -53,25 +73,72 @@ def claims():
 
 
 VERDICTS = {  # of each claim: verdict, by gains, what decides by gains, slack of the checks
-    "1": ("supported", "supported", "supported", "ripple, m = 0.25 (< 1", "ripple, m = 0.25 (< 1", [0.75, 0.75]),
-    "2": ("partly supported", "supported", "refuted", "0.25 (< 1", "time, s = never (< 3", [0.75, 0.75, -math.inf]),
-    "3": ("refuted", "supported", "refuted", "0.25 (< 1", "= inf (<= 0.02", [0.75, -math.inf, -math.inf]),
-    "4": ("supported", "not shown", "supported", "time, s = never (< 3", "= 0.25 (< 1", [-math.inf, 0.75]),
-    "5": ("partly supported", "refuted", "supported", "late: exponent = 2.5 (2 +- 0.25", "exponent = 2 (2 +- 0.25",
-          [0.8848, -1.0, -1.0, 1.0]),
+    "1": (
+        "supported",
+        "supported",
+        "supported",
+        "ripple, m = 0.25 (< 1",
+        "ripple, m = 0.25 (< 1",
+        [0.75, 0.75],
+    ),
+    "2": (
+        "partly supported",
+        "supported",
+        "refuted",
+        "0.25 (< 1",
+        "time, s = never (< 3",
+        [0.75, 0.75, -math.inf],
+    ),
+    "3": (
+        "refuted",
+        "supported",
+        "refuted",
+        "0.25 (< 1",
+        "= inf (<= 0.02",
+        [0.75, -math.inf, -math.inf],
+    ),
+    "4": (
+        "supported",
+        "not shown",
+        "supported",
+        "time, s = never (< 3",
+        "= 0.25 (< 1",
+        [-math.inf, 0.75],
+    ),
+    "5": (
+        "partly supported",
+        "refuted",
+        "supported",
+        "late: exponent = 2.5 (2 +- 0.25",
+        "exponent = 2 (2 +- 0.25",
+        [0.8848, -1.0, -1.0, 1.0],
+    ),
     "6": ("in part", "yes", "in part", "= 0.25 (< 1", "= inf (<= 0.02", [0.75, 0.75, -math.inf]),
     "7": ("not testable", "not testable", "not testable", "Nothing", "Nothing", []),
-}  # fmt: skip
-MARKS = {"supported": "●", "partly supported": "◐", "refuted": "○", "not testable": "–", "in part": "◧"}
+}
+MARKS = {
+    "supported": "●",
+    "partly supported": "◐",
+    "refuted": "○",
+    "not testable": "–",
+    "in part": "◧",
+}
 
 
 def test_an_audit_says_verdicts_what_decides_and_how_far_a_check_is_from_its_limit(claims):
     for one in claims:
         whole, slow, tuned, first, second, slack = VERDICTS[one.id]
-        assert (one.verdict, one.verdicts, one.flips) == (whole, {"slow": slow, "tuned": tuned}, slow != tuned)
+        assert (one.verdict, one.verdicts, one.flips) == (
+            whole,
+            {"slow": slow, "tuned": tuned},
+            slow != tuned,
+        )
         assert first in str(one.decided("slow"))
         assert second in str(one.decided("tuned"))
-        found = [each.slack for gains in one.verdicts for each in one.checks(gains)]
+        found = []
+        for gains in one.verdicts:
+            for each in one.checks(gains):
+                found.append(each.slack)
         assert found == pytest.approx(slack, abs=1e-9)
         assert not one.flips or {"slow", "tuned"} <= {*re.findall(r"\w+", one.note)}
     assert re.findall("(.) ([0-9])", summary(claims)) == [*zip("●◐–○◧", "22111", strict=True)]
@@ -83,10 +150,14 @@ def test_a_notebook_shows_claims_in_a_line_each_and_one_in_full(claims):
     rows = re.findall("<tr><td>.*?</tr>", listed)
     assert len(rows) == len(claims)
     for one, row in zip(claims, rows, strict=True):
-        assert row.startswith(f"<tr><td>{one.id}</td><td>sentence {one.id} of &lt;this&gt; &amp; $that$</td>")
+        assert row.startswith(
+            f"<tr><td>{one.id}</td><td>sentence {one.id} of &lt;this&gt; &amp; $that$</td>"
+        )
         assert f"<b>{MARKS[one.verdict]} {one.verdict}" in row
         assert (", flips" in row) == one.flips
-    cells = [re.findall("<td>(.*?)</td>", row) for row in re.findall("<tr>(?=<td>[st]).*?</tr>", page)]
+    cells = [
+        re.findall("<td>(.*?)</td>", row) for row in re.findall("<tr>(?=<td>[st]).*?</tr>", page)
+    ]
     assert cells == [
         ["slow", "✓", "exponent, distance from 2", "0.0288", "&lt;= 0.25"],
         ["slow", "✗", "late: exponent, distance from 2", "0.5", "&lt;= 0.25"],
@@ -99,12 +170,19 @@ def test_a_badge_has_a_field_for_each_verdict_of_the_paper_s_own_sentences(claim
     text = badge("a <b>", claims)
     assert "<b>" not in text
     assert re.findall(r">([^<>]+)</text>", text) == [
-        "claims of a &lt;b&gt;", "2 supported", "2 partly", "1 not testable",
-    ]  # fmt: skip
-    at, wide, colours = zip(*re.findall(r'<rect x="(\d+)" width="(\d+)" height="20" fill="(#\w+)"', text), strict=True)
+        "claims of a &lt;b&gt;",
+        "2 supported",
+        "2 partly",
+        "1 not testable",
+    ]
+    at, wide, colours = zip(
+        *re.findall(r'<rect x="(\d+)" width="(\d+)" height="20" fill="(#\w+)"', text), strict=True
+    )
     assert [int(x) for x in at] == [sum(map(int, wide[:k])) for k in range(4)]
     assert f'width="{sum(map(int, wide))}" height="20"' in text
-    assert colours[1:] == tuple(COLOURS[one] for one in ("supported", "partly supported", "not testable"))
+    assert colours[1:] == tuple(
+        COLOURS[one] for one in ("supported", "partly supported", "not testable")
+    )
     with pytest.raises(ScenarioError, match=r"end the name in \.svg"):
         save_badge("a", claims, "badge.png")
 
@@ -114,21 +192,39 @@ def test_the_figure_has_a_row_for_each_claim_and_a_dot_for_each_check(claims):
     page = figure(claims, "Claims of nobody")
     (axes,) = page.axes
     labels = axes.get_yticklabels()
-    assert [one.get_text()[:3] for one in labels] == [f"{MARKS[one.verdict]} {one.id}" for one in claims]
+    assert [one.get_text()[:3] for one in labels] == [
+        f"{MARKS[one.verdict]} {one.id}" for one in claims
+    ]
     assert [one.get_color() for one in labels] == [COLOURS[one.verdict] for one in claims]
-    dots = {(round(x, 3), round(y, 3), line.get_markerfacecolor() != "none")
-            for line in axes.lines if line.get_marker() == "o" for x, y in np.asarray(line.get_xydata())}  # fmt: skip
+    dots = set()
+    for line in axes.lines:
+        if line.get_marker() == "o":
+            for x, y in np.asarray(line.get_xydata()):
+                dots.add((round(x, 3), round(y, 3), line.get_markerfacecolor() != "none"))
     above, below = -0.125, 0.125
     holds, never = round(math.log10(0.25), 3), 3.0
-    due = {(holds, k + above, True) for k in (0, 1, 2, 5)} | {(holds, k + below, True) for k in (0, 1, 3, 5)}
-    due |= {(never, 1 + below, False), (never, 2 + below, False), (never, 3 + above, False), (never, 5 + below, False)}
-    due |= {(round(math.log10(0.0288 / 0.25), 3), 4 + above, True), (0.301, 4 + above, False), (3.0, 4 + above, False)}
+    due = {(holds, k + above, True) for k in (0, 1, 2, 5)} | {
+        (holds, k + below, True) for k in (0, 1, 3, 5)
+    }
+    due |= {
+        (never, 1 + below, False),
+        (never, 2 + below, False),
+        (never, 3 + above, False),
+        (never, 5 + below, False),
+    }
+    due |= {
+        (round(math.log10(0.0288 / 0.25), 3), 4 + above, True),
+        (0.301, 4 + above, False),
+        (3.0, 4 + above, False),
+    }
     due |= {(-3.0, 4 + below, True)}
     assert {(x, round(y, 3), filled) for x, y, filled in dots} == due
     (legend,) = page.legends
     assert [one.get_text() for one in legend.get_texts()] == list(MARKS)
     narrow = figure(
-        [claim("1", {"slow": [NEAR]}, text="a sentence as long as papers write them")], "One", size=(4.0, 5.0)
+        [claim("1", {"slow": [NEAR]}, text="a sentence as long as papers write them")],
+        "One",
+        size=(4.0, 5.0),
     )
     assert narrow.axes[0].get_yticklabels()[0].get_text().endswith("…")
     assert "gains" not in narrow.axes[0].get_xlabel()

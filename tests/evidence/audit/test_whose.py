@@ -1,4 +1,6 @@
-"""Whose a claim is decides what is counted, and what is said of all or some gains is decided by one set of them."""
+"""Whose a claim is decides what is counted, and what is said of all or some gains is decided by one
+set of them.
+"""
 
 import pytest
 
@@ -52,7 +54,9 @@ def decided(folder):
 
 
 def test_all_gains_are_refuted_by_one_that_the_theorem_allows_with_its_margin(written):
-    folder = written(DATA.format(over="all", limit="< 4", plants='["duffing"]', margins='margins = "margins"'))
+    folder = written(
+        DATA.format(over="all", limit="< 4", plants='["duffing"]', margins='margins = "margins"')
+    )
     verdict, beside = decided(folder)
     assert verdict == "refuted"
     assert 4.0 <= beside["decided at k"] < 5.0
@@ -63,20 +67,30 @@ def test_all_gains_are_refuted_by_one_that_the_theorem_allows_with_its_margin(wr
 def test_gains_outside_the_conditions_are_no_counter_example(written):
     conditions = 'margins = "margins"'
     assert (
-        decided(written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins=conditions)))[0]
+        decided(
+            written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins=conditions))
+        )[0]
         == "supported"
     )
-    assert decided(written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins="")))[0] == "refuted"
+    assert (
+        decided(written(DATA.format(over="all", limit="< 5", plants='["duffing"]', margins="")))[0]
+        == "refuted"
+    )
 
 
 def test_some_gains_are_enough_on_each_plant_and_the_set_s_own_are_tried_first(written):
     both = '["duffing", "van_der_pol"]'
-    verdict, beside = decided(written(DATA.format(over="some", limit="> 3", plants=both, margins="")))
+    verdict, beside = decided(
+        written(DATA.format(over="some", limit="> 3", plants=both, margins=""))
+    )
     assert verdict == "supported"
     assert min(beside["duffing: decided at k"], beside["van_der_pol: decided at k"]) > 3.0
     first = decided(written(DATA.format(over="some", limit="> 1", plants=both, margins="")))[1]
     assert (first["duffing: decided at k"], first["duffing: sets of gains tried"]) == (2.0, 1)
-    assert decided(written(DATA.format(over="some", limit="> 9", plants=both, margins="")))[0] == "not shown"
+    assert (
+        decided(written(DATA.format(over="some", limit="> 9", plants=both, margins="")))[0]
+        == "not shown"
+    )
 
 
 TWO_SETS = """
@@ -87,11 +101,19 @@ classical = {{ k = 8.0, c = 1.0 }}
 
 @pytest.mark.parametrize(
     ("rivals", "limit", "verdict"),
-    [("paper", "> 8.5", "supported"), ("paper", "> 9", "not shown"), ("other", "< 1.5", "supported")],
+    [
+        ("paper", "> 8.5", "supported"),
+        ("paper", "> 9", "not shown"),
+        ("other", "< 1.5", "supported"),
+    ],
 )
-def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_beside_it(written, rivals, limit, verdict):
+def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_beside_it(
+    written, rivals, limit, verdict
+):
     data = DATA.format(over="some", limit=limit, plants='["duffing"]', margins="tried = [40, 10]")
-    data = data.replace("[allowed", TWO_SETS.format() + "[allowed").replace("over =", f'rivals = "{rivals}"\nover =')
+    data = data.replace("[allowed", TWO_SETS.format() + "[allowed").replace(
+        "over =", f'rivals = "{rivals}"\nover ='
+    )
     (found,) = audit(written(data)).claims
     (beside,) = {"paper", "other"} - {rivals}
     assert (found.verdict, found.flips, found.verdicts[beside]) == (verdict, False, "refuted")
@@ -103,20 +125,28 @@ def test_a_set_of_rivals_gains_decides_by_a_search_and_other_sets_are_told_besid
 
 def test_a_search_may_be_over_the_gains_of_another_law_than_the_first(written):
     data = DATA.format(over="some", limit="> 3", plants='["duffing"]', margins="")
-    data = data.replace('laws = ["classical"]', 'laws = ["none", "classical"]\nsearched = "classical"')
+    data = data.replace(
+        'laws = ["classical"]', 'laws = ["none", "classical"]\nsearched = "classical"'
+    )
     assert decided(written(data))[0] == "supported"
 
 
-def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_the_best(written, snapshot):
+def test_the_gains_tried_are_halton_s_points_within_the_bounds_then_some_around_the_best(
+    written, snapshot
+):
     """No run is made: these numbers are the same on every machine."""
     margins = 'c = [0.5, 2.0]\nmargins = "margins"'
     cases = [
-        (over, limit, quick) for over in ("all", "some") for limit in ("< 4", "> 4", "< 1") for quick in (False, True)
+        (over, limit, quick)
+        for over in ("all", "some")
+        for limit in ("< 4", "> 4", "< 1")
+        for quick in (False, True)
     ]
     said = []
     for over, limit, quick in cases:
         (found,) = audit(
-            written(DATA.format(over=over, limit=limit, plants='["duffing"]', margins=margins)), quick=quick
+            written(DATA.format(over=over, limit=limit, plants='["duffing"]', margins=margins)),
+            quick=quick,
         ).claims
         numbers = [f"{value:.9g}" for value in found.beside["paper"].values()]
         said += [f"{over} {limit} {'quick' * quick}: {found.verdict} {' '.join(numbers)}"]

@@ -21,39 +21,100 @@ SAID = {
     "every condition fails": certificate(
         "pendulum_network",
         parts=[
-            part("saturated PD", {"damping": -1.0, "restoring": -2.0, "actuator": -3.0, "coupling": -4.0}),
+            part(
+                "saturated PD",
+                {"damping": -1.0, "restoring": -2.0, "actuator": -3.0, "coupling": -4.0},
+            ),
             part("reaching", {"reaching": -6.0, "actuator": 0.0}, X=0.0, S=0.0),
             part("super-twisting", {"integral": -7.0, "slope": -8.0, "actuator": 9.0}),
         ],
     ),
     "a switching law": certificate(
-        "inverted_pendulum", "classical", {"k": 3.0, "c": 2.0},
-        [part("saturated PD", {"damping": 0.5}), REACHED, part("level sets", {"start": -0.1}, **LEVELS)],
+        "inverted_pendulum",
+        "classical",
+        {"k": 3.0, "c": 2.0},
+        [
+            part("saturated PD", {"damping": 0.5}),
+            REACHED,
+            part("level sets", {"start": -0.1}, **LEVELS),
+        ],
     ),
     "nothing under a disturbance": certificate(parts=[part("saturated PD", {"damping": 0.5})]),
-    "a terminal surface": certificate("duffing", "terminal", {"k": 3.0, "b": 2.0, "p": 0.75, "bound": 1.0}, [TERMINAL]),
+    "a terminal surface": certificate(
+        "duffing", "terminal", {"k": 3.0, "b": 2.0, "p": 0.75, "bound": 1.0}, [TERMINAL]
+    ),
     "super-twisting": certificate(
-        "van_der_pol", "super_twisting", {"k1": 3.0, "k2": 2.0, "c": 1.5}, disturbance=0.5, slope=1.75,
+        "van_der_pol",
+        "super_twisting",
+        {"k1": 3.0, "k2": 2.0, "c": 1.5},
+        disturbance=0.5,
+        slope=1.75,
         parts=[part("super-twisting", {"integral": 0.25, "slope": 0.1, "actuator": 0.2}, X=0.3)],
     ),
-}  # fmt: skip
+}
 
 
-FACTS = {  # theorem, holds, stable, bound, slope; of each theorem: proven (+), not (-) or nothing (?), and its numbers
-    "fails and falls": ("level sets", True, False, 0.3, 3.0, [["-", "-0.250 N s/m"],
-                        ["+", "|x| = 0.666 m", "|x| <= 0.300 m", "|d| <= 2 N"]]),
+# theorem, holds, stable, bound, slope; of each theorem: proven (+), not (-) or nothing (?), and its
+# numbers
+FACTS = {
+    "fails and falls": (
+        "level sets",
+        True,
+        False,
+        0.3,
+        3.0,
+        [["-", "-0.250 N s/m"], ["+", "|x| = 0.666 m", "|x| <= 0.300 m", "|d| <= 2 N"]],
+    ),
     "without d": ("saturated PD", True, True, 0.0, 3.0, [["+", "without d", "exponentially"]]),
-    "every condition fails": ("saturated PD", False, False, None, 3.0, [
-        ["-", "-1.00 N m s/rad", "-2.00 (", "-3.00 N m (", "-4.00 N m/rad"], ["-", "-6.00 N m ("],
-        ["-", "-7.00 N m/s", "-8.00 N m/s"]]),
-    "a switching law": ("saturated PD", False, True, None, 2.0, [
-        ["+", "without d"], ["+", "|x| <= 1.25 rad", "|s| <= 0.500 rad/s", "|d| <= 2 N m"],
-        ["+", "|x| = 0.999 rad", "come to rest", "|d| <= 2 N m", "start is not among them"]]),
-    "nothing under a disturbance": ("saturated PD", False, True, None, 3.0, [["+"], ["?", "|d| <= 2 N"]]),
-    "a terminal surface": ("reaching", False, False, None, 1.0, [["+", "0.810 m", "after 1.90 s", "|d| <= 2 N"]]),
-    "super-twisting": ("super-twisting", False, False, None, 1.5, [
-        ["+", "|x| <= 0.300 m", "|d| <= 0.5 N", "|d'| <= 1.75 N/s"]]),
-}  # fmt: skip
+    "every condition fails": (
+        "saturated PD",
+        False,
+        False,
+        None,
+        3.0,
+        [
+            ["-", "-1.00 N m s/rad", "-2.00 (", "-3.00 N m (", "-4.00 N m/rad"],
+            ["-", "-6.00 N m ("],
+            ["-", "-7.00 N m/s", "-8.00 N m/s"],
+        ],
+    ),
+    "a switching law": (
+        "saturated PD",
+        False,
+        True,
+        None,
+        2.0,
+        [
+            ["+", "without d"],
+            ["+", "|x| <= 1.25 rad", "|s| <= 0.500 rad/s", "|d| <= 2 N m"],
+            ["+", "|x| = 0.999 rad", "come to rest", "|d| <= 2 N m", "start is not among them"],
+        ],
+    ),
+    "nothing under a disturbance": (
+        "saturated PD",
+        False,
+        True,
+        None,
+        3.0,
+        [["+"], ["?", "|d| <= 2 N"]],
+    ),
+    "a terminal surface": (
+        "reaching",
+        False,
+        False,
+        None,
+        1.0,
+        [["+", "0.810 m", "after 1.90 s", "|d| <= 2 N"]],
+    ),
+    "super-twisting": (
+        "super-twisting",
+        False,
+        False,
+        None,
+        1.5,
+        [["+", "|x| <= 0.300 m", "|d| <= 0.5 N", "|d'| <= 1.75 N/s"]],
+    ),
+}
 BEGIN = {"+": "proven by", "-": "not proven by", "?": "nothing is proven"}
 
 
@@ -67,7 +128,9 @@ def test_a_certificate_says_what_its_theorems_say(name):
         assert sentence.startswith(BEGIN[mark])
         assert [part for part in parts if part not in sentence] == []
         assert ("not among them" in sentence, "exponentially" in sentence) == (
-            "start is not among them" in parts, "exponentially" in parts)  # fmt: skip
+            "start is not among them" in parts,
+            "exponentially" in parts,
+        )
     assert "delay (input_delay(time=0.004))" in left
     assert "noise" in left
     assert [one.holds for one in made.conditions] == [one.margin >= 0.0 for one in made.conditions]
@@ -86,7 +149,9 @@ def test_a_certificate_prints_what_is_said_under_a_disturbance_and_no_control_ch
     assert "\n" not in printed
     assert "no theorem here is about" not in printed
     named = dict(SAID["without d"].data) | {"law": {"name": "\x1b[31mred", "gains": {}}}
-    assert repr(Certificate(data=named)).startswith(r"<Certificate of \x1b[31mred on inverted_pendulum: proven by")
+    assert repr(Certificate(data=named)).startswith(
+        r"<Certificate of \x1b[31mred on inverted_pendulum: proven by"
+    )
 
 
 def test_w_is_bilinear_odd_states_alike_and_1_outside():
@@ -105,22 +170,33 @@ def test_w_is_bilinear_odd_states_alike_and_1_outside():
 def test_the_set_of_a_switching_law_is_a_strip_and_of_a_stable_loop_everything():
     x, s = np.random.default_rng(5).uniform(-1.5, 1.5, (2, 400))
     box = certificate("inverted_pendulum", "classical", {"k": 3.0, "c": 2.0}, [REACHED])
-    np.testing.assert_array_equal(box.contains(x, s - 2.0 * x), (np.abs(x) <= 1.25) & (np.abs(s) <= 0.5))
+    np.testing.assert_array_equal(
+        box.contains(x, s - 2.0 * x), (np.abs(x) <= 1.25) & (np.abs(s) <= 0.5)
+    )
     assert SAID["without d"].contains(x, s).all()
     assert not SAID["a terminal surface"].contains(x, s).any()
-    with pytest.raises(smc.ScenarioError, match="the certificate of terminal on duffing has no level sets"):
+    with pytest.raises(
+        smc.ScenarioError, match="the certificate of terminal on duffing has no level sets"
+    ):
         SAID["a terminal surface"].level(x, s)
 
 
 @pytest.mark.parametrize(
     ("name", "axes", "shown", "inner"),
     [
-        ("fails and falls", 2, ["certified", "level sets", "innermost", "bound", "run"], [0.1, 0.6]),
+        (
+            "fails and falls",
+            2,
+            ["certified", "level sets", "innermost", "bound", "run"],
+            [0.1, 0.6],
+        ),
         ("without d", 1, ["level sets"], []),
         ("a switching law", 1, ["certified", "level sets", "innermost"], [0.1, 0.6]),
     ],
 )
-def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(name, axes, shown, inner, monkeypatch):
+def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(
+    name, axes, shown, inner, monkeypatch
+):
     monkeypatch.setattr("smc_mujoco.evidence.certificates.figure.AXIS_POINTS", 81)
     made = SAID[name]
     run = trace_of(smc.Scenario(plant=made.plant, law="pid", duration=0.2))
@@ -132,8 +208,14 @@ def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(name, axes, show
     (legend,) = page.legends
     for words, text in zip(shown, legend.get_texts(), strict=True):
         assert text.get_text().startswith(words)
-    levels = {float(level) for one in page.axes for area in one.collections if isinstance(area, ContourSet)
-              if not area.filled for level in area.levels}  # fmt: skip
+    levels = {
+        float(level)
+        for one in page.axes
+        for area in one.collections
+        if isinstance(area, ContourSet)
+        if not area.filled
+        for level in area.levels
+    }
     assert set(inner) <= levels
     assert len(levels) >= 5
     for one, bound in [(one, made.bound) for one in page.axes if made.bound]:
@@ -142,10 +224,19 @@ def test_the_plane_of_a_certificate_has_its_sets_bound_and_runs(name, axes, show
         assert any(np.array_equal(line.get_xdata(), run.x[:, 0]) for line in one.lines)
 
 
-@pytest.mark.parametrize(("name", "sentence"), [
-    ("every condition fails", "the states of 5 pendulums do not fit into a plane: draw a single one"),
-    ("super-twisting", "the certificate of super_twisting on van_der_pol has no region to draw"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        (
+            "every condition fails",
+            "the states of 5 pendulums do not fit into a plane: draw a single one",
+        ),
+        (
+            "super-twisting",
+            "the certificate of super_twisting on van_der_pol has no region to draw",
+        ),
+    ],
+)
 def test_what_has_no_plane_is_refused(name, sentence):
     with pytest.raises(smc.ScenarioError, match=sentence):
         SAID[name].figure()

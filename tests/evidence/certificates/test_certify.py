@@ -1,6 +1,8 @@
-"""Certificates: margins by hand, mutants that the checker refuses, starts that never leave, bounds that hold.
+"""Certificates: margins by hand, mutants that the checker refuses, starts that never leave, bounds
+that hold.
 
-As a script it starts 1e5 runs in each certified set: python tests/evidence/certificates/test_certify.py
+As a script it starts 1e5 runs in each certified set: python
+tests/evidence/certificates/test_certify.py
 """
 
 import ast
@@ -32,7 +34,8 @@ from smc_mujoco.evidence.certificates import checker, loops
 FORCE = {"duffing": 2.0, "inverted_pendulum": 1.0, "van_der_pol": 0.0}
 
 
-# gains that keep |u| <= u_max, an integral faster than d, a region with the start in it: tuned ones need not
+# gains that keep |u| <= u_max, an integral faster than d, a region with the start in it: tuned ones
+# need not
 KEPT = {
     ("van_der_pol", "observer_free"): {"lam": 6.0, "k1": 1.992},
     ("inverted_pendulum", "classical"): {"k": 1.523, "c": 15.36},
@@ -45,12 +48,19 @@ KEPT = {
 def scenario(plant, law="observer_free", gains="tuned", **changes):
     fields = {"duration": 8.0} | changes
     kept = KEPT.get((plant, law))
-    return smc.Scenario(plant=plant, law=smc.law(law, **kept) if kept else gain_sets.law(plant, law, gains), **fields)
+    return smc.Scenario(
+        plant=plant,
+        law=smc.law(law, **kept) if kept else gain_sets.law(plant, law, gains),
+        **fields,
+    )
 
 
 @functools.cache
 def certificate(plant, law="observer_free", disturbance=0.0, slope=None, gains="tuned"):
-    within = smc.Uncertainty(disturbance=disturbance, slope=slope) if disturbance else None
+    if disturbance:
+        within = smc.Uncertainty(disturbance=disturbance, slope=slope)
+    else:
+        within = None
     return smc.certify(scenario(plant, law, gains), within)
 
 
@@ -77,7 +87,10 @@ def margins(made, theorem="saturated PD"):
 
 def test_margins_are_those_of_the_formulas():
     told = margins(certificate("inverted_pendulum"))
-    p, gains = smc.plant("inverted_pendulum").parameters, gain_sets.law("inverted_pendulum", "observer_free").gains
+    p, gains = (
+        smc.plant("inverted_pendulum").parameters,
+        gain_sets.law("inverted_pendulum", "observer_free").gains,
+    )
     weight = p["m"] * p["grav"] * p["l"]
     assert told["damping"] == p["b"]
     assert told["actuator"] == pytest.approx(6.0 - gains["lam"])
@@ -103,7 +116,9 @@ def test_a_coupling_that_is_no_spring_fails_by_its_margin():
     assert (made.stable, margins(made)["coupling"]) == (False, -0.3)
     real = scenario("pendulum_network", mechanism="springs")  # its torque is kc sin(x_j - x_i)
     z = np.linspace(0.1, 20.0, 1_000_001)
-    assert margins(smc.certify(real))["coupling"] == pytest.approx(0.5 * (np.sin(z) / z).min(), rel=1e-8)
+    assert margins(smc.certify(real))["coupling"] == pytest.approx(
+        0.5 * (np.sin(z) / z).min(), rel=1e-8
+    )
     assert certificate("pendulum_network").stable
 
 
@@ -120,20 +135,27 @@ def test_hanging_pendulums_need_more_than_their_weight_to_be_stable_from_everywh
 @pytest.mark.parametrize("plant", loops.ONE_JOINT_TERMS)
 def test_the_equations_of_maker_and_checker_are_those_of_the_plant(plant):
     made, rng = smc.plant(plant), np.random.default_rng(1)
-    e = checker.equation({"name": plant, "n": made.n, "parameters": dict(made.parameters), "mechanism": "equation"})
+    e = checker.equation(
+        {"name": plant, "n": made.n, "parameters": dict(made.parameters), "mechanism": "equation"}
+    )
     M, A, B, C, E, F = loops.ONE_JOINT_TERMS[plant](made.values({}))
     for x, v in rng.uniform(-3.0, 3.0, (20, 2)):
         f, g = made.nominal(np.full(made.n, x), np.full(made.n, v), 0, made.values({}))
         force = A * math.sin(x) + B * x + C * x**3 - (E + F * x * x) * v
         assert f / g == pytest.approx(force, rel=1e-12)
         assert 1.0 / g == pytest.approx(M)
-        assert float(checker.phi(e, checker.arb(x)) - (e.E + e.F * x * x) * v) == pytest.approx(force, rel=1e-12)
+        assert float(checker.phi(e, checker.arb(x)) - (e.E + e.F * x * x) * v) == pytest.approx(
+            force, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize(
     ("plant", "law"),
     [
-        *(("duffing", law) for law in ("boundary_layer", "lqr", "classical", "terminal", "super_twisting")),
+        *(
+            ("duffing", law)
+            for law in ("boundary_layer", "lqr", "classical", "terminal", "super_twisting")
+        ),
         ("van_der_pol", "classical"),
         ("van_der_pol", "super_twisting"),
     ],
@@ -150,7 +172,9 @@ def test_classical_comes_to_rest_from_a_set_under_a_disturbance():
     made = certificate("inverted_pendulum", "classical", 1.0)
     assert (made.bound, made.stable) == (None, False)  # its own start lies outside
     assert "come to rest under every |d| <= 1 N m" in made.sentences[2]
-    near = smc.certify(scenario("inverted_pendulum", "classical", x0=0.07), smc.Uncertainty(disturbance=1.0))
+    near = smc.certify(
+        scenario("inverted_pendulum", "classical", x0=0.07), smc.Uncertainty(disturbance=1.0)
+    )
     assert near.bound == 0.0
 
 
@@ -158,7 +182,9 @@ def test_a_law_as_strong_as_the_disturbance_reaches_nothing():
     within = smc.Uncertainty(disturbance=1.0)
     for law in (smc.law("classical", k=1.0), smc.law("terminal", k=1.0, bound=4.0)):
         made = smc.certify(smc.Scenario(plant="duffing", law=law), within)
-        assert made.sentences[1].startswith("not proven by reaching: reaching 0 N (k does not exceed")
+        assert made.sentences[1].startswith(
+            "not proven by reaching: reaching 0 N (k does not exceed"
+        )
 
 
 @pytest.mark.slow
@@ -178,7 +204,10 @@ def test_levels_of_a_law_that_switches_fall_along_its_surface():
 
 
 def test_the_bound_is_that_of_the_inner_level_to_its_last_digit():
-    plant, law = smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803), smc.law("classical", k=2.271, c=0.275)
+    plant, law = (
+        smc.plant("van_der_pol", M=0.685, mu=0.164, k=0.803),
+        smc.law("classical", k=2.271, c=0.275),
+    )
     assert smc.certify(smc.Scenario(plant=plant, law=law, x0=1.58)).bound == 0.0
 
 
@@ -191,7 +220,9 @@ def test_super_twisting_needs_an_integral_faster_than_the_disturbance():
 
 
 def test_what_is_left_out_is_said_with_what_the_scenario_has():
-    machine = scenario("duffing", friction=smc.Coulomb(0.3), input_delay=0.004, noise=smc.Noise(position=0.01))
+    machine = scenario(
+        "duffing", friction=smc.Coulomb(0.3), input_delay=0.004, noise=smc.Noise(position=0.01)
+    )
     left_out = smc.certify(machine).leaves_out
     assert list(left_out) == checker.LEAVES_OUT
     assert left_out["dry friction"] == "Coulomb(level=0.3)"
@@ -234,7 +265,10 @@ def put(*path, change):
     def mutate(data):
         at = data
         for key in path[:-1]:
-            at = part(data, key) if at is data.get("parts") else at[key]
+            if at is data.get("parts"):
+                at = part(data, key)
+            else:
+                at = at[key]
         at[path[-1]] = change(at[path[-1]])
 
     return mutate
@@ -249,7 +283,9 @@ def without(i):
 
 
 def negative(theorem_left_out, gain):
-    """A mutant of a gain below 0, without the theorem that asks most of it and with the margins that it then has."""
+    """A mutant of a gain below 0, without the theorem that asks most of it and with the margins
+    that it then has.
+    """
 
     def mutate(data):
         data["law"]["gains"][gain] *= -1.0
@@ -271,7 +307,9 @@ def farther(data):
     levels = part(data, LEVELS)
     levels["inner"], W = 0.5 * levels["outer"], np.array(levels["W"])
     low = np.minimum.reduce([W[:-1, :-1], W[1:, :-1], W[:-1, 1:], W[1:, 1:]])
-    levels["bound"] = max(x for x, row in zip(levels["x"][1:], low, strict=True) if row.min() <= levels["inner"])
+    levels["bound"] = max(
+        x for x, row in zip(levels["x"][1:], low, strict=True) if row.min() <= levels["inner"]
+    )
 
 
 def raised(W):
@@ -288,7 +326,9 @@ MUTANTS = {
     "local a little larger": set_margin(SATURATED, "local", times(1.001)),
     "start": set_margin(LEVELS, "start", times(1.001)),
     "a box left out": put("parts", SATURATED, "conditions", 1, "boxes", change=without(7)),
-    "the box to infinity left out": put("parts", SATURATED, "conditions", 1, "boxes", change=without(-1)),
+    "the box to infinity left out": put(
+        "parts", SATURATED, "conditions", 1, "boxes", change=without(-1)
+    ),
     "a box shifted": put("parts", SATURATED, "conditions", 1, "boxes", 9, 0, change=times(1.001)),
     "mass in V": put("parts", SATURATED, "V", "v^2", change=times(1.001)),
     "spring in V": put("parts", SATURATED, "V", "x^2", change=times(1.001)),
@@ -307,7 +347,9 @@ MUTANTS = {
     "a row of W left out": put("parts", LEVELS, "W", change=without(20)),
     "a larger disturbance": put("disturbance", change=times(1.5)),
     "another start": put("parts", LEVELS, "start", change=lambda _: [2.9, 5.0]),
-    "sampling not left out": put("leaves_out", change=lambda told: {k: v for k, v in told.items() if k != "sampling"}),
+    "sampling not left out": put(
+        "leaves_out", change=lambda told: {k: v for k, v in told.items() if k != "sampling"}
+    ),
     "another unit": put("unit", change=lambda _: "rad"),
     "another mechanism": put("plant", "mechanism", change=lambda _: "springs"),
     "two carts": put("plant", "n", change=lambda _: 2),
@@ -342,13 +384,20 @@ def scaled(data, factor):
     data["law"]["gains"]["k"] *= factor
     data["u_max"] *= factor
     (saturated,) = data["parts"] = [part(data, SATURATED)]
-    saturated["V"] = {term: value * (1.0 if term == "sigma" else factor) for term, value in saturated["V"].items()}
+    saturated["V"] = {
+        term: value * (1.0 if term == "sigma" else factor) for term, value in saturated["V"].items()
+    }
     for condition in saturated["conditions"]:
-        condition["margin"] *= 1.0 if condition["name"] == "restoring" else factor
+        if condition["name"] == "restoring":
+            condition["margin"] *= 1.0
+        else:
+            condition["margin"] *= factor
 
 
 @pytest.mark.parametrize("wrong", [math.inf, -math.inf, math.nan, 10**400, True, "1.0"])
-@pytest.mark.parametrize(("plant", "law"), [("duffing", "observer_free"), ("duffing", "super_twisting")])
+@pytest.mark.parametrize(
+    ("plant", "law"), [("duffing", "observer_free"), ("duffing", "super_twisting")]
+)
 def test_the_checker_refuses_what_is_no_finite_number_wherever_it_stands(plant, law, wrong):
     whole = copy.deepcopy(certificate(plant, law, disturbance=0.1, slope=0.1).data)
     places = list(numbers(whole))
@@ -382,13 +431,19 @@ def changed(whole, path, change):
     return data
 
 
-NOT_LEFT_OUT = [("duffing", "classical"), ("duffing", "super_twisting"), ("pendulum_network", "observer_free")]
+NOT_LEFT_OUT = [
+    ("duffing", "classical"),
+    ("duffing", "super_twisting"),
+    ("pendulum_network", "observer_free"),
+]
 
 
 @pytest.mark.parametrize(("plant", "law"), NOT_LEFT_OUT)
 def test_the_checker_refuses_fields_that_the_format_lacks_and_fields_left_out(plant, law):
     whole: Any = copy.deepcopy(
-        certificate(plant, law, **{"disturbance": 0.1, "slope": 0.1} if plant == "duffing" else {}).data
+        certificate(
+            plant, law, **{"disturbance": 0.1, "slope": 0.1} if plant == "duffing" else {}
+        ).data
     )
     whole["parts"] = [one for one in whole["parts"] if one["theorem"] != LEVELS]
     assert not refused(copy.deepcopy(whole))
@@ -405,7 +460,10 @@ def test_the_checker_refuses_fields_that_the_format_lacks_and_fields_left_out(pl
             {"bound": 0.0},
         ):
             if not added.keys() & at.keys():
-                assert refused(changed(whole, path, lambda it, added=added: it.update(added))), (path, added)
+                assert refused(changed(whole, path, lambda it, added=added: it.update(added))), (
+                    path,
+                    added,
+                )
                 tried += 1
         for name in at.keys() - {"seal"}:
             assert refused(changed(whole, path, lambda it, name=name: it.pop(name))), (path, name)
@@ -431,7 +489,9 @@ def test_the_checker_refuses_fields_that_the_format_lacks_and_fields_left_out(pl
 )
 def test_the_checker_refuses_what_no_plant_and_no_run_has(plant, law, path, value):
     whole: Any = copy.deepcopy(
-        certificate(plant, law, **{"disturbance": 0.1, "slope": 0.1} if plant == "duffing" else {}).data
+        certificate(
+            plant, law, **{"disturbance": 0.1, "slope": 0.1} if plant == "duffing" else {}
+        ).data
     )
     assert refused(changed(whole, path[:-1], lambda it: it.__setitem__(path[-1], value)))
 
@@ -439,7 +499,11 @@ def test_the_checker_refuses_what_no_plant_and_no_run_has(plant, law, path, valu
 def test_a_field_that_is_there_twice_is_refused(tmp_path, monkeypatch):
     made = certificate("duffing", "classical")
     twice = tmp_path / "twice.json"
-    twice.write_text(json.dumps(dict(made.data)).replace('"disturbance"', '"disturbance": 99.0, "disturbance"', 1))
+    twice.write_text(
+        json.dumps(dict(made.data)).replace(
+            '"disturbance"', '"disturbance": 99.0, "disturbance"', 1
+        )
+    )
     with pytest.raises(smc.ScenarioError, match="is not a certificate"):
         Certificate.load(twice)
     with pytest.raises(SystemExit, match="not proven is which of two fields of one name counts"):
@@ -461,11 +525,16 @@ def test_units_do_not_hide_a_plant_that_feeds_its_motion(factor):
 @pytest.mark.parametrize(
     "told",
     [
-        {"sampling": {"<script>alert(1)</script>": {}}}, {"delay": {"![x](javascript:1)": {}}}, {"noise": "none"},
-        {"drive": {"Lag": {"tau": "0"}}}, {"drive": {"Lag": {"\x1b[31m": 1.0}}}, {"contact": {"a" * 41: {}}},
-        {"rounding": {"RK4": {"step": math.nan}}}, {"proven for every plant": {}},
+        {"sampling": {"<script>alert(1)</script>": {}}},
+        {"delay": {"![x](javascript:1)": {}}},
+        {"noise": "none"},
+        {"drive": {"Lag": {"tau": "0"}}},
+        {"drive": {"Lag": {"\x1b[31m": 1.0}}},
+        {"contact": {"a" * 41: {}}},
+        {"rounding": {"RK4": {"step": math.nan}}},
+        {"proven for every plant": {}},
     ],
-)  # fmt: skip
+)
 def test_nothing_but_words_and_numbers_stands_under_what_is_left_out(told):
     data: Any = copy.deepcopy(certificate("duffing", disturbance=2.0).data)
     data["leaves_out"] = dict(data["leaves_out"]) | told
@@ -481,26 +550,52 @@ def no_rate(data):
 
 TWISTING = "super-twisting"
 OTHERS = {
-    "no damping that is told as damping": ("van_der_pol", "observer_free", set_margin(SATURATED, "damping", abs)),
-    "a form that is too narrow": ("van_der_pol", "observer_free", put("parts", LEVELS, "P", 0, change=times(9))),
-    "a form that does not fall": ("van_der_pol", "observer_free", put("parts", LEVELS, "P", 1, change=times(-9))),
+    "no damping that is told as damping": (
+        "van_der_pol",
+        "observer_free",
+        set_margin(SATURATED, "damping", abs),
+    ),
+    "a form that is too narrow": (
+        "van_der_pol",
+        "observer_free",
+        put("parts", LEVELS, "P", 0, change=times(9)),
+    ),
+    "a form that does not fall": (
+        "van_der_pol",
+        "observer_free",
+        put("parts", LEVELS, "P", 1, change=times(-9)),
+    ),
     "a condition told twice": ("inverted_pendulum", "classical", told_twice),
     "a farther inner set": ("inverted_pendulum", "classical", farther),
     "a surface that leads away": ("duffing", "terminal", negative("reaching", "b")),
     "a term that feeds the motion": ("duffing", "terminal", negative("reaching", "bound")),
-    "a set that is too large": ("duffing", "classical", put("parts", "reaching", "X", change=times(1.3))),
+    "a set that is too large": (
+        "duffing",
+        "classical",
+        put("parts", "reaching", "X", change=times(1.3)),
+    ),
     "a higher strip": ("duffing", "classical", put("parts", "reaching", "S", change=times(1.001))),
     "a longer surface": ("duffing", "terminal", put("parts", "reaching", "X", change=times(1.001))),
     "a larger form": ("duffing", "super_twisting", put("parts", TWISTING, "q", change=times(2.0))),
     "another L": ("duffing", "super_twisting", put("parts", TWISTING, "L", change=times(1.2))),
     "a negative bound of d'": ("duffing", "super_twisting", no_rate),
     "k2": ("duffing", "super_twisting", put("law", "gains", "k2", change=times(0.999))),
-    "an integral beside a proof without one": ("duffing", "pid", put("law", "gains", "ki", change=lambda _: 0.5)),
-    "a spring that pushes": ("pendulum_network", "observer_free", put("plant", "parameters", "kc", change=times(-1))),
-    "inverted pendulums": (
-        "pendulum_network", "observer_free", put("plant", "name", change=lambda _: "inverted_pendulum_network"),
+    "an integral beside a proof without one": (
+        "duffing",
+        "pid",
+        put("law", "gains", "ki", change=lambda _: 0.5),
     ),
-}  # fmt: skip
+    "a spring that pushes": (
+        "pendulum_network",
+        "observer_free",
+        put("plant", "parameters", "kc", change=times(-1)),
+    ),
+    "inverted pendulums": (
+        "pendulum_network",
+        "observer_free",
+        put("plant", "name", change=lambda _: "inverted_pendulum_network"),
+    ),
+}
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -518,11 +613,23 @@ def test_the_inner_set_lies_where_s_0_is_reached_on_both_sides(side, monkeypatch
     """The set |s| <= S; here the inner set reaches to s = -2 or 2."""
     monkeypatch.setattr(checker, "falls", lambda *_: True)
     W = [[1.0, 0.4, 0.1, 0.4, 1.0], [1.0, 0.2, 0.35, 0.9, 1.0][::-side], [1.0] * 5]
-    grid = {"x": [0, 1, 2], "s": [-2, -1, 0, 1, 2], "W": W, "inner": 0.3, "outer": 0.36, "start": [0, 0], "bound": 2}
+    grid = {
+        "x": [0, 1, 2],
+        "s": [-2, -1, 0, 1, 2],
+        "W": W,
+        "inner": 0.3,
+        "outer": 0.36,
+        "start": [0, 0],
+        "bound": 2,
+    }
     one, law = SimpleNamespace(n=1), SimpleNamespace(room=(1, 1), kind="sgn", c=1)
     for reach, within in ((2, True), (1, False)):
         doc = {"disturbance": 1, "parts": [{"theorem": "reaching", "X": 2, "S": reach}]}
-        with contextlib.nullcontext() if within else pytest.raises(checker.Refused, match="an inner set"):
+        with (
+            contextlib.nullcontext()
+            if within
+            else pytest.raises(checker.Refused, match="an inner set")
+        ):
             checker.levels(doc, grid, one, law)
 
 
@@ -537,27 +644,43 @@ def test_the_checker_stands_alone(tmp_path):
     """It is below 400 lines, imports nothing of ours, and runs as a file by itself."""
     source = Path(checker.__file__).read_text()
     tree = ast.walk(ast.parse(source))
-    names = {alias.name for node in tree if isinstance(node, ast.Import) for alias in node.names}
-    names |= {node.module for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)}
+    names = set()
+    for node in tree:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                names.add(alias.name)
+    names |= {
+        node.module for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom)
+    }
     assert names == {"hashlib", "json", "math", "sys", "itertools", "types", "flint"}
     assert len(source.splitlines()) < 400
     shutil.copy(checker.__file__, tmp_path / "apart.py")
     made = certificate("duffing", disturbance=2.0)
     file = made.save(tmp_path / "duffing.json")
     assert Certificate.load(file).data == made.data
-    run = functools.partial(subprocess.run, capture_output=True, text=True, check=False, cwd=tmp_path)
+    run = functools.partial(
+        subprocess.run, capture_output=True, text=True, check=False, cwd=tmp_path
+    )
     done = run([sys.executable, "-I", "apart.py", "duffing.json"])
-    assert (done.returncode, done.stdout) == (0, "duffing.json is accepted: every statement is proven\n")
+    assert (done.returncode, done.stdout) == (
+        0,
+        "duffing.json is accepted: every statement is proven\n",
+    )
     file.write_text(file.read_text().replace('"bound": 0.', '"bound": 0.0'))
     done = run([sys.executable, "-I", "apart.py", "duffing.json"])
-    assert (done.returncode, done.stderr) == (1, "duffing.json is refused: not proven is the seal\n")
+    assert (done.returncode, done.stderr) == (
+        1,
+        "duffing.json is refused: not proven is the seal\n",
+    )
 
 
 # runs
 
 
 def steps(made, x, v, d, duration, dt=1e-3):
-    """States of the exact loop under a force that is held for each step, by the Runge-Kutta method of order 4."""
+    """States of the exact loop under a force that is held for each step, by the Runge-Kutta method
+    of order 4.
+    """
     loop, _, _ = loops.loop_of(made.data)
 
     def rates(x, v, d):
@@ -585,7 +708,9 @@ def starts(made, count, rng):
 
 
 def forces(count, d0, rng):
-    """The force on each run: constant, with the velocity's sign, against it, and switching at random times."""
+    """The force on each run: constant, with the velocity's sign, against it, and switching at
+    random times.
+    """
     kind, period = np.arange(count) % 4, rng.uniform(0.05, 1.0, count)
     sign, phase = rng.choice([-1.0, 1.0], count), rng.uniform(0.0, 1.0, count)
 
@@ -605,7 +730,10 @@ def escapes(plant, count, duration):
     for k, (x, v) in enumerate(steps(made, x, v, forces(count, d0, rng), duration, dt=2e-3)):  # noqa: B020
         if k % 5 == 0:
             left |= ~made.contains(x, v)
-    bound = part(made.data, LEVELS)["bound"] if d0 else 1e-3
+    if d0:
+        bound = part(made.data, LEVELS)["bound"]
+    else:
+        bound = 1e-3
     return int(left.sum()), int((np.abs(x) > bound).sum())
 
 
@@ -637,7 +765,9 @@ def test_region_of_van_der_pol_as_a_share_of_the_true_one():
 
 @pytest.mark.slow
 def test_without_damping_no_bound_holds_from_everywhere():
-    """What docs/what_the_author_may_claim.md says of d = d0 sgn(v): swings shrink from 10 rad and grow from 20."""
+    """What docs/what_the_author_may_claim.md says of d = d0 sgn(v): swings shrink from 10 rad and
+    grow from 20.
+    """
     free = smc.plant("inverted_pendulum", b=0.0)
     made = smc.certify(smc.Scenario(plant=free, law=gain_sets.law(free, "observer_free")))
     x, v = np.array([10.0, 20.0]), np.zeros(2)
@@ -695,10 +825,14 @@ def test_without_python_flint_one_sentence_says_what_to_install(monkeypatch):
 if __name__ == "__main__":
     for name in FORCE:
         left, outside = escapes(name, 100_000, 8.0)
-        print(f"{name}: of 100000 starts {left} left the certified set, {outside} did not end within the bound")
+        print(
+            f"{name}: of 100000 starts {left} left the certified set, {outside} did not end within the bound"
+        )
 
 
-def test_the_run_inside_a_certified_bound_is_the_worst_found_in_the_laws_colour(tmp_path, monkeypatch, capsys):
+def test_the_run_inside_a_certified_bound_is_the_worst_found_in_the_laws_colour(
+    tmp_path, monkeypatch, capsys
+):
     from smc_mujoco.cli.main import main
     from smc_mujoco.evidence.certificates import figure
 
@@ -711,7 +845,11 @@ def test_the_run_inside_a_certified_bound_is_the_worst_found_in_the_laws_colour(
         main(["certify", "duffing", "--disturbance", "2", "--figure", "d.png"])
     assert ended.value.code in (0, None)
     (page,) = drawn
-    (run,) = [text for legend in page.legends for text in legend.get_texts() if "runs" in text.get_text()]
-    assert re.fullmatch(r"the worst of \d+ runs, d from −[12][.\d]* to [12][.\d]* N", run.get_text())
+    (run,) = [
+        text for legend in page.legends for text in legend.get_texts() if "runs" in text.get_text()
+    ]
+    assert re.fullmatch(
+        r"the worst of \d+ runs, d from −[12][.\d]* to [12][.\d]* N", run.get_text()
+    )
     lines = [line for line in page.axes[0].lines if len(line.get_xdata()) > 1000]
     assert [line.get_color() for line in lines] == [style.law_colour("observer_free")]

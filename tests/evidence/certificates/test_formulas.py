@@ -59,18 +59,32 @@ def test_gains_of_a_quadratic_law_solve_its_riccati_equation():
     P[1] = its.r * k / its.b  # k = b' P / r
     P[0, 1] = P[1, 0]
     P[0, 0] = k[0, 0] * its.r * k[0, 1] - its.a1 * P[1, 1] - its.a2 * P[0, 1]
-    np.testing.assert_allclose(A.T @ P + P @ A - k.T @ k * its.r, -np.diag([its.q1, its.q2]), atol=1e-9)
+    np.testing.assert_allclose(
+        A.T @ P + P @ A - k.T @ k * its.r, -np.diag([its.q1, its.q2]), atol=1e-9
+    )
 
 
 def test_margins_of_a_saturated_law_are_those_of_its_theorem():
     A, B, C = 0.4, 0.3, -0.2
-    e, feeds = (Space(**vars(plant(A=A, B=B, C=cubic, E=0.9, kc=0.5)) | {"n": 2}) for cubic in (C, -C))
+    e, feeds = (
+        Space(**vars(plant(A=A, B=B, C=cubic, E=0.9, kc=0.5)) | {"n": 2}) for cubic in (C, -C)
+    )
     f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)
-    V = {"v^2": 0.65, "sigma": 1 / 1.7, "cos x - 1": A, "x^2": -B / 2, "x^4": -C / 4, "springs": 0.25}
+    V = {
+        "v^2": 0.65,
+        "sigma": 1 / 1.7,
+        "cos x - 1": A,
+        "x^2": -B / 2,
+        "x^4": -C / 4,
+        "springs": 0.25,
+    }
     x = np.linspace(0.0, 2.0, 4001)[1:]
     share = (1.0 - (A * np.sin(x) + B * x + C * x**3) / (2.3 * np.tanh(1.7 * x))).min()
     boxes = [*map(list, itertools.pairwise([*np.linspace(0.0, 2.0, 201).tolist(), None]))]
-    weak = {"margin": 1.0 - (A * math.sin(9.0) + 9.0 * B - 729.0 * C) / (2.3 * math.tanh(15.3)), "at": 9.0}
+    weak = {
+        "margin": 1.0 - (A * math.sin(9.0) + 9.0 * B - 729.0 * C) / (2.3 * math.tanh(15.3)),
+        "at": 9.0,
+    }
     expected = {"damping": 0.9, "restoring": None, "actuator": 1.7, "local": 2.3 * 1.7 - A - B}
 
     for mechanism, coupling in (("equation", 0.5), ("springs", -0.5 * 0.2172336282112216)):
@@ -80,14 +94,21 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
             found = checker.saturated({"plant": {"mechanism": mechanism}}, data, e, f)
             return {name: value and float(value[0]) for name, value in found.items()}
 
-        assert margins({"margin": 0.9999 * share, "boxes": boxes}) == pytest.approx(expected | {"coupling": coupling})
+        assert margins({"margin": 0.9999 * share, "boxes": boxes}) == pytest.approx(
+            expected | {"coupling": coupling}
+        )
         for factor, said in ((0.999, "a tight margin"), (1.001, "x from")):
             with pytest.raises(checker.Refused, match=said):
                 margins({"margin": factor * share, "boxes": boxes})
-        assert margins(weak, feeds, **{"x^4": C / 4}) == pytest.approx(expected | {"coupling": coupling})
+        assert margins(weak, feeds, **{"x^4": C / 4}) == pytest.approx(
+            expected | {"coupling": coupling}
+        )
         with pytest.raises(checker.Refused, match="the margin of restoring"):
             margins(weak)  # whose spring does not feed the motion
-        strong = {"margin": 1.0 - (A * math.sin(0.5) + 0.5 * B + 0.125 * -C) / (2.3 * math.tanh(0.85)), "at": 0.5}
+        strong = {
+            "margin": 1.0 - (A * math.sin(0.5) + 0.5 * B + 0.125 * -C) / (2.3 * math.tanh(0.85)),
+            "at": 0.5,
+        }
         for told in (weak | {"at": -9.0}, strong):
             with pytest.raises(checker.Refused, match="the place where the law is too weak"):
                 margins(told, feeds, **{"x^4": C / 4})
@@ -97,7 +118,8 @@ def test_margins_of_a_saturated_law_are_those_of_its_theorem():
 
 
 @pytest.mark.parametrize(
-    "terms", [{"A": 0.8}, {"B": -0.7, "E": 0.3}, {"C": -0.9, "F": -0.4}, {"C": 0.5, "E": 2.9, "F": 0.8}]
+    "terms",
+    [{"A": 0.8}, {"B": -0.7, "E": 0.3}, {"C": -0.9, "F": -0.4}, {"C": 0.5, "E": 2.9, "F": 0.8}],
 )
 def test_a_set_is_reached_up_to_where_the_plant_is_as_strong_as_the_law(terms):
     e, made = plant(**terms), loop("classical", terms)
@@ -134,7 +156,15 @@ def test_a_terminal_surface_holds_up_to_where_its_term_and_the_plant_are_as_stro
 
     def strongest(x):
         v, vs = 0.9 * x**0.7, 0.9 * x**0.4
-        return np.abs(made.phi(x) + made.D(x) * v + np.minimum(0.9 * 0.7 * vs, 0.55) - 1.3 * 0.9 * 0.7 * vs) + 0.2
+        return (
+            np.abs(
+                made.phi(x)
+                + made.D(x) * v
+                + np.minimum(0.9 * 0.7 * vs, 0.55)
+                - 1.3 * 0.9 * 0.7 * vs
+            )
+            + 0.2
+        )
 
     margins = checker.reaching(doc, {"X": 0.6, "S": 0.0}, e, f)
     least = 2.3 - strongest(np.linspace(0.0, 0.6, 1001)).max()
@@ -156,10 +186,21 @@ def test_margins_of_super_twisting_are_those_of_its_form():
     z1, z2 = math.sqrt(q * r / det), math.sqrt(q * p / det)
     v = z1**2 + c * X
     lag = M * c - (E + F * X * X)  # the largest |M c - D|
-    fastest = (abs(B) + 3.0 * abs(C) * X**2 + c * lag) * v + lag * (3.0 * z1 + z2) / M + 2.0 * abs(F) * X * v * v
+    fastest = (
+        (abs(B) + 3.0 * abs(C) * X**2 + c * lag) * v
+        + lag * (3.0 * z1 + z2) / M
+        + 2.0 * abs(F) * X * v * v
+    )
     held = z2 + X * (abs(B) + abs(C) * X**2) + lag * v + d0
-    expected = {"integral": 2.6 - slope, "slope": L - fastest - slope, "actuator": 4.0 - held - 3.0 * z1}
-    doc, part = {"disturbance": d0, "slope": slope, "u_max": 4.0}, {"P": [p, w, r], "L": L, "q": q, "X": X}
+    expected = {
+        "integral": 2.6 - slope,
+        "slope": L - fastest - slope,
+        "actuator": 4.0 - held - 3.0 * z1,
+    }
+    doc, part = (
+        {"disturbance": d0, "slope": slope, "u_max": 4.0},
+        {"P": [p, w, r], "L": L, "q": q, "X": X},
+    )
     e = plant(B=B, C=C, E=E, F=F)
     margins = checker.super_twisting(doc, part, e, f)
     assert {name: float(value) for name, (value, _) in margins.items()} == pytest.approx(expected)
@@ -173,7 +214,14 @@ def test_margins_of_super_twisting_are_those_of_its_form():
     lag = M * c - E
     exact = L - (0.8 + c * lag) * v - lag * (3.0 * z1 + z2) / M - slope
     assert exact - 0.1 < told <= exact + 1e-9
-    for bad in ({"P": [p, 0.6, r]}, {"P": [p, -2.5, r]}, {"L": 2.7}, {"q": 3.0}, {"L": -1.1}, {"q": -q}):
+    for bad in (
+        {"P": [p, 0.6, r]},
+        {"P": [p, -2.5, r]},
+        {"L": 2.7},
+        {"q": 3.0},
+        {"L": -1.1},
+        {"q": -q},
+    ):
         with pytest.raises(checker.Refused):
             checker.super_twisting(doc, part | bad, e, f)
 
@@ -185,8 +233,14 @@ def test_w_falls_in_a_cell_where_it_falls_at_all_samples_and_both_sides_say_so(l
     f = checker.feedback({"name": law, "gains": LAWS[law]}, 4.0)
     random, seen = np.random.default_rng(6), []
     for _ in range(60):
-        x, s = np.cumsum(random.uniform(0.02, 0.15, 2)), random.choice([-1.0, 1.0]) * random.uniform(0.05, 0.5)
-        edges = np.array([s, s + 0.1]) if s > 0.0 else np.array([s - 0.1, s])
+        x, s = (
+            np.cumsum(random.uniform(0.02, 0.15, 2)),
+            random.choice([-1.0, 1.0]) * random.uniform(0.05, 0.5),
+        )
+        if s > 0.0:
+            edges = np.array([s, s + 0.1])
+        else:
+            edges = np.array([s - 0.1, s])
         corners = random.uniform(0.2, 0.6, 4)
         corners[3] = corners[1] + corners[2] - corners[0] + random.uniform(-0.01, 0.01)
         least, most = search.falls(made, x, edges, corners.reshape(4, 1, 1))
@@ -211,7 +265,9 @@ def test_a_form_attracts_where_it_falls_on_a_dense_grid():
     f = checker.feedback({"name": "observer_free", "gains": LAWS["observer_free"]}, 4.0)
     h, D0 = 1e-6, float(made.D(np.zeros(())))
     A = np.array([[-1.7, 1.0], [(0.9 + D0 * 1.7) / 1.3 - 1.7**2, 1.7 - (D0 + 2.3) / 1.3]])
-    np.testing.assert_allclose(A[1], [made.fall(h, 0.0, 0.0) / h, made.fall(0.0, h, 0.0) / h], rtol=1e-5)
+    np.testing.assert_allclose(
+        A[1], [made.fall(h, 0.0, 0.0) / h, made.fall(0.0, h, 0.0) / h], rtol=1e-5
+    )
 
     def attracts(P):
         try:
@@ -222,11 +278,15 @@ def test_a_form_attracts_where_it_falls_on_a_dense_grid():
 
     P = search.form(made, 2.0, attracts)
     assert P is not None
-    np.testing.assert_allclose((A.T @ P + P @ A) / (A.T @ P + P @ A)[0, 0], np.diag([1.0, 1.0 / 1.7**2]), atol=1e-9)
+    np.testing.assert_allclose(
+        (A.T @ P + P @ A) / (A.T @ P + P @ A)[0, 0], np.diag([1.0, 1.0 / 1.7**2]), atol=1e-9
+    )
 
     def falls(P):
         angle, radius = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 361), np.linspace(0.02, 1.0, 50))
-        z = np.linalg.solve(np.linalg.cholesky(P).T, np.stack([np.cos(angle), np.sin(angle)]).reshape(2, -1))
+        z = np.linalg.solve(
+            np.linalg.cholesky(P).T, np.stack([np.cos(angle), np.sin(angle)]).reshape(2, -1)
+        )
         z = z * radius.ravel()
         rate = np.stack([z[1] - 1.7 * z[0], made.fall(z[0], z[1], 0.0)])
         return bool((np.sum(z * (P @ rate), axis=0) < 0.0).all())
@@ -236,7 +296,9 @@ def test_a_form_attracts_where_it_falls_on_a_dense_grid():
     proven, exact = (max(k for k in scales if test(P / k)) for test in (attracts, falls))
     assert 1.0 <= proven < 1.3  # the search leaves a tenth
     assert 0.2 * exact < proven <= exact
-    inside = np.linalg.solve(np.linalg.cholesky(P).T, [[0.6], [0.8]]).ravel()  # on the border of z' P z <= 1
+    inside = np.linalg.solve(
+        np.linalg.cholesky(P).T, [[0.6], [0.8]]
+    ).ravel()  # on the border of z' P z <= 1
     numbers = [P[0, 0], P[0, 1], P[1, 1]]
     checker.quadratic(numbers, e, f, [tuple(0.999 * inside)])
     with pytest.raises(checker.Refused, match="a form around the inner set"):
@@ -244,7 +306,9 @@ def test_a_form_attracts_where_it_falls_on_a_dense_grid():
 
 
 def test_w_is_the_time_to_the_target_along_the_loop():
-    """1 - exp(-T) of nodes from which the loop, without a disturbance, takes the time T at a cost of 1."""
+    """1 - exp(-T) of nodes from which the loop, without a disturbance, takes the time T at a cost
+    of 1.
+    """
     terms = {"B": -0.3, "E": 0.6}
     made = loop("observer_free", terms)
     x, s = search.axis(1.5, 0.01), search.axis(2.5, 0.015)
@@ -255,7 +319,10 @@ def test_w_is_the_time_to_the_target_along_the_loop():
         z, t = np.array([x[i], s[j]]), 0.0
         while max(abs(z[0]) / 0.1, abs(z[1]) / 0.15) > 1.0:
             half = z + 5e-4 * np.array([z[1] - 1.7 * z[0], made.fall(z[0], z[1], 0.0)])
-            z, t = z + 1e-3 * np.array([half[1] - 1.7 * half[0], made.fall(half[0], half[1], 0.0)]), t + 1e-3
+            z, t = (
+                z + 1e-3 * np.array([half[1] - 1.7 * half[0], made.fall(half[0], half[1], 0.0)]),
+                t + 1e-3,
+            )
         assert W[i, j] == pytest.approx(1.0 - math.exp(-t), abs=0.04)
     pushed = search.times(loop("observer_free", terms, 0.2), x, s, far.astype(float))
     assert (pushed > W - 0.02).all()
@@ -270,11 +337,14 @@ def test_a_grid_has_its_least_step_about_0_and_reaches_its_ends():
     assert nodes[111] == pytest.approx(0.004, rel=1e-5)
     steps = np.diff(nodes[110:])
     assert (np.diff(steps) > -1e-5).all()
-    np.testing.assert_allclose(np.diff(search.axis(3.0, 1.0)), 3.0 / 110, rtol=0.05)  # no wider than even
+    np.testing.assert_allclose(
+        np.diff(search.axis(3.0, 1.0)), 3.0 / 110, rtol=0.05
+    )  # no wider than even
 
 
 @pytest.mark.parametrize(
-    ("terms", "d0", "at"), [({"B": -0.7}, 0.5, None), ({"B": 2.5}, 0.5, None), ({"B": -0.7}, 0.0, 0.0)]
+    ("terms", "d0", "at"),
+    [({"B": -0.7}, 0.5, None), ({"B": 2.5}, 0.5, None), ({"B": -0.7}, 0.0, 0.0)],
 )
 def test_the_loop_rests_where_forces_balance(terms, d0, at):
     made = loop("boundary_layer", terms, d0)
@@ -286,7 +356,13 @@ def test_the_loop_rests_where_forces_balance(terms, d0, at):
 
 def test_the_set_of_a_bounded_disturbance_holds_the_linear_loops_worst_case():
     """With d switching against the motion, for a boundary layer so wide that the loop is linear."""
-    made = loops._loop(1.3, [0.0, -0.3, 0.0, 0.6, 0.0], Space(name="boundary_layer", k=2.3, c=1.7, phi=1.1), 4.0, 0.5)
+    made = loops._loop(
+        1.3,
+        [0.0, -0.3, 0.0, 0.6, 0.0],
+        Space(name="boundary_layer", k=2.3, c=1.7, phi=1.1),
+        4.0,
+        0.5,
+    )
     P = search.form(made, 2.0, lambda P: True)
     assert P is not None
     Q, z, far = np.linalg.inv(P), np.zeros(2), 0.0
@@ -312,12 +388,18 @@ def refused(**changes):
 @pytest.mark.parametrize(
     ("changes", "what"),
     [
-        ({"plant": "pendulum_network", "law": "super_twisting"}, "super_twisting on the 5 pendulums of a network"),
+        (
+            {"plant": "pendulum_network", "law": "super_twisting"},
+            "super_twisting on the 5 pendulums of a network",
+        ),
         ({"model": "nominal"}, "model='nominal'"),
         ({"law": "classical", "surface": "linear"}, "a surface"),
         ({"feedforward": smc.Sine(1.0, 2.0)}, "a feedforward"),
         ({"reference": smc.Constant(0.5)}, "a reference that is not 0"),
-        ({"plant": "pendulum_network", "u_max": (5.0, 6.0, 6.0, 6.0, 6.0)}, "gains or bounds by channel"),
+        (
+            {"plant": "pendulum_network", "u_max": (5.0, 6.0, 6.0, 6.0, 6.0)},
+            "gains or bounds by channel",
+        ),
         ({"actuator": smc.DCMotor(command="voltage")}, "a motor's voltage as u"),
         ({"law": smc.law("pid", ki=0.5)}, "pid with an integral"),
         ({"law": smc.law("pid", kp=0.0, ki=0.0, kd=0.0)}, "pid with kp and kd not above 0"),
@@ -348,42 +430,71 @@ def test_what_is_given_instead_of_a_class_or_a_scenario_is_named():
 @pytest.mark.parametrize(
     ("signals", "bounds"),
     [
-        ((), (0.0, 0.0)), (smc.Constant(-0.5), (0.5, 0.0)), (smc.Sine(-0.5, 3.0), (0.5, 1.5)),
-        ((smc.Sine(0.5, 3.0), smc.Constant(0.25)), (0.75, 1.5)), (smc.Step(0.5, 1.0), (0.5, math.inf)),
+        ((), (0.0, 0.0)),
+        (smc.Constant(-0.5), (0.5, 0.0)),
+        (smc.Sine(-0.5, 3.0), (0.5, 1.5)),
+        ((smc.Sine(0.5, 3.0), smc.Constant(0.25)), (0.75, 1.5)),
+        (smc.Step(0.5, 1.0), (0.5, math.inf)),
         (smc.signals.Pulse(-0.5, 1.0, 2.0), (0.5, math.inf)),
     ],
-)  # fmt: skip
+)
 def test_bounds_of_a_disturbance_are_those_of_its_sum(signals, bounds):
-    assert maker._bounds(smc.Scenario(plant="duffing", law="pid", disturbance=signals)) == pytest.approx(bounds)
+    assert maker._bounds(
+        smc.Scenario(plant="duffing", law="pid", disturbance=signals)
+    ) == pytest.approx(bounds)
 
 
 def test_what_is_left_out_is_said_in_full():
     plain = smc.Scenario(plant="duffing", law=gain_sets.law("duffing", "observer_free"))
     machine = smc.Scenario(
-        plant="duffing", law=gain_sets.law("duffing", "observer_free"), friction=smc.Coulomb(0.3), input_delay=0.004,
-        noise=smc.Noise(position=0.01, velocity=0.02), sensor=smc.Encoder(2000), velocity="levant",
-        actuator=smc.Lag(0.01), jump=smc.Jump(1.0, {"M": 1.2}), control_period=0.002, physics_step=0.00025,
+        plant="duffing",
+        law=gain_sets.law("duffing", "observer_free"),
+        friction=smc.Coulomb(0.3),
+        input_delay=0.004,
+        noise=smc.Noise(position=0.01, velocity=0.02),
+        sensor=smc.Encoder(2000),
+        velocity="levant",
+        actuator=smc.Lag(0.01),
+        jump=smc.Jump(1.0, {"M": 1.2}),
+        control_period=0.002,
+        physics_step=0.00025,
         clock=smc.Clock(jitter=0.0005, missed=0.3),
-    )  # fmt: skip
-    names = ["sampling", "delay", "noise", "dry friction", "contact", "drive", "other parameters", "rounding"]
+    )
+    names = [
+        "sampling",
+        "delay",
+        "noise",
+        "dry friction",
+        "contact",
+        "drive",
+        "other parameters",
+        "rounding",
+    ]
     rates = {"sampling": {"samples": {"period": 0.001}}, "rounding": {"RK4": {"step": 0.001}}}
     assert maker.left_out(plain) == {name: {} for name in names} | rates
     assert maker.left_out(machine) == {
         "sampling": {"samples": {"period": 0.002, "jitter": 0.0005, "missed": 0.3}},
         "delay": {"input_delay": {"time": 0.004}},
         "noise": {
-            "noise": {"position": 0.01, "velocity": 0.02}, "levant": {},
+            "noise": {"position": 0.01, "velocity": 0.02},
+            "levant": {},
             "Encoder": {"counts": 2000.0, "bias": 0.0, "dropout": 0.0, "delay": 0.0, "skew": 0.0},
         },
-        "dry friction": {"Coulomb": {"level": 0.3}}, "contact": {}, "drive": {"Lag": {"tau": 0.01}},
-        "other parameters": {"jump": {"time": 1.0, "M": 1.2}}, "rounding": {"RK4": {"step": 0.00025}},
-    }  # fmt: skip
+        "dry friction": {"Coulomb": {"level": 0.3}},
+        "contact": {},
+        "drive": {"Lag": {"tau": 0.01}},
+        "other parameters": {"jump": {"time": 1.0, "M": 1.2}},
+        "rounding": {"RK4": {"step": 0.00025}},
+    }
 
 
 def test_a_window_is_the_widest_range_of_levels_that_no_cell_spoils_and_the_lowest_of_equals():
     its = object.__new__(search._Grid)
     its.x = np.array([0.0, 0.5, 2.0])
-    its.low, its.high = np.array([[0.25, 0.5], [0.625, 0.0]]), np.array([[0.5, 0.5625], [0.75, 1.0]])
+    its.low, its.high = (
+        np.array([[0.25, 0.5], [0.625, 0.0]]),
+        np.array([[0.5, 0.5625], [0.75, 1.0]]),
+    )
     its.bad, its.border, its.limit = np.array([[True, False], [True, False]]), 1.0, 1.0
     assert its.window() == (0.0, 0.25)
     its.border = 1.125

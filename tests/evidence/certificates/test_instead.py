@@ -20,7 +20,9 @@ from smc_mujoco.simulation.scenario import U_MAX
 
 CLAIMS = paper("gaber").claims
 PAGE = (ROOT / "docs" / "what_the_author_may_claim.md").read_text(encoding="utf-8")
-VERDICTS = json.loads((Path(__file__).parents[1] / "papers" / "quick_verdicts.json").read_text())["gaber"]
+VERDICTS = json.loads((Path(__file__).parents[1] / "papers" / "quick_verdicts.json").read_text())[
+    "gaber"
+]
 COMMANDS = sorted({claim.shown_by for claim in CLAIMS.values() if "certify" in claim.shown_by})
 DECIMALS = r"-?\d+\.\d+"
 
@@ -33,9 +35,14 @@ def told(command):
     given = dict(zip(options[::2], options[1::2], strict=True))
     d0 = float(given.get("--disturbance", 0.0))
     law = gain_sets.law(plant, given.get("--law", "observer_free"))
-    within = smc.Uncertainty(disturbance=d0) if d0 else None
+    if d0:
+        within = smc.Uncertainty(disturbance=d0)
+    else:
+        within = None
     made = smc.certify(smc.Scenario(plant=plant, law=law), within)
-    return {number(one.margin) for one in made.conditions} | set(re.findall(DECIMALS, " ".join(made.sentences)))
+    return {number(one.margin) for one in made.conditions} | set(
+        re.findall(DECIMALS, " ".join(made.sentences))
+    )
 
 
 def test_each_claim_that_does_not_hold_has_a_sentence_and_a_command():
@@ -53,17 +60,23 @@ def test_numbers_of_sentences_are_those_of_their_certificates(command):
 
 @pytest.mark.slow
 def test_numbers_of_the_page_are_those_of_certificates():
-    shown = set().union(*map(told, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"]))
+    shown = set().union(
+        *map(told, [*COMMANDS, "smc-mujoco certify inverted_pendulum --disturbance 1"])
+    )
     shown |= told("smc-mujoco certify inverted_pendulum_network")
     shown |= told("smc-mujoco certify inverted_pendulum --law classical --disturbance 1")
-    tables = "\n".join(line for line in PAGE.partition("## Claim by claim")[0].splitlines() if line.startswith("|"))
+    tables = "\n".join(
+        line for line in PAGE.partition("## Claim by claim")[0].splitlines() if line.startswith("|")
+    )
     assert set(re.findall(DECIMALS, tables)) - {"0.2"} <= shown
 
 
 def test_comparisons_of_sentences_hold_with_the_tuned_gains():
     def loop(plant, law):
         component, found = gain_sets.law(plant, law), smc.plant(plant)
-        return ONE_JOINT_TERMS[plant](SimpleNamespace(**found.parameters)), SimpleNamespace(**component.gains)
+        return ONE_JOINT_TERMS[plant](SimpleNamespace(**found.parameters)), SimpleNamespace(
+            **component.gains
+        )
 
     (_, weight, *_), classical = loop("inverted_pendulum", "classical")
     assert "weaker than the" in CLAIMS["28"].instead
@@ -75,19 +88,28 @@ def test_comparisons_of_sentences_hold_with_the_tuned_gains():
     assert min(loop("duffing", "boundary_layer")[1].k, ours.lam) > U_MAX
     assert "steady error under d is larger than each rival's" in CLAIMS["12"].instead
     numbers = VERDICTS["12"]["numbers"]
-    limits = {name: limit for name, limit in numbers.items() if "steady error" in name and name.endswith("<=")}
+    limits = {}
+    for name, limit in numbers.items():
+        if "steady error" in name and name.endswith("<="):
+            limits[name] = limit
     assert limits
     assert all(numbers[name.removesuffix(" <=")] > np.max(limit) for name, limit in limits.items())
 
 
 def test_the_series_of_order_7_falls_where_claim_55_says():
-    roots = np.roots([-17 / 45, 0.0, 2 / 3, 0.0, -1.0, 0.0, 1.0])  # of the derivative of tanh's series
+    roots = np.roots(
+        [-17 / 45, 0.0, 2 / 3, 0.0, -1.0, 0.0, 1.0]
+    )  # of the derivative of tanh's series
     (falls,) = (root.real for root in roots if abs(root.imag) < 1e-12 and root.real > 0.0)
     assert f"{falls:.2f}" in CLAIMS["55"].instead
 
 
 def test_the_share_of_van_der_pol_s_map_is_that_of_its_certificate():
     pytest.importorskip("flint")
-    made = smc.certify(smc.Scenario(plant="van_der_pol", law=gain_sets.law("van_der_pol", "observer_free")))
-    x, v = np.meshgrid(np.linspace(-4.0, 4.0, 50), np.linspace(-12.0, 12.0, 50))  # the map that `basin` draws
+    made = smc.certify(
+        smc.Scenario(plant="van_der_pol", law=gain_sets.law("van_der_pol", "observer_free"))
+    )
+    x, v = np.meshgrid(
+        np.linspace(-4.0, 4.0, 50), np.linspace(-12.0, 12.0, 50)
+    )  # the map that `basin` draws
     assert f"{100.0 * made.contains(x, v).mean():.0f} % of the map" in PAGE

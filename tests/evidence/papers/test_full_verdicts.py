@@ -2,8 +2,8 @@
 
     python tests/evidence/papers/test_full_verdicts.py levant_1993
 
-This writes the verdicts of one paper again; without a name, those of all papers but Gaber's. His audit takes minutes,
-and no test repeats it: test_quick_verdicts_of_gaber.py tells when it changes.
+This writes the verdicts of one paper again; without a name, those of all papers but Gaber's. His
+audit takes minutes, and no test repeats it: test_quick_verdicts_of_gaber.py tells when it changes.
 """
 
 import json
@@ -36,19 +36,28 @@ def full(name: str) -> Shown:
 
 
 def decided(claim: Claim) -> str:
-    """Return the check that decides, under the set of gains that has the claim's verdict, the hardest of several."""
-    sets = [name for name, verdict in claim.verdicts.items() if verdict == claim.verdict] or [*claim.verdicts]
+    """Return the check that decides, under the set of gains that has the claim's verdict, the
+    hardest of several.
+    """
+    sets = [name for name, verdict in claim.verdicts.items() if verdict == claim.verdict] or [
+        *claim.verdicts
+    ]
     checks = {name: check for name in sets if (check := claim.decisive(name))}
     name = min(checks, key=lambda name: (checks[name].holds, checks[name].slack))
     return claim.decided(name) + (f", {name} gains" if len(claim.verdicts) > 1 else "")
 
 
 def test_the_page_shows_every_claim_of_every_paper():
-    assert {name: [*known(name)] for name in shipped()} == {name: [*paper(name).claims] for name in shipped()}
+    assert {name: [*known(name)] for name in shipped()} == {
+        name: [*paper(name).claims] for name in shipped()
+    }
 
 
 def test_readme_counts_the_claims_of_gaber_s_paper():
-    own = [known("gaber")[id][0] for id, claim in paper("gaber").claims.items() if claim.whose == "paper"]
+    own = []
+    for id, claim in paper("gaber").claims.items():
+        if claim.whose == "paper":
+            own.append(known("gaber")[id][0])
     sentence = r"Of (\d+) claims of .*, (\d+) are refuted and (\d+) not shown"
     told = re.findall(sentence, (ROOT / "README.md").read_text(encoding="utf-8"))
     assert told == [(str(len(own)), str(own.count("refuted")), str(own.count("not shown")))]
@@ -67,7 +76,10 @@ def test_full_verdicts_are_those_of_the_page(name):
 
 
 if __name__ == "__main__":
-    everything = json.loads(SHOWN.read_text(encoding="utf-8")) if SHOWN.exists() else {}
+    if SHOWN.exists():
+        everything = json.loads(SHOWN.read_text(encoding="utf-8"))
+    else:
+        everything = {}
     for name in sys.argv[1:] or PAPERS:
         everything[name] = full(name)
         text = json.dumps(dict(sorted(everything.items())), indent=1, ensure_ascii=False)

@@ -14,7 +14,9 @@ def test_every_claim_says_what_where_how_and_whose(name):
     about = paper(name)
     assert all((about.title, about.authors, about.source, about.read))
     for one in about.claims.values():
-        assert all((one.text, one.where, one.measured, one.holds_if, one.laws, one.whose, one.read)), one.id
+        assert all(
+            (one.text, one.where, one.measured, one.holds_if, one.laws, one.whose, one.read)
+        ), one.id
         assert one.evidence.__doc__, one.id
         assert one.whose == "paper" or one.how, one.id
         assert one.plants or one.varies, one.id

@@ -1,10 +1,12 @@
-"""A golden of every paper's quick audit: a change of a claim's code that changes a verdict or a number shows here.
+"""A golden of every paper's quick audit: a change of a claim's code that changes a verdict or a
+number shows here.
 
     python tests/evidence/papers/test_quick_verdicts.py levant_1993
 
-This writes a paper's again, and those of all without a name. Gaber's are in test_quick_verdicts_of_gaber.py. Some
-numbers change by a hundredth if a start moves by 1e-12, as those of a run that chatters. Another processor may change
-them as well, so that the golden has a range for each of them.
+This writes a paper's again, and those of all without a name. Gaber's are in
+test_quick_verdicts_of_gaber.py. Some numbers change by a hundredth if a start moves by 1e-12, as
+those of a run that chatters. Another processor may change them as well, so that the golden has a
+range for each of them.
 """
 
 import contextlib
@@ -36,7 +38,9 @@ NUDGES = (0.0, 1e-12, -1e-11)  # of the starts, while a golden is written
 SAME = 0.01  # share of a number by which it may differ
 NOTHING = 1e-9  # difference that is none
 
-Record = dict[str, Any]  # of a claim: whose it is, its verdict, and what was measured -> number, or [lowest, highest]
+Record = dict[
+    str, Any
+]  # of a claim: whose it is, its verdict, and what was measured -> number, or [lowest, highest]
 
 
 def golden(name: str) -> dict[str, Record]:
@@ -46,7 +50,9 @@ def golden(name: str) -> dict[str, Record]:
 
 def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record]:
     """Return claim -> record of a quick audit, without timings; check whose runs it used."""
-    with mock.patch.object(search, "QUICK_SPREAD_SETS", 1):  # the verdicts are those of two, in less time
+    with mock.patch.object(
+        search, "QUICK_SPREAD_SETS", 1
+    ):  # the verdicts are those of two, in less time
         found = audit(name, only, GAINS.get(name), quick=True)
     for id, sets in found.used.items():
         check_runs(name, id, [one.scenario for used in sets.values() for one in used.values()])
@@ -55,15 +61,21 @@ def quick_verdicts(name: str, only: list[str] | None = None) -> dict[str, Record
 
 
 def record(claim: Claim, late: bool) -> Record:
-    """Return what a golden has of a claim: its checks with their limits, and what stands beside them.
+    """Return what a golden has of a claim: its checks with their limits, and what stands beside
+    them.
 
     What stands beside a late claim counts the runs of all others, which are not all here.
     """
     numbers = {}
     for gains in claim.verdicts:
         for one in claim.checks(gains):
-            numbers |= {f"{gains}: {one.what}": one.value, f"{gains}: {one.what} {one.relation}": one.limit}
-        numbers |= {f"{gains}: {what}": value for what, value in claim.beside[gains].items() if not late}
+            numbers |= {
+                f"{gains}: {one.what}": one.value,
+                f"{gains}: {one.what} {one.relation}": one.limit,
+            }
+        numbers |= {
+            f"{gains}: {what}": value for what, value in claim.beside[gains].items() if not late
+        }
     return {"whose": claim.whose, "verdict": claim.verdict, "numbers": numbers}
 
 
@@ -79,12 +91,11 @@ def check_golden(found: dict[str, Record], known: dict[str, Record]) -> None:
     assert {id: one | {"numbers": [*one["numbers"]]} for id, one in found.items()} == {
         id: one | {"numbers": [*one["numbers"]]} for id, one in known.items()
     }
-    other = {
-        (id, what): (value, known[id]["numbers"][what])
-        for id, one in found.items()
-        for what, value in one["numbers"].items()
-        if not agrees(value, known[id]["numbers"][what])
-    }
+    other = {}
+    for id, one in found.items():
+        for what, value in one["numbers"].items():
+            if not agrees(value, known[id]["numbers"][what]):
+                other[(id, what)] = (value, known[id]["numbers"][what])
     assert other == {}
 
 
@@ -104,10 +115,17 @@ def runs_made_once(nudge: float = 0.0) -> Iterator[None]:
 
     def kept(scenarios, threads):
         keys = [key(scenario.named(None)) for scenario in scenarios]
-        new = {name: scenario for name, scenario in zip(keys, scenarios, strict=True) if name not in made}
+        new = {
+            name: scenario
+            for name, scenario in zip(keys, scenarios, strict=True)
+            if name not in made
+        }
         for i, trace in stream([moved(scenario, nudge) for scenario in new.values()], threads):
             name = list(new)[i]
-            made[name] = dataclasses.replace(trace, scenario=new[name]) if nudge else trace
+            if nudge:
+                made[name] = dataclasses.replace(trace, scenario=new[name])
+            else:
+                made[name] = trace
         return ((i, made[name]) for i, name in enumerate(keys))
 
     runs.stream = kept
@@ -121,14 +139,16 @@ def moved(scenario: Scenario, nudge: float) -> Scenario:
     """Return a scenario with another start; the same for none."""
     if not nudge:
         return scenario
-    start = {
-        name: tuple(one * (1.0 + nudge) + nudge for one in getattr(scenario.resolved, name)) for name in ("x0", "v0")
-    }
+    start = {}
+    for name in ("x0", "v0"):
+        start[name] = tuple(one * (1.0 + nudge) + nudge for one in getattr(scenario.resolved, name))
     return dataclasses.replace(scenario, **start)
 
 
 def test_the_golden_has_every_claim_of_every_paper():
-    claims = {name: [id for id in paper(name).claims if (name, id) not in TIMINGS] for name in shipped()}
+    claims = {}
+    for name in shipped():
+        claims[name] = [id for id in paper(name).claims if (name, id) not in TIMINGS]
     assert {name: list(golden(name)) for name in shipped()} == claims
 
 
@@ -139,9 +159,15 @@ def test_quick_verdicts_are_those_of_the_golden(name):
 
 
 def spread(values: list[float]) -> float | list[float]:
-    """Return a number to four digits, or seven times the range of what starts moved a little make of it."""
+    """Return a number to four digits, or seven times the range of what starts moved a little make
+    of it.
+    """
     first, low, high = values[0], min(values), max(values)
-    if math.isnan(first) or low == high or high - low <= max(0.5 * SAME * abs(first), 0.5 * NOTHING):
+    if (
+        math.isnan(first)
+        or low == high
+        or high - low <= max(0.5 * SAME * abs(first), 0.5 * NOTHING)
+    ):
         return float(f"{first:.4g}")
     return [float(f"{low - 3.0 * (high - low):.3g}"), float(f"{high + 3.0 * (high - low):.3g}")]
 
@@ -160,10 +186,15 @@ def written(name: str) -> dict[str, Record]:
 
 
 if __name__ == "__main__":
-    known = json.loads(GOLDEN.read_text(encoding="utf-8")) if GOLDEN.exists() else {}
+    if GOLDEN.exists():
+        known = json.loads(GOLDEN.read_text(encoding="utf-8"))
+    else:
+        known = {}
     known |= {name: written(name) for name in sys.argv[1:] or shipped()}
     told = {
-        name: ",\n".join(f"  {json.dumps(id)}: {json.dumps(one)}" for id, one in known[name].items())
+        name: ",\n".join(
+            f"  {json.dumps(id)}: {json.dumps(one)}" for id, one in known[name].items()
+        )
         for name in shipped()
         if name in known
     }

@@ -3,9 +3,21 @@
 import pytest
 
 from smc_mujoco.evidence.audit.paper import paper
-from tests.evidence.papers.test_quick_verdicts import TIMINGS, check_golden, golden, quick_verdicts, runs_made_once
+from tests.evidence.papers.test_quick_verdicts import (
+    TIMINGS,
+    check_golden,
+    golden,
+    quick_verdicts,
+    runs_made_once,
+)
 
-SEARCHES = ["12", "20", "24", "61", "T"]  # of millions of steps each; with stubbed runs they are in test_gaber.py
+SEARCHES = [
+    "12",
+    "20",
+    "24",
+    "61",
+    "T",
+]  # of millions of steps each; with stubbed runs they are in test_gaber.py
 OTHERS = [id for id in paper("gaber").claims if ("gaber", id) not in TIMINGS and id not in SEARCHES]
 PARTS = [pytest.param(OTHERS[k::6], id=str(k)) for k in range(6)]
 
@@ -16,7 +28,9 @@ def once():
         yield
 
 
-@pytest.mark.parametrize("ids", [*PARTS, pytest.param(SEARCHES, id="searches", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "ids", [*PARTS, pytest.param(SEARCHES, id="searches", marks=pytest.mark.slow)]
+)
 def test_quick_verdicts_of_some_claims_are_those_of_the_golden(ids):
     expected = golden("gaber")
     check_golden(quick_verdicts("gaber", ids), {id: expected[id] for id in ids})

@@ -1,4 +1,6 @@
-"""The papers that ship beside Gaber's: what each says of itself, and that a broken law loses each of its claims."""
+"""The papers that ship beside Gaber's: what each says of itself, and that a broken law loses each
+of its claims.
+"""
 
 import math
 
@@ -11,7 +13,12 @@ from smc_mujoco.evidence.audit.audit import audit
 from smc_mujoco.evidence.audit.mutants import survivors
 from smc_mujoco.evidence.audit.paper import paper, shipped
 from smc_mujoco.evidence.papers.acary_2012.claims import observed_twisting_60
-from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import BAND, classical_bound, general_margins, least_bound
+from smc_mujoco.evidence.papers.aldana_lopez_2019.claims import (
+    BAND,
+    classical_bound,
+    general_margins,
+    least_bound,
+)
 from smc_mujoco.evidence.papers.huber_2014.claims import implicit_twisting
 from smc_mujoco.evidence.papers.measures import END_SAMPLES, exponent, late, late_step, settled
 from smc_mujoco.evidence.papers.perez_ventura_2017.claims import predicted
@@ -43,7 +50,9 @@ def test_a_broken_law_loses_each_claim(name):
 
 def test_an_exponent_is_that_of_a_power_and_nan_of_runs_that_failed():
     levels = [1.0, 2.0, 4.0]
-    assert exponent(levels, [3.0 * level**1.5 for level in levels for _ in range(2)]) == pytest.approx(1.5)
+    assert exponent(
+        levels, [3.0 * level**1.5 for level in levels for _ in range(2)]
+    ) == pytest.approx(1.5)
     for broken in (math.nan, math.inf, 0.0):
         assert math.isnan(exponent(levels, [1.0, broken, 3.0]))
 
@@ -58,10 +67,13 @@ def run_of(signal):
 @pytest.mark.parametrize(
     ("signal", "time"),
     [
-        ([3.0, 1.0, 0.5, -0.5], 0.1), ([3.0, 1.0, 2.0, 0.5], 0.3), ([0.5, 0.5, 0.5, 0.5], 0.0),
-        ([3.0, 1.0, 0.5, 2.0], math.inf), ([3.0, 1.0, math.nan, math.nan], math.inf),
+        ([3.0, 1.0, 0.5, -0.5], 0.1),
+        ([3.0, 1.0, 2.0, 0.5], 0.3),
+        ([0.5, 0.5, 0.5, 0.5], 0.0),
+        ([3.0, 1.0, 0.5, 2.0], math.inf),
+        ([3.0, 1.0, math.nan, math.nan], math.inf),
     ],
-)  # fmt: skip
+)
 def test_a_signal_is_settled_from_where_it_stays_within_a_band(signal, time):
     assert settled(*run_of(signal), 1.0) == pytest.approx(time)
 
@@ -83,14 +95,22 @@ def test_the_least_bound_of_fixed_time_is_the_integral():
     for k1, k2, a, b in ((2.0, 2.0, 0.5, 1.5), (1.0, 2.0, 0.5, 2.0), (3.0, 1.0, 0.3, 1.5)):
         made = law("fixed_time", k1=k1, k2=k2, a=a, b=b)
         integral, _ = quad(  # over s = e^z
-            lambda z, k1=k1, k2=k2, a=a, b=b: 1.0 / (k1 * math.exp((a - 1.0) * z) + k2 * math.exp((b - 1.0) * z)),
+            lambda z, k1=k1, k2=k2, a=a, b=b: (
+                1.0 / (k1 * math.exp((a - 1.0) * z) + k2 * math.exp((b - 1.0) * z))
+            ),
             -80.0,
             80.0,
             limit=400,
         )
         assert least_bound(made) == pytest.approx(integral, rel=1e-6)
         assert classical_bound(made) > integral
-    without = {"A": 1.0, "B": 1.0, "p": 0.5, "q": 2.0, "k": 0.5}  # at the end of what the general formula is for
+    without = {
+        "A": 1.0,
+        "B": 1.0,
+        "p": 0.5,
+        "q": 2.0,
+        "k": 0.5,
+    }  # at the end of what the general formula is for
     assert general_margins(without) == {"k p < 1": 0.75, "k q > 1": 0.0}
 
 
@@ -101,15 +121,21 @@ def test_fixed_time_is_sampled_finely_enough_for_the_band_that_was_fixed_before_
 
 
 def test_the_predicted_cycle_of_super_twisting_balances_its_harmonics():
-    """N(A, omega) = -1 / W(j omega) for N = c k1 / sqrt(A) + 4 k2 / (pi A j omega), W = 1 / (s (mu s + 1)^2)."""
+    """N(A, omega) = -1 / W(j omega) for N = c k1 / sqrt(A) + 4 k2 / (pi A j omega), W = 1 / (s (mu
+    s + 1)^2).
+    """
     from scipy.integrate import quad
 
     k1, k2, lag = 1.5, 1.1, 5e-3
     amplitude, frequency = predicted(k1, k2, lag)
     omega = math.tau * frequency
     half, _ = quad(lambda angle: math.sin(angle) ** 1.5, 0.0, math.pi)
-    gain = 2.0 / math.pi * half * k1 / math.sqrt(amplitude) + 4.0 * k2 / (math.pi * amplitude * 1j * omega)
-    assert gain * (1.0 / (1j * omega * (1.0 + 1j * omega * lag) ** 2)) == pytest.approx(-1.0, rel=1e-6)
+    gain = 2.0 / math.pi * half * k1 / math.sqrt(amplitude) + 4.0 * k2 / (
+        math.pi * amplitude * 1j * omega
+    )
+    assert gain * (1.0 / (1j * omega * (1.0 + 1j * omega * lag) ** 2)) == pytest.approx(
+        -1.0, rel=1e-6
+    )
 
 
 # laws
@@ -121,13 +147,18 @@ def test_implicit_twisting_has_both_signs_at_the_end_of_the_period():
     h, rng = 0.05, np.random.default_rng(1)
     starts = rng.uniform((-0.2, -1.0), (0.2, 1.0), (40, 2))
     fields = {"plant": smc.plant("duffing", **FREE), "law": implicit_twisting, "u_max": math.inf}
-    runs = [smc.Scenario(x0=x, v0=v, duration=h, control_period=h, physics_step=h, **fields) for x, v in starts]
+    runs = [
+        smc.Scenario(x0=x, v0=v, duration=h, control_period=h, physics_step=h, **fields)
+        for x, v in starts
+    ]
     G, beta = (implicit_twisting.defaults[name] for name in ("G", "beta"))
     gains = np.array([G * (1.0 + beta * h / 2.0), G * beta])
     for (e, de), trace in zip(starts, smc.run(runs), strict=True):
         v = trace.u[0, 0]
         ends = np.array([e + 1.5 * h * de + h * h * v, de + h * v])
-        least, largest = (v + gains @ np.where(abs(ends) > 1e-9, np.sign(ends), free) for free in (-1.0, 1.0))
+        least, largest = (
+            v + gains @ np.where(abs(ends) > 1e-9, np.sign(ends), free) for free in (-1.0, 1.0)
+        )
         assert least <= 1e-9
         assert largest >= -1e-9
 
@@ -138,10 +169,16 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
     h, (k1, k2, k3, k4) = 0.02, (observed_twisting_60.defaults[f"k{i}"] for i in range(1, 5))
     trace = smc.run(
         smc.Scenario(
-            plant=smc.plant("duffing", **FREE), law=observed_twisting_60, x0=0.5, v0=0.3, duration=2.0,
-            control_period=h, physics_step=h, u_max=math.inf,
+            plant=smc.plant("duffing", **FREE),
+            law=observed_twisting_60,
+            x0=0.5,
+            v0=0.3,
+            duration=2.0,
+            control_period=h,
+            physics_step=h,
+            u_max=math.inf,
         )
-    )  # fmt: skip
+    )
     position = velocity = 1.0
     for x, u, shown in zip(trace.x[:-1, 0], trace.u[:-1, 0], trace.s[:-1, 0], strict=True):
         b = x - position
@@ -149,7 +186,9 @@ def test_the_observer_of_equation_60_solves_its_equation_and_predicts_a_period_a
         sign, error = b / (h * h * k3), 0.0
         if abs(sign) > 1.0:
             sign = math.copysign(1.0, b)
-            left = lambda z, b=b: z * (1.0 + h * k2 + h * h * k4) + h * k1 * math.sqrt(z) + h * h * k3 - abs(b)  # noqa: E731
+            left = lambda z, b=b: (
+                z * (1.0 + h * k2 + h * h * k4) + h * k1 * math.sqrt(z) + h * h * k3 - abs(b)
+            )
             error = sign * root_scalar(left, bracket=(0.0, abs(b)), xtol=1e-15).root
         velocity += h * (k3 * sign + k4 * error) + h * u
         position = x - error + h * velocity
@@ -163,8 +202,13 @@ def test_a_paper_s_own_laws_are_those_recorded(snapshot):
     for name in PAPERS:
         for law, one in paper(name).laws.items():
             if isinstance(one, Template) and f"papers.{name}" in one.function.__module__:
-                gains = ", ".join(f"{gain} = {its.default:g}{' > 0' * its.positive}" for gain, its in one.gains.items())
-                said[f"{name} {law}"] = f"{gains}; memory {one.memory}, relative degree {one.relative_degree}"
+                gains = ", ".join(
+                    f"{gain} = {its.default:g}{' > 0' * its.positive}"
+                    for gain, its in one.gains.items()
+                )
+                said[f"{name} {law}"] = (
+                    f"{gains}; memory {one.memory}, relative degree {one.relative_degree}"
+                )
     assert said == snapshot
 
 

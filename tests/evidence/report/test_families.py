@@ -28,12 +28,18 @@ MODEL = """
 
 
 def lead(sets=None, floor=0.0, **scores) -> Any:
-    its = {law: np.broadcast_to(np.asarray(values, float), RUNS).copy() for law, values in scores.items()}
-    return families.lead(its, {law: np.arange(RUNS) if sets is None else sets for law in its}, floor)
+    its = {}
+    for law, values in scores.items():
+        its[law] = np.broadcast_to(np.asarray(values, float), RUNS).copy()
+    return families.lead(
+        its, {law: np.arange(RUNS) if sets is None else sets for law in its}, floor
+    )
 
 
 def test_every_law_that_is_compared_is_in_one_family():
-    assert sorted(law for laws in families.FAMILIES.values() for law in laws) == sorted(gain_sets.COMPARED)
+    assert sorted(law for laws in families.FAMILIES.values() for law in laws) == sorted(
+        gain_sets.COMPARED
+    )
 
 
 def test_a_law_is_scored_in_the_half_of_the_runs_that_did_not_choose_it():
@@ -57,7 +63,10 @@ def test_the_lead_is_the_ratio_to_the_next_family_and_sure_where_its_interval_is
 def test_runs_that_share_gains_count_once():
     sets = np.arange(RUNS) % 6  # a run and the sixth after it
     values = np.exp(np.linspace(0.1, 1.2, RUNS))
-    found, by_set = lead(sets, classical=values, adrc=1.0), np.log(values).reshape(2, 6).mean(axis=0)
+    found, by_set = (
+        lead(sets, classical=values, adrc=1.0),
+        np.log(values).reshape(2, 6).mean(axis=0),
+    )
     assert math.log(found.low) == pytest.approx(by_set.min())
     assert math.log(found.high) == pytest.approx(by_set.max())
 
@@ -68,7 +77,9 @@ def test_what_nobody_can_see_is_no_lead_and_one_family_has_none():
 
 
 def test_a_sentence_stands_is_open_or_is_contradicted_by_its_interval():
-    axis, _, highest, score, kind, _ = next(one for one in script.SENTENCES if one[-1] == "is level at best")
+    axis, _, highest, score, kind, _ = next(
+        one for one in script.SENTENCES if one[-1] == "is level at best"
+    )
     cell = {"plant": "duffing", "axis": axis, "level": highest, "score": score, "kind": kind}
     ends = [(0.9, 1.1), (0.9, 1.2), (1.01, 1.05), (1.2, 1.3)]
     cells = [cell | {"low": low, "high": high} for low, high in ends]
@@ -76,7 +87,10 @@ def test_a_sentence_stands_is_open_or_is_contradicted_by_its_interval():
     assert [*script.judged(cells)][-1] == "in all: 2 of 4 stand, 1 contradicted"
     axis, _, level, score, kind, does = script.SENTENCES[0]
     assert does == "leads"
-    cells = [cells[0] | {"axis": axis, "level": level, "score": score, "kind": kind, "low": low} for low in (0.9, 1.01)]
+    cells = [
+        cells[0] | {"axis": axis, "level": level, "score": score, "kind": kind, "low": low}
+        for low in (0.9, 1.01)
+    ]
     assert [*script.judged(cells)][-1] == "in all: 1 of 2 stand, 0 contradicted"
 
 
@@ -88,21 +102,36 @@ def test_levels_by_lot_are_within_the_sentences_and_of_their_seed():
 
 
 def test_a_lead_is_told_where_the_gains_admit_the_load_and_where_not():
-    runs = {law: np.ones(RUNS) for law in script.SURE} | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 9.0))
-    cell = {"score": "error", "kind": "switching", "runs": runs, "admitted": dict.fromkeys(script.SURE, [True] * RUNS)}
+    runs = {law: np.ones(RUNS) for law in script.SURE} | dict.fromkeys(
+        families.FAMILIES["rivals"], np.full(RUNS, 9.0)
+    )
+    cell = {
+        "score": "error",
+        "kind": "switching",
+        "runs": runs,
+        "admitted": dict.fromkeys(script.SURE, [True] * RUNS),
+    }
     weaker = runs | dict.fromkeys(families.FAMILIES["rivals"], np.full(RUNS, 2.0))
     beyond = cell | {"runs": weaker, "admitted": {"implicit_first_order": [False] * RUNS}}
     told = [*script.borders([cell, beyond, cell | {"kind": "smoothed"}, cell | {"admitted": {}}])]
-    assert [line.split(": ")[1] for line in told[:2]] == ["9 (9 to 9), 12 runs", "2 (2 to 2), 12 runs"]
+    assert [line.split(": ")[1] for line in told[:2]] == [
+        "9 (9 to 9), 12 runs",
+        "2 (2 to 2), 12 runs",
+    ]
     assert told[2].endswith("9 (9 to 9), 12 runs")
     assert told[3].endswith(" 0 runs")
 
 
 def test_gains_admit_a_load_below_k_and_a_rate_below_k2(tmp_path):
-    """On the hanging chain implicit_first_order has k of 0.65 to 0.8 N m, super_twisting k2 of 1 to 8 N m / s."""
+    """On the hanging chain implicit_first_order has k of 0.65 to 0.8 N m, super_twisting k2 of 1 to
+    8 N m / s.
+    """
     found = script.subject("pendulum_network", tmp_path)
     within, beyond = (found.admitted(script.FORCE, level) for level in (0.6, 1.0))
-    assert within == {"implicit_first_order": [True] * RUNS, "super_twisting": [False] * RUNS}  # 14 N m / s at least
+    assert within == {
+        "implicit_first_order": [True] * RUNS,
+        "super_twisting": [False] * RUNS,
+    }  # 14 N m / s at least
     assert not any(beyond["implicit_first_order"])
     assert not found.admitted("load, omega / wc", 0.25)
     assert found.admitted("load, omega / wc", 0.5)
@@ -110,7 +139,9 @@ def test_gains_admit_a_load_below_k_and_a_rate_below_k2(tmp_path):
 
 
 def test_a_load_and_friction_are_in_proportion_to_the_bound():
-    """The twelve runs of a plant of one's own, whose motor gives 60 N, take turns in the gains of its searches."""
+    """The twelve runs of a plant of one's own, whose motor gives 60 N, take turns in the gains of
+    its searches.
+    """
     plant = smc.plant_from(MODEL, channels={"slide": smc.Channel(x0=0.3)})
     laws = [smc.law("adrc", wc=float(i + 1)) for i in range(RUNS)]
     found = script.Subject(plant, {"adrc": Candidate(laws[1], tuple(laws))}, "heavy")
@@ -129,5 +160,7 @@ def test_a_plant_may_be_what_a_python_file_defines(tmp_path):
     assert script.of_file(path).parameters["beta"] == 2.0
     path.write_text("import smc_mujoco as smc\nA, B = map(smc.plant, ('duffing', 'van_der_pol'))\n")
     assert script.of_file(path, "van_der_pol").name == "van_der_pol"
-    with pytest.raises(smc.ScenarioError, match=r"plant of .*mine.py '': choose from duffing, van_der_pol"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"plant of .*mine.py '': choose from duffing, van_der_pol"
+    ):
         script.of_file(path)

@@ -37,13 +37,18 @@ def test_a_switching_law_oscillates_as_predicted_and_a_smooth_one_is_calm(found)
 def test_the_sentence_counts_pairs_and_takes_the_median_error(found):
     switching, smooth = found
     calm = dataclasses.replace(smooth, measured_amplitude=math.nan)
-    worse = [dataclasses.replace(switching, amplitude=q * switching.measured_amplitude) for q in (1.3, 0.5)]
+    worse = []
+    for q in (1.3, 0.5):
+        worse.append(dataclasses.replace(switching, amplitude=q * switching.measured_amplitude))
     better = dataclasses.replace(switching, amplitude=1.01 * switching.measured_amplitude)
     said = oscillation.sentence((*worse, better, calm))
-    assert said.startswith("Of 4 pairs of plant and law 3 are predicted to oscillate and do; 1 do neither.")
+    assert said.startswith(
+        "Of 4 pairs of plant and law 3 are predicted to oscillate and do; 1 do neither."
+    )
     unseen = dataclasses.replace(switching, measured_amplitude=math.nan)
-    assert "2 are predicted to oscillate and do; 0 do neither; for 1 prediction and run disagree." in (
-        oscillation.sentence((*worse, unseen))
+    assert (
+        "2 are predicted to oscillate and do; 0 do neither; for 1 prediction and run disagree."
+        in (oscillation.sentence((*worse, unseen)))
     )
     assert said.endswith("is 30 %, the largest 50 %.")
     better = dataclasses.replace(switching, amplitude=1.1 * switching.measured_amplitude)

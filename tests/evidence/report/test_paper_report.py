@@ -1,4 +1,6 @@
-"""The report of a paper: one file with every claim, its numbers, gains and figure, and the evidence beside it."""
+"""The report of a paper: one file with every claim, its numbers, gains and figure, and the evidence
+beside it.
+"""
 
 import re
 from xml.etree import ElementTree
@@ -39,7 +41,10 @@ holds_if = {{ "TV rate" = "< {}" }}
 """
 DATA += CLAIM.format(1, "paper", "the law & its plant are calm", 1, "duffing", "1e9")
 DATA += CLAIM.format(2, "paper", "nothing moves", 2, "van_der_pol", "0")
-DATA += CLAIM.format(3, "derived", "it is fast", 3, "duffing", "1e9") + 'how = "by sec. 2"\nvaries = "it is timed"\n'
+DATA += (
+    CLAIM.format(3, "derived", "it is fast", 3, "duffing", "1e9")
+    + 'how = "by sec. 2"\nvaries = "it is timed"\n'
+)
 CODE = """
 def calm(runs):
     return {"TV rate": runs.scores(runs.grid().values())[0]["tv_rate"], "beside it": 0.125}
@@ -86,12 +91,20 @@ def test_the_command_refuses_what_is_of_the_study(made):
 @pytest.mark.parametrize(
     ("value", "relation", "limit", "expected"),
     [
-        (0.1, "<", 1.0, -1.0), (10.0, "<", 1.0, 1.0), (100.0, ">", 1.0, -2.0), (0.1, ">=", 1.0, 1.0),
-        (1e-9, "<", 1.0, -MAX_DECADES), (1e9, "<=", 1.0, MAX_DECADES), (0.0, "<=", 0.0, -MAX_DECADES),
-        (1e-9, "<=", 0.0, MAX_DECADES), (float("nan"), "<", 1.0, MAX_DECADES), (float("inf"), ">", 1.0, -MAX_DECADES),
-        (-1.0, "<", 1.0, -MAX_DECADES), (1.0, "<", 1.0, 0.0),
+        (0.1, "<", 1.0, -1.0),
+        (10.0, "<", 1.0, 1.0),
+        (100.0, ">", 1.0, -2.0),
+        (0.1, ">=", 1.0, 1.0),
+        (1e-9, "<", 1.0, -MAX_DECADES),
+        (1e9, "<=", 1.0, MAX_DECADES),
+        (0.0, "<=", 0.0, -MAX_DECADES),
+        (1e-9, "<=", 0.0, MAX_DECADES),
+        (float("nan"), "<", 1.0, MAX_DECADES),
+        (float("inf"), ">", 1.0, -MAX_DECADES),
+        (-1.0, "<", 1.0, -MAX_DECADES),
+        (1.0, "<", 1.0, 0.0),
     ],
-)  # fmt: skip
+)
 def test_a_check_is_left_of_1_where_it_holds(value, relation, limit, expected):
     assert place(check("x", value, relation, limit)) == pytest.approx(expected)
 

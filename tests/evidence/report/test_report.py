@@ -1,6 +1,8 @@
-"""The report: one file from real runs that needs no other, counted from the data, and alive in a real browser.
+"""The report: one file from real runs that needs no other, counted from the data, and alive in a
+real browser.
 
-The browser is Chromium (Debian, Ubuntu: apt-get install chromium); without it these tests are skipped, but not in CI.
+The browser is Chromium (Debian, Ubuntu: apt-get install chromium); without it these tests are
+skipped, but not in CI.
 """
 
 import dataclasses
@@ -53,7 +55,13 @@ TINY = dataclasses.replace(
     flight_seeds=2,
     periods=(4e-3, 2e-3),
 )
-BROWSERS = ("chromium", "chromium-headless-shell", "chromium-browser", "google-chrome", "google-chrome-stable")
+BROWSERS = (
+    "chromium",
+    "chromium-headless-shell",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+)
 SWITCHES = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
 
@@ -191,7 +199,11 @@ def test_scores_are_the_medians_of_the_tables_runs(folder, findings):
     from smc_mujoco.studies.table import Table
 
     table = Table.read(folder / "study").select(law="classical", condition="noise")
-    score = next(s for s in findings.scores if (s.law, s.condition, s.metric) == ("classical", "noise", "itae"))
+    score = next(
+        s
+        for s in findings.scores
+        if (s.law, s.condition, s.metric) == ("classical", "noise", "itae")
+    )
     assert score.median == pytest.approx(np.median(table.column("itae")), rel=1e-12)
     assert score.seeds == 2
 
@@ -211,7 +223,11 @@ def test_a_score_counts_its_law_s_failed_runs(made, folder):
 
 def test_the_first_line_counts_what_was_run(text, findings):
     (line,) = re.findall(r'<p class="sub">(\d+) runs .*?>(\w+) failed</a>(.*?) seeds each', text)
-    runs, failed, factors = int(line[0]), line[1], [int(number) for number in re.findall(r"\d+", line[2])]
+    runs, failed, factors = (
+        int(line[0]),
+        line[1],
+        [int(number) for number in re.findall(r"\d+", line[2])],
+    )
     assert (runs, failed, factors) == (12, "none", [1, 3, 2, 2])  # plants, laws, conditions, seeds
     assert math.prod(factors) == runs == findings.about.runs
 
@@ -219,10 +235,14 @@ def test_the_first_line_counts_what_was_run(text, findings):
 def test_a_scene_has_the_gains_of_the_report(folder, findings, monkeypatch):
     drawn = []
     monkeypatch.setattr(films, "curves", lambda traces, title: drawn.extend(traces) or b"")
-    work = Work(plan=dataclasses.replace(TINY, filmed=0), folder=folder, threads=None, bars=Bars(False))
+    work = Work(
+        plan=dataclasses.replace(TINY, filmed=0), folder=folder, threads=None, bars=Bars(False)
+    )
     (scene,) = stages.all_scenes(work)
     assert scene.laws == findings.scenes[0].laws == TINY.scene_laws
-    assert [trace.scenario.law for trace in drawn] == [gains.law("duffing", law, seed=0) for law in TINY.scene_laws]
+    assert [trace.scenario.law for trace in drawn] == [
+        gains.law("duffing", law, seed=0) for law in TINY.scene_laws
+    ]
 
 
 def test_margins_are_found_under_every_set_of_gains(findings):
@@ -239,8 +259,22 @@ def test_the_gains_of_every_set_stand_beside_each_other(reader, findings):
 
 
 THIRTEEN = (
-    *("observer_free", "classical", "boundary_layer", "adaptive", "super_twisting", "conditioned_super_twisting"),
-    *("implicit_super_twisting", "twisting", "nonsingular_terminal", "fixed_time", "integral", "disturbance_observer"),
+    *(
+        "observer_free",
+        "classical",
+        "boundary_layer",
+        "adaptive",
+        "super_twisting",
+        "conditioned_super_twisting",
+    ),
+    *(
+        "implicit_super_twisting",
+        "twisting",
+        "nonsingular_terminal",
+        "fixed_time",
+        "integral",
+        "disturbance_observer",
+    ),
     "pid",
 )
 
@@ -252,7 +286,10 @@ def test_thirteen_laws_have_colours_and_short_names_of_their_own(monkeypatch):
     assert max(len(words.short(law)) for law in THIRTEEN) <= 3
     assert words.colour("classical") == words.style.law_colour("classical")
     assert words.law("pid") == "PID"
-    near = (words.style.distance(words.colour(f"law_{k}"), words.colour("super_twisting")) for k in range(300))
+    near = (
+        words.style.distance(words.colour(f"law_{k}"), words.colour("super_twisting"))
+        for k in range(300)
+    )
     assert min(near) > words.style.MIN_DISTANCE  # a user's law, of any name
     mine = [f"law_{k}" for k in range(8)]  # of installed packages, in one report
     monkeypatch.setattr(words, "known_laws", lambda: SimpleNamespace(added=mine), raising=False)
@@ -276,7 +313,15 @@ def test_a_law_and_a_verdict_that_nobody_foresaw_are_shown(findings):
     scores = tuple(s._replace(law="mine") for s in findings.scores if s.law == "classical")
     boards = boards_of([Place("mine")], 2)
     few = dataclasses.replace(
-        findings, claims=(claim,), scores=scores, boards=boards, margins=(), basins=(), fronts=(), scenes=(), fields=()
+        findings,
+        claims=(claim,),
+        scores=scores,
+        boards=boards,
+        margins=(),
+        basins=(),
+        fronts=(),
+        scenes=(),
+        fields=(),
     )
     assert "mine" in page.page(few)
 
@@ -290,7 +335,23 @@ def scores(condition="nominal", plant="duffing", runs=16, **medians):
     wins = {law: level == [law] and len(medians) > 1 for law in medians}
     return [
         Score(
-            *(plant, condition, law, "settling_time", m, m, m, best, not best, wins[law], "", 16, 0, runs, "16 seeds"),
+            *(
+                plant,
+                condition,
+                law,
+                "settling_time",
+                m,
+                m,
+                m,
+                best,
+                not best,
+                wins[law],
+                "",
+                16,
+                0,
+                runs,
+                "16 seeds",
+            ),
             floor=0.0,
         )
         for law, m in medians.items()
@@ -300,7 +361,9 @@ def scores(condition="nominal", plant="duffing", runs=16, **medians):
 
 def told(findings, *cells):
     """The answer, of these cells alone."""
-    few = dataclasses.replace(findings, scores=tuple(score for cell in cells for score in cell), boards=())
+    few = dataclasses.replace(
+        findings, scores=tuple(score for cell in cells for score in cell), boards=()
+    )
     return sentences(few, ["settling_time"])
 
 
@@ -309,8 +372,13 @@ def sentences(findings, metrics):
 
 
 def test_a_law_that_is_level_with_one_that_seldom_settles_keeps_it_from_winning(findings):
-    cell = [s._replace(best=True, wins=False) for s in scores(observer_free=1.0, classical=math.inf)]
-    assert answer.leaders(answer.cells(cell), "duffing", "nominal", "settling_time") == ["observer_free", "classical"]
+    cell = []
+    for s in scores(observer_free=1.0, classical=math.inf):
+        cell.append(s._replace(best=True, wins=False))
+    assert answer.leaders(answer.cells(cell), "duffing", "nominal", "settling_time") == [
+        "observer_free",
+        "classical",
+    ]
     assert "wins" not in told(findings, cell)
 
 
@@ -319,9 +387,14 @@ def test_a_law_alone_does_not_win(findings):
 
 
 def test_where_the_papers_law_loses_is_listed_worst_first():
-    lost = answer.losses(answer.cells(scores(observer_free=3.0, classical=1.0, adaptive=2.0)), ["settling_time"])
+    lost = answer.losses(
+        answer.cells(scores(observer_free=3.0, classical=1.0, adaptive=2.0)), ["settling_time"]
+    )
     assert [(loss.law, loss.times) for loss in lost] == [("classical", 3.0)]
-    assert answer.losses(answer.cells(scores(observer_free=1.0, classical=3.0)), ["settling_time"]) == []
+    assert (
+        answer.losses(answer.cells(scores(observer_free=1.0, classical=3.0)), ["settling_time"])
+        == []
+    )
     calm = scores(observer_free=1.0, classical=math.inf)
     calm += [s._replace(metric="tv_rate") for s in scores(observer_free=2.0, classical=1.0)]
     (one,) = answer.losses(answer.cells(calm), ["tv_rate"])
@@ -329,7 +402,9 @@ def test_where_the_papers_law_loses_is_listed_worst_first():
     small = [s._replace(floor=0.5) for s in scores(observer_free=3.0, classical=0.1)]
     (one,) = answer.losses(answer.cells(small), ["settling_time"])
     assert (one.times, one.rounded) == (6.0, True)  # over the least difference that counts
-    never = answer.losses(answer.cells(scores(observer_free=math.inf, classical=1.0)), ["settling_time"])
+    never = answer.losses(
+        answer.cells(scores(observer_free=math.inf, classical=1.0)), ["settling_time"]
+    )
     assert never[0].times == math.inf
 
 
@@ -350,15 +425,27 @@ def picked(findings, *places):
 
 
 def test_the_law_to_take_is_beaten_in_the_fewest_conditions_then_has_the_best_mean_rank(findings):
-    one = picked(findings, Place("a", 2, 2, 1.0), Place("b", 1, 0, 3.0), Place("c", 1, 0, 2.0), Place("d", plant="x"))
+    one = picked(
+        findings,
+        Place("a", 2, 2, 1.0),
+        Place("b", 1, 0, 3.0),
+        Place("c", 1, 0, 2.0),
+        Place("d", plant="x"),
+    )
     assert (one.law, one.others) == ("c", ("b",))
     assert one.sure == "unbeaten in 3 of 4"
-    assert picked(findings, Place("a", 4, median=2.0), Place("b", 1, 1)).sure == "unbeaten in 3 of 4, wins in 1"
+    assert (
+        picked(findings, Place("a", 4, median=2.0), Place("b", 1, 1)).sure
+        == "unbeaten in 3 of 4, wins in 1"
+    )
     assert picked(findings, Place("a", 0, 4)).sure == "wins in all 4"
     failing = Place("a", 1, mean=1.0)._replace(failed=2)
     assert picked(findings, failing, Place("b", 1, mean=2.0)).law == "b"
     unbeaten = picked(findings, Place("a"), Place("b"), Place("c"))
-    assert (unbeaten.law, unbeaten.sure) == ("", "all 3 laws unbeaten in each of 4")  # none is named, by the alphabet
+    assert (unbeaten.law, unbeaten.sure) == (
+        "",
+        "all 3 laws unbeaten in each of 4",
+    )  # none is named, by the alphabet
     boards = boards_of([Place("a"), Place("b")], 2)
     for block in boards[0].blocks:
         block.level = True
@@ -385,18 +472,26 @@ def test_the_papers_verdict_is_one_line_that_counts(findings):
         *scores("noise", observer_free=1.0, classical=3.0),
         *scores("sine", observer_free=1.0, classical=1.0),
     ]
-    claims = [dataclasses.replace(findings.claims[0], verdict=v) for v in ("supported", "refuted", "refuted")]
+    claims = []
+    for v in ("supported", "refuted", "refuted"):
+        claims.append(dataclasses.replace(findings.claims[0], verdict=v))
     beside = dataclasses.replace(claims[0], whose="derived")  # not counted
     few = dataclasses.replace(findings, scores=tuple(cells), claims=(*claims, beside))
     for quick, less in ((False, ""), (True, " audited quickly under one set of gains,")):
-        about = dataclasses.replace(findings.about, plan=dataclasses.replace(findings.about.plan, quick=quick))
+        about = dataclasses.replace(
+            findings.about, plan=dataclasses.replace(findings.about.plan, quick=quick)
+        )
         assert answer.verdict(dataclasses.replace(few, about=about), ["settling_time"]) == (
             "The paper: its observer-free law is beaten in 1 of 3 comparisons and wins in 1; of its 3 checked claims,"
             f"{less} 1 is supported and 2 are refuted."
         )
-    failing = [s._replace(best=False, beaten=True) for s in scores("step", observer_free=math.inf, classical=math.inf)]
+    failing = []
+    for s in scores("step", observer_free=math.inf, classical=math.inf):
+        failing.append(s._replace(best=False, beaten=True))
     with_failing = dataclasses.replace(few, scores=(*cells, *failing), claims=())
-    assert "beaten in 1 of 4 comparisons" in answer.verdict(with_failing, ["settling_time"])  # as the table of losses
+    assert "beaten in 1 of 4 comparisons" in answer.verdict(
+        with_failing, ["settling_time"]
+    )  # as the table of losses
     unclear = [s._replace(best=False, beaten=False) for s in failing]
     few_samples = dataclasses.replace(with_failing, scores=(*cells, *unclear))
     assert "too few samples to tell in 1" in answer.verdict(few_samples, ["settling_time"])
@@ -459,7 +554,9 @@ def test_a_killed_stage_leaves_nothing_and_other_arguments_repeat_a_stage(tmp_pa
 
     def keep(depends, make):
         write = lambda found, path: path.write_text(json.dumps(found))  # noqa: E731
-        return cached(tmp_path / "a.json", depends, make, write, lambda path: json.loads(path.read_text()))
+        return cached(
+            tmp_path / "a.json", depends, make, write, lambda path: json.loads(path.read_text())
+        )
 
     with pytest.raises(KeyboardInterrupt):
         keep([1], killed)
@@ -481,7 +578,9 @@ def test_without_a_renderer_the_report_says_so_in_one_sentence(folder, findings,
 
 def test_the_command_is_light_to_import():
     code = "import smc_mujoco.evidence.commands.report, sys; print(*sys.modules)"
-    assert {"mujoco", "numba", "jinja2", "pyarrow", "scipy"} & set(python("-c", code).stdout.split()) == set()
+    assert {"mujoco", "numba", "jinja2", "pyarrow", "scipy"} & set(
+        python("-c", code).stdout.split()
+    ) == set()
 
 
 # in a browser
@@ -506,7 +605,10 @@ class Seen:
     def __init__(self, browser, url, width=1400, scheme="light"):
         self.said, self.asked = [], []
         self.page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
-        self.page.on("console", lambda m: self.said.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on(
+            "console",
+            lambda m: self.said.append(m.text) if m.type in ("error", "warning") else None,
+        )
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(url)
@@ -520,11 +622,15 @@ def seen(browser, made):
 
 def test_the_page_has_no_error_and_asks_for_nothing(seen, made):
     assert seen.said == []
-    assert [url for url in seen.asked if not url.startswith(("data:", "blob:")) and url != made.as_uri()] == []
+    assert [
+        url for url in seen.asked if not url.startswith(("data:", "blob:")) and url != made.as_uri()
+    ] == []
 
 
 def test_every_chart_is_drawn(seen, findings):
-    counts = seen.page.eval_on_selector_all(".plot > svg", "all => all.map(svg => svg.querySelectorAll('path').length)")
+    counts = seen.page.eval_on_selector_all(
+        ".plot > svg", "all => all.map(svg => svg.querySelectorAll('path').length)"
+    )
     # with medians, accuracy, field, fronts, machines and flight
     assert len(counts) == 6 + len(TINY.kinds) + len(TINY.basins) + len(TINY.scenes)
     assert min(counts) > 10
@@ -563,7 +669,9 @@ def test_clicking_a_header_sorts_and_clicking_again_sorts_the_other_way(seen):
     assert len(set(up)) > 1
     assert head.get_attribute("aria-sort") == "ascending"
     head.locator("button").click()
-    assert [float(v) for v in column(page, "leaderboard", 3 + words.TABLE_METRICS.index("itae"))] == up[::-1]
+    assert [
+        float(v) for v in column(page, "leaderboard", 3 + words.TABLE_METRICS.index("itae"))
+    ] == up[::-1]
     page.locator("#leaderboard th button").nth(2).click()
     laws = column(page, "leaderboard", 2)
     assert laws == sorted(laws)
@@ -584,7 +692,9 @@ def test_claims_are_filtered_by_verdict_and_open_to_their_numbers(seen, findings
     for button in page.locator(".verdicts").all():
         button.click()
         wanted = button.get_attribute("data-verdict")
-        shown = page.eval_on_selector_all(".claim:not([hidden])", "all => all.map(one => one.dataset.verdict)")
+        shown = page.eval_on_selector_all(
+            ".claim:not([hidden])", "all => all.map(one => one.dataset.verdict)"
+        )
         if wanted not in ("", "flips"):
             assert shown
             assert set(shown) == {wanted}
@@ -601,19 +711,24 @@ def test_a_number_leads_to_its_definition(seen):
     assert seen.page.evaluate("document.querySelector(':target').tagName") == "DT"
 
 
-def test_a_phone_shows_it_without_scrolling_sideways_and_what_scrolls_takes_the_keyboard(browser, made):
+def test_a_phone_shows_it_without_scrolling_sideways_and_what_scrolls_takes_the_keyboard(
+    browser, made
+):
     phone = Seen(browser, made.as_uri(), 420).page
     assert phone.evaluate("document.documentElement.scrollWidth") == 420
     assert (
         phone.eval_on_selector_all(
-            ".chart, .wide", "all => all.filter(a => a.scrollWidth > a.clientWidth + 1 && a.tabIndex < 0).length"
+            ".chart, .wide",
+            "all => all.filter(a => a.scrollWidth > a.clientWidth + 1 && a.tabIndex < 0).length",
         )
         == 0
     )
     box = phone.locator(".wide:has(#picks)")
     assert box.evaluate("a => a.scrollWidth > a.clientWidth + 50")
     shades = box.evaluate("a => getComputedStyle(a)")["backgroundAttachment"]
-    assert shades == "local, local, local, scroll, scroll, scroll"  # shadows at edges, which ends of the table cover
+    assert (
+        shades == "local, local, local, scroll, scroll, scroll"
+    )  # shadows at edges, which ends of the table cover
     name = phone.locator("#picks tbody th").first
     left = name.evaluate("a => a.getBoundingClientRect().left")
     box.evaluate("a => a.scrollTo(200, 0)")
@@ -624,15 +739,28 @@ def test_a_phone_shows_it_without_scrolling_sideways_and_what_scrolls_takes_the_
 def contrast(a, b):
     """The contrast of two colours, 1 to 21 (WCAG 2.2)."""
     parts = [np.array(words.style.rgb(colour)) / 255 for colour in (a, b)]
-    linear = [np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ (0.2126, 0.7152, 0.0722) for c in parts]
+    linear = []
+    for c in parts:
+        linear.append(
+            np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+            @ (0.2126, 0.7152, 0.0722)
+        )
     return (max(linear) + 0.05) / (min(linear) + 0.05)
 
 
 def colours(page, selector, what):
     """The colours of what a selector finds, "#rrggbb"."""
-    found = page.eval_on_selector_all(selector, f"all => [...new Set(all.map(e => getComputedStyle(e).{what}))]")
-    parts = [([float(v) for v in re.findall(r"[\d.]+", one)[:3]], "srgb" in one) for one in found if "rgb" in one]
-    return {"#{:02x}{:02x}{:02x}".format(*(round(v * (255 if share else 1)) for v in rgb)) for rgb, share in parts}
+    found = page.eval_on_selector_all(
+        selector, f"all => [...new Set(all.map(e => getComputedStyle(e).{what}))]"
+    )
+    parts = []
+    for one in found:
+        if "rgb" in one:
+            parts.append(([float(v) for v in re.findall(r"[\d.]+", one)[:3]], "srgb" in one))
+    return {
+        "#{:02x}{:02x}{:02x}".format(*(round(v * (255 if share else 1)) for v in rgb))
+        for rgb, share in parts
+    }
 
 
 def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
@@ -643,7 +771,10 @@ def test_in_the_dark_letters_and_laws_are_legible_in_charts_too(browser, made):
     marks = colours(night.page, "#figure-medians g:has(> title) use", "fill") - {back}
     assert min(contrast(colour, back) for colour in marks) > 2.5
     assert len(marks) >= len(TINY.laws)
-    for media in ({"media": "print"}, {"media": "screen", "color_scheme": "light"}):  # on paper all is dark on white
+    for media in (
+        {"media": "print"},
+        {"media": "screen", "color_scheme": "light"},
+    ):  # on paper all is dark on white
         night.page.emulate_media(**media)
         by_day = colours(night.page, "#figure-medians g[transform*=scale]", "fill")
         assert min(contrast(colour, "#ffffff") for colour in by_day) > 4.5

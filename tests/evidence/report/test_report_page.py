@@ -35,20 +35,34 @@ NEVER, NONE = math.inf, math.nan
 PLANTS = "duffing", "van_der_pol", "no_plant", "pendulum_network"
 LAWS = "observer_free", "classical", "super_twisting"
 CONDITIONS = "nominal", "noise"
-SIZES = {"settling_time": 2.0, "overshoot": 30.0, "itae": 0.4, "ultimate_bound": 1e-3, "steady_error": 7e-4}
+SIZES = {
+    "settling_time": 2.0,
+    "overshoot": 30.0,
+    "itae": 0.4,
+    "ultimate_bound": 1e-3,
+    "steady_error": 7e-4,
+}
 SIZES |= {"max_u": 5.0, "tv_rate": 900.0}
 
 
 def scores():
-    """Other laws lead under other conditions; one never settles, one is level, one has runs that fail."""
+    """Other laws lead under other conditions; one never settles, one is level, one has runs that
+    fail.
+    """
     for i, plant in enumerate(PLANTS[:2]):
         for j, condition in enumerate(CONDITIONS):
             for k, (metric, size) in enumerate(SIZES.items()):
                 best = LAWS[(i * j + k) % 3]
                 for m, law in enumerate(LAWS):
-                    median = size * (1.0 + 0.3 * i + 0.7 * j + 1.9 * (m + 1) * (law != best) * 2.5**k)
-                    median = NEVER if (metric, law, i) == ("settling_time", "super_twisting", 1) else median
-                    width = (0.1 * median if m else 0.0) if i == 0 else NONE
+                    median = size * (
+                        1.0 + 0.3 * i + 0.7 * j + 1.9 * (m + 1) * (law != best) * 2.5**k
+                    )
+                    if (metric, law, i) == ("settling_time", "super_twisting", 1):
+                        median = NEVER
+                    if i == 0:
+                        width = 0.1 * median if m else 0.0
+                    else:
+                        width = NONE
                     wins, level = law == best and (i, j) != (1, 1), (i, j, m) == (1, 1, 1)
                     yield Score(
                         plant=plant,
@@ -72,7 +86,9 @@ def scores():
 
 
 class Place(NamedTuple):
-    """A law's line in a board: in how many of its blocks it loses and wins, its mean rank and runs that fail."""
+    """A law's line in a board: in how many of its blocks it loses and wins, its mean rank and runs
+    that fail.
+    """
 
     law: str
     losses: int = 0
@@ -89,16 +105,28 @@ def boards_of(places, of):
     boards = []
     for plant, metric in dict.fromkeys((place.plant, place.metric) for place in places):
         lines = [place for place in places if (place.plant, place.metric) == (plant, metric)]
-        entries = [
-            SimpleNamespace(
-                law=p.law, failed=p.failed, rank=SimpleNamespace(mean=p.mean), interval=SimpleNamespace(median=p.median)
+        entries = []
+        for p in lines:
+            entries.append(
+                SimpleNamespace(
+                    law=p.law,
+                    failed=p.failed,
+                    rank=SimpleNamespace(mean=p.mean),
+                    interval=SimpleNamespace(median=p.median),
+                )
             )
-            for p in lines
-        ]
-        blocks = [SimpleNamespace(best=[p.law for p in lines if k >= p.losses], level=False) for k in range(of)]
+        blocks = []
+        for k in range(of):
+            blocks.append(
+                SimpleNamespace(best=[p.law for p in lines if k >= p.losses], level=False)
+            )
         wins = {p.law: ["a condition"] * p.wins for p in lines}
         group = {"plant": plant}
-        boards.append(SimpleNamespace(group=group, metric=metric, entries=entries, blocks=blocks, wins=wins.get))
+        boards.append(
+            SimpleNamespace(
+                group=group, metric=metric, entries=entries, blocks=blocks, wins=wins.get
+            )
+        )
     return boards
 
 
@@ -108,15 +136,25 @@ def boards():
         for k, metric in enumerate(("settles", *words.MAIN_METRICS)):
             for m, law in enumerate(LAWS):
                 wins, losses = ((2, 0), (0, 1), (1, 2))[(i * k + m) % 3]
-                median = (0.6, 1.0, 0.95)[m] if metric == "settles" else (m + 1) * (i + 1) * 0.31 * 10.0 ** (k - 3)
-                places.append(Place(law, losses, wins, 1.25 + m * 0.5, m // 2, median, metric, plant))
+                if metric == "settles":
+                    median = (0.6, 1.0, 0.95)[m]
+                else:
+                    median = (m + 1) * (i + 1) * 0.31 * 10.0 ** (k - 3)
+                places.append(
+                    Place(law, losses, wins, 1.25 + m * 0.5, m // 2, median, metric, plant)
+                )
     return boards_of(places, 2)
 
 
 def claims():
     checks = {
         "duffing: settling time, s": {"value": 2.5, "relation": "<", "limit": 4.0, "holds": True},
-        "largest step, over lambda": {"value": 1.25, "relation": "<=", "limit": 1.0, "holds": False},
+        "largest step, over lambda": {
+            "value": 1.25,
+            "relation": "<=",
+            "limit": 1.0,
+            "holds": False,
+        },
     }
     fields = {"measured": "runs with eps > 0", "holds_if": "steps of eps s^2 <= lambda"}
     yield Claim(
@@ -160,7 +198,10 @@ def scaling(errors, order, theory, interval=0.25, why=""):
 def accuracies():
     for condition in ("constant", "coulomb"):
         for m, law in enumerate(LAWS):
-            errors = tuple(3e-3 * (h / 4e-3) ** m for h in PERIODS) if m else (NEVER, 2e-4, 0.0)
+            if m:
+                errors = tuple(3e-3 * (h / 4e-3) ** m for h in PERIODS)
+            else:
+                errors = (NEVER, 2e-4, 0.0)
             yield Accuracy(
                 plant="duffing",
                 condition=condition,
@@ -169,7 +210,12 @@ def accuracies():
                 unit="m",
                 periods=PERIODS,
                 e=scaling(errors, NONE if not m else m + 0.1, m - 1 if m else None),
-                s=scaling(errors, m + 0.5 * (condition == "coulomb"), m if m else None, why="levels off" * m),
+                s=scaling(
+                    errors,
+                    m + 0.5 * (condition == "coulomb"),
+                    m if m else None,
+                    why="levels off" * m,
+                ),
                 runs=6,
                 failed=2 * (not m),
                 floor=1e-9,
@@ -270,21 +316,36 @@ def leads():
 def machines():
     """The QUBE-Servo, on which one law wins in one metric, several in another and none in a third."""
     twin = smc.rig("qube_servo")
-    winners = {"itae": ["relay"] * 4, "tv_rate": ["relay", None, "regulator", "relay"], "ultimate_bound": [None] * 4}
+    winners = {
+        "itae": ["relay"] * 4,
+        "tv_rate": ["relay", None, "regulator", "relay"],
+        "ultimate_bound": [None] * 4,
+    }
     boards = []
     for k, (metric, won) in enumerate(winners.items()):
-        medians = [{law.name: 0.03 * 10.0**k * (m + 1 + 0.1 * j) for m, law in enumerate(twin.laws)} for j in range(4)]
-        blocks = [
-            SimpleNamespace(winner=one, medians=its, sample="6 starts") for one, its in zip(won, medians, strict=True)
-        ]
-        boards.append(SimpleNamespace(metric=metric, blocks=blocks, winner=won[0] if len(set(won)) == 1 else None))
+        medians = []
+        for j in range(4):
+            medians.append(
+                {law.name: 0.03 * 10.0**k * (m + 1 + 0.1 * j) for m, law in enumerate(twin.laws)}
+            )
+        blocks = []
+        for one, its in zip(won, medians, strict=True):
+            blocks.append(SimpleNamespace(winner=one, medians=its, sample="6 starts"))
+        boards.append(
+            SimpleNamespace(
+                metric=metric, blocks=blocks, winner=won[0] if len(set(won)) == 1 else None
+            )
+        )
     yield rigs.Machine(rig=twin, boards=tuple(boards))
 
 
 def repeated():
     t = np.linspace(0.0, 1.0, 5)
     columns = {"theta": np.sin(t), "alpha": t**2}
-    fits = {"the twin’s": {"theta": 94.06, "alpha": 88.0}, "quanser": {"theta": Fall(8.44), "alpha": Fall(8.44)}}
+    fits = {
+        "the twin’s": {"theta": 94.06, "alpha": 88.0},
+        "quanser": {"theta": Fall(8.44), "alpha": Fall(8.44)},
+    }
     yield rigs.Repeated(
         rig=smc.rig("qube_servo"),
         name="a.npz",
@@ -298,22 +359,46 @@ def repeated():
 
 def flown():
     """Three laws in two conditions: one is unbeaten in both, one has runs that fail."""
-    medians = {"geometric": (0.002, 0.2), "quaternion_sliding": (0.001, 0.1), "cascaded_pid": (0.01, NEVER)}
-    blocks = [
-        SimpleNamespace(
-            condition=name, best=("quaternion_sliding", "geometric")[: 2 - i], runs=6, sample="6 seeds",
-            medians={law: values[i] for law, values in medians.items()}, lacking={"cascaded_pid": 3 * i},
+    medians = {
+        "geometric": (0.002, 0.2),
+        "quaternion_sliding": (0.001, 0.1),
+        "cascaded_pid": (0.01, NEVER),
+    }
+    blocks = []
+    for i, name in enumerate(("nominal", "payload of 19 %")):
+        blocks.append(
+            SimpleNamespace(
+                condition=name,
+                best=("quaternion_sliding", "geometric")[: 2 - i],
+                runs=6,
+                sample="6 seeds",
+                medians={law: values[i] for law, values in medians.items()},
+                lacking={"cascaded_pid": 3 * i},
+            )
         )
-        for i, name in enumerate(("nominal", "payload of 19 %"))
-    ]  # fmt: skip
-    worst = {(block.condition, law): 3.0 * value for block in blocks for law, value in block.medians.items()}
+    worst = {}
+    for block in blocks:
+        for law, value in block.medians.items():
+            worst[(block.condition, law)] = 3.0 * value
     board = SimpleNamespace(blocks=blocks, entries=[SimpleNamespace(law=law) for law in medians])
-    return Flight(board=board, worst=worst | {("nominal", "geometric"): 0.0021}, medians=b"<svg/>", gains="default")
+    return Flight(
+        board=board,
+        worst=worst | {("nominal", "geometric"): 0.0021},
+        medians=b"<svg/>",
+        gains="default",
+    )
 
 
 def scenes():
     for plant, film in (("duffing", b"film"), ("pendulum_network", None)):
-        yield Scene(plant=plant, condition="nominal", laws=LAWS[:2], curves=b"<svg/>", film=film, seconds=2.0)
+        yield Scene(
+            plant=plant,
+            condition="nominal",
+            laws=LAWS[:2],
+            curves=b"<svg/>",
+            film=film,
+            seconds=2.0,
+        )
 
 
 def about():
@@ -349,13 +434,29 @@ def about():
 @pytest.fixture(scope="module")
 def findings():
     found = tuple(margins())
-    made = scores, leads, boards, claims, fields, fronts, oscillations, basins, machines, repeated, scenes
+    made = (
+        scores,
+        leads,
+        boards,
+        claims,
+        fields,
+        fronts,
+        oscillations,
+        basins,
+        machines,
+        repeated,
+        scenes,
+    )
     return Findings(
-        **{one.__name__: tuple(one()) for one in made}, medians=b"<svg></svg>", worst=tuple(worst_cases()),
+        **{one.__name__: tuple(one()) for one in made},
+        medians=b"<svg></svg>",
+        worst=tuple(worst_cases()),
         flight=flown(),
-        margins=found, by_set={"tuned": found[:6], "study": found[:4]}, accuracies=AccuracyTable(accuracies()),
+        margins=found,
+        by_set={"tuned": found[:6], "study": found[:4]},
+        accuracies=AccuracyTable(accuracies()),
         about=about(),
-    )  # fmt: skip
+    )
 
 
 SVG = re.compile(r"<svg.*?</svg>", re.S)
@@ -376,24 +477,35 @@ def said(text):
 def test_a_page_says_its_findings(findings, snapshot):
     text, _, defined = map(said, page.page(findings).partition('<h3 id="definitions">'))
     for metric in metrics():
-        assert said(words.pretty(str(inspect.getdoc(metric.formula)).split("\n\n")[-1])) in defined, metric.name
-    assert re.sub(r"the package’s \d+ laws", "the package’s laws", text) == snapshot  # a new one needs no new record
+        assert (
+            said(words.pretty(str(inspect.getdoc(metric.formula)).split("\n\n")[-1])) in defined
+        ), metric.name
+    assert (
+        re.sub(r"the package’s \d+ laws", "the package’s laws", text) == snapshot
+    )  # a new one needs no new record
 
 
-def test_charts_have_the_colours_of_the_page_and_say_their_numbers_where_the_pointer_rests(findings):
-    shown = {kind: charts.embedded(charts.margins(findings.margins, kind), kind) for kind in ("delay", "mass")}
+def test_charts_have_the_colours_of_the_page_and_say_their_numbers_where_the_pointer_rests(
+    findings,
+):
+    shown = {}
+    for kind in ("delay", "mass"):
+        shown[kind] = charts.embedded(charts.margins(findings.margins, kind), kind)
     hints = {kind: re.findall(r"<title>(.*?)</title>", svg) for kind, svg in shown.items()}
     for margin in findings.margins:
-        value = (
-            "none"
-            if math.isnan(margin.value)
-            else f"{'at least ' * (margin.value >= margin.searched)}{margin.value:.3g}"
-        )
-        assert any(hint.startswith(f"{words.law(margin.law)}: {value}") for hint in hints[margin.kind]), margin
+        if math.isnan(margin.value):
+            value = "none"
+        else:
+            value = f"{'at least ' * (margin.value >= margin.searched)}{margin.value:.3g}"
+        assert any(
+            hint.startswith(f"{words.law(margin.law)}: {value}") for hint in hints[margin.kind]
+        ), margin
     ids = [re.findall(r' id="(.*?)"', svg) for svg in shown.values()]
     assert set(ids[0]) & set(ids[1]) == set()
     for svg in shown.values():
-        assert set(re.findall(r"(?:url\(|href=\")#([^\")]*)", svg)) <= set(re.findall(r' id="(.*?)"', svg))
+        assert set(re.findall(r"(?:url\(|href=\")#([^\")]*)", svg)) <= set(
+            re.findall(r' id="(.*?)"', svg)
+        )
         assert "metadata" not in svg
         colours = set(re.findall(r"(?<!, )#[0-9a-f]{6}", svg))
         assert colours == set()  # each is the page's, or lighter by night
@@ -404,15 +516,30 @@ def test_charts_have_the_colours_of_the_page_and_say_their_numbers_where_the_poi
 
 
 def cells(rows, metric="itae"):
-    """Scores of cells: for each cell, law -> "wins", "level" or its median, where the best one is 1."""
+    """Scores of cells: for each cell, law -> "wins", "level" or its median, where the best one is
+    1.
+    """
     for k, cell in enumerate(rows):
         for law, how in cell.items():
             median = how if isinstance(how, float) else 1.0
             yield Score(
-                plant=PLANTS[k % 2], condition=CONDITIONS[k // 2 % 2], law=law, metric=metric, median=median,
-                low=median, high=median, best=median == 1.0, beaten=median > 1.0, wins=how == "wins", lead="",
-                seeds=6, failed=0, runs=6, sample="6 starts", floor=0.0,
-            )  # fmt: skip
+                plant=PLANTS[k % 2],
+                condition=CONDITIONS[k // 2 % 2],
+                law=law,
+                metric=metric,
+                median=median,
+                low=median,
+                high=median,
+                best=median == 1.0,
+                beaten=median > 1.0,
+                wins=how == "wins",
+                lead="",
+                seeds=6,
+                failed=0,
+                runs=6,
+                sample="6 starts",
+                floor=0.0,
+            )
 
 
 A, B, C, D = (*LAWS, "pid")
@@ -422,15 +549,28 @@ CASES = {  # what was found -> scores
     "three unbeaten": cells([dict.fromkeys((A, B, C), "level") | {D: 2.0}]),
     "four unbeaten": cells([dict.fromkeys((A, B, C, D), "level")]),
     "one wins": cells([{A: 2.0, B: "wins"}] * 2),
-    "one wins on every plant": cells([{A: 2.0, B: "wins"}] * 2 + [{A: "wins", B: 5.0}, {A: 3.0, B: "wins"}]),
-    "four win": cells([{A: "wins", B: 2.0, C: 2.0, D: 2.0}, {A: 4.0, B: "wins", C: 2.0, D: 2.0},
-                       {A: 8.0, B: 2.0, C: "wins", D: 2.0}, {A: 16.0, B: 2.0, C: 2.0, D: "wins"}]),
-}  # fmt: skip
+    "one wins on every plant": cells(
+        [{A: 2.0, B: "wins"}] * 2 + [{A: "wins", B: 5.0}, {A: 3.0, B: "wins"}]
+    ),
+    "four win": cells(
+        [
+            {A: "wins", B: 2.0, C: 2.0, D: 2.0},
+            {A: 4.0, B: "wins", C: 2.0, D: 2.0},
+            {A: 8.0, B: 2.0, C: "wins", D: 2.0},
+            {A: 16.0, B: 2.0, C: 2.0, D: "wins"},
+        ]
+    ),
+}
 
 
 def test_the_answer_is_counted_from_the_scores(findings, snapshot):
     lines = []
     for name, some in CASES.items():
         few = dataclasses.replace(findings, scores=tuple(some), claims=())
-        lines += [f"{name}:", answer.first(few, ["itae"]), answer.sure(few, ["itae"]), answer.verdict(few, ["itae"])]
+        lines += [
+            f"{name}:",
+            answer.first(few, ["itae"]),
+            answer.sure(few, ["itae"]),
+            answer.verdict(few, ["itae"]),
+        ]
     assert "\n".join(lines) == snapshot

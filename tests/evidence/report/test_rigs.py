@@ -1,4 +1,6 @@
-"""The report's section on real machines: rankings over parameter sets, and records beside their twins."""
+"""The report's section on real machines: rankings over parameter sets, and records beside their
+twins.
+"""
 
 from pathlib import Path
 
@@ -38,7 +40,10 @@ def shown(folder, work):
 
 
 def test_records_find_the_twin_of_their_columns(shown):
-    assert [(each.name, each.rig.name) for each in shown] == [("run.npz", "emps"), ("slow.npz", "emps")]
+    assert [(each.name, each.rig.name) for each in shown] == [
+        ("run.npz", "emps"),
+        ("slow.npz", "emps"),
+    ]
     own, nothing = shown[0].fits["the twin’s"], shown[0].fits["do nothing"]
     assert min(own.values()) > 90.0  # the velocity at the start is read off the positions
     assert nothing["u"] == pytest.approx(0.0, abs=1.0)
@@ -49,7 +54,11 @@ def test_records_find_the_twin_of_their_columns(shown):
 
 def test_a_picture_has_what_was_measured_beside_the_twin(shown, monkeypatch):
     given = []
-    monkeypatch.setattr(charts, "residual_figure", lambda *those: given.extend(those) or those[-1].write_bytes(b"svg"))
+    monkeypatch.setattr(
+        charts,
+        "residual_figure",
+        lambda *those: given.extend(those) or those[-1].write_bytes(b"svg"),
+    )
     assert charts.record(shown[0]) == b"svg"
     title, t, measured, predicted, fits, units, _ = given
     assert title == "emps: run.npz"
@@ -60,7 +69,10 @@ def test_a_picture_has_what_was_measured_beside_the_twin(shown, monkeypatch):
 
 def test_a_folder_without_records_of_a_rig_is_refused_before_any_run(work, tmp_path):
     (tmp_path / "a.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(smc.ScenarioError, match="has the columns of a rig: give those of one of emps t, x, u, r; qub"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match="has the columns of a rig: give those of one of emps t, x, u, r; qub",
+    ):
         stages.find(TINY, work.folder / "none", None, Bars(False), tmp_path)
     assert not (work.folder / "none").exists()
     with pytest.raises(smc.ScenarioError, match="no folder at"):

@@ -1,4 +1,6 @@
-"""How a report is put together: its plan, its progress, what it keeps, and small pieces of its stages."""
+"""How a report is put together: its plan, its progress, what it keeps, and small pieces of its
+stages.
+"""
 
 import contextlib
 import dataclasses
@@ -35,7 +37,8 @@ def work(tmp_path, plan=QUICK, shown=False):
 def test_a_stage_shows_its_share_of_items_and_its_time(tmp_path, monkeypatch, capsys):
     reached = []
     monkeypatch.setattr(
-        "smc_mujoco.common.progress.Bar.reached", lambda self, done, whole: reached.append((done, whole))
+        "smc_mujoco.common.progress.Bar.reached",
+        lambda self, done, whole: reached.append((done, whole)),
     )
     monkeypatch.setattr(plan, "time", SimpleNamespace(monotonic=iter([10.0, 13.4]).__next__))
     bars = Bars(False)
@@ -63,7 +66,9 @@ def noted(monkeypatch, path, gives=None):
 
     def stub(*given, **options):
         calls.append((given, options))
-        return gives(*given, **options) if callable(gives) else gives
+        if callable(gives):
+            return gives(*given, **options)
+        return gives
 
     monkeypatch.setattr(f"smc_mujoco.{path}", stub)
     return calls
@@ -83,7 +88,13 @@ def test_a_report_is_of_its_plan_and_its_changes(tmp_path, monkeypatch):
     assert (tmp_path / "report.html").read_text() == "the page"
     make(str(tmp_path), progress=True, records="there")
     (plan, folder, threads, bars, records), _ = found[-1]
-    assert (plan, folder, threads, bars.shown, records) == (FULL, tmp_path, None, True, Path("there"))
+    assert (plan, folder, threads, bars.shown, records) == (
+        FULL,
+        tmp_path,
+        None,
+        True,
+        Path("there"),
+    )
     make(tmp_path, plan=QUICK, quick=False)
     assert found[-1][0][0] is QUICK
 
@@ -113,8 +124,9 @@ def test_records_of_a_folder_are_read_in_the_order_of_their_names(tmp_path, monk
     monkeypatch.setattr(Path, "iterdir", lambda _: iter(files))
     monkeypatch.setattr(rigs.records, "load", lambda path: dict.fromkeys("txur", path.name))
     assert [(path.name, twin.name, record["t"]) for path, twin, record in rigs.read(tmp_path)] == [
-        ("a.csv", "emps", "a.csv"), ("b.npz", "emps", "b.npz"),
-    ]  # fmt: skip
+        ("a.csv", "emps", "a.csv"),
+        ("b.npz", "emps", "b.npz"),
+    ]
 
 
 STAGES = {  # stage -> the function that does its work for one item, and what that gives here
@@ -138,7 +150,9 @@ SMALL = dataclasses.replace(
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(stage, tmp_path, monkeypatch, capsys, snapshot):
+def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(
+    stage, tmp_path, monkeypatch, capsys, snapshot
+):
     path, gives = STAGES[stage]
     calls = noted(monkeypatch, path, gives)
     if stage == "all_basins":
@@ -147,9 +161,18 @@ def test_a_stage_hands_on_its_plan_and_keeps_a_file_for_each_item(stage, tmp_pat
     getattr(stages, stage)(work(tmp_path, SMALL, shown=True), *GIVEN.get(stage, ()))
     lines = [re.sub(r" *\d+ s$", "", line) for line in capsys.readouterr().out.splitlines()]
     for given, options in calls:
-        plain = [one.name if isinstance(one, Path) else one.__name__ if callable(one) else one for one in given]
-        plain = [f"{one.law.name} on {one.plant.name}" if isinstance(one, smc.Scenario) else one for one in plain]
-        lines.append(f"{plain} { ({name: one for name, one in options.items() if name != 'report'}) }")
+        plain = []
+        for one in given:
+            plain.append(
+                one.name if isinstance(one, Path) else one.__name__ if callable(one) else one
+            )
+        plain = [
+            f"{one.law.name} on {one.plant.name}" if isinstance(one, smc.Scenario) else one
+            for one in plain
+        ]
+        lines.append(
+            f"{plain} { ({name: one for name, one in options.items() if name != 'report'}) }"
+        )
     lines += names(tmp_path)
     assert "\n".join(lines) == snapshot
 
@@ -164,19 +187,27 @@ def test_findings_are_what_the_stages_give_in_their_order(tmp_path, monkeypatch,
 
     def stub(name):
         return lambda *given, **named: (
-            done.append(f"{name}({', '.join(map(shown, (*given, *named.values())))})") or f"of {name}"
+            done.append(f"{name}({', '.join(map(shown, (*given, *named.values())))})")
+            or f"of {name}"
         )
 
     def shown(value):
-        return (
-            "spent" if value is bars.spent else type(value).__name__ if isinstance(value, (Work, Plan)) else f"{value}"
-        )
+        if value is bars.spent:
+            return "spent"
+        if isinstance(value, (Work, Plan)):
+            return type(value).__name__
+        return f"{value}"
 
     for name in names.split():
         monkeypatch.setattr(f"smc_mujoco.evidence.report.stages.{name}", stub(name))
     monkeypatch.setattr(stages.video, "missing", lambda: "no film: no renderer")
     findings = stages.find(SMALL, tmp_path, 3, bars, Path("there"))
-    assert "\n".join([*done, *(f"{name}: {value}" for name, value in vars(findings).items()), *bars.spent]) == snapshot
+    assert (
+        "\n".join(
+            [*done, *(f"{name}: {value}" for name, value in vars(findings).items()), *bars.spent]
+        )
+        == snapshot
+    )
 
 
 def test_the_grid_is_kept_and_its_noise_is_drawn_for_a_user_s_law(tmp_path, monkeypatch):
@@ -188,11 +219,15 @@ def test_the_grid_is_kept_and_its_noise_is_drawn_for_a_user_s_law(tmp_path, monk
         assert stages.grid(work(tmp_path, plan)) == "the table"
         (runs, folder), options = calls.pop()
         assert [(one.law.name, one.condition, one.seed, one.duration) for one in runs] == [
-            (law, condition, seed, 3.0) for condition in plan.conditions for law in ("pid", "lqr") for seed in range(24)
+            (law, condition, seed, 3.0)
+            for condition in plan.conditions
+            for law in ("pid", "lqr")
+            for seed in range(24)
         ]
         assert (folder, options) == (
-            tmp_path / "study", {"threads": 3, "progress": False, "noise_key": key, "half_steps": True},
-        )  # fmt: skip
+            tmp_path / "study",
+            {"threads": 3, "progress": False, "noise_key": key, "half_steps": True},
+        )
 
 
 def test_what_the_grid_was_is_told(monkeypatch):
@@ -205,7 +240,13 @@ def test_what_the_grid_was_is_told(monkeypatch):
     monkeypatch.setattr(about.paired_runs, "sources", lambda table: ["tuned"])
     monkeypatch.setattr(about, "in_words", lambda sources: f"in words {sources}")
     its = about.about(SMALL, table, {"grid": 1.5}, "no renderer")
-    assert (its.plan, its.runs, its.failed, its.seeds, its.sources) == (SMALL, 5, 3, 3, "in words ['tuned']")
+    assert (its.plan, its.runs, its.failed, its.seeds, its.sources) == (
+        SMALL,
+        5,
+        3,
+        3,
+        "in words ['tuned']",
+    )
     assert list(its.versions) == ["a", "pyarrow", "scipy"]
     assert (its.spent, its.no_film) == ({"grid": 1.5}, "no renderer")
 
@@ -213,7 +254,9 @@ def test_what_the_grid_was_is_told(monkeypatch):
 def test_accuracy_is_of_each_condition_with_the_plan_s_periods(tmp_path, monkeypatch):
     calls = noted(monkeypatch, "evidence.report.stages.accuracy", lambda *_, **__: AccuracyTable())
     assert stages.accuracies(work(tmp_path, SMALL)) == []
-    expected = [(SMALL.laws, "duffing", SMALL.periods, one, 1, "tuned") for one in ("constant", "coulomb")]
+    expected = []
+    for one in ("constant", "coulomb"):
+        expected.append((SMALL.laws, "duffing", SMALL.periods, one, 1, "tuned"))
     assert [given for given, _ in calls] == expected
     assert all(options["threads"] == 3 for _, options in calls)
     assert names(tmp_path) == [f"accuracy-duffing-{one}.json" for one in stages.ACCURACY_CONDITIONS]
@@ -225,13 +268,21 @@ def test_accuracy_is_of_each_condition_with_the_plan_s_periods(tmp_path, monkeyp
 
 def test_v_rises_where_its_rate_is_positive_off_the_surface():
     x, v = np.array([0.0, 1.0]), np.array([-1.0, 0.0, 2.0])
-    rate, s = np.array([[1.0, -1.0], [0.0, 2.0], [3.0, 1e-9]]), np.array([[1.0, 1.0], [1.0, -1.0], [1e-6, 1.0]])
+    rate, s = (
+        np.array([[1.0, -1.0], [0.0, 2.0], [3.0, 1e-9]]),
+        np.array([[1.0, 1.0], [1.0, -1.0], [1e-6, 1.0]]),
+    )
     field = Field(plant="duffing", x=x, v=v, vdot=rate, s=s)
     assert field.rises.tolist() == [[True, False], [False, True], [False, True]]
     assert field.share == 0.5
     assert stages.fields(dataclasses.replace(SMALL, laws=("pid",))) == ()
     (own, _) = stages.fields(dataclasses.replace(SMALL, laws=("observer_free",)))
-    assert (own.plant, own.vdot.shape, own.x.shape, own.v.shape) == ("duffing", (121, 121), (121,), (121,))
+    assert (own.plant, own.vdot.shape, own.x.shape, own.v.shape) == (
+        "duffing",
+        (121, 121),
+        (121,),
+        (121,),
+    )
 
 
 def test_a_film_has_every_frame(tmp_path, monkeypatch):
@@ -253,8 +304,14 @@ def test_a_film_has_every_frame(tmp_path, monkeypatch):
     assert film == b"webm"
 
 
-def test_limit_cycles_are_of_laws_behind_a_lag_and_a_law_without_prediction_is_left_out(tmp_path, monkeypatch):
-    cycle = type("Cycle", (), {"amplitude": 0.2, "frequency": 9.0, "third_harmonic": 0.04, "uncertainty": 0.1})
+def test_limit_cycles_are_of_laws_behind_a_lag_and_a_law_without_prediction_is_left_out(
+    tmp_path, monkeypatch
+):
+    cycle = type(
+        "Cycle",
+        (),
+        {"amplitude": 0.2, "frequency": 9.0, "third_harmonic": 0.04, "uncertainty": 0.1},
+    )
 
     def predicted(scenario):
         if scenario.law.name == "lqr":
@@ -262,12 +319,21 @@ def test_limit_cycles_are_of_laws_behind_a_lag_and_a_law_without_prediction_is_l
         return cycle
 
     halved = [type("Change", (), {"marked": marked}) for marked in (True, False, False)]
-    runs = noted(monkeypatch, "evidence.report.oscillation.run", lambda cases, threads: [made(one) for one in cases])
+    runs = noted(
+        monkeypatch,
+        "evidence.report.oscillation.run",
+        lambda cases, threads: [made(one) for one in cases],
+    )
     changes = noted(monkeypatch, "evidence.report.oscillation.step_halving", halved)
     monkeypatch.setattr(oscillation, "chattering", predicted)
     monkeypatch.setattr(oscillation, "channel_cycle", lambda trace: (0.25, 8.0))
-    plan, reached = dataclasses.replace(SMALL, plants=("duffing",), laws=("pid", "lqr", "classical")), []
-    found = oscillation._on("duffing", plan.laws, 3, lambda done, whole: reached.append((done, whole)))
+    plan, reached = (
+        dataclasses.replace(SMALL, plants=("duffing",), laws=("pid", "lqr", "classical")),
+        [],
+    )
+    found = oscillation._on(
+        "duffing", plan.laws, 3, lambda done, whole: reached.append((done, whole))
+    )
     assert reached == [(0, 3), (1, 3), (2, 3)]
     (cases, threads), _ = runs[0]
     assert threads == 3
@@ -296,10 +362,23 @@ def test_gains_of_an_audit_are_listed_once_with_their_plants():
         return type("Used", (), {"scenario": smc.Scenario(plant=plant, law=law)})
 
     pid, classical = smc.law("pid", kp=3.0), smc.law("classical", k=2.0, c=1.5)
-    first = {"slow": {"a": used(pid, "duffing"), "b": used(classical, "duffing"), "c": used(classical, "van_der_pol")}}
-    done = type("Done", (), {"used": {"1": first, "2": {"slow": {"d": used(classical, "duffing")}, "other": {}}}})
+    first = {
+        "slow": {
+            "a": used(pid, "duffing"),
+            "b": used(classical, "duffing"),
+            "c": used(classical, "van_der_pol"),
+        }
+    }
+    done = type(
+        "Done",
+        (),
+        {"used": {"1": first, "2": {"slow": {"d": used(classical, "duffing")}, "other": {}}}},
+    )
     found = paper.gains(done, "slow")
-    assert list(found) == [("classical", "k = 2.00, c = 1.50"), next(key for key in found if key[0] == "pid")]
+    assert list(found) == [
+        ("classical", "k = 2.00, c = 1.50"),
+        next(key for key in found if key[0] == "pid"),
+    ]
     assert found["classical", "k = 2.00, c = 1.50"] == ["Duffing", "Van der Pol"]
     assert paper.gains(done, "other") == {}
 
@@ -308,7 +387,12 @@ def test_records_of_a_folder_are_repeated_in_few_points(tmp_path, monkeypatch):
     twin = type(
         "Twin",
         (),
-        {"name": "twin", "published": ("a",), "fit": lambda _, r: {"x": 90.0}, "idle": lambda _, r: {"x": 0.0}},
+        {
+            "name": "twin",
+            "published": ("a",),
+            "fit": lambda _, r: {"x": 90.0},
+            "idle": lambda _, r: {"x": 0.0},
+        },
     )()
     t = np.arange(2401.0)
     twin.set = lambda name: type("Set", (), {"fits": lambda _, many: [{"x": 50.0}]})()
@@ -323,7 +407,13 @@ def test_records_of_a_folder_are_repeated_in_few_points(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("unit", "typeset"),
-    [("rad s^2", "rad·s²"), ("(rad)^2", "rad²"), ("N m/s", "N·m/s"), ("% of runs", "% of runs"), ("1", "1")],
+    [
+        ("rad s^2", "rad·s²"),
+        ("(rad)^2", "rad²"),
+        ("N m/s", "N·m/s"),
+        ("% of runs", "% of runs"),
+        ("1", "1"),
+    ],
 )
 def test_units_are_typeset_with_dots_and_powers(unit, typeset):
     assert words.typeset(unit) == typeset
@@ -331,11 +421,21 @@ def test_units_are_typeset_with_dots_and_powers(unit, typeset):
 
 def test_words_are_those_of_the_suite_and_unknown_names_are_words():
     assert words.either(["rad", "1", "m", "", "rad"]) == "rad or m"
-    assert (words.unit("itae"), words.unit("itae", "duffing"), words.unit("mine")) == ("rad·s² or m·s²", "m·s²", "")
+    assert (words.unit("itae"), words.unit("itae", "duffing"), words.unit("mine")) == (
+        "rad·s² or m·s²",
+        "m·s²",
+        "",
+    )
     assert (words.metric("my_metric"), words.kind("my_kind"), words.condition("input_delay")) == (
-        "my metric", "my kind", "input delay",
-    )  # fmt: skip
-    assert (words.number(np.inf), words.number(np.nan), words.number(1234.6)) == ("never", "none", "1235")
+        "my metric",
+        "my kind",
+        "input delay",
+    )
+    assert (words.number(np.inf), words.number(np.nan), words.number(1234.6)) == (
+        "never",
+        "none",
+        "1235",
+    )
     assert words.interval(1.0, 0.9, 1.1) == "0.900 – 1.10"
     assert words.interval(2.0, 1.9999, 2.0001) == words.interval(1.0, np.nan, 1.1) == ""
     assert words.pretty("`steps` of eps != alphadot in van_der_pol under observer_free") == (

@@ -1,4 +1,6 @@
-"""Torques of RealAIGym's double pendulum, from its motion: of simulated runs, and of the public sys-id records."""
+"""Torques of RealAIGym's double pendulum, from its motion: of simulated runs, and of the public
+sys-id records.
+"""
 
 import re
 from pathlib import Path
@@ -12,7 +14,13 @@ import smc_mujoco as smc
 DATA = Path(smc.__file__).resolve().parents[2] / "shared" / "rigs"
 RIG = smc.rig("realaigym_acrobot")
 TRAIN = "C1-sysid-03", "C1-sysid-13"
-UNUSED = "C1-sysid-01", "C1-sysid-05", "C1-sysid-07", "acrobot-ilqr_tvlqr_lqr-01", "pendubot-ilqr_tvlqr_lqr-01"
+UNUSED = (
+    "C1-sysid-01",
+    "C1-sysid-05",
+    "C1-sysid-07",
+    "acrobot-ilqr_tvlqr_lqr-01",
+    "pendubot-ilqr_tvlqr_lqr-01",
+)
 
 
 def rms(rig, record):
@@ -30,7 +38,11 @@ def apart(rig, record):
 def swung():
     """4 s of the acrobot without friction under a torque at its elbow, as a record."""
     rig = RIG.set("model_1_1")
-    trace = smc.run(rig.scenario("none", feedforward=smc.Sine(1.0, 6.0), duration=4.0, sensor=None, x0=(0.3, 0.2)))
+    trace = smc.run(
+        rig.scenario(
+            "none", feedforward=smc.Sine(1.0, 6.0), duration=4.0, sensor=None, x0=(0.3, 0.2)
+        )
+    )
     x, v = trace.x[:, ::-1], trace.v[:, ::-1]  # shoulder, elbow
     record = {"time": trace.t, "tau_meas1": np.zeros(len(trace.t)), "tau_meas2": trace.u[:, 0]}
     for i in range(2):
@@ -54,10 +66,14 @@ def test_a_simulated_run_gives_its_moments_back(swung):
 
 
 def test_noise_of_the_encoders_does_not_make_a_link_lighter(swung):
-    """Noise of an acceleration must not count as motion that takes a torque: least squares would shrink the inertia."""
+    """Noise of an acceleration must not count as motion that takes a torque: least squares would
+    shrink the inertia.
+    """
     rig, record = swung
     rng = np.random.default_rng(1)
-    noisy = record | {f"pos_meas{i}": record[f"pos_meas{i}"] + rng.normal(0.0, 1e-3, 2001) for i in (1, 2)}
+    noisy = record | {
+        f"pos_meas{i}": record[f"pos_meas{i}"] + rng.normal(0.0, 1e-3, 2001) for i in (1, 2)
+    }
     found = smc.identify(rig, noisy, ("r2", "I2"), starts=1)
     assert found.values["I2"] == pytest.approx(rig.values["I2"], rel=0.05)
 
@@ -74,7 +90,9 @@ def test_the_published_dry_friction_is_what_its_arctangent_reaches():
 @pytest.mark.parametrize(("count", "step"), [(400, 2e-3), (50, 0.1)])
 def test_a_record_too_short_or_too_slow_for_torques_is_refused(count, step, swung):
     t = step * np.arange(count)
-    with pytest.raises(smc.ScenarioError, match="for its torques give at least 1 s, with a sample every"):
+    with pytest.raises(
+        smc.ScenarioError, match="for its torques give at least 1 s, with a sample every"
+    ):
         RIG.fit(dict.fromkeys(swung[1], t))
 
 

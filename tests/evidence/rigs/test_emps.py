@@ -34,9 +34,13 @@ def test_a_reference_a_tick_late_or_early_errs_by_fifteen_hundredths():
 
 
 def test_the_error_at_constant_speed_is_that_of_the_formula():
-    """v / kp + F / (kv kp force_per_volt), with F the friction at that speed, late on the longest plateau."""
+    """v / kp + F / (kv kp force_per_volt), with F the friction at that speed, late on the longest
+    plateau.
+    """
     q, gains = RIG.values, RIG.scenario().law.gains
-    trace = smc.run(RIG.scenario(reference=PROGRAM, duration=2.4, x0=emps.START[0], v0=emps.START[1]))
+    trace = smc.run(
+        RIG.scenario(reference=PROGRAM, duration=2.4, x0=emps.START[0], v0=emps.START[1])
+    )
     k = 2000
     v = trace.v[k, 0]
     force = q["viscous"] * v + q["coulomb"] + q["offset"]

@@ -57,20 +57,31 @@ def test_a_rig_has_laws_and_a_start_of_its_own():
     assert {run.resolved.x0 for run in runs} == {(0.0, 0.1)}
     many = ensemble.runs(PENDULUM, ["pid"])
     assert ({run.duration for run in many}, {run.seed for run in many}) == ({10.0}, {*range(20)})
-    assert {len({run.resolved.x0 for run in many if run.condition == f"set {k}"}) for k in range(1, 6)} == {20}
+    assert {
+        len({run.resolved.x0 for run in many if run.condition == f"set {k}"}) for k in range(1, 6)
+    } == {20}
     assert all(0.24 - 1e-9 <= run.resolved.x0[0] <= 0.36 + 1e-9 for run in many)
-    with pytest.raises(smc.ScenarioError, match="no laws have gains for realaigym_acrobot: give some"):
+    with pytest.raises(
+        smc.ScenarioError, match="no laws have gains for realaigym_acrobot: give some"
+    ):
         ensemble.runs(smc.rig("realaigym_acrobot"))
 
 
 @pytest.mark.parametrize(
-    ("name", "torque", "drag"), [("qube_servo", 5.07081e-3, True), ("stepper_furuta", 1.104e-3, False)]
+    ("name", "torque", "drag"),
+    [("qube_servo", 5.07081e-3, True), ("stepper_furuta", 1.104e-3, False)],
 )
 def test_the_laws_of_a_rotary_pendulum_slide_on_its_own_surface_of_least_cost(name, torque, drag):
-    """With the weights of `rotary_swing_up`, by a Riccati equation of the linear machine, in its unit of u."""
+    """With the weights of `rotary_swing_up`, by a Riccati equation of the linear machine, in its
+    unit of u.
+    """
     from scipy.linalg import solve_continuous_are
 
-    rig = smc.rig(name) if drag else smc.rig(name, pendulum_inertia=1.0215e-4)  # of the firmware's model
+    # of the firmware's model
+    if drag:
+        rig = smc.rig(name)
+    else:
+        rig = smc.rig(name, pendulum_inertia=1.0215e-4)
     p, q = rig.scenario("none").plant.values({}), rig.values
     Jp, lever, weight = p.Jc + p.m * p.l**2, p.m * p.L * p.l, p.m * p.grav * p.l
     A, b = np.zeros((4, 4)), np.zeros((4, 1))
@@ -85,13 +96,18 @@ def test_the_laws_of_a_rotary_pendulum_slide_on_its_own_surface_of_least_cost(na
     (c,) = b.T @ solve_continuous_are(A, b, np.diag([1.0, 10.0, 0.05, 0.05]), [[R]]) / R
     for law in rig.laws:
         if "catch" in law.gains:
-            assert [law.gains[f"c{i}"] for i in (1, 2, 3, 4)] == pytest.approx(c, rel=1e-5), law.name
+            assert [law.gains[f"c{i}"] for i in (1, 2, 3, 4)] == pytest.approx(c, rel=1e-5), (
+                law.name
+            )
             assert law.gains["catch"] == pytest.approx(0.05 / torque)
 
 
 def test_laws_are_tuned_on_every_set_of_the_machine_by_one_rule():
     """A volt and an acceleration are searched about their bounds, terms that a law lacks stay away."""
-    for name, bound, count in (("qube_servo", 10.0, 4), ("stepper_furuta", 20e3 * math.tau / 1600.0, 8)):
+    for name, bound, count in (
+        ("qube_servo", 10.0, 4),
+        ("stepper_furuta", 20e3 * math.tau / 1600.0, 8),
+    ):
         rig = smc.rig(name)
         goal = ensemble.objective(rig)
         assert goal.u_max == pytest.approx(bound)
@@ -99,7 +115,9 @@ def test_laws_are_tuned_on_every_set_of_the_machine_by_one_rule():
         cases = goal.scenarios(rig.scenario("none").plant, rig.laws[-1])
         assert len(cases) == count
         assert {case.limits for case in cases} == {rig.scenario("none").limits}
-        assert [case.plant for case in cases] == [one.scenario("none").plant for one in rig.members().values()]
+        assert [case.plant for case in cases] == [
+            one.scenario("none").plant for one in rig.members().values()
+        ]
     goal = ensemble.objective(smc.rig("qube_servo"))
     boxes = {
         law.name: set(search._task(rig.scenario("none").plant, law, goal, 8, 0, 1).box)
@@ -114,19 +132,41 @@ def test_laws_are_tuned_on_every_set_of_the_machine_by_one_rule():
 def test_runs_take_the_gains_of_the_searches_in_turn_and_firmware_keeps_its_own():
     rig = smc.rig("stepper_furuta")
     regulator = next(law for law in rig.laws if law.name == "regulator")
-    two = [dataclasses.replace(regulator, gains=dict(regulator.gains) | {"k": k}) for k in (300.0, 600.0)]
+    two = []
+    for k in (300.0, 600.0):
+        two.append(dataclasses.replace(regulator, gains=dict(regulator.gains) | {"k": k}))
     found = ensemble.Candidate(two[1], tuple(two))
     (linear,) = ensemble.tuned(rig, ["linear"], searches=1, budget=1)
     assert linear.sets == (rig.laws[0],)
     assert linear.remark == "not tuned: law 'linear' has no gain to tune: choose another"
-    runs = [one for one in ensemble.runs(rig, [found, linear], seeds=3, duration=0.5) if one.condition == "set 2"]
-    assert [one.law.gains["k"] for one in runs if one.law.name == "regulator"] == [300.0, 600.0, 300.0]
-    assert {one.law.name: one.limits[0] for one in runs} == {"regulator": math.inf, "linear": math.inf}  # are alike
+    runs = []
+    for one in ensemble.runs(rig, [found, linear], seeds=3, duration=0.5):
+        if one.condition == "set 2":
+            runs.append(one)
+    assert [one.law.gains["k"] for one in runs if one.law.name == "regulator"] == [
+        300.0,
+        600.0,
+        300.0,
+    ]
+    assert {one.law.name: one.limits[0] for one in runs} == {
+        "regulator": math.inf,
+        "linear": math.inf,
+    }  # are alike
 
 
 @pytest.mark.slow
 def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path):
-    words = ["compare", "--rig", "simple_pendulum_ak80", "--law", "pid", "--law", "twisting", "--searches", "1"]
+    words = [
+        "compare",
+        "--rig",
+        "simple_pendulum_ak80",
+        "--law",
+        "pid",
+        "--law",
+        "twisting",
+        "--searches",
+        "1",
+    ]
     more = ["--seeds", "1", "--duration", "0.5", "--defaults", "--out", str(tmp_path)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ensemble.tuned, "__defaults__", (None, 1, 1, None, None, None, False))
@@ -138,12 +178,20 @@ def test_a_law_is_tuned_on_a_machine_and_compared_there(tmp_path):
 
 def test_a_law_by_name_has_the_gains_of_the_rig_and_every_place_says_so(tmp_path):
     pid = next(law for law in PENDULUM.laws if law.name == "pid")
-    its = {run.law.name: run.law for run in ensemble.runs(PENDULUM, ["pid", "twisting"], seeds=1, duration=0.1)}
-    assert (its["pid"], its["pid"].source.kind, its["twisting"].source.kind) == (pid, "shipped", "default")
+    its = {}
+    for run in ensemble.runs(PENDULUM, ["pid", "twisting"], seeds=1, duration=0.1):
+        its[run.law.name] = run.law
+    assert (its["pid"], its["pid"].source.kind, its["twisting"].source.kind) == (
+        pid,
+        "shipped",
+        "default",
+    )
     words = ["worst", PENDULUM.name, "--law", "pid,twisting", "--budget", "1", "--duration", "0.1"]
     done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "worst.json")])
     assert done.exit_code == 0, done.output
-    said = {one["scenario"]["source"]["kind"] for one in json.loads((tmp_path / "worst.json").read_text())}
+    said = set()
+    for one in json.loads((tmp_path / "worst.json").read_text()):
+        said.add(one["scenario"]["source"]["kind"])
     assert said == {"shipped", "default"}
     assert "gains: pid shipped (" in done.output
     assert "twisting default" in done.output
@@ -151,18 +199,25 @@ def test_a_law_by_name_has_the_gains_of_the_rig_and_every_place_says_so(tmp_path
 
 def test_a_board_of_a_voltage_is_in_volts(tmp_path):
     fields = {"actuator": smc.DCMotor(command="voltage"), "duration": 0.2}
-    runs = [
-        smc.Scenario(plant="duffing", law=law, x0=x0, seed=seed, **fields)
-        for law in LAWS
-        for seed, x0 in enumerate((0.2, 0.3))
-    ]
+    runs = []
+    for law in LAWS:
+        for seed, x0 in enumerate((0.2, 0.3)):
+            runs.append(smc.Scenario(plant="duffing", law=law, x0=x0, seed=seed, **fields))
     (board,) = smc.leaderboard(smc.study(runs, tmp_path, progress=False), metrics=("tv_rate",))
     assert board.unit == "V/s"
     assert heading(board) == "TV rate (V/s)"
 
 
 def test_the_command_compares_laws_on_every_set(tmp_path):
-    words = ["compare", "--rig", PENDULUM.name, "--law", "pid(kp=30, kd=6),super_twisting", "--seeds", "1"]
+    words = [
+        "compare",
+        "--rig",
+        PENDULUM.name,
+        "--law",
+        "pid(kp=30, kd=6),super_twisting",
+        "--seeds",
+        "1",
+    ]
     done = CliRunner().invoke(app, [*words, "--duration", "0.1", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "tv_rate: no law wins on all 5 parameter sets (none on any)" in done.output
@@ -176,8 +231,19 @@ def test_the_command_compares_laws_on_every_set(tmp_path):
 
 def test_the_command_identifies_from_files(tmp_path):
     rig = smc.rig("emps")
-    smc.run(rig.scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(tmp_path / "run.npz")
-    words = ["rig", "--fit", "emps", str(tmp_path / "run.npz"), "--quantities", "mass", "--starts", "1"]
+    smc.run(rig.scenario(duration=0.3, reference=smc.Sine(0.05, 8.0), x0=0.0)).save(
+        tmp_path / "run.npz"
+    )
+    words = [
+        "rig",
+        "--fit",
+        "emps",
+        str(tmp_path / "run.npz"),
+        "--quantities",
+        "mass",
+        "--starts",
+        "1",
+    ]
     done = CliRunner().invoke(app, [*words, "--json", str(tmp_path / "found.json")])
     assert done.exit_code == 0, done.output
     assert "mass" in done.output

@@ -25,14 +25,19 @@ WRONG = {"mass": 80.0, "viscous": 150.0, "coulomb": 30.0, "offset": 0.0}
 
 
 def carriage(x, v, force, time, m, b, dry, constant):
-    """An axis under a constant force, s later, in closed form between its stops: an independent oracle."""
+    """An axis under a constant force, s later, in closed form between its stops: an independent
+    oracle.
+    """
     while time > 1e-15:
         net = force - constant
         if v == 0.0 and abs(net) <= dry:
             break
         sign = math.copysign(1.0, v or net)
         final, lag = (net - dry * sign) / b, m / b
-        stop = lag * math.log((v - final) / -final) if v and final * sign < 0.0 else math.inf
+        if v and final * sign < 0.0:
+            stop = lag * math.log((v - final) / -final)
+        else:
+            stop = math.inf
         spent = min(time, stop)
         left = math.exp(-spent / lag)
         x, v = x + final * spent + (v - final) * lag * (1.0 - left), final + (v - final) * left
@@ -41,7 +46,9 @@ def carriage(x, v, force, time, m, b, dry, constant):
 
 
 def axis_record(seconds, begin=0.0, speed=4.0):
-    """Columns of the real axis on a sine from rest, as its encoder, cascade and amplifier would write them."""
+    """Columns of the real axis on a sine from rest, as its encoder, cascade and amplifier would
+    write them.
+    """
     quantum, gains = AXIS.values["count"], AXIS.scenario().law.gains
     t = 1e-3 * np.arange(round(seconds / 1e-3) + 1)
     r = 0.05 * np.sin(speed * t)
@@ -51,16 +58,22 @@ def axis_record(seconds, begin=0.0, speed=4.0):
         y[k] = quantum * math.floor(x / quantum + 0.5)
         rate = (y[k] - y[k - 1]) / 1e-3 if k else 0.0
         u[k] = min(10.0, max(-10.0, gains["kv"] * (gains["kp"] * (r[k] - y[k]) - rate)))
-        x, v = carriage(x, v, AXIS.values["force_per_volt"] * u[k], 1e-3, *map(AXIS.values.get, AXIS.free))
+        x, v = carriage(
+            x, v, AXIS.values["force_per_volt"] * u[k], 1e-3, *map(AXIS.values.get, AXIS.free)
+        )
     first = round(begin / 1e-3)
     return {"t": t[first:] - begin, "x": y[first:], "u": u[first:], "r": r[first:]}
 
 
 @pytest.mark.parametrize(
-    "begin", [pytest.param(0.0, marks=pytest.mark.slow), 0.25], ids=["with a jump from rest", "in motion"]
+    "begin",
+    [pytest.param(0.0, marks=pytest.mark.slow), 0.25],
+    ids=["with a jump from rest", "in motion"],
 )
 def test_columns_of_the_axis_give_all_four_however_they_begin(begin):
-    """By another simulator without steps; a cubic through the first samples would err by 8 % in the offset."""
+    """By another simulator without steps; a cubic through the first samples would err by 8 % in the
+    offset.
+    """
     near = AXIS.with_values({name: 1.05 * AXIS.values[name] for name in AXIS.free})
     result = smc.identify(near, axis_record(0.6 + begin, begin), starts=1, most=3)
     for name, value in result.values.items():
@@ -84,7 +97,12 @@ def swung():
     """1.5 s of the pendulum under a torque, with noise."""
     return smc.run(
         PENDULUM.scenario(
-            "none", feedforward=smc.Sine(2.0, 4.5), duration=1.5, x0=-math.pi, noise=smc.Noise(1e-3), seed=3
+            "none",
+            feedforward=smc.Sine(2.0, 4.5),
+            duration=1.5,
+            x0=-math.pi,
+            noise=smc.Noise(1e-3),
+            seed=3,
         )
     )
 
@@ -103,7 +121,9 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
     """From a mass so far off that a random start is better, and with a single step from it."""
     far = AXIS.with_values({"mass": 2000.0})
     brief = smc.run(AXIS.scenario(duration=0.5, reference=smc.Sine(0.05, 8.0), x0=0.0))
-    one, again, other = (smc.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6))
+    one, again, other = (
+        smc.identify(far, brief, ["mass"], starts=2, seed=seed, most=1) for seed in (5, 5, 6)
+    )
     assert (one.values, one.errors) == (again.values, again.errors)
     assert one.values != other.values
     for found in (one, other):
@@ -113,7 +133,9 @@ def test_equal_seeds_give_equal_results_and_another_seed_begins_elsewhere():
 @pytest.mark.slow
 def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
     free = ("inertia", "mass_moment", "coulomb")
-    result = smc.identify(PENDULUM.with_values({"inertia": 0.15, "coulomb": 0.15}), swung, free, starts=1)
+    result = smc.identify(
+        PENDULUM.with_values({"inertia": 0.15, "coulomb": 0.15}), swung, free, starts=1
+    )
     for name in free:
         assert abs(result.values[name] - PENDULUM.values[name]) < 3.0 * result.errors[name]
         assert result.errors[name] < 0.05 * PENDULUM.values[name]
@@ -121,13 +143,17 @@ def test_a_motion_gives_its_quantities_within_three_standard_errors(swung):
 
 @pytest.mark.slow
 def test_a_closed_loop_s_transient_gives_a_quantity_within_three_errors():
-    """A reference that jumps in speed decides the mass within 0.1 s. A jackknife alone errs by more than 3 deviations.
+    """A reference that jumps in speed decides the mass within 0.1 s.
 
-    The noise of the second sample, which the controller takes for a velocity, decides most of the error. Where it is
-    itself beyond 3 deviations, as in seed 4, the error may be as far off.
+    A jackknife alone errs by more than 3 deviations.
+
+    The noise of the second sample, which the controller takes for a velocity, decides most of the
+    error. Where it is itself beyond 3 deviations, as in seed 4, the error may be as far off.
     """
     noise = smc.Noise(2e-7)
-    trace = smc.run(AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=8, noise=noise))
+    trace = smc.run(
+        AXIS.scenario(reference=smc.Sine(0.05, 3.0), x0=0.0, duration=1.0, seed=8, noise=noise)
+    )
     result = smc.identify(AXIS, trace, ("mass", "viscous"), starts=1, most=4)
     for name, value in result.values.items():
         assert abs(value - AXIS.values[name]) < 3.0 * result.errors[name]
@@ -144,35 +170,64 @@ def test_noise_is_read_off_a_moving_record():
 def test_parameters_that_cannot_be_told_apart_are_named(swung):
     with pytest.raises(smc.ScenarioError) as error:
         smc.identify(PENDULUM, swung, ("inertia", "torque_limit"), starts=1)
-    assert str(error.value) == "nothing in the records depends on torque_limit: leave it out, or give other records"
+    assert (
+        str(error.value)
+        == "nothing in the records depends on torque_limit: leave it out, or give other records"
+    )
     with pytest.raises(smc.ScenarioError) as error:
         smc.identify(AXIS, smc.run(AXIS.scenario(duration=0.06, x0=0.0)), starts=1)
-    assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(error.value)
+    assert "cannot tell" in str(error.value) or "nothing in the records depends on" in str(
+        error.value
+    )
     known, errors = {"coulomb": 1.0, "offset": -1.0}, {"coulomb": 2.0, "offset": 3.0}
-    with pytest.raises(smc.ScenarioError, match=r"tell coulomb \(1 ± 2\) and offset \(-1 ± 3\) apart: leave"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"tell coulomb \(1 ± 2\) and offset \(-1 ± 3\) apart: leave"
+    ):
         uncertainty._refuse_alike("emps", known, errors, np.array([[1.0, -0.99], [-0.99, 1.0]]))
 
 
 @pytest.mark.slow
 def test_a_plants_own_parameters_are_found_from_a_run():
     plant = smc.plant("duffing")
-    run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
+    run = smc.run(
+        smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0)
+    )
     wrong = smc.plant("duffing", M=1.2, delta=0.1)
     result = smc.identify(wrong, run, ("M", "delta"), starts=1)
-    assert result.values == pytest.approx({name: plant.parameters[name] for name in ("M", "delta")}, rel=1e-3)
+    assert result.values == pytest.approx(
+        {name: plant.parameters[name] for name in ("M", "delta")}, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
         (lambda run: smc.identify("emps", []), "there are no records: give at least one"),
-        (lambda run: smc.identify("emps", "run.csv"), "record is 'run.csv': give a mapping of columns, such as"),
+        (
+            lambda run: smc.identify("emps", "run.csv"),
+            "record is 'run.csv': give a mapping of columns, such as",
+        ),
         (lambda run: smc.identify("emps", run, ["weight"]), "unknown quantity of emps 'weight': "),
-        (lambda run: smc.identify("emps", run, ["mass", "mass"]), "quantities have mass 2 times: name it once"),
-        (lambda run: smc.identify("emps", run, []), "emps has no quantities to find: name some, of mass"),
-        (lambda run: smc.identify("ip02", {"t": [0]}), "ip02 has no quantities to find: name some, of resistance"),
-        (lambda run: smc.identify(3, run), "cannot identify 3: give a rig, the name of one, or a smc.Plant"),
-        (lambda run: smc.identify("emps", [run, {"t": [0]}]), "records are traces of one law, or columns"),
+        (
+            lambda run: smc.identify("emps", run, ["mass", "mass"]),
+            "quantities have mass 2 times: name it once",
+        ),
+        (
+            lambda run: smc.identify("emps", run, []),
+            "emps has no quantities to find: name some, of mass",
+        ),
+        (
+            lambda run: smc.identify("ip02", {"t": [0]}),
+            "ip02 has no quantities to find: name some, of resistance",
+        ),
+        (
+            lambda run: smc.identify(3, run),
+            "cannot identify 3: give a rig, the name of one, or a smc.Plant",
+        ),
+        (
+            lambda run: smc.identify("emps", [run, {"t": [0]}]),
+            "records are traces of one law, or columns",
+        ),
     ],
 )
 def test_bad_questions_get_one_sentence(make, sentence, moved):
@@ -183,13 +238,17 @@ def test_bad_questions_get_one_sentence(make, sentence, moved):
 
 def test_a_search_stays_within_its_ranges_to_the_last_bit():
     """1e-4 / 0.042 * 0.042 is less than 1e-4."""
-    made = Replays(smc.rig("qube_servo", back_emf=0.042), ["back_emf"], [], True, lambda count: None)
+    made = Replays(
+        smc.rig("qube_servo", back_emf=0.042), ["back_emf"], [], True, lambda count: None
+    )
     assert (made.low * made.scales)[0] < 1e-4
     assert made.rig(Point(made.low, made.start.states)).values["back_emf"] == 1e-4
 
 
 CARRIAGE = {"M": 3.2, "b": 4.1, "cf": 1.7, "offset": 0.6}
-NOISE = math.hypot(1e-5, 2e-5 / math.sqrt(12.0))  # m, of the positions of `pushed`, with their rounding to counts
+NOISE = math.hypot(
+    1e-5, 2e-5 / math.sqrt(12.0)
+)  # m, of the positions of `pushed`, with their rounding to counts
 
 
 def positions(u, quantities, x=0.0, v=0.0):
@@ -202,21 +261,34 @@ def positions(u, quantities, x=0.0, v=0.0):
 
 
 def pushed(seed, seconds=1.5):
-    """Columns of a carriage under four sines, from its exact motion, with noise of 10 um and counts of 20 um."""
+    """Columns of a carriage under four sines, from its exact motion, with noise of 10 um and counts
+    of 20 um.
+    """
     rng = np.random.default_rng(seed)
     t = 1e-3 * np.arange(round(seconds / 1e-3) + 1)
-    sines = zip((4.0, 3.0, 3.0, 2.0), rng.uniform(3.0, 33.0, 4), rng.uniform(0.0, 6.28, 4), strict=True)
+    sines = zip(
+        (4.0, 3.0, 3.0, 2.0), rng.uniform(3.0, 33.0, 4), rng.uniform(0.0, 6.28, 4), strict=True
+    )
     u = sum(size * np.sin(speed * t + phase) for size, speed, phase in sines)
     exact = positions(u, CARRIAGE.values())
     return {"t": t, "x": 2e-5 * np.round((exact + rng.normal(0.0, 1e-5, len(t))) / 2e-5), "u": u}
 
 
 def least_errors(u):
-    """Standard errors of least squares of the exact motion and its start, with the noise known: of the quantities."""
+    """Standard errors of least squares of the exact motion and its start, with the noise known: of
+    the quantities.
+    """
     truth = np.array([*CARRIAGE.values(), 0.0, 0.0])
     steps = 1e-4 * np.diag([*CARRIAGE.values(), 0.1, 0.1])
-    ends = [[positions(u, each[:4], *each[4:]) for each in (truth + step, truth - step)] for step in steps]
-    J = np.column_stack([(ahead - back) / (2.0 * step.sum()) for (ahead, back), step in zip(ends, steps, strict=True)])
+    ends = []
+    for step in steps:
+        ends.append([positions(u, each[:4], *each[4:]) for each in (truth + step, truth - step)])
+    J = np.column_stack(
+        [
+            (ahead - back) / (2.0 * step.sum())
+            for (ahead, back), step in zip(ends, steps, strict=True)
+        ]
+    )
     return NOISE * np.sqrt(np.diag(np.linalg.inv(J.T @ J)))[:4]
 
 
@@ -228,15 +300,18 @@ FAR = {"M": 95.0, "b": 203.0, "cf": 20.4, "offset": -3.2}
 def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
     """The full coverage, three machines and 20 seeds, is in benchmarks/identification.py.
 
-    Seed and bounds were fixed before this record was identified. A quantity lies within four standard errors but for
-    1 in 16,000. The square of a jackknife's error, of n blocks, is the true one times chi squared / (n - 1), and what
-    the steps add is at most half of it.
+    Seed and bounds were fixed before this record was identified. A quantity lies within four
+    standard errors but for 1 in 16,000. The square of a jackknife's error, of n blocks, is the true
+    one times chi squared / (n - 1), and what the steps add is at most half of it.
     """
     record, rare = pushed(2026, seconds), math.erfc(4.0 / math.sqrt(2.0))
     found = smc.identify(smc.plant("servo_axis", **CARRIAGE), record, start=start)
     assert min(found.fits[0].values()) >= min(found.fits_before[0].values())
     free = uncertainty.BLOCKS[0] - 1
-    low, high = np.sqrt(chi2.ppf([rare / 2.0, 1.0 - rare / 2.0], free) / free) * [1.0, math.hypot(1.0, 0.5)]
+    low, high = np.sqrt(chi2.ppf([rare / 2.0, 1.0 - rare / 2.0], free) / free) * [
+        1.0,
+        math.hypot(1.0, 0.5),
+    ]
     for (name, truth), least in zip(CARRIAGE.items(), least_errors(record["u"]), strict=True):
         assert abs(found.values[name] - truth) < 4.0 * found.errors[name]
         assert low * least < found.errors[name] < high * least
@@ -244,7 +319,9 @@ def test_standard_errors_cover_the_truth_from_any_start(start, seconds):
 
 @pytest.mark.slow
 def test_shorter_steps_change_what_a_record_with_stops_says():
-    """At the true quantities steps of 0.25 ms err by up to 50 um, corrected ones by less than the noise of 10 um."""
+    """At the true quantities steps of 0.25 ms err by up to 50 um, corrected ones by less than the
+    noise of 10 um.
+    """
     record = pushed(1)
     twin, data = identification._twin(smc.plant("servo_axis", **CARRIAGE), [record])
     replays = Replays(twin, [], data, False, lambda count: None)
@@ -254,7 +331,10 @@ def test_shorter_steps_change_what_a_record_with_stops_says():
             assert replays.correct(replays.start, halvings)
         slopes = replays.slopes(replays.start)
         at = Point(np.zeros(0), replays.start.states + slopes.moves(np.zeros(0)))
-        residuals.append(np.concatenate(replays.residuals([at])[0]) * np.linalg.norm(record["x"] - record["x"].mean()))
+        residuals.append(
+            np.concatenate(replays.residuals([at])[0])
+            * np.linalg.norm(record["x"] - record["x"].mean())
+        )
     assert np.std(residuals[0]) > 1.3 * np.std(residuals[1])
     assert np.std(residuals[1]) == pytest.approx(NOISE, rel=0.1)
 
@@ -263,14 +343,20 @@ def test_swapped_columns_are_told():
     record = pushed(1, 0.75)
     exchanged = record | {"x": record["u"], "u": record["x"]}
     with pytest.raises(
-        smc.ScenarioError, match=r"columns x and u of the record of servo_axis look swapped, as its pie"
+        smc.ScenarioError,
+        match=r"columns x and u of the record of servo_axis look swapped, as its pie",
     ):
         smc.identify(smc.plant("servo_axis", **CARRIAGE), exchanged, ["M"], starts=1, most=1)
 
 
 def test_masses_and_frictions_stay_physical():
     ranges = identification._of_plant(smc.plant("servo_axis"), None).quantities
-    assert {name: each.least for name, each in ranges.items()} == {"M": 1e-6, "b": 0.0, "cf": 0.0, "offset": -math.inf}
+    assert {name: each.least for name, each in ranges.items()} == {
+        "M": 1e-6,
+        "b": 0.0,
+        "cf": 0.0,
+        "offset": -math.inf,
+    }
 
 
 def test_the_twin_of_a_run_has_the_whole_machine_of_the_run():
@@ -300,7 +386,11 @@ def test_columns_of_a_plant_s_record_are_those_of_its_channels():
 
 def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
     plant = smc.plant("duffing")
-    run = smc.run(smc.Scenario(plant=plant, law="none", feedforward=smc.Sine(20.0, 3.0), u_max=30.0, duration=1.0))
+    run = smc.run(
+        smc.Scenario(
+            plant=plant, law="none", feedforward=smc.Sine(20.0, 3.0), u_max=30.0, duration=1.0
+        )
+    )
     record = {"t": run.t, "x": run.x[:, 0], "u": run.u[:, 0]}
     assert abs(record["u"]).max() > 15.0
     assert identification._of_plant(plant, None).fit(record)["x"] > 99.9
@@ -309,7 +399,9 @@ def test_a_command_beyond_the_default_bound_is_replayed_as_it_was():
 def test_a_poor_fit_is_said(found):
     assert found.notes == []
     poor = dataclasses.replace(found, fits=({"x": 99.0, "u": 61.3},))
-    assert poor.notes[0].startswith("the worst fit is 61 %: the model lacks something, a column is wrong")
+    assert poor.notes[0].startswith(
+        "the worst fit is 61 %: the model lacks something, a column is wrong"
+    )
 
 
 def test_drawn_sets_have_the_errors_and_correlations_found(found):
@@ -324,9 +416,22 @@ def test_drawn_sets_have_the_errors_and_correlations_found(found):
 
 @pytest.mark.slow
 def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path):
-    run = smc.run(smc.Scenario(plant="duffing", law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0))
+    run = smc.run(
+        smc.Scenario(
+            plant="duffing", law="none", feedforward=smc.Sine(3.0, 2.0), x0=0.3, duration=2.0
+        )
+    )
     run.export(tmp_path / "run.csv")
-    words = ["rig", "--fit", "duffing", str(tmp_path / "run.csv"), "--quantities", "delta", "--starts", "1"]
+    words = [
+        "rig",
+        "--fit",
+        "duffing",
+        str(tmp_path / "run.csv"),
+        "--quantities",
+        "delta",
+        "--starts",
+        "1",
+    ]
     refused = CliRunner().invoke(app, [*words, "--set", "delta=much"])
     assert refused.exit_code == 2
     assert "--set delta=much is no number: write it as M=5,b=8" in refused.output
@@ -339,7 +444,10 @@ def test_the_command_identifies_a_plant_of_the_library_from_a_csv_file(tmp_path)
 
 @pytest.mark.slow
 def test_values_that_are_only_tried_warn_of_nothing(moved, recwarn):
-    """The motor gives 352 N at rest. It holds an offset of 340 N, and not the greater ones that the search tries."""
+    """The motor gives 352 N at rest.
+
+    It holds an offset of 340 N, and not the greater ones that the search tries.
+    """
     smc.identify(smc.rig("emps", offset=-340.0), moved, ["offset"], starts=6, most=2)
     assert not [each for each in recwarn if "DCMotor gives at most" in str(each.message)]
 
@@ -348,21 +456,37 @@ def test_residuals_are_what_was_measured_less_what_was_predicted(tmp_path, monke
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
     t, measured = np.arange(3.0), {"x": np.array([1.0, 2.0, 6.0]), "u": np.array([0.5, 0.0, 4.0])}
-    twins = {"twin": {name: 2.0 * values for name, values in measured.items()}, "driver": dict.fromkeys(measured, t)}
+    twins = {
+        "twin": {name: 2.0 * values for name, values in measured.items()},
+        "driver": dict.fromkeys(measured, t),
+    }
     fits = {"twin": {"x": 87.6, "u": 3.25}, "driver": {"x": Fall(8.44), "u": Fall(8.44)}}
     paths = residual_figure("A", t, measured, twins, fits, {"x": "m", "u": "V"}, tmp_path / "a.png")
     assert [path.name for path in paths] == ["a.svg", "a.png"]
     assert list(drawn[0].axes[1].lines[-2].get_ydata()) == [-1.0, -2.0, -6.0]
     left, *_, right = drawn[0].axes
-    assert [list(line.get_ydata()) for line in left.lines] == [[1.0, 2.0, 6.0], [2.0, 4.0, 12.0], [0.0, 1.0, 2.0]]
-    assert [list(line.get_ydata()) for line in right.lines[1:]] == [[-0.5, 0.0, -4.0], [0.5, -1.0, 2.0]]
-    assert [(ax.get_xlabel(), ax.get_ylabel(), ax.get_title(loc="left")) for ax in drawn[0].axes] == [
+    assert [list(line.get_ydata()) for line in left.lines] == [
+        [1.0, 2.0, 6.0],
+        [2.0, 4.0, 12.0],
+        [0.0, 1.0, 2.0],
+    ]
+    assert [list(line.get_ydata()) for line in right.lines[1:]] == [
+        [-0.5, 0.0, -4.0],
+        [0.5, -1.0, 2.0],
+    ]
+    assert [
+        (ax.get_xlabel(), ax.get_ylabel(), ax.get_title(loc="left")) for ax in drawn[0].axes
+    ] == [
         ("", "x (m)", "fit: twin 87.6 %, driver falls at 8.4 s"),
         ("", "", "residual, rms: twin 3.7,\ndriver 2.45"),
         ("time (s)", "u (V)", "fit: twin 3.2 %, driver falls at 8.4 s"),
         ("time (s)", "", "residual, rms: twin 2.33,\ndriver 1.32"),
     ]
-    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["measured", "twin", "driver"]
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == [
+        "measured",
+        "twin",
+        "driver",
+    ]
 
 
 def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
@@ -376,7 +500,9 @@ def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
     for name in ("a.npz", "a.csv"):
         read = dict(records.load(tmp_path / name))
         assert all(np.array_equal(read[key], columns[key]) for key in columns)
-    assert np.array_equal(records.of_trace(smc.load(tmp_path / "trace.npz"), AXIS.columns)["x"], columns["x"])
+    assert np.array_equal(
+        records.of_trace(smc.load(tmp_path / "trace.npz"), AXIS.columns)["x"], columns["x"]
+    )
     assert isinstance(records.load(tmp_path / "trace.npz"), smc.Trace)
     renamed = dict(records.load(tmp_path / "a.csv", {"position": "x"}))
     np.testing.assert_array_equal(renamed["position"], columns["x"])
@@ -385,8 +511,13 @@ def test_files_of_columns_and_traces_are_read_alike(moved, tmp_path):
 @pytest.mark.parametrize("cut", [0, 200, -1], ids=["empty", "cut off", "no archive"])
 def test_a_damaged_npz_file_is_one_sentence(tmp_path, cut):
     file = tmp_path / "a.npz"
-    np.savez(file, t=np.arange(99.0)) if cut >= 0 else np.save(file.with_suffix(".npy"), np.arange(3))
-    content = file.read_bytes()[:cut] if cut >= 0 else file.with_suffix(".npy").read_bytes()
+    np.savez(file, t=np.arange(99.0)) if cut >= 0 else np.save(
+        file.with_suffix(".npy"), np.arange(3)
+    )
+    if cut >= 0:
+        content = file.read_bytes()[:cut]
+    else:
+        content = file.with_suffix(".npy").read_bytes()
     file.write_bytes(content)
     with pytest.raises(smc.ScenarioError, match="is not a record"):
         records.load(file)

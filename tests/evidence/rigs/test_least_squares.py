@@ -1,4 +1,6 @@
-"""The parts of identification on a record that a formula makes: y = a f(t) + b g(t) + x0 of each piece."""
+"""The parts of identification on a record that a formula makes: y = a f(t) + b g(t) + x0 of each
+piece.
+"""
 
 import math
 from types import SimpleNamespace
@@ -29,15 +31,28 @@ def curves(t):
 
 
 class Curve(Replays):
-    """Replays of a formula, which is linear in the quantities a >= 0 and b, and in the offset of each of 3 pieces."""
+    """Replays of a formula, which is linear in the quantities a >= 0 and b, and in the offset of
+    each of 3 pieces.
+    """
 
     def __init__(self, noise=0.0, start=(1.0, 1.0), spread=SPREAD):
         random = np.random.default_rng(1)
-        y = curves(T) @ TRUE + 0.3 * np.repeat([1.0, -1.0, 0.5], [150, 150, 100]) + noise * random.normal(size=T.size)
+        y = (
+            curves(T) @ TRUE
+            + 0.3 * np.repeat([1.0, -1.0, 0.5], [150, 150, 100])
+            + noise * random.normal(size=T.size)
+        )
         self.parts = np.split(np.arange(T.size), [150, 300])
-        self.pieces = [Piece(0, None, 0, {"y": y[part]}, {"y": spread}, np.ones(1)) for part in self.parts]
+        self.pieces = [
+            Piece(0, None, 0, {"y": y[part]}, {"y": spread}, np.ones(1)) for part in self.parts
+        ]
         self.names, self.free, self.data, self.evaluations = ["a", "b"], np.arange(1), [None], 0
-        self.low, self.high, self.first, self.tried = np.array([0.0, -50.0]), np.array([80.0, 50.0]), start, []
+        self.low, self.high, self.first, self.tried = (
+            np.array([0.0, -50.0]),
+            np.array([80.0, 50.0]),
+            start,
+            [],
+        )
 
         self.steps, self.corrections, self.closed, self.report = {}, None, False, lambda count: None
         self.twin = SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=(), x=("y",)))
@@ -48,7 +63,9 @@ class Curve(Replays):
         return Point(np.array(self.first), np.zeros((3, 1)))
 
     def rig(self, point) -> Any:
-        plain = SimpleNamespace(realistic=self.lag > 0.0, control_period=1e-3, input_delay=0.0, friction=())
+        plain = SimpleNamespace(
+            realistic=self.lag > 0.0, control_period=1e-3, input_delay=0.0, friction=()
+        )
         return SimpleNamespace(repeated=lambda part: plain)
 
     def _part(self, k) -> Any:
@@ -60,7 +77,10 @@ class Curve(Replays):
         self.replayed.append(fields)
         error = self.lag * fields.get("physics_step", 0.0)
         return [
-            [{"y": curves(T[part]) @ one.values + one.states[k] + error * T[part]} for k, part in enumerate(self.parts)]
+            [
+                {"y": curves(T[part]) @ one.values + one.states[k] + error * T[part]}
+                for k, part in enumerate(self.parts)
+            ]
             for one in points
         ]
 
@@ -73,19 +93,25 @@ def block(k, rows):
     return np.column_stack([-curves(T[rows]), -np.eye(3)[[k]].repeat(len(rows), 0)]) / SPREAD
 
 
-@pytest.mark.parametrize("values", [(1.0, 1.0), (0.0, -50.0), (80.0, 0.0)], ids=["inside", "lowest", "highest"])
+@pytest.mark.parametrize(
+    "values", [(1.0, 1.0), (0.0, -50.0), (80.0, 0.0)], ids=["inside", "lowest", "highest"]
+)
 def test_slopes_are_derivatives_also_at_the_ends_of_ranges(values):
     curve = Curve(spread=100.0 * SPREAD)
     slopes = curve.slopes(Point(np.array(values), np.zeros((3, 1))))
     for k, part in enumerate(curve.parts):
         exact = block(k, part) / 100.0
         np.testing.assert_allclose(
-            np.hstack([slopes.by_values[k], slopes.by_states[k]]), exact[:, [0, 1, 2 + k]], atol=1e-9
+            np.hstack([slopes.by_values[k], slopes.by_states[k]]),
+            exact[:, [0, 1, 2 + k]],
+            atol=1e-9,
         )
         expected = (curve.pieces[k].measured["y"] - curves(T[part]) @ values) / SPREAD / 100.0
         np.testing.assert_allclose(slopes.residuals[k], expected, atol=1e-12)
     assert (slopes.columns, slopes.records) == (1, 1)
-    assert slopes.fit == pytest.approx(100.0 * (1.0 - math.sqrt(sum(np.sum(r**2) for r in slopes.residuals))))
+    assert slopes.fit == pytest.approx(
+        100.0 * (1.0 - math.sqrt(sum(np.sum(r**2) for r in slopes.residuals)))
+    )
 
 
 def test_a_step_is_least_squares_with_damping_within_a_factor_of_ten():
@@ -95,7 +121,12 @@ def test_a_step_is_least_squares_with_damping_within_a_factor_of_ten():
     np.testing.assert_allclose(search._moved(curve, slopes, 0.0), TRUE, atol=1e-6)
     damped = np.linalg.solve(J.T @ J * (1.0 + 0.5 * np.eye(2)), -J.T @ r)
     np.testing.assert_allclose(search._moved(curve, slopes, 0.5), 1.0 + damped)
-    for first, reached in (((0.1, 1.0), 1.0), ((25.0, 1.0), 2.5), ((1e-4, 1.0), 2.0), ((1.1e-4, 1.0), 1.1e-3)):
+    for first, reached in (
+        ((0.1, 1.0), 1.0),
+        ((25.0, 1.0), 2.5),
+        ((1e-4, 1.0), 2.0),
+        ((1.1e-4, 1.0), 1.1e-3),
+    ):
         curve = Curve(start=first)
         slopes = curve.slopes(curve.start)
         assert search._moved(curve, slopes, 0.0)[0] == pytest.approx(reached, rel=1e-3)
@@ -166,9 +197,17 @@ def test_a_jackknife_leaves_out_one_block_after_the_other():
     rows = np.vstack([block(k, part) for k, part in enumerate(curve.parts)])
     y = np.concatenate(slopes.residuals)
     blocks = np.concatenate(
-        [k * parts + np.arange(len(part)) * parts // len(part) for k, part in enumerate(curve.parts)]
+        [
+            k * parts + np.arange(len(part)) * parts // len(part)
+            for k, part in enumerate(curve.parts)
+        ]
     )
-    found = np.array([np.linalg.lstsq(rows[blocks != b], y[blocks != b], rcond=None)[0][:2] for b in range(3 * parts)])
+    found = np.array(
+        [
+            np.linalg.lstsq(rows[blocks != b], y[blocks != b], rcond=None)[0][:2]
+            for b in range(3 * parts)
+        ]
+    )
     every = np.linalg.lstsq(rows, y, rcond=None)[0][:2]
     expected = (len(found) - 1) / len(found) * (found - every).T @ (found - every)
     np.testing.assert_allclose(uncertainty.jackknife(slopes), expected, rtol=1e-6)
@@ -178,7 +217,10 @@ def test_a_jackknife_leaves_out_one_block_after_the_other():
 
 def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_are_too_short():
     """Of 40 lines through 400 samples, whose errors last 50 samples, or are independent."""
-    random, J = np.random.default_rng(3), np.column_stack([np.ones(400), np.linspace(-1.0, 1.0, 400)])
+    random, J = (
+        np.random.default_rng(3),
+        np.column_stack([np.ones(400), np.linspace(-1.0, 1.0, 400)]),
+    )
     inverse_normal = np.linalg.inv(J.T @ J)
     for memory, low, high in ((0.96, 0.7, 1.7), (0.0, 0.7, 1.3)):
         shares, blocks = [], []
@@ -187,9 +229,13 @@ def test_slow_residuals_widen_standard_errors_where_the_blocks_of_the_jackknife_
             for k in range(1, 400):
                 noise[k] += memory * noise[k - 1]
             r = noise - J @ (inverse_normal @ (J.T @ noise))
-            slopes = Slopes(Point(np.zeros(2), np.zeros((1, 0))), [r], [J], [np.zeros((400, 0))], 1, 1)
+            slopes = Slopes(
+                Point(np.zeros(2), np.zeros((1, 0))), [r], [J], [np.zeros((400, 0))], 1, 1
+            )
             moved = inverse_normal @ (J.T @ noise)
-            shares.append(moved / uncertainty.by_correlation(slopes, J, uncertainty.independent(slopes)))
+            shares.append(
+                moved / uncertainty.by_correlation(slopes, J, uncertainty.independent(slopes))
+            )
             blocks.append(moved / np.sqrt(np.diag(uncertainty.jackknife(slopes))))
         assert low < np.sqrt(np.mean(np.square(shares))) < high
         assert (np.sqrt(np.mean(np.square(blocks))) > 2.0) == (memory > 0.0)
@@ -207,9 +253,16 @@ def test_blocks_are_as_long_as_residuals_depend_on_each_other(memory, count):
 
 @pytest.mark.parametrize(
     ("value", "least", "most", "scale"),
-    [(3.0, 0.0, 100.0, 3.0), (-0.2, 0.0, 100.0, 1.0), (0.0, 0.0, math.inf, 1e-3), (0.2, -math.inf, 1.0, 0.2)],
+    [
+        (3.0, 0.0, 100.0, 3.0),
+        (-0.2, 0.0, 100.0, 1.0),
+        (0.0, 0.0, math.inf, 1e-3),
+        (0.2, -math.inf, 1.0, 0.2),
+    ],
 )
-def test_a_quantity_has_the_scale_of_its_value_or_a_hundredth_of_its_range(value, least, most, scale):
+def test_a_quantity_has_the_scale_of_its_value_or_a_hundredth_of_its_range(
+    value, least, most, scale
+):
     assert replays._scale(Quantity(value, "", "given here", least, most)) == pytest.approx(scale)
 
 
@@ -219,7 +272,9 @@ def test_corrected_replays_have_steps_that_divide_the_period():
     assert replays._steps(plain, 2)["physics_step"] == pytest.approx(5.5e-5)
     even = smc.Scenario(plant="duffing", law="pid", control_period=0.001)
     assert replays._steps(even, 1)["physics_step"] == pytest.approx(1.25e-4)
-    late = smc.Scenario(plant="duffing", law="pid", input_delay=0.003, friction=smc.hardware.LuGre(0.3, 0.4, 0.01))
+    late = smc.Scenario(
+        plant="duffing", law="pid", input_delay=0.003, friction=smc.hardware.LuGre(0.3, 0.4, 0.01)
+    )
     assert replays._steps(late, 1)["integrator"] == "implicitfast"
     assert replays._steps(late, 1)["physics_step"] == late.resolved.physics_step / 2
 
@@ -241,7 +296,10 @@ def test_replays_are_corrected_by_what_two_step_sizes_leave():
     assert {one["physics_step"] for one in curve.replayed} == {6.25e-5}
     assert sharp.residuals is slopes.residuals
     assert curve.steps == {"integrator": "RK4", "physics_step": 2.5e-4}
-    for closed in ({"closed": True}, {"twin": SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=("y",)))}):
+    for closed in (
+        {"closed": True},
+        {"twin": SimpleNamespace(dynamics=None, columns=SimpleNamespace(state=("y",)))},
+    ):
         other = Curve()
         vars(other).update(closed, lag=800.0)
         assert not other.correct(other.start, 1)
@@ -275,11 +333,17 @@ def test_a_record_is_cut_into_pieces_of_its_window():
         assert piece.skipped == 0
     assert made.free.tolist() == [0, 1]
     state = made.state(Point(made.start.values, np.tile([2.0, -1.0], (3, 1))), 1)
-    np.testing.assert_allclose(state, [0.3 * np.sin(5.5), 1.5 * np.cos(5.5)] + scales * [2.0, -1.0], rtol=1e-3)
+    np.testing.assert_allclose(
+        state, [0.3 * np.sin(5.5), 1.5 * np.cos(5.5)] + scales * [2.0, -1.0], rtol=1e-3
+    )
     rest = made.at_rest(made.start)
-    np.testing.assert_allclose(np.array([made.state(rest, k) for k in range(3)])[:, 1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        np.array([made.state(rest, k) for k in range(3)])[:, 1], 0.0, atol=1e-12
+    )
     assert len(Replays(twin, ["M"], data, False, lambda count: None, whole=True).pieces) == 1
-    np.testing.assert_allclose(made.start.values * made.scales, [twin.values["M"], twin.values["b"]])
+    np.testing.assert_allclose(
+        made.start.values * made.scales, [twin.values["M"], twin.values["b"]]
+    )
     np.testing.assert_allclose(made.low * made.scales, [1e-6, 0.0])
 
 
@@ -302,10 +366,14 @@ def test_torques_above_5_hz_are_left_out_by_four_poles_forward_and_backward(hert
     assert (at[0], at[-1]) == (pytest.approx(0.1), pytest.approx(19.9))
     _, gain = freqz(*np.array(butter(4, 5.0, fs=100.0)), worN=[hertz], fs=100.0)
     middle = slice(300, -300)
-    np.testing.assert_allclose(low[middle], abs(gain[0]) ** 2 * np.sin(math.tau * hertz * at[middle]), atol=6e-3)
+    np.testing.assert_allclose(
+        low[middle], abs(gain[0]) ** 2 * np.sin(math.tau * hertz * at[middle]), atol=6e-3
+    )
 
 
-@pytest.mark.parametrize(("seconds", "step", "enough"), [(1.0, 0.05, True), (0.99, 0.01, False), (2.0, 0.051, False)])
+@pytest.mark.parametrize(
+    ("seconds", "step", "enough"), [(1.0, 0.05, True), (0.99, 0.01, False), (2.0, 0.051, False)]
+)
 def test_a_record_has_torques_from_1_s_on_at_20_hz(seconds, step, enough):
     data = {"t": np.append(step * np.arange(round(seconds / step)), seconds)}
     assert inverse.long_enough(data, records.Columns()) is enough
@@ -331,5 +399,6 @@ def test_the_cascade_of_the_axis_is_its_formula():
     u, _ = cascade.function(y, Values(kp=3.0, kv=5.0), np.zeros(0))
     assert u == pytest.approx(5.0 * (3.0 * (0.2 - 0.3) - 0.2))
     assert {one.name: one.label for one in (state_feedback, cascade)} == {
-        "state_feedback": "Rig's state feedback", "cascade": "Rig's cascade"
-    }  # fmt: skip
+        "state_feedback": "Rig's state feedback",
+        "cascade": "Rig's cascade",
+    }

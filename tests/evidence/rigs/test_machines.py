@@ -1,4 +1,6 @@
-"""The machines that ship: their numbers, sources and words as recorded, and a quantity that each of them feels."""
+"""The machines that ship: their numbers, sources and words as recorded, and a quantity that each of
+them feels.
+"""
 
 import dataclasses
 from collections.abc import Mapping
@@ -14,13 +16,23 @@ from smc_mujoco.mechanisms.plant import Plant
 pytestmark = pytest.mark.quick
 
 MACHINES = (
-    *("emps", "ip02", "qube_servo", "qube_servo_2", "qube_servo_3", "realaigym_acrobot", "simple_pendulum_ak80"),
+    *(
+        "emps",
+        "ip02",
+        "qube_servo",
+        "qube_servo_2",
+        "qube_servo_3",
+        "realaigym_acrobot",
+        "simple_pendulum_ak80",
+    ),
     *("srv02", "stepper_furuta"),
 )
 
 
 def told(value):
-    """Return a value of a rig as text: what its plant, laws and parts differ in from their defaults."""
+    """Return a value of a rig as text: what its plant, laws and parts differ in from their
+    defaults.
+    """
     match value:
         case Quantity():
             text = f"{value.value:.9g} {value.unit} in [{value.least:.9g}, {value.most:.9g}]"
@@ -37,16 +49,16 @@ def told(value):
         case _ if dataclasses.is_dataclass(value):
             given = {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
             plain = {one.name: one.default for one in dataclasses.fields(value)}
-            text = (
-                f"{type(value).__name__} {told({name: one for name, one in given.items() if one is not plain[name]})}"
-            )
+            text = f"{type(value).__name__} {told({name: one for name, one in given.items() if one is not plain[name]})}"
         case _:
             text = "a function" if callable(value) else str(value)
     return text
 
 
 def lines(rig):
-    """Yield a line for each source with its quantities, for each other field of a rig, and for its scenarios."""
+    """Yield a line for each source with its quantities, for each other field of a rig, and for its
+    scenarios.
+    """
     sources: dict[str, list[str]] = {}
     for name, one in rig.quantities.items():
         sources.setdefault(one.source, []).append(f"{name} {told(one)}")
@@ -54,7 +66,10 @@ def lines(rig):
     for field in dataclasses.fields(Rig):
         value = getattr(rig, field.name)
         if field.name not in ("quantities", "machine") and value:
-            parts = value if field.name in ("ensemble", "laws", "reached") else (value,)
+            if field.name in ("ensemble", "laws", "reached"):
+                parts = value
+            else:
+                parts = (value,)
             yield from (f"{field.name}: {told(one)}" for one in parts)
     yield f"scenario {'; '.join(f'{name}: {told(one)}' for name, one in machine(rig).items())}"
     if rig.dynamics:
@@ -72,9 +87,13 @@ def test_the_numbers_of_a_machine_and_their_sources_are_as_recorded(name, snapsh
 
 def test_a_pendubot_is_an_acrobot_that_is_driven_at_the_shoulder():
     two, one = (list(lines(smc.rig(f"realaigym_{name}"))) for name in ("acrobot", "pendubot"))
-    swapped = [
-        line.replace("acrobot", "pendubot").replace("driven at the elbow", "driven at the shoulder") for line in two
-    ]
+    swapped = []
+    for line in two:
+        swapped.append(
+            line.replace("acrobot", "pendubot").replace(
+                "driven at the elbow", "driven at the shoulder"
+            )
+        )
     assert swapped == one
 
 
@@ -82,7 +101,10 @@ def test_a_pendubot_is_an_acrobot_that_is_driven_at_the_shoulder():
 def test_each_quantity_changes_the_machine(name):
     """From values where no term is 0."""
     rig = smc.rig(name)
-    ends = {key: np.clip([one.value, 2 * one.value, 0.01], one.least, one.most) for key, one in rig.quantities.items()}
+    ends = {
+        key: np.clip([one.value, 2 * one.value, 0.01], one.least, one.most)
+        for key, one in rig.quantities.items()
+    }
     rig = rig.with_values({key: float(one[1] or one[2]) for key, one in ends.items()})
     for key in rig.quantities:
         other = rig.with_values({key: 0.5 * rig.values[key]})

@@ -42,7 +42,9 @@ def test_the_twin_and_the_published_numbers_fit_records_as_the_page_tells():
     np.testing.assert_allclose(ours[:, :4], told("06, 18, 30, 42"), **within)
     np.testing.assert_allclose(ours[:, 4:], told("11"), **within)
     medians = np.median(published[:, :4], axis=1, keepdims=True)
-    np.testing.assert_allclose(medians, told("published numbers, arm m r²/12: median of these"), **within)
+    np.testing.assert_allclose(
+        medians, told("published numbers, arm m r²/12: median of these"), **within
+    )
 
 
 @pytest.mark.slow
@@ -80,14 +82,22 @@ def brushes():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("parts", "read", "wrong"), [(2, 10, 1), (4, 12, 4)])
-def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_docs_tell(brushes, parts, read, wrong):
-    """Fewer wrong than one in twenty, as SURE promises, is not reached. Wrong is off by over a sixteenth of a pitch."""
+def test_parts_of_records_have_the_brushes_of_the_whole_but_for_those_that_the_docs_tell(
+    brushes, parts, read, wrong
+):
+    """Fewer wrong than one in twenty, as SURE promises, is not reached.
+
+    Wrong is off by over a sixteenth of a pitch.
+    """
     values, off = Values(**RIG.values), []
     for record, whole in brushes:
         ends = np.linspace(round(START_TIME / PERIOD), len(record["t"]), parts + 1).astype(int)
         for first, last in itertools.pairwise(ends):
             part = {name: column[first - ends[0] : last] for name, column in record.items()}
-            off += [(found - whole + PITCH / 2) % PITCH - PITCH / 2 for found in zero(values, part).values()]
+            off += [
+                (found - whole + PITCH / 2) % PITCH - PITCH / 2
+                for found in zero(values, part).values()
+            ]
     assert (len(off), np.sum(np.abs(off) > PITCH / 16)) == (read, wrong)
 
 

@@ -1,4 +1,6 @@
-"""The QUBE-Servo 3's twin against two records of the machine: a step of 1 V, and falls of its pendulum."""
+"""The QUBE-Servo 3's twin against two records of the machine: a step of 1 V, and falls of its
+pendulum.
+"""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,9 +40,14 @@ def test_the_published_numbers_do_not():
 
 
 def test_the_cable_takes_energy_from_a_turn_and_hardly_any_from_a_fall():
-    """Friction that slips at once would stop the falls, and none would leave the step without its loss."""
+    """Friction that slips at once would stop the falls, and none would leave the step without its
+    loss.
+    """
     rig = smc.rig("qube_servo_3")
-    stiff, none = rig.with_values({"cable_stiffness": 10.0}), rig.with_values({"cable_friction": 0.0})
+    stiff, none = (
+        rig.with_values({"cable_stiffness": 10.0}),
+        rig.with_values({"cable_friction": 0.0}),
+    )
     assert falls(stiff)[1] > 3.0 * DAMPING
     assert step_error(none) > 0.1
 
@@ -67,16 +74,26 @@ def test_its_laws_have_the_surface_of_least_quadratic_cost_of_its_arm_pendulum_a
 
     rig = smc.rig("qube_servo_3")
     q = SimpleNamespace(**rig.values)
-    per_volt, pull = q.torque_constant / q.resistance, q.pendulum_mass * q.arm_length * q.pendulum_centre
+    per_volt, pull = (
+        q.torque_constant / q.resistance,
+        q.pendulum_mass * q.arm_length * q.pendulum_centre,
+    )
     around = q.arm_inertia + q.rotor_inertia + q.pendulum_mass * q.arm_length**2
     swinging = q.pendulum_inertia + q.pendulum_mass * q.pendulum_centre**2
     inverse = np.linalg.inv([[around, pull], [pull, swinging]])
-    forces = np.array([
-        [-q.cable, 0.0, -q.arm_damping - per_volt * q.torque_constant, 0.0],
-        [0.0, q.pendulum_mass * q.gravity * q.pendulum_centre, 0.0, 0.0],
-    ])  # fmt: skip
-    A, b = np.vstack([np.eye(4)[2:], inverse @ forces]), np.concatenate([np.zeros(2), inverse[:, 0]])[:, np.newaxis]
+    forces = np.array(
+        [
+            [-q.cable, 0.0, -q.arm_damping - per_volt * q.torque_constant, 0.0],
+            [0.0, q.pendulum_mass * q.gravity * q.pendulum_centre, 0.0, 0.0],
+        ]
+    )
+    A, b = (
+        np.vstack([np.eye(4)[2:], inverse @ forces]),
+        np.concatenate([np.zeros(2), inverse[:, 0]])[:, np.newaxis],
+    )
     P = solve_continuous_are(A, b, np.diag([1.0, 10.0, 0.05, 0.05]), [[2000.0]])
     surface = (b.T @ P).ravel() / 2000.0 / per_volt
     for law in rig.laws:
-        assert [law.gains[name] for name in ("c1", "c2", "c3", "c4")] == pytest.approx(surface, rel=1e-4)
+        assert [law.gains[name] for name in ("c1", "c2", "c3", "c4")] == pytest.approx(
+            surface, rel=1e-4
+        )

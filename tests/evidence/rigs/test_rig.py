@@ -23,9 +23,14 @@ def recorded(trace, **changes):
     t, bias = trace.t, trace.scenario.sensor.bias
     zero = np.zeros(len(t))
     record = {
-        "t": t, "theta": trace.x[:, 0] + bias, "alpha": trace.x[:, 1] + bias, "plant_input": trace.u[:, 0],
-        "target_theta": trace.r[:, 0], "target_alpha": zero, "feedforward": zero,
-    }  # fmt: skip
+        "t": t,
+        "theta": trace.x[:, 0] + bias,
+        "alpha": trace.x[:, 1] + bias,
+        "plant_input": trace.u[:, 0],
+        "target_theta": trace.r[:, 0],
+        "target_alpha": zero,
+        "feedforward": zero,
+    }
     return record | changes
 
 
@@ -33,7 +38,9 @@ def recorded(trace, **changes):
 def record():
     """7 s of the twin itself, whose arm follows a sine, read without rounding."""
     sensor = dataclasses.replace(QUBE.scenario().sensor, counts=math.inf)
-    moving = QUBE.scenario(duration=7.0, reference=smc.Sine(0.3, 1.5), sensor=sensor, x0=(0.02, 0.03))
+    moving = QUBE.scenario(
+        duration=7.0, reference=smc.Sine(0.3, 1.5), sensor=sensor, x0=(0.02, 0.03)
+    )
     return recorded(smc.run(moving))
 
 
@@ -42,7 +49,10 @@ def test_every_number_has_a_source_and_its_licence():
         for quantity, known in smc.rig(name).quantities.items():
             assert len(known.source) > 5, (name, quantity)
             if not known.source.startswith(("identified here", "chosen", "part of")):
-                assert re.search(r"\((MIT|BSD-3|no licence stated)\)", known.source), (name, quantity)
+                assert re.search(r"\((MIT|BSD-3|no licence stated)\)", known.source), (
+                    name,
+                    quantity,
+                )
             assert known.least <= known.value <= known.most, (name, quantity)
 
 
@@ -65,7 +75,12 @@ def test_a_record_too_short_to_read_the_brushes_is_repeated_with_an_even_torque(
 
 @pytest.mark.parametrize(
     ("name", "stall", "brake"),  # N m or N per volt; V per rad/s or m/s
-    [("qube_servo_2", 5e-3, 0.042), ("qube_servo_3", 5.63e-3, 0.0422), ("srv02", 0.128, 0.538), ("ip02", 1.72, 4.48)],
+    [
+        ("qube_servo_2", 5e-3, 0.042),
+        ("qube_servo_3", 5.63e-3, 0.0422),
+        ("srv02", 0.128, 0.538),
+        ("ip02", 1.72, 4.48),
+    ],
 )
 def test_a_quanser_motor_pushes_and_brakes_as_published(name, stall, brake):
     rig = smc.rig(name)
@@ -92,8 +107,14 @@ def test_a_changed_quantity_changes_the_machine_and_its_source():
     ("make", "sentence"),
     [
         (lambda: smc.rig("cube_servo"), "unknown rig 'cube_servo': did you mean 'qube_servo'?"),
-        (lambda: smc.rig("qube_servo", arm=1.0), "unknown quantity of qube_servo 'arm': did you mean 'arm_damping'?"),
-        (lambda: smc.rig("qube_servo", arm_length=-1.0), "qube_servo's arm_length is -1: give at least 0.01"),
+        (
+            lambda: smc.rig("qube_servo", arm=1.0),
+            "unknown quantity of qube_servo 'arm': did you mean 'arm_damping'?",
+        ),
+        (
+            lambda: smc.rig("qube_servo", arm_length=-1.0),
+            "qube_servo's arm_length is -1: give at least 0.01",
+        ),
     ],
 )
 def test_what_is_no_rig_is_refused(make, sentence):
@@ -103,7 +124,9 @@ def test_what_is_no_rig_is_refused(make, sentence):
 
 
 def test_the_twin_repeats_its_own_record(record):
-    """The start's velocities come from positions, and a count in them is forgotten after two seconds."""
+    """The start's velocities come from positions, and a count in them is forgotten after two
+    seconds.
+    """
     fit = QUBE.fit(record)
     assert list(fit) == ["theta", "alpha", "u"]
     assert min(fit.values()) > 99.0
@@ -115,7 +138,9 @@ def test_a_trace_is_a_record_too():
     assert min(fit.values()) > 99.0
     assert fit.keys() == {"x", "u"}
     assert smc.rig("emps", mass=80.0).fit(run)["u"] < 95.0
-    with pytest.raises(smc.ScenarioError, match="is one of servo_axis and the plant of qube_servo is furuta"):
+    with pytest.raises(
+        smc.ScenarioError, match="is one of servo_axis and the plant of qube_servo is furuta"
+    ):
         QUBE.fit(run)
 
 
@@ -126,7 +151,9 @@ def test_a_record_of_another_machine_fits_less(record):
 
 
 def test_the_replay_is_the_controllers_own_command(record):
-    """On measured positions the law, with what is added to it, gives the recorded command from the first sample on."""
+    """On measured positions the law, with what is added to it, gives the recorded command from the
+    first sample on.
+    """
     start = 1.0
     target = 0.01 * np.sign(np.sin(3.0 * record["t"]))
     rng = np.random.default_rng(3)
@@ -134,19 +161,38 @@ def test_the_replay_is_the_controllers_own_command(record):
     e = np.column_stack([theta - record["target_theta"], alpha - target])
     d, u = np.zeros(2), np.zeros(len(target))
     for k in range(len(target)):
-        d = (50.0 * (e[k] - e[k - 1]) + d) / (1.0 + 50.0 * 2e-3) if k else d
+        if k:
+            d = (50.0 * (e[k] - e[k - 1]) + d) / (1.0 + 50.0 * 2e-3)
         u[k] = 6.0 * e[k, 0] + 1.8 * d[0] + 30.0 * e[k, 1] + 2.5 * d[1] + feedforward[k]
-    changed = record | {"theta": theta, "alpha": alpha, "target_alpha": target, "feedforward": feedforward}
+    changed = record | {
+        "theta": theta,
+        "alpha": alpha,
+        "target_alpha": target,
+        "feedforward": feedforward,
+    }
     scenario = QUBE.replay(changed, start=start)
     memory, first = np.zeros(5), round(start / 2e-3)
     gains = python_controller.Values(**scenario.law.gains)
     for k in range(400):
         r = python_controller.evaluate(scenario.reference, k * 2e-3)[0]
         y = python_controller.Measurement(
-            0.0, 2e-3, theta[first + k], 0.0, theta[first + k] - r, 0.0, r, 0.0, 0.0, 0.0, 0.0, q=alpha[first + k]
+            0.0,
+            2e-3,
+            theta[first + k],
+            0.0,
+            theta[first + k] - r,
+            0.0,
+            r,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            q=alpha[first + k],
         )
         added = python_controller.evaluate(scenario.feedforward, k * 2e-3)[0]
-        assert state_feedback.function(y, gains, memory)[0] + added == pytest.approx(u[first + k], abs=1e-9)
+        assert state_feedback.function(y, gains, memory)[0] + added == pytest.approx(
+            u[first + k], abs=1e-9
+        )
 
 
 @pytest.mark.parametrize(
@@ -167,7 +213,9 @@ def test_a_replay_is_an_ordinary_scenario(record, tmp_path):
     scenario = QUBE.replay(record, duration=0.2)
     trace, other = smc.run(scenario), reference.run(scenario)
     for name in ARRAYS:
-        np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9, err_msg=name
+        )
     again = smc.load(trace.save(tmp_path / "a"))
     assert again.scenario == scenario
     assert again.scenario.law.function is state_feedback.function
@@ -186,24 +234,66 @@ def changed(record, name, at, value):
 @pytest.mark.parametrize(
     ("bad", "sentence"),
     [
-        (lambda r: without(r, "theta"), "the record of qube_servo has no column theta (it has t, alpha"),
-        (lambda r: without(without(r, "theta"), "plant_input"), "has no column theta, plant_input (it has"),
-        (lambda r: changed(r, "alpha", 100, np.nan), "column alpha of qube_servo is nan at sample 100, one of 1"),
+        (
+            lambda r: without(r, "theta"),
+            "the record of qube_servo has no column theta (it has t, alpha",
+        ),
+        (
+            lambda r: without(without(r, "theta"), "plant_input"),
+            "has no column theta, plant_input (it has",
+        ),
+        (
+            lambda r: changed(r, "alpha", 100, np.nan),
+            "column alpha of qube_servo is nan at sample 100, one of 1",
+        ),
         (lambda r: r | {"alpha": ["a"] * 3501}, "column alpha of qube_servo is ['a', "),
-        (lambda r: r | {"alpha": r["alpha"][:-1]}, "column alpha of qube_servo has 3500 samples and t has 3501"),
-        (lambda r: changed(r, "t", 7, 0.0), "time of qube_servo runs backward after sample 6, from 0.012 s to 0 s"),
-        (lambda r: r | {"t": r["t"] * 0.5}, "is sampled every 0.001 s and the rig's controller runs every 0.002 s"),
-        (lambda r: {k: v[::2] for k, v in r.items()}, "is sampled every 0.004 s and the rig's controller runs every"),
-        (lambda r: {k: np.delete(v, 9) for k, v in r.items()}, "has a gap after sample 8, from 0.016 s to 0.02 s"),
-        (lambda r: {k: v[:800] for k, v in r.items()}, "lasts 1.6 s, too short to repeat it: give at least 2.1"),
-        (lambda r: {k: v[:1500] for k, v in r.items()}, "lasts 3 s, too short to score it: give at least 4.1 s"),
-        (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")}, "look like degrees"),
-        (lambda r: r | {"alpha": np.rad2deg(r["alpha"])}, "the values of alpha of the record of qube_servo look like"),
-        (lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")}, "values of theta and target_theta of"),
-        (lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])}, "the values of target_theta of the record of"),
+        (
+            lambda r: r | {"alpha": r["alpha"][:-1]},
+            "column alpha of qube_servo has 3500 samples and t has 3501",
+        ),
+        (
+            lambda r: changed(r, "t", 7, 0.0),
+            "time of qube_servo runs backward after sample 6, from 0.012 s to 0 s",
+        ),
+        (
+            lambda r: r | {"t": r["t"] * 0.5},
+            "is sampled every 0.001 s and the rig's controller runs every 0.002 s",
+        ),
+        (
+            lambda r: {k: v[::2] for k, v in r.items()},
+            "is sampled every 0.004 s and the rig's controller runs every",
+        ),
+        (
+            lambda r: {k: np.delete(v, 9) for k, v in r.items()},
+            "has a gap after sample 8, from 0.016 s to 0.02 s",
+        ),
+        (
+            lambda r: {k: v[:800] for k, v in r.items()},
+            "lasts 1.6 s, too short to repeat it: give at least 2.1",
+        ),
+        (
+            lambda r: {k: v[:1500] for k, v in r.items()},
+            "lasts 3 s, too short to score it: give at least 4.1 s",
+        ),
+        (
+            lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "alpha", "target_theta")},
+            "look like degrees",
+        ),
+        (
+            lambda r: r | {"alpha": np.rad2deg(r["alpha"])},
+            "the values of alpha of the record of qube_servo look like",
+        ),
+        (
+            lambda r: r | {k: np.rad2deg(r[k]) for k in ("theta", "target_theta")},
+            "values of theta and target_theta of",
+        ),
+        (
+            lambda r: r | {"target_theta": np.rad2deg(r["target_theta"])},
+            "the values of target_theta of the record of",
+        ),
         (lambda r: "record.csv", "record is 'record.csv': give a mapping of columns"),
     ],
-)  # fmt: skip
+)
 def test_bad_data_get_one_sentence(bad, sentence, record):
     with pytest.raises(smc.ScenarioError) as error:
         QUBE.fit(bad(record))
@@ -237,7 +327,9 @@ def test_a_record_is_a_trace_of_what_was_measured(record):
 
 
 def test_a_machine_that_does_nothing_follows_its_references(record):
-    idle = QUBE.idle(record | {"theta": record["target_theta"], "alpha": 0.1 * record["target_theta"] + 0.3})
+    idle = QUBE.idle(
+        record | {"theta": record["target_theta"], "alpha": 0.1 * record["target_theta"] + 0.3}
+    )
     assert idle["theta"] == 100.0
     assert idle["alpha"] < 0.0
     assert idle["u"] == pytest.approx(0.0, abs=0.5)
@@ -245,7 +337,10 @@ def test_a_machine_that_does_nothing_follows_its_references(record):
 
 def test_records_of_torques_are_not_repeated():
     rig = smc.rig("realaigym_acrobot")
-    with pytest.raises(smc.ScenarioError, match="records of realaigym_acrobot are not replayed, as their torques are"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match="records of realaigym_acrobot are not replayed, as their torques are",
+    ):
         rig.replay(dict.fromkeys(rig.needed, np.arange(600.0)))
 
 

@@ -1,4 +1,6 @@
-"""The pendulum on a stepper: its firmware's laws are those that are told, and its figures those of known signals."""
+"""The pendulum on a stepper: its firmware's laws are those that are told, and its figures those of
+known signals.
+"""
 
 import csv
 import dataclasses
@@ -8,15 +10,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.evidence.rigs import firmware, predictions, stepper_record
 from smc_mujoco.evidence.rigs.firmware import FOUR_STATES, LINEAR, STEPS, TICK, TWO_STATES
 from smc_mujoco.evidence.rigs.machines.stepper_furuta import LAWS, PREDICTION
-from helpers import reference
 
-RECORDS = Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"  # of the machine; not part of the package
+RECORDS = (
+    Path(__file__).parents[4] / "shared" / "rigs" / "stepper_furuta"
+)  # of the machine; not part of the package
 
 
 def memory(**values):
@@ -27,7 +31,11 @@ def memory(**values):
 
 
 # theta'' per alpha, alpha', theta and theta' as read from the firmware, 1/s^2 and 1/s
-LAYER = {LINEAR: (163.3, 16.5, 7.1, 6.4), TWO_STATES: (174.6, 15.9, 7.1, 6.4), FOUR_STATES: (234.7, 21.3, 18.1, 12.6)}
+LAYER = {
+    LINEAR: (163.3, 16.5, 7.1, 6.4),
+    TWO_STATES: (174.6, 15.9, 7.1, 6.4),
+    FOUR_STATES: (234.7, 21.3, 18.1, 12.6),
+}
 
 
 @pytest.mark.parametrize("kind", LAYER)
@@ -37,7 +45,11 @@ def test_a_law_is_within_its_layer_the_linear_law_that_was_read(kind):
     def of(**moved):
         return firmware.acceleration(kind, moved["ALPHA"], memory(**moved), 1.0, 0.0)[0] / STEPS
 
-    slopes = [(of(**at | {name: at[name] + h}) - of(**at | {name: at[name] - h})) / (2.0 * h) for name in at]
+    slopes = []
+    for name in at:
+        slopes.append(
+            (of(**at | {name: at[name] + h}) - of(**at | {name: at[name] - h})) / (2.0 * h)
+        )
     assert slopes == pytest.approx(LAYER[kind], abs=0.1)
 
 
@@ -59,7 +71,10 @@ def test_rates_are_tustins_filter_with_the_nominal_period():
     from scipy.signal import bilinear
 
     b, a = bilinear([1.0, 0.0], [1.0 / 450.0, 1.0], 1.0 / TICK)
-    assert (pytest.approx(b[0], rel=1e-5), pytest.approx(a[1], abs=1e-4)) == (firmware.SLOPE, firmware.OLD_RATE)
+    assert (pytest.approx(b[0], rel=1e-5), pytest.approx(a[1], abs=1e-4)) == (
+        firmware.SLOPE,
+        firmware.OLD_RATE,
+    )
     m = memory(STARTED=1.0, ALPHA=1.0, ALPHA_RATE=10.0)
     passed = firmware.measure(SimpleNamespace(q=math.radians(1.1), x=0.0, t=0.0123), m)
     assert passed == 0.0123
@@ -81,7 +96,9 @@ def test_a_move_is_a_trapezoid_that_ends_at_its_target():
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 def test_the_compiled_run_is_that_of_the_reference_loop(law):
-    fields = {"x0": PREDICTION.start(3), "seed": 3, "duration": 2.5} | {"reference": smc.Step(0.2, 1.0)}
+    fields = {"x0": PREDICTION.start(3), "seed": 3, "duration": 2.5} | {
+        "reference": smc.Step(0.2, 1.0)
+    }
     one = smc.rig("stepper_furuta").scenario(law, **fields)
     trace = smc.run(one)
     assert_same(trace, reference.run(one))
@@ -90,14 +107,18 @@ def test_the_compiled_run_is_that_of_the_reference_loop(law):
 
 
 def test_a_machine_that_tips_stops_its_motor():
-    rig = smc.rig("stepper_furuta", holding_torque=1e-3, arm_friction=0.05)  # too weak to move the arm
+    rig = smc.rig(
+        "stepper_furuta", holding_torque=1e-3, arm_friction=0.05
+    )  # too weak to move the arm
     trace = smc.run(rig.scenario(x0=(0.0, 0.03), duration=2.0))
     assert abs(trace.x[-1, 1]) > 1.0
     assert (trace.u[-100:] == 0.0).all()
     assert PREDICTION.fallen(stepper_record.figures(record(alpha=lambda t: 40.0 + 0.0 * t)))
 
 
-def record(alpha=lambda t: 0.0 * t, theta=lambda t: 0.0 * t, speed=lambda t: 0.0 * t, duration=60.0):
+def record(
+    alpha=lambda t: 0.0 * t, theta=lambda t: 0.0 * t, speed=lambda t: 0.0 * t, duration=60.0
+):
     """A record of known signals, degrees and steps/s, in rows of 20 ms."""
     t, h = 0.02 * np.arange(round(duration / 0.02)), 1e-6
     rates = ((f(t + h) - f(t - h)) / (2.0 * h) for f in (alpha, theta))
@@ -107,18 +128,28 @@ def record(alpha=lambda t: 0.0 * t, theta=lambda t: 0.0 * t, speed=lambda t: 0.0
 
 
 def test_the_figures_of_known_signals_are_theirs():
-    """In degrees, alpha = 2 sin(5.08 Hz) is opposite to theta = sin; theta' lags the speed command by 80 degrees."""
+    """In degrees, alpha = 2 sin(5.08 Hz) is opposite to theta = sin; theta' lags the speed command
+    by 80 degrees.
+    """
     w = 2.0 * math.pi * 50.0 * 26.0 / 256.0
     lag = math.radians(80.0)
     found = stepper_record.figures(
         record(
-            lambda t: 2.0 * np.sin(w * t), lambda t: -np.sin(w * t), lambda t: STEPS / 1.2 * w * -np.cos(w * t + lag)
+            lambda t: 2.0 * np.sin(w * t),
+            lambda t: -np.sin(w * t),
+            lambda t: STEPS / 1.2 * w * -np.cos(w * t + lag),
         )
     )
     assert found["alpha_rms"] == pytest.approx(math.sqrt(2.0), rel=1e-3)
     assert found["centroid"] == pytest.approx(50.0 * 26.0 / 256.0, abs=0.02)
-    assert (found["ratio"], found["phase"]) == (pytest.approx(2.0, rel=1e-6), pytest.approx(-180.0, abs=1e-6))
-    assert (found["gain"], found["lag"]) == (pytest.approx(1.2, rel=1e-3), pytest.approx(-80.0, abs=0.1))
+    assert (found["ratio"], found["phase"]) == (
+        pytest.approx(2.0, rel=1e-6),
+        pytest.approx(-180.0, abs=1e-6),
+    )
+    assert (found["gain"], found["lag"]) == (
+        pytest.approx(1.2, rel=1e-3),
+        pytest.approx(-80.0, abs=0.1),
+    )
     assert found["acceleration_rms"] == 10.0
 
 
@@ -141,14 +172,18 @@ def test_seconds_count_about_their_mean_and_rests_by_their_angle():
     def alpha(t):
         return np.where(t < 43.0, 2.0, np.where(t < 63.0, -4.0, 9.0 * np.sin(math.tau * t)))
 
-    found = stepper_record.figures(record(alpha=alpha, speed=lambda t: np.where(t < 63.0, 0.0, 60.0), duration=73.0))
+    found = stepper_record.figures(
+        record(alpha=alpha, speed=lambda t: np.where(t < 63.0, 0.0, 60.0), duration=73.0)
+    )
     assert found["second_50"] == pytest.approx(0.0, abs=1e-9)
     assert found["second_90"] == pytest.approx(9.0 / math.sqrt(2.0), rel=1e-3)
     assert (found["resting_50"], found["resting_90"]) == (2.0, 4.0)
 
 
 def test_a_run_is_logged_as_the_firmware_sees_it():
-    """Its rows are every fourth tick, its angles rounded and trimmed, its speed the sum of its accelerations."""
+    """Its rows are every fourth tick, its angles rounded and trimmed, its speed the sum of its
+    accelerations.
+    """
     rig = smc.rig("stepper_furuta")
     one = rig.scenario(x0=PREDICTION.start(1), seed=1, duration=25.0)
     trace = smc.run(one)
@@ -199,10 +234,11 @@ def test_the_recorded_figures_are_those_of_the_machines_file(condition):
 
 def told(by_law, falls=()):
     """Figures of one set whose laws have these alpha_rms, at all seeds; runs of `falls` fell."""
-    made = {
-        ("", "set 1", law, "hold"): [{"alpha_rms": value, "alpha_max": 99.0 if law in falls else 1.0}] * 3
-        for law, value in zip(PREDICTION.order, by_law, strict=True)
-    }
+    made = {}
+    for law, value in zip(PREDICTION.order, by_law, strict=True):
+        made[("", "set 1", law, "hold")] = [
+            {"alpha_rms": value, "alpha_max": 99.0 if law in falls else 1.0}
+        ] * 3
     return predictions.Told(prediction=PREDICTION, values=made)
 
 
@@ -211,7 +247,10 @@ def test_laws_are_in_the_machines_order_or_not():
     assert (told((3, 2, 1)).ordered("hold"), told((3, 2, 1)).correlation("hold")) == ((0, 1), -1.0)
     assert told((1, 3, 2)).correlation("hold") == pytest.approx(1 / 3)
     fallen = told((1, 2, 0), falls=PREDICTION.order[2:])
-    assert (fallen.ordered("hold"), fallen.falls(PREDICTION.order[2], "hold")) == ((1, 1), 1.0)  # a fall is the worst
+    assert (fallen.ordered("hold"), fallen.falls(PREDICTION.order[2], "hold")) == (
+        (1, 1),
+        1.0,
+    )  # a fall is the worst
     assert len(fallen.of(PREDICTION.order[2], "hold", "alpha_rms")) == 0
     with pytest.raises(smc.ScenarioError, match="emps has no figures to predict: give a record"):
         predictions.predicted(smc.rig("emps"))
@@ -219,11 +258,15 @@ def test_laws_are_in_the_machines_order_or_not():
 
 @pytest.mark.slow
 def test_the_plain_twin_has_the_machines_order_reversed():
-    """Every law runs in every condition, without a part only in the first, and from a quarter of the seeds."""
+    """Every law runs in every condition, without a part only in the first, and from a quarter of
+    the seeds.
+    """
     plain = "all of these, noise and vibration"
     short = dataclasses.replace(
         PREDICTION,
-        conditions={name: {**fields, "duration": 22.0} for name, fields in PREDICTION.conditions.items()},
+        conditions={
+            name: {**fields, "duration": 22.0} for name, fields in PREDICTION.conditions.items()
+        },
         left_out={plain: PREDICTION.left_out[plain]},
     )
     rig = dataclasses.replace(smc.rig("stepper_furuta"), prediction=short, ensemble=())

@@ -28,15 +28,24 @@ def row(machine, record, figure, variant=""):
 
 def test_whether_a_record_was_used_follows_from_the_rig(monkeypatch):
     held = row("qube_servo", "11", "theta rms")
-    assert (held.use, row("qube_servo", "06", "theta rms").use) == (twin_figures.HELD_OUT, twin_figures.FITTED)
+    assert (held.use, row("qube_servo", "06", "theta rms").use) == (
+        twin_figures.HELD_OUT,
+        twin_figures.FITTED,
+    )
     assert {one.use for one in twin_figures.rows("emps")} == {twin_figures.UNFITTED}
     other = dataclasses.replace(smc.rig("qube_servo"), identified_from=("11",))
     monkeypatch.setattr(twin_figures, "catalogue", lambda: {**rig.catalogue(), "qube_servo": other})
-    assert (held.use, row("qube_servo", "06", "theta rms").use) == (twin_figures.FITTED, twin_figures.HELD_OUT)
+    assert (held.use, row("qube_servo", "06", "theta rms").use) == (
+        twin_figures.FITTED,
+        twin_figures.HELD_OUT,
+    )
 
 
 def test_every_record_that_a_rig_was_identified_from_has_rows():
-    told = {one.record for one in twin_figures.rows()}  # two rigs are one double pendulum, with the same records
+    # two rigs are one double pendulum, with the same records
+    told = set()
+    for one in twin_figures.rows():
+        told.add(one.record)
     for name in smc.rigs():
         assert set(smc.rig(name).identified_from) <= told, name
 
@@ -44,23 +53,39 @@ def test_every_record_that_a_rig_was_identified_from_has_rows():
 def test_the_rows_of_emps_are_those_of_its_program():
     rms, largest = emps.tracking(smc.rig("emps"))
     assert row("emps", "program of 24.8 s", "rms error").twin == pytest.approx(1e3 * rms, rel=1e-3)
-    assert row("emps", "program of 24.8 s", "largest error").twin == pytest.approx(1e3 * largest, rel=1e-3)
+    assert row("emps", "program of 24.8 s", "largest error").twin == pytest.approx(
+        1e3 * largest, rel=1e-3
+    )
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the public records are not at hand")
 def test_rows_are_those_of_the_records():
-    record, twin = dict(np.load(DATA / "double_pendulum-acrobot-mcpilco-01.npz")), smc.rig("realaigym_acrobot")
+    record, twin = (
+        dict(np.load(DATA / "double_pendulum-acrobot-mcpilco-01.npz")),
+        smc.rig("realaigym_acrobot"),
+    )
     told = row("realaigym_acrobot", "acrobot 2", "tau_meas2 rms")
     ((predicted, measured, _),) = twin.predictions([record])
     assert told.machine == pytest.approx(np.std(measured["tau_meas2"]), rel=1e-3)
     assert told.twin == pytest.approx(np.std(predicted["tau_meas2"]), rel=1e-3)
     assert told.fit == pytest.approx(twin.fit(record)["tau_meas2"], abs=0.05)
     sets = [np.std(one.predictions([record])[0][0]["tau_meas2"]) for one in twin.members().values()]
-    assert (told.low, told.high) == (pytest.approx(min(sets), rel=1e-3), pytest.approx(max(sets), rel=1e-3))
+    assert (told.low, told.high) == (
+        pytest.approx(min(sets), rel=1e-3),
+        pytest.approx(max(sets), rel=1e-3),
+    )
 
 
 def test_a_summary_is_over_the_known_figures_of_whole_twins():
-    common = {"rig": "emps", "record": "one", "law": "none", "unit": "m", "machine": 2.0, "low": 1.0, "high": 3.0}
+    common = {
+        "rig": "emps",
+        "record": "one",
+        "law": "none",
+        "unit": "m",
+        "machine": 2.0,
+        "low": 1.0,
+        "high": 3.0,
+    }
     rows = [
         twin_figures.TwinFigure(figure="a", twin=2.2, runs=1, published=3.0, **common),
         twin_figures.TwinFigure(figure="b", twin=1.0, runs=1, **common | {"low": 0.5, "high": 1.5}),
@@ -69,8 +94,15 @@ def test_a_summary_is_over_the_known_figures_of_whole_twins():
     ]
     (one,) = twin_figures.summaries(rows)
     assert (one.rig, one.use, len(one.rows), one.inside) == ("emps", twin_figures.UNFITTED, 2, 1)
-    assert (one.median, one.largest, one.published) == (pytest.approx(0.3), pytest.approx(0.5), pytest.approx(0.5))
-    assert [twin_figures.TwinFigure(**twin_figures._numbers(twin_figures.described(r))) for r in rows[:3]] == rows[:3]
+    assert (one.median, one.largest, one.published) == (
+        pytest.approx(0.3),
+        pytest.approx(0.5),
+        pytest.approx(0.5),
+    )
+    assert [
+        twin_figures.TwinFigure(**twin_figures._numbers(twin_figures.described(r)))
+        for r in rows[:3]
+    ] == rows[:3]
 
 
 def test_the_page_has_the_package_s_rows():
@@ -81,15 +113,24 @@ def test_the_page_has_the_package_s_rows():
         told = [float(number) for number in re.findall(r"[\d.]+", apart)]
         assert told == pytest.approx([100.0 * one.median, 100.0 * one.largest], abs=0.5)
         assert (int(count), int(inside)) == (len(one.rows), one.inside)
-        assert published.strip() == ("" if math.isnan(one.published) else f"{100.0 * one.published:.1f} %")
+        assert published.strip() == (
+            "" if math.isnan(one.published) else f"{100.0 * one.published:.1f} %"
+        )
 
 
 @pytest.mark.parametrize("condition", ["hold", "nudges"])
 def test_laws_stand_in_the_machines_order_in_three_of_four_sets(condition):
     """Of the stepper's twin, which was found from the linear law's figures; not of the plain one."""
     whole, plain = (
-        next(one for one in twin_figures.orders("stepper_furuta") if (one.variant, one.condition) == (variant, under))
-        for variant, under in (("", condition), ("without all of these, noise and vibration", "hold"))
+        next(
+            one
+            for one in twin_figures.orders("stepper_furuta")
+            if (one.variant, one.condition) == (variant, under)
+        )
+        for variant, under in (
+            ("", condition),
+            ("without all of these, noise and vibration", "hold"),
+        )
     )
     assert whole.ordered >= 0.75 * whole.sets
     assert plain.ordered == 0
@@ -105,7 +146,9 @@ def test_a_twin_that_falls_is_told_and_drawn(tmp_path):
 
 
 def test_a_figure_has_one_row_for_all_its_records_and_is_read_on_a_phone(tmp_path):
-    """Its page is no wider than a phone, with letters of 8 points: a page as wide as its column keeps their size."""
+    """Its page is no wider than a phone, with letters of 8 points: a page as wide as its column
+    keeps their size.
+    """
     rows = [one for one in twin_figures.rows("qube_servo") if not one.variant]
     svg, _ = twins_figure(rows, tmp_path / "told.svg")
     text = svg.read_text(encoding="utf-8")

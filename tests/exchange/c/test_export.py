@@ -35,11 +35,21 @@ PLANTS = ("inverted_pendulum", "duffing", "pendulum_network")
 # What scenarios are like: without the model, with it, and with a surface, where the law takes one.
 WAYS = ({}, {"model": "nominal"}, {"model": "nominal", "surface": "linear"})
 FIELDS = ("x", "v", "u", "applied", "s")
-OF_PLANT = {"a1": 0.5, "a2": -0.2, "b": 2.0}  # which a scenario gives to a law of the library, and to none in C
-# Laws whose C takes every turn there is: powers, roots, tables, loops, branches, several results, state.
+OF_PLANT = {
+    "a1": 0.5,
+    "a2": -0.2,
+    "b": 2.0,
+}  # which a scenario gives to a law of the library, and to none in C
+# Laws whose C takes every turn there is: powers, roots, tables, loops, branches, several results,
+# state.
 SINGLE = (
-    "extended_state", "fuzzy_gain", "nested_third_order", "observer_free_table", "observer_free_taylor", "terminal",
-)  # fmt: skip
+    "extended_state",
+    "fuzzy_gain",
+    "nested_third_order",
+    "observer_free_table",
+    "observer_free_taylor",
+    "terminal",
+)
 
 
 @pytest.fixture(scope="module")
@@ -71,24 +81,38 @@ def traces(compiled):
         for way, more in enumerate(WAYS):
             if "surface" in more and (template.relative_degree != 1 or template.plants):
                 continue
-            plant = template.plants[0] if template.plants else next(given)
+            if template.plants:
+                plant = template.plants[0]
+            else:
+                plant = next(given)
             known = {gain: OF_PLANT[its.plant] for gain, its in template.gains.items() if its.plant}
-            pairs[name, way] = [scenario(law, plant, **more) for law in (template(**known), compiled[name](**known))]
+            pairs[name, way] = [
+                scenario(law, plant, **more) for law in (template(**known), compiled[name](**known))
+            ]
     found = iter(smc.run([s for pair in pairs.values() for s in pair]))
     return {key: (next(found), next(found)) for key in pairs}
 
 
 @contextlib.contextmanager
 def unmeasured():
-    """Files without the size of their code, and loaded untried, which takes a process or two for each."""
+    """Files without the size of their code, and loaded untried, which takes a process or two for
+    each.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(export, "_measured", lambda code: "not measured")
-        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
+        patch.setattr(
+            sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
+        )
         yield
 
 
 def scenario(law, plant="duffing", **more) -> smc.Scenario:
-    common = {"duration": 0.1, "noise": smc.Noise(0.003, 0.02), "disturbance": smc.Sine(0.5, 7.0), "v0": 0.3}
+    common = {
+        "duration": 0.1,
+        "noise": smc.Noise(0.003, 0.02),
+        "disturbance": smc.Sine(0.5, 7.0),
+        "v0": 0.3,
+    }
     return smc.Scenario(plant=plant, law=law, **common | {"reference": smc.Sine(0.2, 3.0)} | more)
 
 
@@ -96,15 +120,35 @@ def back(folder: Path, law, numbers="double", **more) -> CLaw:
     """A law's C, compiled without a warning, as a function (y, gains, memory) -> (u, s)."""
     path = folder / f"{law.name}-{numbers}.c"
     path.write_text(smc.exchange.law_to_c(law, numbers))
-    made = smc.exchange.law_from_c(path, flags=(*STRICT, *more.get("flags", ())), timeout=60.0).function
+    made = smc.exchange.law_from_c(
+        path, flags=(*STRICT, *more.get("flags", ())), timeout=60.0
+    ).function
     assert isinstance(made, CLaw)
     return made
 
 
 def measured(k: int, rng) -> list[float]:
     """Some measurement, with model and surface now and then."""
-    e, de = 0.5 * math.cos(0.02 * k) + 0.01 * rng.normal(), 0.05 * rng.normal() - 0.3 * math.sin(0.02 * k)
-    given = [1e-3 * k, 1e-3, e + 0.2, de, e, de, 0.2, 0.0, 0.0, -1.3 * e, 1.7, 0.1 * de, 6.0, float(k % 4 > 1)]
+    e, de = (
+        0.5 * math.cos(0.02 * k) + 0.01 * rng.normal(),
+        0.05 * rng.normal() - 0.3 * math.sin(0.02 * k),
+    )
+    given = [
+        1e-3 * k,
+        1e-3,
+        e + 0.2,
+        de,
+        e,
+        de,
+        0.2,
+        0.0,
+        0.0,
+        -1.3 * e,
+        1.7,
+        0.1 * de,
+        6.0,
+        float(k % 4 > 1),
+    ]
     return [*given, float(k % 5 == 0), de + e, -de, 0.1 * e, 0.1 * de, 0.3, -0.4]
 
 
@@ -112,22 +156,33 @@ def measured(k: int, rng) -> list[float]:
 
 
 def test_a_law_written_out_and_read_back_gives_its_own_trace_to_the_last_bit(traces):
-    """With glibc, whose pow, exp, tanh and sin the compiled law calls too; another library's may differ by some ulp."""
+    """With glibc, whose pow, exp, tanh and sin the compiled law calls too; another library's may
+    differ by some ulp.
+    """
     assert {name for name, _ in traces} == set(LAWS)
     for name, (first, second) in traces.items():
         assert first.failure is None
         assert second.scenario.law.gains == first.scenario.law.gains
         for field in FIELDS:
-            np.testing.assert_array_equal(getattr(second, field), getattr(first, field), err_msg=str(name))
+            np.testing.assert_array_equal(
+                getattr(second, field), getattr(first, field), err_msg=str(name)
+            )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SINGLE)
 def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, name):
     law, f = LAWS[name](), np.float32
-    ours, theirs = back(folder, law, "float", flags=["-Wdouble-promotion"]), rebuild(law.function, lambda g: g)
+    ours, theirs = (
+        back(folder, law, "float", flags=["-Wdouble-promotion"]),
+        rebuild(law.function, lambda g: g),
+    )
     read = gains_of(law)
-    gains, memory, rng = type(read)(*map(f, read)), np.zeros(law.memory, f), np.random.default_rng(0)
+    gains, memory, rng = (
+        type(read)(*map(f, read)),
+        np.zeros(law.memory, f),
+        np.random.default_rng(0),
+    )
     for k in range(200):
         y = Measurement(*map(f, measured(k, rng)))
         before = memory.astype(float)
@@ -142,18 +197,27 @@ def test_in_single_precision_it_is_the_same_python_in_numpy_s_float32(folder, na
 def test_every_law_in_single_precision_compiles_without_a_double_in_it(folder):
     paths = [folder / f"{name}-single.c" for name in LAWS]
     with unmeasured(), ThreadPoolExecutor(2) as pool:
-        for path, text in zip(paths, pool.map(lambda name: smc.exchange.law_to_c(name, "float"), LAWS), strict=True):
+        for path, text in zip(
+            paths, pool.map(lambda name: smc.exchange.law_to_c(name, "float"), LAWS), strict=True
+        ):
             path.write_text(text)
-            assert re.search(r"(?<![\w.])\d+\.\d+(?![\df])", text[text.index("smc_law_modelled =") :]) is None
+            assert (
+                re.search(r"(?<![\w.])\d+\.\d+(?![\df])", text[text.index("smc_law_modelled =") :])
+                is None
+            )
     flags = [*STRICT, "-Wdouble-promotion", "-fsyntax-only"]
-    done = subprocess.run([*build.compiler(), *flags, *paths], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*build.compiler(), *flags, *paths], capture_output=True, text=True, check=False
+    )
     assert done.stderr == ""
     assert done.returncode == 0
 
 
 @pytest.mark.parametrize("plant", PLANTS)
 def test_fixed_point_is_the_library_s_to_the_last_bit(folder, plant):
-    (folder / "q15.c").write_text(smc.exchange.law_to_c(smc.law("observer_free", lam=5.0, k1=1.7), "q15"))
+    (folder / "q15.c").write_text(
+        smc.exchange.law_to_c(smc.law("observer_free", lam=5.0, k1=1.7), "q15")
+    )
     mine, theirs = (
         smc.exchange.law_from_c(folder / "q15.c", flags=STRICT),
         smc.law("observer_free_q15", lam=5.0, k1=1.7),
@@ -170,10 +234,16 @@ def test_fixed_point_s_core_is_whole_numbers_and_right_for_every_word(folder):
     core = text[text.index("static const int16_t TABLE") : text.index("/* From here on")]
     assert re.search(r"double|float|smc_real|math", core) is None
     words = {name: int(value) for name, value in re.findall(r"Q15_(\w+) = (-?\d+)", text)}
-    assert words == {"ON_E": 2560, "ON_DE": 2048, "LAM": 24576}  # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
+    assert words == {
+        "ON_E": 2560,
+        "ON_DE": 2048,
+        "LAM": 24576,
+    }  # 2.5 4/8 and 8/8 in 2^-11, 6/8 in 2^-15
     core = back(folder, smc.law("observer_free"), "q15").library.smc_q15_u
     core.restype, core.argtypes = ctypes.c_int16, [ctypes.c_int16] * 2
-    assert core(-32768, 24576) == core(-32767, 24576)  # which the sliding variable's function never gives
+    assert core(-32768, 24576) == core(
+        -32767, 24576
+    )  # which the sliding variable's function never gives
     s = np.arange(-32767, 32768)
     i, part = np.abs(s) >> 7, np.abs(s) & 127
     T = q15.TABLE[i] + ((np.diff(q15.TABLE, append=0)[i] * part + 64) >> 7)
@@ -220,7 +290,10 @@ def turns(z, K, state):
     double += QUARTERS[i]
     s, _ = sliding(z, K.k)
     state[0], state[1] = state[1], state[0] + s
-    high, low = (0.75, 0.25) if state[0] > state[1] else (a, b)
+    if state[0] > state[1]:
+        high, low = (0.75, 0.25)
+    else:
+        high, low = (a, b)
     memory = high - (low - (a - b)) / (2.0 / (b * b + 1.0))
     u = -K.out * math.tanh(s) - -NOUGHT * a - K.if_ * double + late * abs(count) + memory
     return u, s + state[2] + (1 if a > b else 0.5) + state[3]
@@ -256,7 +329,10 @@ def taken(y, gains, memory):
 
 @pytest.mark.parametrize("dialect", ["-std=c99", "-std=gnu17"])
 def test_names_that_c_has_for_something_else_are_other_names_in_it(folder, dialect):
-    function, y = back(folder, taken(), flags=[dialect]), Measurement(*measured(7, np.random.default_rng(2)))
+    function, y = (
+        back(folder, taken(), flags=[dialect]),
+        Measurement(*measured(7, np.random.default_rng(2))),
+    )
     assert function(y, (), np.zeros(1)) == taken.function(y, (), np.zeros(1))
 
 
@@ -280,21 +356,29 @@ def test_numpy_s_sign_is_that_of_the_compiled_python(folder, e):
 
 
 REFUSED = {
-    "u = sum((y.e, y.de))": "sum of an array", "u = [y.e, y.de][0]": "List", "u = y.e // 2.0": "the operator FloorDiv",
-    "u = 'a'": "the value 'a'", "u = y.e if y.de else np.sinc(y.e)": "sinc",
+    "u = sum((y.e, y.de))": "sum of an array",
+    "u = [y.e, y.de][0]": "List",
+    "u = y.e // 2.0": "the operator FloorDiv",
+    "u = 'a'": "the value 'a'",
+    "u = y.e if y.de else np.sinc(y.e)": "sinc",
     "memory[-1] = 1.0; u = 0.0": "memory at a negative index",
     "memory[8] = 1.0; u = 0.0": r"it uses memory\[8\], and its memory has 8 numbers: give memory=9",
-    "u = TABLE[2]": "an index outside -2 to 1", "for u in (y.e, y.de): pass": "a loop over anything but a range",
+    "u = TABLE[2]": "an index outside -2 to 1",
+    "for u in (y.e, y.de): pass": "a loop over anything but a range",
     "n = 3; u = 0.0\n    for i in range(n): n += 1": "a loop that changes its own variable or range",
     "u = 0.0\n    for i in range(3): i += 1": "a loop that changes its own variable or range",
     "u = 0.0\n    for i in range(int(memory[0])): memory[0] += 1.0": "a loop that changes its own variable or range",
-    "u = again(y.e)": "again, which calls itself,", "u = 2 ** 40 * y.e": "a power of a whole number",
-    "u = 5000000000 * y.e": "beyond 32 bits", "u = nowhere * y.e": "a name without a value",
-    "try:\n        u = y.e\n    finally:\n        pass": "try", "u = (lambda a: a)(y.e)": "a call",
-    "y = 3.0; u = y": "an assignment to this", "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
+    "u = again(y.e)": "again, which calls itself,",
+    "u = 2 ** 40 * y.e": "a power of a whole number",
+    "u = 5000000000 * y.e": "beyond 32 bits",
+    "u = nowhere * y.e": "a name without a value",
+    "try:\n        u = y.e\n    finally:\n        pass": "try",
+    "u = (lambda a: a)(y.e)": "a call",
+    "y = 3.0; u = y": "an assignment to this",
+    "u = y.foo": "it reads an unknown measurement 'foo': choose from a, ",
     "u = gains.k * y.e": "it reads an unknown gain 'k': there are none",
     "u = halts(y.e)": "halts, which does not end in a return,",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(("line", "words"), REFUSED.items())
@@ -306,7 +390,9 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
         f"@smc.law_function\ndef strange(y, gains, memory):\n    {line}\n    return u, 0.0\n"
     )
     law = strange(text, tmp_path, monkeypatch)
-    with pytest.raises(smc.ScenarioError, match=f"law 'strange' cannot be written in C: .*({words})") as error:
+    with pytest.raises(
+        smc.ScenarioError, match=f"law 'strange' cannot be written in C: .*({words})"
+    ) as error:
         smc.exchange.law_to_c(law)
     assert "\n" not in str(error.value)
 
@@ -316,7 +402,16 @@ def test_what_has_no_translation_is_refused_by_name(tmp_path, monkeypatch, line,
 
 def test_the_file_says_formula_source_gains_and_sizes(tmp_path):
     with pytest.raises(SystemExit) as end:
-        cli.main(["export", str(tmp_path / "super_twisting.c"), "--gains", "k1=5,c=1.5", "--type", "float"])
+        cli.main(
+            [
+                "export",
+                str(tmp_path / "super_twisting.c"),
+                "--gains",
+                "k1=5,c=1.5",
+                "--type",
+                "float",
+            ]
+        )
     text = (tmp_path / "super_twisting.c").read_text()
     assert not end.value.code
     head, _, rest = text.partition("*/")
@@ -344,11 +439,18 @@ def test_the_file_says_formula_source_gains_and_sizes(tmp_path):
 def test_gains_are_ready_to_be_passed(tmp_path, law, options, kind):
     (tmp_path / "law.c").write_text(smc.exchange.law_to_c(law, **options))
     strict = (*STRICT, "-Wfloat-conversion", "-shared", "-fPIC")
-    subprocess.run([*build.compiler(), *strict, "law.c", "-o", "law.so", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run(
+        [*build.compiler(), *strict, "law.c", "-o", "law.so", "-lm"], cwd=tmp_path, check=True
+    )
     library = ctypes.CDLL(str(tmp_path / "law.so"))
     n = options.get("joints", 1)
-    values = [one for gain in law.gains.values() for one in (gain if isinstance(gain, tuple) else [gain] * n)]
-    assert [*(kind * len(values)).in_dll(library, "smc_law_defaults")] == [kind(one).value for one in values]
+    values = []
+    for gain in law.gains.values():
+        for one in gain if isinstance(gain, tuple) else [gain] * n:
+            values.append(one)
+    assert [*(kind * len(values)).in_dll(library, "smc_law_defaults")] == [
+        kind(one).value for one in values
+    ]
 
 
 def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
@@ -363,8 +465,14 @@ def test_without_a_compiler_it_is_written_all_the_same(monkeypatch):
     ("words", "said"),
     [
         (["twistin"], "unknown law 'twistin': did you mean 'twisting'?"),
-        (["twisting", "--type", "half"], "unknown type of numbers 'half': choose from double, float, q15"),
-        (["twisting", "--type", "q15"], "law 'twisting' has no Q15 form: give observer_free or observer_free_q15"),
+        (
+            ["twisting", "--type", "half"],
+            "unknown type of numbers 'half': choose from double, float, q15",
+        ),
+        (
+            ["twisting", "--type", "q15"],
+            "law 'twisting' has no Q15 form: give observer_free or observer_free_q15",
+        ),
         (["twisting", "--gains", "r3=1"], "unknown gain of twisting 'r3'"),
         (["twisting", "--gains", "r1=-1"], "twisting's r1 is -1: give a number greater than 0"),
         (["twisting", "--gains", "r1"], "--gains is 'r1': give names and numbers"),

@@ -54,15 +54,24 @@ def traces(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
         patch.setattr(export, "_measured", lambda code: "not measured")
-        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
+        patch.setattr(
+            sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
+        )
         made = [*pool.map(make, LAWS)]
-    found = iter(smc.run([s for pair in zip(LAWS, made, strict=True) for law in pair for s in scenarios(law)]))
+    found = iter(
+        smc.run(
+            [s for pair in zip(LAWS, made, strict=True) for law in pair for s in scenarios(law)]
+        )
+    )
     return {name: [*zip(*[[next(found), next(found)] for _ in "12"], strict=True)] for name in LAWS}
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_of_flight_written_out_gives_its_own_trace_to_the_last_bit(traces, name):
-    assert [ours.scenario.resolved.plant.name for ours, _ in traces[name]] == ["quadrotor", "quadrotor.xml"]
+    assert [ours.scenario.resolved.plant.name for ours, _ in traces[name]] == [
+        "quadrotor",
+        "quadrotor.xml",
+    ]
     for ours, theirs in traces[name]:
         assert ours.failure is theirs.failure is None
         for field in ("x", "v", "u", "s", "applied"):
@@ -76,11 +85,18 @@ def test_firmware_gives_what_a_run_gives_from_what_was_measured_there(tmp_path, 
     trace, read = recorded(scenarios("adaptive_quaternion_sliding")[of], tmp_path)
     (tmp_path / "firmware.c").write_text(FIRMWARE)
     flags = [*STRICT, "-O2", "-ffp-contract=off"]
-    subprocess.run([*build.compiler(), *flags, "firmware.c", "-o", "firmware", "-lm"], cwd=tmp_path, check=True)
+    subprocess.run(
+        [*build.compiler(), *flags, "firmware.c", "-o", "firmware", "-lm"], cwd=tmp_path, check=True
+    )
     given = np.zeros(len(read), [("q", "f8", (7,)), ("y", MEASUREMENT)])
-    given["q"] = [(*x[:3], *np.multiply((1.0, -1.0)[k % 2], quaternion(*x[3:]))) for k, x in enumerate(read["x"])]
+    given["q"] = [
+        (*x[:3], *np.multiply((1.0, -1.0)[k % 2], quaternion(*x[3:])))
+        for k, x in enumerate(read["x"])
+    ]
     given["y"] = read
-    done = subprocess.run([tmp_path / "firmware"], input=given.tobytes(), capture_output=True, check=True)
+    done = subprocess.run(
+        [tmp_path / "firmware"], input=given.tobytes(), capture_output=True, check=True
+    )
     numbers = np.frombuffer(done.stdout).reshape(len(trace.t), 34)
     x, u, s, controls, errors = np.split(numbers, [6, 12, 18, 22], axis=1)
     np.testing.assert_array_equal(errors, np.hstack([read["e"], read["de"]]))
@@ -96,14 +112,20 @@ def test_a_trial_in_a_process_of_its_own_finds_nothing_wrong(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["list", str(path)])
     assert not end.value.code
-    assert "tried.c: smc_law passes; 6 joints; gains kx = 2, " in capsys.readouterr().out.splitlines()[-1]
+    assert (
+        "tried.c: smc_law passes; 6 joints; gains kx = 2, "
+        in capsys.readouterr().out.splitlines()[-1]
+    )
 
 
 @pytest.mark.parametrize(
     ("law", "said"),
     [
         ("geometric", "law 'geometric' is of a free body, of 6 joints: leave joints=7 out"),
-        (smc.Scenario(plant="quadrotor", law="geometric"), "a scenario has its own joints: leave joints out"),
+        (
+            smc.Scenario(plant="quadrotor", law="geometric"),
+            "a scenario has its own joints: leave joints out",
+        ),
     ],
 )
 def test_another_number_of_joints_is_refused(law, said):

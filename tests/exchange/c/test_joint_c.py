@@ -1,4 +1,6 @@
-"""Laws of many joints in C: written out, they give the compiled law's bits; every mistake is one sentence."""
+"""Laws of many joints in C: written out, they give the compiled law's bits; every mistake is one
+sentence.
+"""
 
 import math
 import re
@@ -16,7 +18,15 @@ from numba import njit
 
 import smc_mujoco as smc
 from smc_mujoco.cli import main as cli
-from smc_mujoco.control.joint_law import JointMeasurement, coriolis, norm, product, saturate, solve, torque
+from smc_mujoco.control.joint_law import (
+    JointMeasurement,
+    coriolis,
+    norm,
+    product,
+    saturate,
+    solve,
+    torque,
+)
 from smc_mujoco.control.units import Gain
 from smc_mujoco.exchange.c import build, export, sandbox
 from smc_mujoco.simulation import python_controller, reference
@@ -26,7 +36,9 @@ pytestmark = needs_compiler
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-Wmissing-prototypes")
 LAWS = arms.LAWS
-TYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+TYPE = (
+    "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+)
 EACH = np.array([1.0, 0.25, 3.0])
 ORDER = np.array([2, 0, 1])
 
@@ -75,7 +87,10 @@ def turns(y, gains, memory):
     memory[:, 0] += y.dt * saturate(s)
     memory[:, 1] = memory[:, 0] - memory[:, 1] * 0.5
     for i in range(n):
-        memory[i, 2] = memory[i, 1] if s[i] > 0.0 else math.tanh(y.a[i] / y.limit[i])
+        if s[i] > 0.0:
+            memory[i, 2] = memory[i, 1]
+        else:
+            memory[i, 2] = math.tanh(y.a[i] / y.limit[i])
     table, column = np.ones((2, n)), np.empty((n, n))
     table[1] = s * EACH
     column[:, 0] = table[1]
@@ -86,12 +101,21 @@ def turns(y, gains, memory):
     for one in twice:
         total += one
     if norm(y.e) > 0.1 and total < 1e3:
-        u = np.where(s > low, np.sqrt(np.abs(s)) * np.sign(s), np.minimum(s, high)) - s**3 - 0.1 * np.abs(s) ** 0.5
+        u = (
+            np.where(s > low, np.sqrt(np.abs(s)) * np.sign(s), np.minimum(s, high))
+            - s**3
+            - 0.1 * np.abs(s) ** 0.5
+        )
     else:
         u = torque(y, -gains.k * s) - coriolis(y, np.array([s[0], 0.5, total / (1.0 + abs(total))]))
     kept = u.copy()
     kept[1] -= inside(kept, y.g)[2]
-    u = kept + gains.k * (memory[:, 2] - low) + table[0] * (twice - gains.all * np.ones(n)) + solve(y.M, y.h)
+    u = (
+        kept
+        + gains.k * (memory[:, 2] - low)
+        + table[0] * (twice - gains.all * np.ones(n))
+        + solve(y.M, y.h)
+    )
     return 0.01 * u, s
 
 
@@ -108,7 +132,9 @@ def turned(q, k):
 
 @njit
 def next_of(q):
-    return turned(q, 2.0) if q[0] > 0.0 else (q[1], 0.25, q[-1])
+    if q[0] > 0.0:
+        return turned(q, 2.0)
+    return (q[1], 0.25, q[-1])
 
 
 @njit
@@ -147,7 +173,10 @@ def parts(y, gains, memory):
     s, u, kept, table = y.de + gains.c * y.e, np.zeros(n), memory[:, 0], np.zeros((3, n))
     q = s[0], 0.5, -s[2]
     q = q[1], q[2], q[0] + len(q)
-    q = next_of(q) if y.t > 0.05 else next_of((s[1], q[0], q[2]))
+    if y.t > 0.05:
+        q = next_of(q)
+    else:
+        q = next_of((s[1], q[0], q[2]))
     tail, pair, two = split(s)
     tail, two = sum_and_difference(tail, two)
     u[:2], u[2] = two, pair[1] + q[n - 2]
@@ -191,12 +220,22 @@ def compiled(folder):
 
     with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(2) as pool:
         patch.setattr(export, "_measured", lambda code: "not measured")
-        patch.setattr(sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1]))
-        return {name: (laws[name], made()) for name, made in zip(laws, pool.map(make, laws), strict=True)}
+        patch.setattr(
+            sandbox, "load", lambda law: sandbox.facts(sandbox.entry(str(law.file), law.symbol)[1])
+        )
+        return {
+            name: (laws[name], made())
+            for name, made in zip(laws, pool.map(make, laws), strict=True)
+        }
 
 
 def scenario(law, plant=None, **fields) -> smc.Scenario:
-    common = {"duration": 0.1, "reference": smc.Sine(0.2, 5.0), "noise": smc.Noise(1e-3, 1e-2), "u_max": 50.0}
+    common = {
+        "duration": 0.1,
+        "reference": smc.Sine(0.2, 5.0),
+        "noise": smc.Noise(1e-3, 1e-2),
+        "u_max": 50.0,
+    }
     return smc.Scenario(plant=plant or arms.arm(), law=law, **common | fields)
 
 
@@ -214,18 +253,25 @@ WAYS = {
 def ways_of(law):
     """The scenarios that suit a law: not all laws can do without the model, and one needs a tip."""
     for way, fields in WAYS.items():
-        if (law.requires_model and fields.get("model") == "none") or (law.name == "hybrid_sliding" and way != "arm"):
+        if (law.requires_model and fields.get("model") == "none") or (
+            law.name == "hybrid_sliding" and way != "arm"
+        ):
             continue
         yield fields
 
 
 @pytest.fixture(scope="module")
 def traces(compiled):
-    """Name -> pairs of traces, of the law and of its C: of one way after the other, and of "turns" in all ways."""
+    """Name -> pairs of traces, of the law and of its C: of one way after the other, and of "turns"
+    in all ways.
+    """
     pairs = {}
     for i, (name, (law, c)) in enumerate(compiled.items()):
         ways = list(ways_of(law))
-        chosen = ways if name == "turns" else [ways[i % len(ways)]]
+        if name == "turns":
+            chosen = ways
+        else:
+            chosen = [ways[i % len(ways)]]
         pairs[name] = [(scenario(law, **fields), scenario(c, **fields)) for fields in chosen]
     found = iter(smc.run([s for each in pairs.values() for pair in each for s in pair]))
     return {name: [(next(found), next(found)) for _ in each] for name, each in pairs.items()}
@@ -247,7 +293,9 @@ def test_gains_by_joint_and_shared_ones_are_read_back(compiled):
     assert compiled["turns"][1].shared == ("all",)
     assert compiled["unit_vector"][1].shared == ("rho", "eps")
     assert compiled["turns"][1].joint
-    with pytest.raises(smc.ScenarioError, match=r"all is \(1, 2, 3\): give one number for all channels"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"all is \(1, 2, 3\): give one number for all channels"
+    ):
         compiled["turns"][1].template(all=[1, 2, 3])
 
 
@@ -260,7 +308,9 @@ def test_the_reference_loop_calls_it_alike(compiled, name):
     assert_same(trace, reference.run(trace.scenario))
 
 
-@pytest.mark.parametrize("name", ["passivity_based", "super_twisting_computed_torque", "time_delay_sliding"])
+@pytest.mark.parametrize(
+    "name", ["passivity_based", "super_twisting_computed_torque", "time_delay_sliding"]
+)
 def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(folder, name):
     (path := folder / f"{name}-single.c").write_text(smc.exchange.law_to_c(name, "float", joints=3))
     flags = (*STRICT, "-Wdouble-promotion")
@@ -274,8 +324,14 @@ def test_in_single_precision_each_call_is_that_of_double_within_its_rounding(fol
         theirs.memory[:] = memory[:, : law.memory]
         expected, found = theirs.call_joint(y), single(y, gains_of(law, 3), memory)
         for ours, wanted in zip(found, expected, strict=True):
-            scale = 1.0 / y.dt if name == "time_delay_sliding" else 1.0  # it divides a difference of velocities by dt
-            np.testing.assert_allclose(ours, wanted, atol=1e-5 * scale * (1.0 + np.abs(wanted).max()), rtol=0)
+            # it divides a difference of velocities by dt
+            if name == "time_delay_sliding":
+                scale = 1.0 / y.dt
+            else:
+                scale = 1.0
+            np.testing.assert_allclose(
+                ours, wanted, atol=1e-5 * scale * (1.0 + np.abs(wanted).max()), rtol=0
+            )
 
 
 @smc.law_function(joint=True)
@@ -287,7 +343,8 @@ def edges(y, gains, memory):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "x", [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)]
+    "x",
+    [(0.0, -0.0, 0.0), (-0.0, 0.0, -0.0), (math.nan, 1.0, math.nan), (1.0, math.nan, -math.inf)],
 )
 def test_zeros_and_nan_are_those_of_the_compiled_python(folder, x):
     (path := folder / "edges.c").write_text(smc.exchange.law_to_c(edges, joints=3))
@@ -329,24 +386,45 @@ def own(body: str, joints: str = "#define SMC_JOINTS 2", head: str = TYPE) -> st
 
 
 MISTAKES = {
-    "no number": (own("out[0] = y->x[1];", joints=""), "does not compile: line 8, subscripted value is neither"),
+    "no number": (
+        own("out[0] = y->x[1];", joints=""),
+        "does not compile: line 8, subscripted value is neither",
+    ),
     "type": (own("", head=TYPE.replace("smc_meas", "other_meas")), "does not compile: line 3"),
-    "header": (own("").replace("smc_law(", "smc_other("), f"has no function smc_law: define {TYPE}"),
-    "less": (own("", head=TYPE.replace(", smc_real *out", "").replace("{", "{ smc_real out[4];")), f"must be {TYPE}"),
+    "header": (
+        own("").replace("smc_law(", "smc_other("),
+        f"has no function smc_law: define {TYPE}",
+    ),
+    "less": (
+        own("", head=TYPE.replace(", smc_real *out", "").replace("{", "{ smc_real out[4];")),
+        f"must be {TYPE}",
+    ),
     "memory": (own("memory[16] = 1.0;"), "smc_law writes beyond the 8 numbers of its memory"),
     "out": (own("out[4] = 1.0;"), "smc_law writes beyond the numbers of out"),
-    "measurement": (own("((double *)y->x)[1] = 0.0;"), "smc_law changes its measurement: keep what changes in memory"),
-    "nan": (own("out[1] = gains[0] / memory[0];"), "smc_law returned u = inf, s = 0.0 of joint 1 at t = 0"),
+    "measurement": (
+        own("((double *)y->x)[1] = 0.0;"),
+        "smc_law changes its measurement: keep what changes in memory",
+    ),
+    "nan": (
+        own("out[1] = gains[0] / memory[0];"),
+        "smc_law returned u = inf, s = 0.0 of joint 1 at t = 0",
+    ),
     "gains": (
         own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2 3";'),
         "gain k of mine.c is (1, 2, 3): give it one number, or 2",
     ),
-    "one joint": (own("", joints="#define SMC_JOINTS 1"), "does not compile: define SMC_JOINTS as a number from 2"),
+    "one joint": (
+        own("", joints="#define SMC_JOINTS 1"),
+        "does not compile: define SMC_JOINTS as a number from 2",
+    ),
     "shared": (
-        own("", joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2", smc_law_shared[] = "k";'),
+        own(
+            "",
+            joints='#define SMC_JOINTS 2\nconst char smc_law_gains[] = "k=1 2", smc_law_shared[] = "k";',
+        ),
         "shared gain k of mine.c is (1, 2): give it one number",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", MISTAKES)
@@ -355,12 +433,16 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path, case):
     (path := tmp_path / "mine.c").write_text(text)
     gains = {"k": 1.0} if case == "nan" else None
     with pytest.raises(smc.ScenarioError, match=re.escape(said)) as error:
-        smc.exchange.law_from_c(path, isolate=case in ("memory", "out", "measurement", "nan"), gains=gains)
+        smc.exchange.law_from_c(
+            path, isolate=case in ("memory", "out", "measurement", "nan"), gains=gains
+        )
     assert "\n" not in str(error.value)
 
 
 def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
-    with pytest.raises(smc.ScenarioError, match="its C code is for 3, where panda has 7: write it for 7") as error:
+    with pytest.raises(
+        smc.ScenarioError, match="its C code is for 3, where panda has 7: write it for 7"
+    ) as error:
         smc.Scenario(plant="panda", law=compiled["unit_vector"][1])
     assert "\n" not in str(error.value)
     three = smc.plant("inverted_pendulum_network", n=3)
@@ -368,8 +450,13 @@ def test_a_mistake_in_the_scenario_is_one_sentence(compiled, tmp_path):
     assert "asks for the Jacobian of a tip, and there is none" in str(trace.failure)
     (path := tmp_path / "mine.c").write_text(smc.exchange.law_to_c("unit_vector", joints=2))
     library = tmp_path / "mine.so"
-    subprocess.run([*build.compiler(), *build.LIBRARY_FLAGS, str(path), "-o", str(library), "-lm"], check=True)
-    with pytest.raises(smc.ScenarioError, match=r"mine\.so is a library with a law of many joints: give its \.c file"):
+    subprocess.run(
+        [*build.compiler(), *build.LIBRARY_FLAGS, str(path), "-o", str(library), "-lm"], check=True
+    )
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"mine\.so is a library with a law of many joints: give its \.c file",
+    ):
         smc.exchange.law_from_c(library)
 
 

@@ -1,4 +1,6 @@
-"""Users' laws in C: the same traces as the library's, and for every mistake one sentence, not a dead process."""
+"""Users' laws in C: the same traces as the library's, and for every mistake one sentence, not a
+dead process.
+"""
 
 import copy
 import os
@@ -13,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.commands import python
 from helpers.compiler import needs_compiler
 
@@ -21,7 +24,6 @@ from smc_mujoco.cli import main
 from smc_mujoco.control import joint_law
 from smc_mujoco.control.law import Measurement
 from smc_mujoco.exchange.c import build
-from helpers import reference
 from smc_mujoco.studies import run_key
 
 pytestmark = needs_compiler
@@ -30,7 +32,9 @@ DOCS = Path(smc.__file__).parents[1] / "docs" / "c.md"
 (MINE,) = re.findall(r"^```c\n(.*?)^```$", DOCS.read_text(), re.MULTILINE | re.DOTALL)
 HEADER = build.HEADER.read_text()
 CALLED = "has another smc_law than smc_mujoco calls: it must be"
-TYPE = "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+TYPE = (
+    "int smc_law(const smc_measurement *y, const smc_real *gains, smc_real *memory, smc_real *out)"
+)
 FIELDS = ("x", "v", "u", "applied", "s")
 
 
@@ -41,7 +45,9 @@ def law(body: str, more: str = "") -> str:
 
 
 FALLS = law("out[0] = -y->e;", "int smc_setup(void) { return *(volatile int *)16; }")
-WAITS = law("out[0] = -y->e;", "#include <unistd.h>\nint smc_setup(void) { for (;;) pause(); return 0; }")
+WAITS = law(
+    "out[0] = -y->e;", "#include <unistd.h>\nint smc_setup(void) { for (;;) pause(); return 0; }"
+)
 # state that is neither in memory nor in static data
 KEPT = """#include <fenv.h>
 #include <signal.h>
@@ -91,7 +97,15 @@ def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file):
     mine = smc.exchange.law_from_c(file(MINE))
     pairs = [(mine(lam=5.0), smc.law("observer_free", lam=5.0))] * 3
     plants = ("inverted_pendulum", "duffing", "pendulum_network")
-    traces = iter(smc.run([scenario(law, plant) for pair, plant in zip(pairs, plants, strict=True) for law in pair]))
+    traces = iter(
+        smc.run(
+            [
+                scenario(law, plant)
+                for pair, plant in zip(pairs, plants, strict=True)
+                for law in pair
+            ]
+        )
+    )
     for fast, theirs in zip(traces, traces, strict=True):
         assert fast.failure is None
         assert same(fast, theirs)
@@ -100,32 +114,65 @@ def test_a_law_in_c_gives_the_bits_of_the_library_s_and_of_the_plain_loop(file):
 
 def test_it_runs_in_the_callback_without_a_word_and_on_threads_alike(file):
     mine = smc.exchange.law_from_c(file(MINE))
-    sweep = [scenario(mine(lam=lam), seed=seed, duration=0.1) for lam in (2.0, 6.0) for seed in range(4)]
-    one, two = smc.run(sweep, threads=1), smc.run(sweep, threads=2)  # a PlainLoopWarning would be an error
+    sweep = []
+    for lam in (2.0, 6.0):
+        for seed in range(4):
+            sweep.append(scenario(mine(lam=lam), seed=seed, duration=0.1))
+    one, two = (
+        smc.run(sweep, threads=1),
+        smc.run(sweep, threads=2),
+    )  # a PlainLoopWarning would be an error
     assert all(same(a, b) for a, b in zip(one, two, strict=True))
 
 
 def test_every_number_of_the_measurement_is_where_the_header_says(file):
-    total = " + ".join(f"{i}.0 * y->{name}" for i, name in enumerate(Measurement._fields) if name != "limit")
+    total = " + ".join(
+        f"{i}.0 * y->{name}" for i, name in enumerate(Measurement._fields) if name != "limit"
+    )
 
     @smc.law_function
     def summed(y, gains, memory):
         return (
-            0.0 * y.t + 1.0 * y.dt + 2.0 * y.x + 3.0 * y.v + 4.0 * y.e + 5.0 * y.de + 6.0 * y.r + 7.0 * y.dr
-            + 8.0 * y.ddr + 9.0 * y.f + 10.0 * y.g + 11.0 * y.a + 13.0 * y.model + 14.0 * y.has_surface + 15.0 * y.s
-            + 16.0 * y.v_eq + 17.0 * y.q + 18.0 * y.dq + 19.0 * y.fq + 20.0 * y.gq
-        ), y.limit  # fmt: skip
+            0.0 * y.t
+            + 1.0 * y.dt
+            + 2.0 * y.x
+            + 3.0 * y.v
+            + 4.0 * y.e
+            + 5.0 * y.de
+            + 6.0 * y.r
+            + 7.0 * y.dr
+            + 8.0 * y.ddr
+            + 9.0 * y.f
+            + 10.0 * y.g
+            + 11.0 * y.a
+            + 13.0 * y.model
+            + 14.0 * y.has_surface
+            + 15.0 * y.s
+            + 16.0 * y.v_eq
+            + 17.0 * y.q
+            + 18.0 * y.dq
+            + 19.0 * y.fq
+            + 20.0 * y.gq
+        ), y.limit
 
     more = {"model": "nominal", "surface": "linear", "reference": smc.Sine(0.1, 3.0), "u_max": 1e9}
-    mine = smc.exchange.law_from_c(file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",))
+    mine = smc.exchange.law_from_c(
+        file(law(f"out[0] = {total}; out[1] = y->limit;")), plants=("cart_pole",)
+    )
     theirs = smc.law_function(plants=("cart_pole",))(summed.function)
-    assert same(*smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)]))
+    assert same(
+        *smc.run([scenario(law, "cart_pole", **more, duration=0.05) for law in (mine, theirs)])
+    )
 
 
 @pytest.mark.slow
 def test_single_precision_is_single_within_and_double_without(file):
-    single = smc.exchange.law_from_c(file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True)
-    fast, exact = smc.run([scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))])
+    single = smc.exchange.law_from_c(
+        file("#define SMC_REAL float\n" + MINE.replace("tanh", "tanhf")), isolate=True
+    )
+    fast, exact = smc.run(
+        [scenario(law, duration=1.0) for law in (single, smc.law("observer_free"))]
+    )
     assert np.array_equal(fast.s, fast.s.astype(np.float32))
     assert 0.0 < np.abs(fast.x - exact.x).max() < 1e-6
     assert same(fast, reference.run(fast.scenario))
@@ -138,10 +185,24 @@ def test_a_shared_library_is_taken_as_it_is_and_again_after_a_new_build(file, tm
     target = tmp_path / "my_law.so"
     traces = []
     for gain in (1.0, 2.0):
-        source = file(law(f"out[0] = -{gain} * gains[0] * y->e;").replace("smc_law(", "firmware_step("), "built.c")
-        line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
+        source = file(
+            law(f"out[0] = -{gain} * gains[0] * y->e;").replace("smc_law(", "firmware_step("),
+            "built.c",
+        )
+        line = [
+            *build.compiler(),
+            "-shared",
+            "-fPIC",
+            "-I",
+            str(build.FOLDER),
+            str(source),
+            "-o",
+            str(target),
+        ]
         subprocess.run(line, check=True)
-        mine = smc.exchange.law_from_c(target, symbol="firmware_step", gains={"k": 0.5}, isolate=True)
+        mine = smc.exchange.law_from_c(
+            target, symbol="firmware_step", gains={"k": 0.5}, isolate=True
+        )
         traces.append(smc.run(scenario(mine, noise=None)))
         assert same(traces[-1], reference.run(traces[-1].scenario))
     assert traces[1].u[0, 0] == pytest.approx(2.0 * traces[0].u[0, 0], rel=1e-12)
@@ -151,10 +212,20 @@ def test_two_laws_of_one_library_are_two(file, tmp_path):
     target, text = tmp_path / "laws.so", law("out[0] = -y->e;")
     second = text.partition("int ")[2].replace("smc_law(", "other(").replace("-y->e", "-2 * y->e")
     source = file(text + "int " + second)
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
+    line = [
+        *build.compiler(),
+        "-shared",
+        "-fPIC",
+        "-I",
+        str(build.FOLDER),
+        str(source),
+        "-o",
+        str(target),
+    ]
     subprocess.run(line, check=True)
     one, other = (
-        scenario(smc.exchange.law_from_c(target, symbol=name, name="mine")()) for name in ("smc_law", "other")
+        scenario(smc.exchange.law_from_c(target, symbol=name, name="mine")())
+        for name in ("smc_law", "other")
     )
     assert one != other
     assert run_key.key(one) != run_key.key(other)
@@ -164,9 +235,18 @@ def test_two_laws_of_one_library_are_two(file, tmp_path):
 def test_a_scenario_is_its_copies_equal_and_no_other_law_s(file):
     path = file(MINE)
     first = scenario(smc.exchange.law_from_c(path)(lam=4.0))
-    copies = [pickle.loads(pickle.dumps(first)), copy.deepcopy(first), scenario(smc.exchange.law_from_c(path)(lam=4.0))]
-    assert all(each == first and hash(each.law.function) == hash(first.law.function) for each in copies)
-    wider, renamed = smc.exchange.law_from_c(path, memory=20), smc.exchange.law_from_c(path, name="other")
+    copies = [
+        pickle.loads(pickle.dumps(first)),
+        copy.deepcopy(first),
+        scenario(smc.exchange.law_from_c(path)(lam=4.0)),
+    ]
+    assert all(
+        each == first and hash(each.law.function) == hash(first.law.function) for each in copies
+    )
+    wider, renamed = (
+        smc.exchange.law_from_c(path, memory=20),
+        smc.exchange.law_from_c(path, name="other"),
+    )
     edited = smc.exchange.law_from_c(file(MINE.replace("out[1] = s", "out[1] = 0.5 + s")))
     functions = {each.function for each in (first.law, wider(), renamed(), edited())}
     assert len(functions) == 4
@@ -176,9 +256,20 @@ def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
     """The rest of the register holds what it likes."""
     target = tmp_path / "my_law.so"
     text = "long long smc_law(const double *y, const double *gains, double *memory, double *out)\n"
-    text += "{ (void)memory; out[0] = out[1] = -y[4]; return (long long)gains[0] << 32; }"  # the int in it is 0
+    # the int in it is 0
+    text += "{ (void)memory; out[0] = out[1] = -y[4]; return (long long)gains[0] << 32; }"
     source = file(text)
-    line = [*build.compiler(), "-O2", "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(target)]
+    line = [
+        *build.compiler(),
+        "-O2",
+        "-shared",
+        "-fPIC",
+        "-I",
+        str(build.FOLDER),
+        str(source),
+        "-o",
+        str(target),
+    ]
     subprocess.run(line, check=True)
     assert smc.run(scenario(smc.exchange.law_from_c(target, gains={"k": 3.0}))).failure is None
 
@@ -186,12 +277,17 @@ def test_a_library_s_int_is_read_as_an_int(file, tmp_path):
 def test_other_files_and_flags_come_along(file, tmp_path):
     other = file("double twice(double a) { return 2.0 * a; }", "filter.c")
     mine = file(law("out[0] = -K * twice(y->e);", "double twice(double a);"))
-    trace = smc.run(scenario(smc.exchange.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None))
+    trace = smc.run(
+        scenario(smc.exchange.law_from_c(mine, flags=["-DK=1.5", str(other)]), noise=None)
+    )
     assert trace.u[0, 0] == -3.0 * trace.x[0, 0]
 
 
 def test_set_up_is_called_before_the_first_run(file):
-    text = law("out[0] = table[3];", "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }")
+    text = law(
+        "out[0] = table[3];",
+        "static double table[4];\nint smc_setup(void) { table[3] = 0.25; return 0; }",
+    )
     assert (smc.run(scenario(smc.exchange.law_from_c(file(text)))).u == 0.25).all()
 
 
@@ -205,9 +301,19 @@ def test_a_trace_keeps_name_and_gains_but_not_the_code(file, tmp_path):
 
 def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_then(file, tmp_path):
     text = 'const char smc_law_gains[] = "k=2";'
-    first = scenario(smc.exchange.law_from_c(file(law(
-        "out[0] = table * gains[0] * y->e;", f"static double table;\n{text}\n"
-        "int smc_setup(void) { table = -1.0; return 0; }")), name="mine")(k=4.0), noise=None)  # fmt: skip
+    first = scenario(
+        smc.exchange.law_from_c(
+            file(
+                law(
+                    "out[0] = table * gains[0] * y->e;",
+                    f"static double table;\n{text}\n"
+                    "int smc_setup(void) { table = -1.0; return 0; }",
+                )
+            ),
+            name="mine",
+        )(k=4.0),
+        noise=None,
+    )
     kept, trace = pickle.dumps([first, first]), smc.run(first)
     file(law("out[0] = y->e;"))
     one, two = pickle.loads(kept)
@@ -221,8 +327,12 @@ def test_another_process_runs_what_was_loaded_here_whatever_the_file_holds_by_th
 
 
 def test_a_law_of_floats_is_as_large_in_another_process(file):
-    text = "#define SMC_REAL float\n" + law("memory[99] += gains[0]; out[0] = 0.0f; out[1] = memory[99];")
-    first = scenario(smc.exchange.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01)
+    text = "#define SMC_REAL float\n" + law(
+        "memory[99] += gains[0]; out[0] = 0.0f; out[1] = memory[99];"
+    )
+    first = scenario(
+        smc.exchange.law_from_c(file(text), gains={"k": 2.0}, memory=100), duration=0.01
+    )
     trace = smc.run(pickle.loads(pickle.dumps(first)))
     assert trace.s[:, 0].tolist() == [2.0 * k for k in range(1, 12)]
 
@@ -230,13 +340,20 @@ def test_a_law_of_floats_is_as_large_in_another_process(file):
 def test_code_of_another_machine_is_one_sentence(file):
     mine = smc.exchange.law_from_c(file(MINE)).function
     remade, arguments = mine.__reduce__()
-    with pytest.raises(smc.ScenarioError, match=r"my_law\.c cannot be loaded \(my_law\.c: file too short\): run it on"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"my_law\.c cannot be loaded \(my_law\.c: file too short\): run it on",
+    ):
         remade(*arguments[:2], b"\x7fELF", *arguments[3:])
 
 
 def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
     def key(gain: float, name: str = "my_law.c", **more: object) -> str:
-        return run_key.key(scenario(smc.exchange.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()))
+        return run_key.key(
+            scenario(
+                smc.exchange.law_from_c(file(law(f"out[0] = -{gain} * y->e;"), name), **more)()
+            )
+        )
 
     first = key(1.0)
     assert key(2.0) != first
@@ -245,14 +362,23 @@ def test_what_a_study_knows_of_it_is_its_code(file, tmp_path):
     assert key(1.0, flags=["-O0"]) != first
     (tmp_path / "elsewhere").mkdir()
     assert key(1.0, "elsewhere/my_law.c") == first
-    again = pickle.loads(pickle.dumps(scenario(smc.exchange.law_from_c(file(law("out[0] = -1.0 * y->e;")))())))
+    again = pickle.loads(
+        pickle.dumps(scenario(smc.exchange.law_from_c(file(law("out[0] = -1.0 * y->e;")))()))
+    )
     assert run_key.key(again) == first
 
 
 def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
-    """y0 and remove are functions of C's, timezone a number: a linker may take those without a word."""
+    """y0 and remove are functions of C's, timezone a number: a linker may take those without a
+    word.
+    """
     more = "double y0(double a) { return -a; }\ndouble remove(double a) { return y0(2.0 * a); }\ndouble timezone = 0.5;"
-    trace = smc.run(scenario(smc.exchange.law_from_c(file(law("out[0] = timezone * remove(y->e);", more))), noise=None))
+    trace = smc.run(
+        scenario(
+            smc.exchange.law_from_c(file(law("out[0] = timezone * remove(y->e);", more))),
+            noise=None,
+        )
+    )
     assert trace.u[0, 0] == -trace.x[0, 0]
 
 
@@ -262,23 +388,41 @@ def test_its_functions_and_data_are_its_own_whatever_else_has_their_names(file):
 @pytest.mark.slow
 def test_what_cannot_be_loaded_is_one_sentence(file):
     for text, words in (
-        (law("out[0] = y->e return;"), "my_law.c does not compile: line 7, expected ';' before 'return'"),
-        (MINE.replace("smc_measurement", "smc_in"), f"unknown type name 'smc_in'; the law must be {TYPE}"),
+        (
+            law("out[0] = y->e return;"),
+            "my_law.c does not compile: line 7, expected ';' before 'return'",
+        ),
+        (
+            MINE.replace("smc_measurement", "smc_in"),
+            f"unknown type name 'smc_in'; the law must be {TYPE}",
+        ),
         ('#include "nowhere.h"\n' + MINE, "does not compile: line 1, nowhere.h: No such file"),
         ("int smc_law(double e, double de) { return e + de; }", f"{CALLED} {TYPE}"),
         (MINE.replace("int smc_law(", "double smc_law("), f"{CALLED} {TYPE}"),
         (HEADER.replace("smc_real gq;", ""), "has another smc_law than smc_mujoco calls"),
         ("int my_law(void) { return 0; }", f"has no function smc_law: define {TYPE}"),
-        (law("out[0] = other(y->e);", "double other(double);"), "cannot be loaded (my_law.c: undefined symbol: other)"),
-        (law("out[0] = other(y->e);", "double other(double);\n/* -Wl,-z,defs */"), "undefined reference to `other'"),
-        (MINE.replace("k1=2.5", "k1"), "my_law.c's smc_law_gains is 'lam=6,k1': give names and numbers"),
+        (
+            law("out[0] = other(y->e);", "double other(double);"),
+            "cannot be loaded (my_law.c: undefined symbol: other)",
+        ),
+        (
+            law("out[0] = other(y->e);", "double other(double);\n/* -Wl,-z,defs */"),
+            "undefined reference to `other'",
+        ),
+        (
+            MINE.replace("k1=2.5", "k1"),
+            "my_law.c's smc_law_gains is 'lam=6,k1': give names and numbers",
+        ),
         (
             MINE.replace("k1=2.5", "lam=2"),
             "my_law.c's smc_law_gains is 'lam=6,lam=2': give names and numbers, each once",
         ),
         (MINE + "const int smc_law_degree = 5;", "degree is 5: give a whole number from 1 to 3"),
         (law("", "int smc_setup(void) { return 3; }"), "my_law.c: smc_setup returned 3"),
-        (law("", "#include <stdlib.h>\nint smc_setup(void) { exit(7); }"), "ended the process with exit code 7"),
+        (
+            law("", "#include <stdlib.h>\nint smc_setup(void) { exit(7); }"),
+            "ended the process with exit code 7",
+        ),
         (FALLS, "my_law.c: smc_setup died of SIGSEGV (Segmentation fault)"),
     ):
         flags = re.findall(r"/\* (-Wl\S+) \*/", text)
@@ -292,11 +436,15 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
     write = f'FILE *f = fopen("{told}", "w"); fprintf(f, "%d", (int)getpid()); fclose(f);'
     headers = "#include <stdio.h>\n#include <unistd.h>\n"
     waits = law("out[0] = 0.0;", f"{headers}int smc_setup(void) {{ {write} for (;;) pause(); }}")
-    starts = law("", f"{headers}__attribute__((constructor)) static void start(void) {{ for (;;) pause(); }}")
+    starts = law(
+        "", f"{headers}__attribute__((constructor)) static void start(void) {{ for (;;) pause(); }}"
+    )
     with ThreadPoolExecutor(2) as pool:  # each waits for its time limit
         files = file(waits, "waits.c"), file(starts, "starts.c")
         tries = [pool.submit(smc.exchange.law_from_c, path, timeout=3.0) for path in files]
-        for tried, words in zip(tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True):
+        for tried, words in zip(
+            tries, ("smc_setup did not end within 3 s", "loading did not end"), strict=True
+        ):
             with pytest.raises(smc.ScenarioError, match=words):
                 tried.result()
     with pytest.raises(ProcessLookupError):
@@ -306,22 +454,34 @@ def test_set_up_and_loading_that_never_end_are_killed(file, tmp_path):
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        ("out[0] = *(volatile int *)(y->t > 0.1 ? 16 : (long)&gains[0]);", "smc_law died of SIGSEGV (Seg"),
+        (
+            "out[0] = *(volatile int *)(y->t > 0.1 ? 16 : (long)&gains[0]);",
+            "smc_law died of SIGSEGV (Seg",
+        ),
         ("out[0] = y->e / (y->t - y->t);", "smc_law returned u = inf, s = 1.00"),
         ("out[0] = 0.0; return 4;", "smc_law returned 4 at t = 0, e = 1"),
         ("memory[8] = y->e; out[0] = 0.0;", "smc_law writes beyond the 8 numbers of its memory"),
-        ("memory[-1] = 1.0f; out[0] = 0.0f; /* of floats */", "smc_law writes beyond the 8 numbers of its memory"),
+        (
+            "memory[-1] = 1.0f; out[0] = 0.0f; /* of floats */",
+            "smc_law writes beyond the 8 numbers of its memory",
+        ),
         ("out[2] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
         ("out[0] = -gains[1] * y->e;", "smc_law returned u = nan, s = 1.00"),
         ("out[-1] = y->e; out[0] = 0.0;", "smc_law writes beyond the numbers of out"),
         ("((double *)gains)[0] = 1.0; out[0] = 0.0;", "smc_law changes its gains"),
         ("((double *)y)[4] = 0.0; out[0] = 0.0;", "smc_law changes its gains or its measurement"),
-        ("static double z; out[0] = z += y->e;", "smc_law gave two answers to one measurement, as from state which"),
-        ("out[0] = y->e; fesetround(FE_UPWARD);", "smc_law changes the arithmetic of its thread (rounding, flush-"),
+        (
+            "static double z; out[0] = z += y->e;",
+            "smc_law gave two answers to one measurement, as from state which",
+        ),
+        (
+            "out[0] = y->e; fesetround(FE_UPWARD);",
+            "smc_law changes the arithmetic of its thread (rounding, flush-",
+        ),
         ("out[0] = *hidden += y->e;", "smc_law gave two answers to one measurement"),
         ("raise(40); out[0] = 0.0;", "smc_law died of signal 40 (Real-time signal 6)"),
     ],
-)  # fmt: skip
+)
 def test_isolated_a_law_that_does_harm_is_one_sentence(file, body, words):
     with pytest.raises(smc.ScenarioError, match=re.escape(words)) as error:
         smc.exchange.law_from_c(
@@ -349,7 +509,9 @@ def sanitizers():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the compiler is a shell script")
 @pytest.mark.parametrize(("compiler_ends", "program_ends"), [(0, 0), (0, 1), (1, 0)])
-def test_sanitizers_work_where_a_program_with_them_compiles_and_runs(tmp_path, compiler_ends, program_ends):
+def test_sanitizers_work_where_a_program_with_them_compiles_and_runs(
+    tmp_path, compiler_ends, program_ends
+):
     compiler = tmp_path / "cc"
     program = f"'#!/bin/sh\\nexit {program_ends}\\n'"
     compiler.write_text(f"""#!/bin/sh
@@ -366,7 +528,9 @@ def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
     """Nothing of it changes a number that the trial itself looks at."""
     text = law(body, "#include <stdlib.h>\n#include <string.h>")
     line = text[: text.index(body)].count("\n") + 1
-    with pytest.raises(smc.ScenarioError, match=re.escape(f"my_law.c makes an error in line {line}: {words}")) as error:
+    with pytest.raises(
+        smc.ScenarioError, match=re.escape(f"my_law.c makes an error in line {line}: {words}")
+    ) as error:
         smc.exchange.law_from_c(file(text), gains={"k": 3.0}, isolate=True, timeout=60.0)
     assert "\n" not in str(error.value)
 
@@ -374,14 +538,20 @@ def test_isolated_what_sanitizers_see_is_one_sentence(file, body, words):
 def test_check_c_says_what_it_could_not_see(call, file, tmp_path, monkeypatch):
     out = call("list", file(MINE))[1]
     wrapper = tmp_path / "cc"
-    wrapper.write_text(f'#!/bin/sh\ncase "$*" in *-fsanitize*) exit 1;; esac\nexec {" ".join(build.compiler())} "$@"\n')
+    wrapper.write_text(
+        f'#!/bin/sh\ncase "$*" in *-fsanitize*) exit 1;; esac\nexec {" ".join(build.compiler())} "$@"\n'
+    )
     wrapper.chmod(0o755)
     monkeypatch.setenv("CC", str(wrapper))
     told = call("list", file(MINE))[1].splitlines()
     without = f"my_law.c is tried without address and undefined-behaviour sanitizers: {wrapper} has none that work here"
     assert told == [without, out.splitlines()[-1]]
-    library = build.library(tmp_path / "my_law.c", "smc_law", [], 60.0)[0].rename(tmp_path / "my_law.so")
-    without = "my_law.so is tried without address and undefined-behaviour sanitizers: give its .c file"
+    library = build.library(tmp_path / "my_law.c", "smc_law", [], 60.0)[0].rename(
+        tmp_path / "my_law.so"
+    )
+    without = (
+        "my_law.so is tried without address and undefined-behaviour sanitizers: give its .c file"
+    )
     assert call("list", library)[1].splitlines()[0] == without
 
 
@@ -402,9 +572,18 @@ ALTERS = "changes the arithmetic of its thread (rounding, flush-to-zero, traps),
     ("more", "words"),
     [
         (FLUSHES, f"loading it {ALTERS}"),
-        ("#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_TOWARDZERO); }", f"smc_setup {ALTERS}"),
-        ("#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_DOWNWARD); }", f"smc_setup {ALTERS}"),
-        ("int feenableexcept(int);\nint smc_setup(void) { feenableexcept(4); return 0; }", f"smc_setup {ALTERS}"),
+        (
+            "#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_TOWARDZERO); }",
+            f"smc_setup {ALTERS}",
+        ),
+        (
+            "#include <fenv.h>\nint smc_setup(void) { return fesetround(FE_DOWNWARD); }",
+            f"smc_setup {ALTERS}",
+        ),
+        (
+            "int feenableexcept(int);\nint smc_setup(void) { feenableexcept(4); return 0; }",
+            f"smc_setup {ALTERS}",
+        ),
         (ENDS, "unloading died of SIGABRT (Aborted): fix where it aborts"),
     ],
 )
@@ -415,14 +594,29 @@ def test_what_would_harm_other_runs_is_not_loaded(file, more, words):
 
 
 def test_a_library_that_changes_the_rounding_is_found_too(file, tmp_path):
-    source = file(law("out[0] = y->e; if (y->t > 0.1) fesetround(FE_DOWNWARD);", "#include <fenv.h>"))
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-lm", "-o", tmp_path / "a.so"]
+    source = file(
+        law("out[0] = y->e; if (y->t > 0.1) fesetround(FE_DOWNWARD);", "#include <fenv.h>")
+    )
+    line = [
+        *build.compiler(),
+        "-shared",
+        "-fPIC",
+        "-I",
+        str(build.FOLDER),
+        str(source),
+        "-lm",
+        "-o",
+        tmp_path / "a.so",
+    ]
     subprocess.run(line, check=True)
     with pytest.raises(smc.ScenarioError, match=re.escape(f"a.so: smc_law {ALTERS}")):
         smc.exchange.law_from_c(tmp_path / "a.so", isolate=True)
     ours, theirs = scenario("super_twisting"), scenario(smc.exchange.law_from_c(tmp_path / "a.so"))
     alone = smc.run(ours)
-    for trace, beside in (smc.run([theirs, ours], threads=1), [reference.run(theirs), smc.run(ours)]):
+    for trace, beside in (
+        smc.run([theirs, ours], threads=1),
+        [reference.run(theirs), smc.run(ours)],
+    ):
         assert f"smc_law {ALTERS}" in str(trace.failure)
         assert same(alone, beside)
 
@@ -478,18 +672,34 @@ def test_what_a_set_up_prints_is_not_kept(file):
 
 def test_a_law_that_fails_ends_its_run_with_a_reason_and_harms_no_other(file):
     late = smc.exchange.law_from_c(file(law("out[0] = y->t > 0.1 ? y->e / (y->t - y->t) : 0.0;")))
-    code = smc.exchange.law_from_c(file(law("out[0] = 0.0; return y->t > 0.1 ? -5 : 0;")), name="mine")
+    code = smc.exchange.law_from_c(
+        file(law("out[0] = 0.0; return y->t > 0.1 ? -5 : 0;")), name="mine"
+    )
     first, third = smc.run([scenario(law) for law in (late, "observer_free")])
     second = smc.run(scenario(code))
     assert first.failure is not None
-    assert re.match(r"law 'my_law' returned u = -?inf, s = .* in channel 0, at t = 0.101 s", first.failure)
-    assert second.failure == "law 'mine' raised ArithmeticError (smc_law returned -5) in channel 0, at t = 0.101 s"
+    assert re.match(
+        r"law 'my_law' returned u = -?inf, s = .* in channel 0, at t = 0.101 s", first.failure
+    )
+    assert (
+        second.failure
+        == "law 'mine' raised ArithmeticError (smc_law returned -5) in channel 0, at t = 0.101 s"
+    )
     assert third.failure is None
 
 
 def test_a_law_that_says_no_s_ends_its_run(file, tmp_path):
     silent = file(law("out[0] = 0.0;").replace("    out[1] = y->e;\n", ""))
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(silent), "-o", str(tmp_path / "a.so")]
+    line = [
+        *build.compiler(),
+        "-shared",
+        "-fPIC",
+        "-I",
+        str(build.FOLDER),
+        str(silent),
+        "-o",
+        str(tmp_path / "a.so"),
+    ]
     subprocess.run(line, check=True)
     for source in (silent, tmp_path / "a.so"):
         trace = smc.run(scenario(smc.exchange.law_from_c(source)))
@@ -527,11 +737,19 @@ def test_wrong_arguments_are_one_sentence(file):
         ("nowhere.c", {}, "there is no file nowhere.c"),
         (None, {"gains": {"k2": 1.0}}, "unknown gain of my_law.c 'k2': choose from k1, lam"),
         (None, {"gains": 3}, "gains is 3: give names"),
-        (None, {"gains": {"k1": np.nan}, "isolate": True}, "default of gain k1 is nan: give a finite number"),
+        (
+            None,
+            {"gains": {"k1": np.nan}, "isolate": True},
+            "default of gain k1 is nan: give a finite number",
+        ),
         (None, {"gains": {"k1": np.ones(2)}}, "gain k1 of my_law.c is (1, 1): give it one number"),
         (".", {}, "cannot take a law from '.': give a .c file"),
         (None, {"symbol": "a b"}, "symbol is 'a b': give the name of a C function"),
-        (None, {"symbol": "my_step"}, "my_law.c has no function my_step: define int my_step(const smc_measurement"),
+        (
+            None,
+            {"symbol": "my_step"},
+            "my_law.c has no function my_step: define int my_step(const smc_measurement",
+        ),
         (None, {"flags": "-O3"}, "flags is '-O3': give several"),
         (None, {"name": "a\nb"}, "name is 'a\\nb': give a name of printable"),
     ):
@@ -544,17 +762,34 @@ def test_a_library_that_may_not_be_read_is_one_sentence(file, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("shutil.copy", refuse)  # nothing is forbidden to root
-    with pytest.raises(smc.ScenarioError, match=r"my_law\.so cannot be read \(Permission denied\): give one"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"my_law\.so cannot be read \(Permission denied\): give one"
+    ):
         smc.exchange.law_from_c(file("", "my_law.so"))
 
 
 def test_what_is_no_library_or_of_single_precision_is_refused(file, tmp_path):
-    with pytest.raises(smc.ScenarioError, match=r"junk.so cannot be loaded \(junk.so: file too short\)"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"junk.so cannot be loaded \(junk.so: file too short\)"
+    ):
         smc.exchange.law_from_c(file("junk", "junk.so"))
-    source = file("#define SMC_REAL float\n" + MINE + "const int smc_law_real = sizeof(smc_real);\n")
-    line = [*build.compiler(), "-shared", "-fPIC", "-I", str(build.FOLDER), str(source), "-o", str(tmp_path / "a.so")]
+    source = file(
+        "#define SMC_REAL float\n" + MINE + "const int smc_law_real = sizeof(smc_real);\n"
+    )
+    line = [
+        *build.compiler(),
+        "-shared",
+        "-fPIC",
+        "-I",
+        str(build.FOLDER),
+        str(source),
+        "-o",
+        str(tmp_path / "a.so"),
+    ]
     subprocess.run(line, check=True)
-    with pytest.raises(smc.ScenarioError, match=r"a\.so is a library of single precision: give its \.c file"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"a\.so is a library of single precision: give its \.c file"
+    ):
         smc.exchange.law_from_c(tmp_path / "a.so")
 
 
@@ -577,8 +812,14 @@ def test_the_header_has_the_numbers_of_the_measurement_in_their_order():
 def test_check_c_names_its_own_options(call, file):
     wants = file(law("memory[20] = 1.0; out[0] = -gains[0] * y->e;"))
     for words, said in (
-        ((), "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory"),
-        (("--memory", 21), "fix it, or name all gains that it reads in smc_law_gains, or give --gains"),
+        (
+            (),
+            "writes beyond the 8 numbers of its memory: say more in smc_law_memory, or give --memory",
+        ),
+        (
+            ("--memory", 21),
+            "fix it, or name all gains that it reads in smc_law_gains, or give --gains",
+        ),
         (("--memory", 21, "--gains", "k=2", "--flag=-lnowhere"), "fix it, or give other --flag"),
     ):
         code, out, err = call("list", wants, *words)
@@ -592,12 +833,16 @@ def test_check_c_names_its_own_options(call, file):
 
 
 def test_gains_may_have_any_name_that_python_takes(file):
-    mine = smc.exchange.law_from_c(file(law("out[0] = -gains[0] * y->e;", 'const char smc_law_gains[] = "λ=3";')))
+    mine = smc.exchange.law_from_c(
+        file(law("out[0] = -gains[0] * y->e;", 'const char smc_law_gains[] = "λ=3";'))
+    )
     assert mine.defaults == {"λ": 3.0}
 
 
 def test_nothing_is_left_behind(file):
     code = f"import smc_mujoco as smc; smc.exchange.law_from_c({str(file(MINE))!r})\n"
-    folder = python("-c", code + "from smc_mujoco.exchange.c import build; print(build.folder())").stdout.strip()
+    folder = python(
+        "-c", code + "from smc_mujoco.exchange.c import build; print(build.folder())"
+    ).stdout.strip()
     assert folder
     assert not Path(folder).exists()

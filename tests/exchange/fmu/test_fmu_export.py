@@ -1,4 +1,6 @@
-"""Laws as FMUs: valid by FMPy, bit for bit what smc.run computes, and independent of each other in one process."""
+"""Laws as FMUs: valid by FMPy, bit for bit what smc.run computes, and independent of each other in
+one process.
+"""
 
 import ctypes
 import itertools
@@ -30,10 +32,19 @@ pytestmark = needs_compiler
 
 REFERENCE = smc.Sine(0.2, 3.0)
 SURFACES = surface.catalogue()
-FIRST = [n for n, law in catalogue().items() if law.relative_degree == 1 and not (law.plants or law.requires_model)]
-# (law, surface, estimator): each surface and each estimator once or more, laws with memory, of t, and of higher order.
+FIRST = [
+    n
+    for n, law in catalogue().items()
+    if law.relative_degree == 1 and not (law.plants or law.requires_model)
+]
+# (law, surface, estimator): each surface and each estimator once or more, laws with memory, of t,
+# and of higher order.
 COMBINED = [
-    *zip(FIRST, [n for n, s in SURFACES.items() if s.relative_degree == 1], itertools.cycle(estimator.catalogue())),
+    *zip(
+        FIRST,
+        [n for n, s in SURFACES.items() if s.relative_degree == 1],
+        itertools.cycle(estimator.catalogue()),
+    ),
     ("observer_free_third", None, "extended_state_observer"),
     ("prescribed_time", None, "kalman"),
     ("pid", None, "measured"),
@@ -54,8 +65,16 @@ def folder(tmp_path_factory):
 
 
 def scenario(law, of_surface=None, velocity="measured", **more) -> smc.Scenario:
-    common = {"duration": 0.1, "v0": 0.3, "reference": REFERENCE, "disturbance": smc.Sine(0.5, 7.0), "u_max": 20.0}
-    return smc.Scenario(plant="duffing", law=law, surface=of_surface, velocity=velocity, **common | more)
+    common = {
+        "duration": 0.1,
+        "v0": 0.3,
+        "reference": REFERENCE,
+        "disturbance": smc.Sine(0.5, 7.0),
+        "u_max": 20.0,
+    }
+    return smc.Scenario(
+        plant="duffing", law=law, surface=of_surface, velocity=velocity, **common | more
+    )
 
 
 @pytest.fixture(scope="module")
@@ -64,13 +83,18 @@ def combined(folder):
     scenarios = [scenario(*one) for one in COMBINED]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
-        paths = pool.map(lambda i: smc.exchange.law_to_fmu(scenarios[i], folder / f"{i}.fmu"), range(len(scenarios)))
+        paths = pool.map(
+            lambda i: smc.exchange.law_to_fmu(scenarios[i], folder / f"{i}.fmu"),
+            range(len(scenarios)),
+        )
         return dict(zip(COMBINED, zip(list(paths), smc.run(scenarios), strict=True), strict=True))
 
 
 @pytest.fixture(scope="module")
 def twisting(folder):
-    """The FMU of a law with memory, with a surface and an estimator with memory, and the folder of its files."""
+    """The FMU of a law with memory, with a surface and an estimator with memory, and the folder of
+    its files.
+    """
     return smc.exchange.law_to_fmu(
         "super_twisting", folder / "twisting.fmu", surface="integral", velocity="levant", u_max=3.0
     ), folder / "twisting"
@@ -106,7 +130,9 @@ def test_an_fmu_gives_the_bits_of_a_run(combined, folder, one):
 
 
 def test_all_surfaces_and_estimators_are_among_the_combinations():
-    assert {one[1] for one in COMBINED} >= {n for n, s in SURFACES.items() if s.relative_degree == 1}
+    assert {one[1] for one in COMBINED} >= {
+        n for n, s in SURFACES.items() if s.relative_degree == 1
+    }
     assert {one[2] for one in COMBINED} >= set(estimator.catalogue())
 
 
@@ -135,8 +161,19 @@ def test_the_sources_compile_without_a_warning(twisting, folder):
     with zipfile.ZipFile(twisting[0]) as archive:
         archive.extractall(files)
     sources = sorted((files / "sources").glob("*.c"))
-    flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror", "-c", *map(str, sources)]
-    done = subprocess.run([*build.compiler(), *flags], cwd=files, capture_output=True, text=True, check=False)
+    flags = [
+        "-std=c99",
+        "-O2",
+        "-Wall",
+        "-Wextra",
+        "-pedantic",
+        "-Werror",
+        "-c",
+        *map(str, sources),
+    ]
+    done = subprocess.run(
+        [*build.compiler(), *flags], cwd=files, capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -147,7 +184,9 @@ def test_an_fmu_holds_no_python_and_no_path_of_this_machine(twisting, folder):
     assert again.read_bytes() == twisting[0].read_bytes()
     with zipfile.ZipFile(again) as archive:
         (library,) = (name for name in archive.namelist() if name.startswith("binaries/"))
-        needed = subprocess.run(["ldd", archive.extract(library, folder)], capture_output=True, text=True, check=True)
+        needed = subprocess.run(
+            ["ldd", archive.extract(library, folder)], capture_output=True, text=True, check=True
+        )
         assert "python" not in needed.stdout
         assert b"smc_mujoco-" not in archive.read(library)  # the folder in which it was compiled
 
@@ -178,7 +217,9 @@ def test_instances_in_one_process_do_not_share_their_memory(twisting):
         found.append(first.step(1e-3 * k, **wave(k)))
         second.step(1e-3 * k, **wave(3 * k + 7))
     assert found == expected
-    assert first.get("law.memory[1]", "estimator.memory[2]") != second.get("law.memory[1]", "estimator.memory[2]")
+    assert first.get("law.memory[1]", "estimator.memory[2]") != second.get(
+        "law.memory[1]", "estimator.memory[2]"
+    )
 
 
 def test_reset_forgets_everything(twisting):
@@ -232,10 +273,16 @@ def test_gains_are_in_their_order_and_change_while_it_runs(folder):
     path = smc.exchange.law_to_fmu(law, folder / "gains.fmu")
     fmu = Importer(path, folder / "gains")
     u, s = fmu.step(0.0, x=0.5, v=0.1, r=0.2, dr=0.05)
-    assert (u, s) == (pytest.approx(-4.0 * np.tanh(0.05 + 2.0 * 0.3), rel=1e-15), 0.1 - 0.05 + 2.0 * (0.5 - 0.2))
+    assert (u, s) == (
+        pytest.approx(-4.0 * np.tanh(0.05 + 2.0 * 0.3), rel=1e-15),
+        0.1 - 0.05 + 2.0 * (0.5 - 0.2),
+    )
     fmu.set(law__lam=1.0, law__k1=3.0)
     u, s = fmu.step(1e-3)
-    assert (u, s) == (pytest.approx(-np.tanh(0.05 + 3.0 * 0.3), rel=1e-15), 0.1 - 0.05 + 3.0 * (0.5 - 0.2))
+    assert (u, s) == (
+        pytest.approx(-np.tanh(0.05 + 3.0 * 0.3), rel=1e-15),
+        0.1 - 0.05 + 3.0 * (0.5 - 0.2),
+    )
     fmu.set(u_max=0.25)
     assert fmu.step(2e-3)[0] == -0.25
     fmu.set(u_max=sys.float_info.max)
@@ -244,7 +291,9 @@ def test_gains_are_in_their_order_and_change_while_it_runs(folder):
 
 def test_each_component_has_gains_of_its_own(folder):
     """Law and surface of the same name of a gain, c, which only the surface's value of decides."""
-    path = smc.exchange.law_to_fmu("super_twisting", folder / "two.fmu", surface=smc.surface("linear", c=3.0))
+    path = smc.exchange.law_to_fmu(
+        "super_twisting", folder / "two.fmu", surface=smc.surface("linear", c=3.0)
+    )
     fmu = Importer(path, folder / "two")
     assert fmu.get("law.c", "surface.c") == [2.5, 3.0]
     assert fmu.step(0.0, x=0.5)[1] == 1.5
@@ -284,14 +333,19 @@ def test_a_long_step_is_its_samples_and_a_short_one_holds(twisting):
 
 def test_samples_are_counted_from_the_start_time(folder, combined):
     path, _ = combined["prescribed_time", None, "kalman"]
-    early, late = Importer(path, folder / path.stem), Importer(path, folder / path.stem, start=100.0)
+    early, late = (
+        Importer(path, folder / path.stem),
+        Importer(path, folder / path.stem, start=100.0),
+    )
     for k in range(5):
         assert early.step(1e-3 * k, x=0.4) == late.step(100.0 + 1e-3 * k, x=0.4)
     assert late.get("time") == [pytest.approx(100.005)]
 
 
 def test_with_event_mode_u_follows_x_without_a_step_between(twisting):
-    """At each sample it has the bits of an instance without events after its step; stays held in between."""
+    """At each sample it has the bits of an instance without events after its step; stays held in
+    between.
+    """
     plain, events = Importer(*twisting), Importer(*twisting, events=True)
     expected = [plain.step(1e-3 * k, **wave(k)) for k in range(30)]
     for k in range(30):
@@ -341,14 +395,21 @@ def test_in_initialization_mode_u_is_that_of_the_first_sample(twisting):
 
 def test_calls_in_a_wrong_mode_are_refused(twisting):
     fmu = Importer(*twisting, begin=False)
-    for call in (lambda: fmu.fmu.doStep(0.0, 1e-3), fmu.fmu.terminate, fmu.fmu.exitInitializationMode):
+    for call in (
+        lambda: fmu.fmu.doStep(0.0, 1e-3),
+        fmu.fmu.terminate,
+        fmu.fmu.exitInitializationMode,
+    ):
         with pytest.raises(Exception, match="fmi3"):
             call()
         assert "was called in the wrong mode" in fmu.said[-1]
     fmu.begin()
     with pytest.raises(Exception, match="fmi3EnterEventMode"):
         fmu.fmu.enterEventMode()
-    for t, h, said in ((0.5, 1e-3, "the step begins at another time"), (0.0, 0.0, "is not positive")):
+    for t, h, said in (
+        (0.5, 1e-3, "the step begins at another time"),
+        (0.0, 0.0, "is not positive"),
+    ):
         with pytest.raises(Exception, match="fmi3DoStep"):
             fmu.fmu.doStep(t, h)
         assert said in fmu.said[-1]
@@ -376,7 +437,9 @@ def test_a_token_of_another_fmu_is_refused(twisting):
     about.guid = "{another}"
     said = []
     with pytest.raises(Exception, match="Failed to instantiate"):
-        fmpy.simulation.instantiate_fmu(str(files), about, "CoSimulation", logger=lambda *words: said.append(words[-1]))
+        fmpy.simulation.instantiate_fmu(
+            str(files), about, "CoSimulation", logger=lambda *words: said.append(words[-1])
+        )
     assert said == [b"the instantiation token is that of another FMU"]
 
 
@@ -389,7 +452,10 @@ def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
     (folder / "controller.c").write_text((ROOT / "examples" / "controller.c").read_text())
     library = folder / "controller.so"
     flags = [*build.LIBRARY_FLAGS, "-Wall", "-Wextra", "-Werror"]
-    subprocess.run([*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"], check=True)
+    subprocess.run(
+        [*build.compiler(), *flags, str(folder / "controller.c"), "-o", str(library), "-lm"],
+        check=True,
+    )
     block = ctypes.CDLL(str(library))
     block.controller.argtypes = [ctypes.c_double] * 5 + [ctypes.POINTER(ctypes.c_double)] * 2
     trace, u, s, found = smc.run(scenario(law, u_max=6.0)), ctypes.c_double(), ctypes.c_double(), []
@@ -397,7 +463,9 @@ def test_the_example_for_a_c_caller_block_gives_the_bits_of_a_run(folder):
         block.controller_start()
         for k, t in enumerate(trace.t):
             r, dr, _ = type(REFERENCE).value(t, REFERENCE)
-            block.controller(t, trace.x[k, 0], trace.v[k, 0], r, dr, ctypes.byref(u), ctypes.byref(s))
+            block.controller(
+                t, trace.x[k, 0], trace.v[k, 0], r, dr, ctypes.byref(u), ctypes.byref(s)
+            )
             found.append((u.value, s.value))
     np.testing.assert_array_equal(found, np.tile(np.c_[trace.u, trace.s], (2, 1)))
 
@@ -422,23 +490,42 @@ def test_the_units_are_those_of_the_scenario_s_joint(folder):
         path = smc.exchange.law_to_fmu(
             scenario("pid").__class__(plant=plant, law="pid"), folder / f"{plant}.fmu", binary=False
         )
-        units[plant] = {v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables}
+        units[plant] = {
+            v.name: v.unit for v in fmpy.read_model_description(str(path)).modelVariables
+        }
     assert [units["duffing"][n] for n in ("x", "v", "u", "law.kp")] == ["m", "m/s", "N", "N/m"]
-    assert [units["inverted_pendulum"][n] for n in ("x", "v", "u", "law.kp")] == ["rad", "rad/s", "N.m", "N.m/rad"]
+    assert [units["inverted_pendulum"][n] for n in ("x", "v", "u", "law.kp")] == [
+        "rad",
+        "rad/s",
+        "N.m",
+        "N.m/rad",
+    ]
 
 
 def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
     for call, said in (
-        (lambda: smc.exchange.law_to_fmu("passivity_based"), "is of many joints: give their number, such as joints=7"),
-        (lambda: smc.exchange.law_to_fmu(smc.law("classical", k=[1.0, 2.0])), "has gains by channel"),
-        (lambda: smc.exchange.law_to_fmu("pid", "law.zip"), "cannot save to 'law.zip': end the name in .fmu"),
+        (
+            lambda: smc.exchange.law_to_fmu("passivity_based"),
+            "is of many joints: give their number, such as joints=7",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu(smc.law("classical", k=[1.0, 2.0])),
+            "has gains by channel",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu("pid", "law.zip"),
+            "cannot save to 'law.zip': end the name in .fmu",
+        ),
         (lambda: smc.exchange.law_to_fmu("pid", u_max=-1.0), "u_max is -1"),
         (lambda: smc.exchange.law_to_fmu("hierarchical", model="none"), "needs the nominal model"),
         (
             lambda: smc.exchange.law_to_fmu("twisting", surface="linear"),
             "surface 'linear' has relative degree 1, and law 'twisting' 2",
         ),
-        (lambda: smc.exchange.law_to_fmu(scenario("pid"), surface="linear"), "a scenario has its own surface"),
+        (
+            lambda: smc.exchange.law_to_fmu(scenario("pid"), surface="linear"),
+            "a scenario has its own surface",
+        ),
         (lambda: smc.exchange.law_to_fmu(smc.policy(lambda x: 0.0)), "cannot be written in C"),
     ):
         monkeypatch.chdir(tmp_path)
@@ -450,7 +537,10 @@ def test_what_cannot_be_an_fmu_is_one_sentence(tmp_path, monkeypatch):
 
 def test_without_a_compiler_the_cure_is_said(tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "nocc")
-    with pytest.raises(smc.ScenarioError, match=r"no C compiler 'nocc': install one, set CC, or leave the binary out"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"no C compiler 'nocc': install one, set CC, or leave the binary out",
+    ):
         smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu")
     assert smc.exchange.law_to_fmu("pid", tmp_path / "pid.fmu", binary=False).exists()
 

@@ -1,4 +1,6 @@
-"""Controllers in FMUs as laws: those of this library come back with the same bits, and others' keep their own steps."""
+"""Controllers in FMUs as laws: those of this library come back with the same bits, and others' keep
+their own steps.
+"""
 
 import gc
 import math
@@ -16,6 +18,7 @@ import pytest
 fmpy = pytest.importorskip("fmpy", reason="FMPy, pip install 'smc-mujoco[fmu]', is not installed")
 
 from helpers import fmu as helper  # noqa: E402
+from helpers import reference  # noqa: E402
 from helpers.compiler import needs_compiler  # noqa: E402
 
 import smc_mujoco as smc  # noqa: E402
@@ -23,11 +26,15 @@ from smc_mujoco.common.guard import Fault  # noqa: E402
 from smc_mujoco.control.law import Measurement  # noqa: E402
 from smc_mujoco.exchange.fmu import load, slave  # noqa: E402
 from smc_mujoco.exchange.fmu.slave import Slave  # noqa: E402
-from helpers import reference  # noqa: E402
 from smc_mujoco.simulation.python_controller import gains_of  # noqa: E402
 
-pytestmark = [needs_compiler, pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning")]
-FMI1 = 'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
+pytestmark = [
+    needs_compiler,
+    pytest.mark.filterwarnings("ignore::smc_mujoco.errors.PlainLoopWarning"),
+]
+FMI1 = (
+    'fmiVersion="1.0" modelIdentifier="c" numberOfContinuousStates="0" numberOfEventIndicators="0"'
+)
 VARIABLES = {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
 RENAMED = {"variables": VARIABLES, "constants": {"mode": 0.0}}
 
@@ -44,7 +51,12 @@ def foreign(folder):
 
 
 def scenario(law, plant="duffing", **more) -> smc.Scenario:
-    common = {"duration": 0.1, "v0": 0.3, "noise": smc.Noise(0.003, 0.02), "reference": smc.Sine(0.2, 3.0)}
+    common = {
+        "duration": 0.1,
+        "v0": 0.3,
+        "noise": smc.Noise(0.003, 0.02),
+        "reference": smc.Sine(0.2, 3.0),
+    }
     return smc.Scenario(plant=plant, law=law, **common | more)
 
 
@@ -62,7 +74,11 @@ def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more)
     ours = scenario(law, plant, **more)
     path = smc.exchange.law_to_fmu(ours, folder / f"{plant}-{law}.fmu")
     theirs = smc.exchange.law_from_fmu(path, name="theirs", isolate=False)()
-    first = reference.run(ours) if "model" in more else smc.run(ours)  # the model's last bit differs between the two
+    # the model's last bit differs between the two
+    if "model" in more:
+        first = reference.run(ours)
+    else:
+        first = smc.run(ours)
     second = smc.run(scenario(theirs, plant, **{k: v for k, v in more.items() if k == "model"}))
     assert second.failure is None
     for field in ("x", "v", "u", "s"):
@@ -70,14 +86,22 @@ def test_an_exported_law_comes_back_with_the_same_bits(folder, plant, law, more)
 
 
 def test_samples_that_are_late_or_missed_are_steps_that_follow_each_other(folder, foreign):
-    """The law's state waits for a missed sample, and an FMU of a longer period for the first sample that is due."""
+    """The law's state waits for a missed sample, and an FMU of a longer period for the first sample
+    that is due.
+    """
     clock = {"clock": smc.Clock(jitter=5e-4, missed=0.3), "physics_step": 1e-4, "seed": 4}
     ours = scenario("super_twisting", **clock)
-    theirs = smc.exchange.law_from_fmu(smc.exchange.law_to_fmu(ours, folder / "late.fmu"), isolate=False)()
+    theirs = smc.exchange.law_from_fmu(
+        smc.exchange.law_to_fmu(ours, folder / "late.fmu"), isolate=False
+    )()
     first, second = smc.run([ours, scenario(theirs, **clock)])
     assert second.failure is None
     np.testing.assert_array_equal(second.u, first.u)
-    slower = smc.run(scenario(smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)(), u_max=100.0, **clock))
+    slower = smc.run(
+        scenario(
+            smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)(), u_max=100.0, **clock
+        )
+    )
     changed = np.flatnonzero(np.diff(slower.u[:, 0])) + 1
     assert slower.failure is None
     assert set(changed // 10) == set(range(1, 11))  # once in each 10 ms
@@ -85,7 +109,9 @@ def test_samples_that_are_late_or_missed_are_steps_that_follow_each_other(folder
 
 
 def test_gains_are_the_fmu_s_parameters(folder):
-    path = smc.exchange.law_to_fmu(smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0)
+    path = smc.exchange.law_to_fmu(
+        smc.law("observer_free", lam=4.0, k1=2.0), folder / "gains.fmu", u_max=5.0
+    )
     template = smc.exchange.law_from_fmu(path, isolate=False)
     assert template.defaults == {"u_max": 5.0, "law_lam": 4.0, "law_k1": 2.0}
     with pytest.raises(smc.ScenarioError, match="law_lam"):
@@ -93,7 +119,10 @@ def test_gains_are_the_fmu_s_parameters(folder):
     with pytest.raises(smc.ScenarioError, match="unknown gain of gains 'lam'"):
         template(lam=1.0)
     first, second = smc.run(
-        [scenario(smc.law("observer_free", lam=3.0, k1=1.5)), scenario(template(law_lam=3.0, law_k1=1.5))]
+        [
+            scenario(smc.law("observer_free", lam=3.0, k1=1.5)),
+            scenario(template(law_lam=3.0, law_k1=1.5)),
+        ]
     )
     np.testing.assert_array_equal(first.u, second.u)
 
@@ -114,7 +143,11 @@ def test_a_new_memory_starts_a_new_instance_and_the_old_ends_with_its_memory(fol
         smc.exchange.law_to_fmu("super_twisting", folder / "written_again.fmu"), isolate=False
     )()
     assert law.function is not None
-    y, gains, memory = Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0), gains_of(law), np.zeros(1)
+    y, gains, memory = (
+        Measurement(0.0, 1e-3, 0.5, 0.1, 0.5, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0),
+        gains_of(law),
+        np.zeros(1),
+    )
     first, second = [law.function(y._replace(t=t), gains, memory) for t in (0.0, 1e-3)]
     assert first != second
     memory = np.zeros(1)
@@ -134,7 +167,9 @@ def test_another_process_takes_the_law_from_the_file(folder):
     smc.exchange.law_to_fmu("classical", path)
     load.extracted.cache_clear()
     changed = smc.run(scenario(law))
-    assert "FMU 'sent.fmu' is gone or has changed: call smc.exchange.law_from_fmu again" in str(changed.failure)
+    assert "FMU 'sent.fmu' is gone or has changed: call smc.exchange.law_from_fmu again" in str(
+        changed.failure
+    )
 
 
 # another tool's
@@ -159,7 +194,10 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
     assert dict(function.inputs) == {"x": "Plant.Theta", "v": "omega", "r": "setpoint"}
     assert (function.outputs, function.period) == (("torque",), 0.01)
     trace, slower = smc.run(
-        [scenario(law(), noise=None, u_max=100.0), scenario(law(gain_k=3.0), noise=None, u_max=100.0)]
+        [
+            scenario(law(), noise=None, u_max=100.0),
+            scenario(law(gain_k=3.0), noise=None, u_max=100.0),
+        ]
     )
     np.testing.assert_allclose(trace.u[:, 0], expected(trace), rtol=1e-14, atol=1e-14)
     np.testing.assert_allclose(slower.u[:, 0], expected(slower, 3.0), rtol=1e-14, atol=1e-14)
@@ -169,7 +207,9 @@ def test_a_foreign_fmu_keeps_its_period_and_its_state(foreign):
 
 def test_an_fmu_faster_than_the_law_steps_several_times_a_sample(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
-    trace = smc.run(scenario(law, noise=None, u_max=100.0, control_period=0.02, physics_step=1e-3, duration=0.2))
+    trace = smc.run(
+        scenario(law, noise=None, u_max=100.0, control_period=0.02, physics_step=1e-3, duration=0.2)
+    )
     u, total = [], 0.0
     for i in range(len(trace.t)):
         e = trace.x[i, 0] - trace.r[i, 0]
@@ -189,19 +229,28 @@ def test_inputs_that_are_not_real_may_be_held(folder):
             f"servo.fmu has inputs that mean nothing that a law measures, {said}: hold each, "
             f"constants={{{first!r}: 0.0}}"
         )
-    laws = [smc.exchange.law_from_fmu(path, variables=names, constants={"enable": on, "mode": 2}) for on in (1, 0)]
+    laws = []
+    for on in (1, 0):
+        laws.append(
+            smc.exchange.law_from_fmu(path, variables=names, constants={"enable": on, "mode": 2})
+        )
     trace, off = smc.run([scenario(law(), noise=None, u_max=100.0, reference=None) for law in laws])
     seen = slice(None, None, 5)
     total = 0.005 * np.cumsum(trace.x[seen, 0])
     u = -20.0 * trace.x[seen, 0] - 4.0 * trace.v[seen, 0] - total
-    np.testing.assert_allclose(trace.u[:, 0], np.repeat(u, 5)[: len(trace.u)], rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(
+        trace.u[:, 0], np.repeat(u, 5)[: len(trace.u)], rtol=1e-13, atol=1e-13
+    )
     assert (off.u == 0.0).all()
 
 
 def test_periods_that_do_not_fit_are_said(foreign):
     law = smc.exchange.law_from_fmu(foreign, **RENAMED, isolate=False)()
     trace = smc.run(scenario(law, control_period=3e-3, physics_step=1e-3))
-    assert "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01" in str(trace.failure)
+    assert (
+        "the FMU steps every 0.01 s and the law runs every 0.003 s: give control_period=0.01"
+        in str(trace.failure)
+    )
 
 
 @pytest.mark.slow
@@ -209,16 +258,25 @@ def test_periods_that_do_not_fit_are_said(foreign):
     ("mode", "said"),
     [
         (1.0, r"the step from t = 0 s died of SIGSEGV"),
-        (2.0, r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout="),
+        (
+            2.0,
+            r"the step from t = 0 s did not end within 6 s: fix what it waits for, or give timeout=",
+        ),
         (3.0, r"torque is nan after 1 steps: fix the FMU"),
         (4.0, r"the step from t = 0 s fails \(the licence has ended\)"),
-        (5.0, r"the step from t = 0 s changes the arithmetic of its thread \(rounding, flush-to-zero, "),
+        (
+            5.0,
+            r"the step from t = 0 s changes the arithmetic of its thread \(rounding, flush-to-zero, ",
+        ),
     ],
 )
 def test_a_trial_says_how_an_fmu_fails(foreign, mode, said):
     with pytest.raises(smc.ScenarioError, match=rf"^controller\.fmu: {said}") as error:
         smc.exchange.law_from_fmu(
-            foreign, variables=VARIABLES, constants={"mode": mode}, timeout=6.0 if mode == 2.0 else 60.0
+            foreign,
+            variables=VARIABLES,
+            constants={"mode": mode},
+            timeout=6.0 if mode == 2.0 else 60.0,
         )
     assert "\n" not in str(error.value)
 
@@ -252,7 +310,9 @@ def test_a_trial_has_the_parameters_of_the_run(foreign, tmp_path):
 
 
 def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
-    law = smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 4.0}, isolate=False)()
+    law = smc.exchange.law_from_fmu(
+        foreign, variables=VARIABLES, constants={"mode": 4.0}, isolate=False
+    )()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "the step from t = 0 s fails (the licence has ended)" in str(trace.failure)
     assert fine.failure is None
@@ -260,7 +320,9 @@ def test_a_failing_step_of_an_fmu_ends_its_run_with_the_reason(foreign):
 
 def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(foreign):
     one, alone = 1.0, smc.run(scenario("pid"))
-    law = smc.exchange.law_from_fmu(foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False)()
+    law = smc.exchange.law_from_fmu(
+        foreign, variables=VARIABLES, constants={"mode": 5.0}, isolate=False
+    )()
     trace, fine = smc.run([scenario(law), scenario("pid")])
     assert "changes the arithmetic of its thread" in str(trace.failure)
     assert one / 3.0 == float.fromhex("0x1.5555555555555p-2")
@@ -275,9 +337,18 @@ def test_an_fmu_that_changes_the_rounding_fails_and_other_runs_keep_their_bits(f
             "controller.fmu has inputs that mean nothing that a law measures, mode: say which it is, "
             "variables={'x': 'mode'}, or hold each, constants={'mode': 0.0}",
         ),
-        ({"constants": {"mod": 1.0}}, "unknown input of controller.fmu 'mod': did you mean 'mode'?"),
-        ({"variables": {"x": "theta"}}, "unknown input of controller.fmu 'theta': did you mean 'Plant.Theta'?"),
-        ({"variables": {"u": "omega"}}, "unknown output of controller.fmu 'omega': choose from torque"),
+        (
+            {"constants": {"mod": 1.0}},
+            "unknown input of controller.fmu 'mod': did you mean 'mode'?",
+        ),
+        (
+            {"variables": {"x": "theta"}},
+            "unknown input of controller.fmu 'theta': did you mean 'Plant.Theta'?",
+        ),
+        (
+            {"variables": {"u": "omega"}},
+            "unknown output of controller.fmu 'omega': choose from torque",
+        ),
         ({"variables": {"position": "omega"}}, "unknown meaning of a variable 'position'"),
         ({"constants": {"mode": "on"}}, "constants['mode'] is 'on': give a number"),
         ({"constants": {"mode": 0.0}, "name": "\n"}, "name is '\\n': give a name"),
@@ -306,21 +377,41 @@ def changed(foreign: Path, folder: Path, *pairs: tuple[str, str]) -> Path:
 @pytest.mark.parametrize(
     ("pair", "said"),
     [
-        (("CoSimulation", "ModelExchange"), "changed.fmu is for Model Exchange only: export it for Co-Simulation"),
-        (('fmiVersion="2.0"', FMI1),
-         "changed.fmu is of FMI 1.0"),
-        (('modelIdentifier="controller"', 'modelIdentifier="other"'), "changed.fmu has no binary of its "),
+        (
+            ("CoSimulation", "ModelExchange"),
+            "changed.fmu is for Model Exchange only: export it for Co-Simulation",
+        ),
+        (('fmiVersion="2.0"', FMI1), "changed.fmu is of FMI 1.0"),
+        (
+            ('modelIdentifier="controller"', 'modelIdentifier="other"'),
+            "changed.fmu has no binary of its ",
+        ),
         (("<fmiModelDescription", "<fmi"), "changed.fmu is not an FMU ("),
-        (('name="torque" valueReference="4" causality="output"', 'name="torque" valueReference="4"'),
-         "changed.fmu has no output: export it with the command as an output"),
-        (('name="torque"', 'name="s" valueReference="9" causality="output"><Real/></ScalarVariable>'
-          '<ScalarVariable name="kraft"'), "changed.fmu has no output that is named as a command (s, kraft): "
-         "say which it is, as in variables={'u': 'kraft'}"),
-        (('name="mode" valueReference="3" causality="input"><Real start="0"/>',
-          'name="mode" valueReference="3" causality="input"><String start=""/>'),
-         "'mode' of changed.fmu is not one number: export it without this input"),
+        (
+            (
+                'name="torque" valueReference="4" causality="output"',
+                'name="torque" valueReference="4"',
+            ),
+            "changed.fmu has no output: export it with the command as an output",
+        ),
+        (
+            (
+                'name="torque"',
+                'name="s" valueReference="9" causality="output"><Real/></ScalarVariable>'
+                '<ScalarVariable name="kraft"',
+            ),
+            "changed.fmu has no output that is named as a command (s, kraft): "
+            "say which it is, as in variables={'u': 'kraft'}",
+        ),
+        (
+            (
+                'name="mode" valueReference="3" causality="input"><Real start="0"/>',
+                'name="mode" valueReference="3" causality="input"><String start=""/>',
+            ),
+            "'mode' of changed.fmu is not one number: export it without this input",
+        ),
     ],
-)  # fmt: skip
+)
 def test_an_fmu_that_cannot_be_a_law_is_one_sentence(foreign, tmp_path, pair, said):
     with pytest.raises(smc.ScenarioError) as error:
         smc.exchange.law_from_fmu(changed(foreign, tmp_path, pair), **RENAMED)
@@ -335,9 +426,15 @@ def test_a_parameter_that_is_a_word_of_python_is_a_gain(foreign, tmp_path):
 
 @pytest.mark.parametrize("name", ["/lib/x", "a**", "../a"])
 def test_an_identifier_that_is_no_name_is_refused(tmp_path, name):
-    text = (helper.HERE / "fmi2.xml").read_text().replace('modelIdentifier="controller"', f'modelIdentifier="{name}"')
+    text = (
+        (helper.HERE / "fmi2.xml")
+        .read_text()
+        .replace('modelIdentifier="controller"', f'modelIdentifier="{name}"')
+    )
     assert name in text
-    with pytest.raises(smc.ScenarioError, match=r"has the modelIdentifier .*, which is no name in C"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"has the modelIdentifier .*, which is no name in C"
+    ):
         smc.exchange.law_from_fmu(helper.fmi2(tmp_path, text), constants={"mode": 0.0})
 
 
@@ -346,9 +443,18 @@ def test_a_file_that_is_no_fmu_is_one_sentence(tmp_path):
     with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
         archive.writestr("other.xml", "")
     for path, said in (
-        (tmp_path / "text.fmu", "text.fmu is not an FMU, as it is no zip archive: give an FMU for Co-Simulation"),
-        (tmp_path / "empty.fmu", "empty.fmu is not an FMU, as there is no modelDescription.xml in it: give an FMU for"),
-        (tmp_path / "none.fmu", f"no functional mock-up unit at {tmp_path / 'none.fmu'}: give the path"),
+        (
+            tmp_path / "text.fmu",
+            "text.fmu is not an FMU, as it is no zip archive: give an FMU for Co-Simulation",
+        ),
+        (
+            tmp_path / "empty.fmu",
+            "empty.fmu is not an FMU, as there is no modelDescription.xml in it: give an FMU for",
+        ),
+        (
+            tmp_path / "none.fmu",
+            f"no functional mock-up unit at {tmp_path / 'none.fmu'}: give the path",
+        ),
         (3, "cannot read 3: give the path of an .fmu file"),
     ):
         with pytest.raises(smc.ScenarioError) as error:
@@ -362,33 +468,63 @@ def test_an_fmu_for_another_machine_is_refused_by_its_machines(foreign, tmp_path
         for name in old.namelist():
             archive.writestr(name.replace(fmpy.platform, "win16"), old.read(name))
     with pytest.raises(
-        smc.ScenarioError, match=r"windows\.fmu has a binary for win16, and this one is .*: export it for"
+        smc.ScenarioError,
+        match=r"windows\.fmu has a binary for win16, and this one is .*: export it for",
     ):
         smc.exchange.law_from_fmu(path)
     source = smc.exchange.law_to_fmu("pid", tmp_path / "source.fmu", binary=False)
-    with pytest.raises(smc.ScenarioError, match=r"source\.fmu has a binary for no machine, .*, or compile its sources"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"source\.fmu has a binary for no machine, .*, or compile its sources",
+    ):
         smc.exchange.law_from_fmu(source)
 
 
 @pytest.mark.parametrize(("step", "h"), [(None, 1e-3), (0.02, 0.02)])
 def test_an_fmu_is_tried_on_a_double_integrator_between_walls(step, h, monkeypatch):
     names = Measurement._fields
-    order = {"folder": "f", "inputs": dict.fromkeys(names, 3), "outputs": ["u"], "fixed": {}, "step": step}
+    order = {
+        "folder": "f",
+        "inputs": dict.fromkeys(names, 3),
+        "outputs": ["u"],
+        "fixed": {},
+        "step": step,
+    }
     made = mock.Mock(**{"step.side_effect": lambda seen, t, h: [8.0 * seen[names.index("e")]]})
     monkeypatch.setattr(slave, "Slave", lambda *_: made)
     slave.attempt(order, said := mock.Mock())
     y: Any = Measurement(*np.transpose([call.args[0] for call in made.step.mock_calls]))
-    known = {"t": h * np.arange(500), "dt": h, "r": 0.1 * np.sin(y.t), "dr": 0.1 * np.cos(y.t), "ddr": -y.r, "a": -y.r}
-    known |= {"e": y.x - y.r, "de": y.v - y.dr, "g": 1.0, "gq": 1.0, "limit": 6.0, "model": 1.0, "q": 0.0}
+    known = {
+        "t": h * np.arange(500),
+        "dt": h,
+        "r": 0.1 * np.sin(y.t),
+        "dr": 0.1 * np.cos(y.t),
+        "ddr": -y.r,
+        "a": -y.r,
+    }
+    known |= {
+        "e": y.x - y.r,
+        "de": y.v - y.dr,
+        "g": 1.0,
+        "gq": 1.0,
+        "limit": 6.0,
+        "model": 1.0,
+        "q": 0.0,
+    }
     for name, expected in known.items():
         np.testing.assert_allclose(getattr(y, name), expected, err_msg=name)
-    free, change = np.abs(y.x[1:]) < 3.0, h * np.clip(8.0 * y.e, -6.0, 6.0)[:-1]  # the walls are at 3 m
+    free, change = (
+        np.abs(y.x[1:]) < 3.0,
+        h * np.clip(8.0 * y.e, -6.0, 6.0)[:-1],
+    )  # the walls are at 3 m
     np.testing.assert_allclose(y.v[1:], np.where(free, y.v[:-1] + change, 0.0))
     np.testing.assert_allclose(y.x[1:], np.where(free, y.x[:-1] + h * y.v[1:], 3.0))
     assert (y.x[0], y.v[0], free.all()) == (0.5, 0.0, step is None)
     assert said.mock_calls[2] == mock.call(f"the step from t = {h:g} s")
     made.step.side_effect = lambda *_: [math.nan]
-    with pytest.raises(Fault, match="u is nan after 1 steps: fix the FMU, or its inputs and parameters"):
+    with pytest.raises(
+        Fault, match="u is nan after 1 steps: fix the FMU, or its inputs and parameters"
+    ):
         slave.attempt(order, said)
 
 

@@ -24,7 +24,8 @@ pytestmark = needs_compiler
 
 REFERENCE = smc.Sine(0.2, 5.0)
 JOINTS = (1, 2, 3)
-# Law -> what its scenario has besides: every law once, with and without the model, with an estimator, with own bounds.
+# Law -> what its scenario has besides: every law once, with and without the model, with an
+# estimator, with own bounds.
 CASES = {name: {"model": "nominal"} for name in arms.LAWS} | {
     "time_delay_sliding": {"velocity": "levant", "v0": (0.1, -0.2, 0.3)},
     "observer_free_joint": {"velocity": "extended_state_observer", "u_max": (3.0, 1.5, 2.0)},
@@ -33,7 +34,13 @@ GAINS = {"computed_torque_sliding": {"k": [10.0, 20.0, 5.0]}, "unit_vector": {"r
 
 
 def scenario(name: str, **fields) -> smc.Scenario:
-    common = {"plant": arms.arm(), "duration": 0.1, "reference": REFERENCE, "x0": (0.1, -0.3, 0.2), "u_max": 60.0}
+    common = {
+        "plant": arms.arm(),
+        "duration": 0.1,
+        "reference": REFERENCE,
+        "x0": (0.1, -0.3, 0.2),
+        "u_max": 60.0,
+    }
     return smc.Scenario(law=smc.law(name, **GAINS.get(name, {})), **common | CASES[name] | fields)
 
 
@@ -48,7 +55,9 @@ def made(folder):
     scenarios = [scenario(name) for name in CASES]
     with ThreadPoolExecutor(2) as pool, pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "LIBRARY_FLAGS", ("-O0", *build.LIBRARY_FLAGS[1:]))
-        paths = list(pool.map(lambda s: smc.exchange.law_to_fmu(s, folder / f"{s.law.name}.fmu"), scenarios))
+        paths = list(
+            pool.map(lambda s: smc.exchange.law_to_fmu(s, folder / f"{s.law.name}.fmu"), scenarios)
+        )
         return dict(zip(CASES, zip(paths, smc.run(scenarios), strict=True), strict=True))
 
 
@@ -57,12 +66,18 @@ def seen(known, controller: Controller, trace: smc.Trace, k: int) -> dict[str, f
     motion = np.repeat(np.transpose([type(REFERENCE).value(trace.t[k], REFERENCE)]), 3, axis=1)
     y = controller.joint_measurement(trace.x[k], trace.v[k], trace.t[k], motion)
     vectors = {name: getattr(y, name) for name in ("x", "v", "r", "dr", "ddr", "h", "g")}
-    values = {f"{name}[{i}]": float(each[i - 1]) for name, each in vectors.items() for i in JOINTS}
+    values = {}
+    for name, each in vectors.items():
+        for i in JOINTS:
+            values[f"{name}[{i}]"] = float(each[i - 1])
     matrices = {"M": y.M, "C": np.column_stack([coriolis(y, unit) for unit in np.eye(3)])}
     if "J[1,1]" in known:
         matrices["J"] = jacobian(y)
     values |= {
-        f"{name}[{i},{j}]": float(m[i - 1, j - 1]) for name, m in matrices.items() for i in JOINTS for j in JOINTS
+        f"{name}[{i},{j}]": float(m[i - 1, j - 1])
+        for name, m in matrices.items()
+        for i in JOINTS
+        for j in JOINTS
     }
     return {name: value for name, value in values.items() if name in known}
 
@@ -83,7 +98,9 @@ def stepped(fmu: Importer, trace: smc.Trace, samples: int) -> np.ndarray:
 
 @pytest.mark.parametrize("name", CASES)
 def test_an_fmu_gives_what_a_run_gives(made, folder, name):
-    """To the last bit; but C w is a product here, where smc.run asks MuJoCo for it, so that 1e-12 remains."""
+    """To the last bit; but C w is a product here, where smc.run asks MuJoCo for it, so that 1e-12
+    remains.
+    """
     path, trace = made[name]
     assert trace.failure is None
     assert validate_fmu(str(path)) == []
@@ -100,15 +117,20 @@ def test_an_fmu_gives_what_a_run_gives(made, folder, name):
 @pytest.mark.parametrize("name", CASES)
 def test_its_inputs_are_those_that_the_law_reads(made, name):
     read = {
-        "computed_torque_sliding": "x v r dr ddr M h", "hybrid_sliding": "x v r dr ddr M h J",
-        "observer_free_joint": "x r dr", "passivity_based": "x v r dr ddr M h C",
-        "super_twisting_computed_torque": "x v r dr ddr M h", "time_delay_sliding": "x r dr ddr",
+        "computed_torque_sliding": "x v r dr ddr M h",
+        "hybrid_sliding": "x v r dr ddr M h J",
+        "observer_free_joint": "x r dr",
+        "passivity_based": "x v r dr ddr M h C",
+        "super_twisting_computed_torque": "x v r dr ddr M h",
+        "time_delay_sliding": "x r dr ddr",
         "unit_vector": "x v r dr ddr M h",
-    }[name]  # fmt: skip
+    }[name]
     known = {v.name: v for v in fmpy.read_model_description(str(made[name][0])).modelVariables}
     inputs = {one.partition("[")[0] for one, v in known.items() if v.causality == "input"}
     assert inputs == set(read.split())
-    assert [n for n, v in known.items() if v.causality == "output"] == [f"{n}[{i}]" for n in "us" for i in JOINTS]
+    assert [n for n, v in known.items() if v.causality == "output"] == [
+        f"{n}[{i}]" for n in "us" for i in JOINTS
+    ]
 
 
 @njit
@@ -122,7 +144,9 @@ def other_words(y, gains, memory):
 
 
 def test_what_a_function_reads_is_an_input_whatever_it_calls_the_measurement(folder):
-    path = smc.exchange.law_to_fmu(other_words, folder / "words.fmu", joints=2, model="nominal", binary=False)
+    path = smc.exchange.law_to_fmu(
+        other_words, folder / "words.fmu", joints=2, model="nominal", binary=False
+    )
     assert "M[1,2]" in {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
 
 
@@ -131,7 +155,9 @@ def test_gains_and_bounds_are_those_of_the_joints_and_change_while_it_runs(made,
     fmu = Importer(path, folder / "computed_torque_sliding")
     assert fmu.get("law.k[1]", "law.k[2]", "law.k[3]", "law.c[2]") == [10.0, 20.0, 5.0, 5.0]
     before = stepped(fmu, trace, 3)
-    other = Importer(path, folder / "computed_torque_sliding", **{"law__c[2]": 9.0, "u_max[3]": 0.25})
+    other = Importer(
+        path, folder / "computed_torque_sliding", **{"law__c[2]": 9.0, "u_max[3]": 0.25}
+    )
     after = stepped(other, trace, 3)
     same = np.all(before == after, axis=0)
     assert same[3:].tolist() == [True, False, True]  # s of the joint whose slope has changed
@@ -164,7 +190,10 @@ def test_an_fmu_of_a_free_body_gives_the_actuators_their_controls(tmp_path):
     path = smc.exchange.law_to_fmu(of_run, tmp_path / "flight.fmu")
     assert validate_fmu(str(path)) == []
     fmu, axes = Importer(path, tmp_path / "flight"), range(1, 7)
-    inputs = {f"{name}[{i}]": (name, i - 1) for name in ("x", "v", "r", "dr", "ddr", "h") for i in axes}
+    inputs = {}
+    for name in ("x", "v", "r", "dr", "ddr", "h"):
+        for i in axes:
+            inputs[f"{name}[{i}]"] = (name, i - 1)
     inputs |= {f"M[{i},{j}]": ("M", i - 1, j - 1) for i in axes for j in axes}
     names = [f"{name}[{i}]" for name in "us" for i in axes] + [f"control[{i}]" for i in range(1, 5)]
     known = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
@@ -173,7 +202,9 @@ def test_an_fmu_of_a_free_body_gives_the_actuators_their_controls(tmp_path):
     assert known["x[1]"].unit is None  # some are m, some rad
     found = []
     for k, t in enumerate(trace.t):
-        fmu.set(**{name: float(read[field][(k, *place)]) for name, (field, *place) in inputs.items()})
+        fmu.set(
+            **{name: float(read[field][(k, *place)]) for name, (field, *place) in inputs.items()}
+        )
         fmu.fmu.doStep(t, 1e-3)
         found.append(fmu.get(*names))
     np.testing.assert_array_equal(found, np.hstack([trace.u, trace.s, trace.applied[:, :4]]))
@@ -181,7 +212,9 @@ def test_an_fmu_of_a_free_body_gives_the_actuators_their_controls(tmp_path):
 
 
 def test_units_are_left_out_where_joints_differ(made, folder):
-    known = {v.name: v.unit for v in fmpy.read_model_description(str(made["unit_vector"][0])).modelVariables}
+    known = {}
+    for v in fmpy.read_model_description(str(made["unit_vector"][0])).modelVariables:
+        known[v.name] = v.unit
     # the arm slides and turns
     assert [known[name] for name in ("x[1]", "u[1]", "dt", "law.c[1]")] == [None, None, "s", "1/s"]
     path = smc.exchange.law_to_fmu("unit_vector", folder / "turning.fmu", joints=2, binary=False)
@@ -192,12 +225,30 @@ def test_units_are_left_out_where_joints_differ(made, folder):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, surface="linear"), "has its own surface"),
-        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, model="none"), "needs the nominal model"),
-        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=3, u_max=[1.0, 2.0]), "u_max has 2 values for 3 joints"),
-        (lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, u_max=[1.0, -2.0]), r"u_max\[1\] is -2"),
-        (lambda: smc.exchange.law_to_fmu("pid", joints=2), "law 'pid' is of one channel: leave joints=2 out"),
-        (lambda: smc.exchange.law_to_fmu(scenario("unit_vector"), joints=3), "a scenario has its own joints"),
+        (
+            lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, surface="linear"),
+            "has its own surface",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, model="none"),
+            "needs the nominal model",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu("unit_vector", joints=3, u_max=[1.0, 2.0]),
+            "u_max has 2 values for 3 joints",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu("unit_vector", joints=2, u_max=[1.0, -2.0]),
+            r"u_max\[1\] is -2",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu("pid", joints=2),
+            "law 'pid' is of one channel: leave joints=2 out",
+        ),
+        (
+            lambda: smc.exchange.law_to_fmu(scenario("unit_vector"), joints=3),
+            "a scenario has its own joints",
+        ),
     ],
 )
 def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch):
@@ -209,7 +260,9 @@ def test_what_cannot_be_an_fmu_is_one_sentence(call, said, tmp_path, monkeypatch
 
 
 def test_it_is_no_law_of_one_channel(made):
-    said = r"unit_vector\.fmu has inputs that mean nothing that a law measures, x\[1\], x\[2\], x\[3\]"
+    said = (
+        r"unit_vector\.fmu has inputs that mean nothing that a law measures, x\[1\], x\[2\], x\[3\]"
+    )
     with pytest.raises(smc.ScenarioError, match=said) as error:
         smc.exchange.law_from_fmu(made["unit_vector"][0])
     assert "\n" not in str(error.value)
@@ -221,9 +274,16 @@ def test_the_command_takes_the_number_of_joints(tmp_path, capsys):
         cli.main(["export", "unit_vector", str(out), "--gains", "c=4 6", "--no-binary"])
     assert not end.value.code
     known = {v.name: v for v in fmpy.read_model_description(str(out)).modelVariables}
-    assert [float(known[name].start) for name in ("law.c[1]", "law.c[2]", "M[2,2]", "M[1,2]")] == [4.0, 6.0, 1.0, 0.0]
+    assert [float(known[name].start) for name in ("law.c[1]", "law.c[2]", "M[2,2]", "M[1,2]")] == [
+        4.0,
+        6.0,
+        1.0,
+        0.0,
+    ]
     with pytest.raises(SystemExit) as end:
         cli.main(["export", "unit_vector.fmu"])
     assert end.value.code == 2
-    said = "smc-mujoco: law 'unit_vector' is of many joints: give their number, such as --joints 7\n"
+    said = (
+        "smc-mujoco: law 'unit_vector' is of many joints: give their number, such as --joints 7\n"
+    )
     assert capsys.readouterr().err == said

@@ -1,4 +1,6 @@
-"""A road of models that nobody here wrote: a plant, a run, a picture, margins, gains and C from each."""
+"""A road of models that nobody here wrote: a plant, a run, a picture, margins, gains and C from
+each.
+"""
 
 import importlib.util
 from pathlib import Path
@@ -34,14 +36,23 @@ ARM = """
   </worldbody>
   <actuator><position joint="pan" forcerange="-80 80"/><position joint="lift" forcerange="-80 80"/>
     <position joint="elbow" forcerange="-40 40"/></actuator>
-</mujoco>"""  # as those of mujoco_menagerie: visual geoms in group 2, collision geoms in group 3, position servos
+# as those of mujoco_menagerie: visual geoms in group 2, collision geoms in group 3, position servos
+</mujoco>"""
 SERVO = smc.Channel(motor=True)
 ROAD = {  # name -> package, file, channels
     "menagerie-like": (None, ARM, {"pan": SERVO, "lift": SERVO, "elbow": SERVO}),
     "dm acrobot": ("dm_control", "suite/acrobot.xml", ["elbow"]),
-    "manipulator": ("dm_control", "suite/manipulator.xml", ["arm_root", "arm_shoulder", "arm_elbow", "arm_wrist"]),
+    "manipulator": (
+        "dm_control",
+        "suite/manipulator.xml",
+        ["arm_root", "arm_shoulder", "arm_elbow", "arm_wrist"],
+    ),
     "gym reacher": ("gymnasium", "envs/mujoco/assets/reacher.xml", ["joint0", "joint1"]),
-    "gym cheetah": ("gymnasium", "envs/mujoco/assets/half_cheetah.xml", ["bthigh", "bshin", "fthigh", "fshin"]),
+    "gym cheetah": (
+        "gymnasium",
+        "envs/mujoco/assets/half_cheetah.xml",
+        ["bthigh", "bshin", "fthigh", "fshin"],
+    ),
 }
 
 
@@ -65,8 +76,15 @@ def ran(name):
     """Return the traces of two laws on a foreign model, from a start off rest."""
     plant = smc.plant_from(*model(name))
     ranges = plant.ranges or [("", 0.0, np.inf)] * plant.n
-    start = [x + (0.05 if x + 0.05 < high else -0.05) for x, (_, _, high) in zip(plant.x0, ranges, strict=True)]
-    traces = smc.run([smc.Scenario(plant=plant, law=law, x0=start, duration=0.3) for law in ("pid", "super_twisting")])
+    start = []
+    for x, (_, _, high) in zip(plant.x0, ranges, strict=True):
+        start.append(x + (0.05 if x + 0.05 < high else -0.05))
+    traces = smc.run(
+        [
+            smc.Scenario(plant=plant, law=law, x0=start, duration=0.3)
+            for law in ("pid", "super_twisting")
+        ]
+    )
     assert not [trace.failure for trace in traces if trace.failure]
     return traces
 
@@ -80,7 +98,9 @@ def test_laws_run_on_a_foreign_model_and_its_columns_are_its_joints(name):
 
 
 @FOREIGN
-@pytest.mark.parametrize("name", ["menagerie-like", pytest.param("gym cheetah", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["menagerie-like", pytest.param("gym cheetah", marks=pytest.mark.slow)]
+)
 def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
     traces, joints = ran(name), list(ROAD[name][2])
     plant, start = traces[0].scenario.plant, traces[0].scenario.x0
@@ -89,13 +109,17 @@ def test_a_foreign_model_is_drawn_seen_tuned_and_written_in_c(name, tmp_path):
         assert any(label.startswith(f"{joint} e") for label in labels), labels
     assert not any("mean" in label for label in labels)
     if gl.missing() is None:
-        picture = np.asarray(Image.open(smc.film(traces, tmp_path / "b.png", at=0.2, size=(640, 360)))).astype(int)
+        picture = np.asarray(
+            Image.open(smc.film(traces, tmp_path / "b.png", at=0.2, size=(640, 360)))
+        ).astype(int)
         assert picture[60:200].std() > 5.0
         assert (picture[60:230].min(axis=2) > 250).mean() < 0.5  # the floor is not burnt white
     law = smc.law("pid")
     if not plant.unscaled:
         brief = Objective(conditions=("nominal",), duration=0.2)
-        law = smc.tune(plant, "pid", budget=4, objective=brief, searches=1, starts=smc.starts(x0=start)).law
+        law = smc.tune(
+            plant, "pid", budget=4, objective=brief, searches=1, starts=smc.starts(x0=start)
+        ).law
         assert law.source.kind in ("tuned here", "default")  # where no set of gains tried is better
     else:
         with pytest.raises(smc.ScenarioError, match="nominal model"):
@@ -114,7 +138,9 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
     (tmp_path / "arm.xml").write_text(ARM)
     monkeypatch.chdir(tmp_path)
     for text in ("arm.xml:lift,elbow", "arm.xml:lift+elbow", "arm.xml: lift, elbow"):
-        with pytest.raises(smc.ScenarioError, match="motor=True"):  # a menagerie's servos are not motors
+        with pytest.raises(
+            smc.ScenarioError, match="motor=True"
+        ):  # a menagerie's servos are not motors
             as_plant(text)
     (tmp_path / "arm.xml").write_text(
         ARM.replace("<position", "<motor").replace(' kp="100" kv="10" inheritrange="1"', "")
@@ -123,8 +149,11 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
         scenario = smc.Scenario(plant=text, law="pid", x0=0.1, duration=0.1)
         assert scenario.plant.label == "spatial arm"
         assert [panel.label for panel in panels.strip([smc.run(scenario)])] == [
-            "lift x (rad)", "lift u (N·m)", "elbow x (rad)", "elbow u (N·m)",
-        ]  # fmt: skip
+            "lift x (rad)",
+            "lift u (N·m)",
+            "elbow x (rad)",
+            "elbow u (N·m)",
+        ]
     for text, words in (
         ("arm.xml", "as arm.xml:shoulder"),
         ("no.xml:a", "no model at"),
@@ -135,6 +164,8 @@ def test_a_plant_is_named_by_its_file_and_joints(tmp_path, monkeypatch):
     (tmp_path / "one.xml").write_text("""
       <mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size=".05" pos="0 0 -.3"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
-    with pytest.raises(smc.ScenarioError, match="starts at rest at 0"):  # before any gains are searched
+    with pytest.raises(
+        smc.ScenarioError, match="starts at rest at 0"
+    ):  # before any gains are searched
         smc.which("one.xml:j", "nominal", needs="fast", laws="pid", out=tmp_path / "which")
     assert not (tmp_path / "which").exists()

@@ -1,4 +1,6 @@
-"""A free body of a user's model: pose, mixer, motion against an integration without MuJoCo, scores, comparisons."""
+"""A free body of a user's model: pose, mixer, motion against an integration without MuJoCo, scores,
+comparisons.
+"""
 
 import dataclasses
 import math
@@ -33,7 +35,9 @@ def drone():
     return smc.plant_from(TEXT, channels=["body"], name="drone", keyframe="hover")
 
 
-@smc.law_function(joint=True, plants=("a free body",), gains={"time": smc.control.units.Gain(0.0, shared=True)})
+@smc.law_function(
+    joint=True, plants=("a free body",), gains={"time": smc.control.units.Gain(0.0, shared=True)}
+)
 def flip(y, gains, memory):
     """A wrench of time alone: a roll, a pitch and a yaw while the thrust changes."""
     u = np.zeros(6)
@@ -52,13 +56,21 @@ def nothing(y, gains, memory):
 
 
 def newton_euler(duration, period):
-    """Return position, rotation matrix, velocities at the end of `flip`, by DOP853 between samples: no MuJoCo."""
+    """Return position, rotation matrix, velocities at the end of `flip`, by DOP853 between samples:
+    no MuJoCo.
+    """
     state = np.concatenate([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], np.zeros(6), np.full(4, 0.0782)])
     for k in range(round(duration / period)):
         t = k * period
         F = 0.3 + 0.05 * math.sin(9.0 * t)
-        Mx, My, Mz = 6e-4 * math.sin(5.0 * t), 3e-4 * math.cos(7.0 * t), 2e-4 * math.sin(3.0 * t + 1.0)
-        signs = np.array([(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)])  # as in the firmware's power distribution
+        Mx, My, Mz = (
+            6e-4 * math.sin(5.0 * t),
+            3e-4 * math.cos(7.0 * t),
+            2e-4 * math.sin(3.0 * t + 1.0),
+        )
+        signs = np.array(
+            [(-1, -1, -1), (-1, 1, 1), (1, 1, -1), (1, -1, 1)]
+        )  # as in the firmware's power distribution
         asked = F / 4 + signs @ np.array([Mx / LEVER, My / LEVER, Mz / YAW]) / 4
         asked = np.clip(asked - max(0.0, asked.max() - MOST), 0.0, MOST)
 
@@ -66,15 +78,28 @@ def newton_euler(duration, period):
             q, v, w, f = y[3:7] / np.linalg.norm(y[3:7]), y[7:10], y[10:13], y[13:]
             turn = Rotation.from_quat(q, scalar_first=True)
             places = LEVER * np.array([(1, -1), (-1, -1), (-1, 1), (1, 1)])
-            torque = np.array([f @ places[:, 1], -f @ places[:, 0], YAW * (-f[0] + f[1] - f[2] + f[3])])
+            torque = np.array(
+                [f @ places[:, 1], -f @ places[:, 0], YAW * (-f[0] + f[1] - f[2] + f[3])]
+            )
             dq = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
             acceleration = turn.apply([0.0, 0.0, f.sum() / MASS]) - [0.0, 0.0, G]
             return np.concatenate(
-                [v, dq, acceleration, np.linalg.solve(J, torque - np.cross(w, J @ w)), (asked - f) / LAG]
+                [
+                    v,
+                    dq,
+                    acceleration,
+                    np.linalg.solve(J, torque - np.cross(w, J @ w)),
+                    (asked - f) / LAG,
+                ]
             )
 
         state = solve_ivp(rates, (0.0, period), state, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
-    return state[:3], Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(), state[7:10], state[10:13]
+    return (
+        state[:3],
+        Rotation.from_quat(state[3:7], scalar_first=True).as_matrix(),
+        state[7:10],
+        state[10:13],
+    )
 
 
 def test_two_seconds_of_a_flip_are_those_of_an_integration_without_mujoco(drone):
@@ -94,9 +119,15 @@ def test_two_seconds_of_a_flip_are_those_of_an_integration_without_mujoco(drone)
 
 def test_a_tumbling_body_keeps_its_angular_momentum_and_energy_and_falls_on_a_parabola(drone):
     start = {"x0": (0.0, 0.0, 3.0, 0.3, -0.2, 0.1), "v0": (1.0, -2.0, 3.0, 5.0, 20.0, 3.0)}
-    text = TEXT.replace('"16.8e-6 16.8e-6', '"16.8e-6 20e-6').replace('act="0.0782 0.0782 0.0782 0.0782"', "")
+    text = TEXT.replace('"16.8e-6 16.8e-6', '"16.8e-6 20e-6').replace(
+        'act="0.0782 0.0782 0.0782 0.0782"', ""
+    )
     body = smc.plant_from(text, channels=["body"], name="body", keyframe="hover")
-    trace = smc.run(smc.Scenario(plant=body, law=nothing, duration=5.0, integrator="RK4", physics_step=1e-3, **start))
+    trace = smc.run(
+        smc.Scenario(
+            plant=body, law=nothing, duration=5.0, integrator="RK4", physics_step=1e-3, **start
+        )
+    )
     inertia, w = np.diag([16.8e-6, 20e-6, 29.8e-6]), trace.v[:, 3:]
     momentum = Rotation.from_rotvec(trace.x[:, 3:].copy()).apply(w @ inertia)
     size, energy = np.linalg.norm(momentum, axis=1), np.einsum("ki,ij,kj->k", w, inertia, w)
@@ -117,22 +148,36 @@ def test_rotors_that_saturate_keep_the_torques_and_give_up_thrust(drone):
 
     trace = smc.run(smc.Scenario(plant=drone, law=much, duration=2e-3))
     part = 2e-3 / LEVER / 4
-    np.testing.assert_allclose(trace.applied[0], [0.12 - 2 * part] * 2 + [0.12] * 2 + [0.0] * 2, rtol=1e-12)
+    np.testing.assert_allclose(
+        trace.applied[0], [0.12 - 2 * part] * 2 + [0.12] * 2 + [0.0] * 2, rtol=1e-12
+    )
     assert trace.u[0, 2] == 0.44
 
 
 def test_rotation_vectors_and_quaternions_are_those_of_scipy():
     random = np.random.default_rng(7)
-    for turn in [*Rotation.random(20, random), Rotation.identity(), Rotation.from_rotvec([3.1, 0.5, 0.0])]:
+    for turn in [
+        *Rotation.random(20, random),
+        Rotation.identity(),
+        Rotation.from_rotvec([3.1, 0.5, 0.0]),
+    ]:
         q, other = turn.as_quat(scalar_first=True), Rotation.random(rng=random)
         np.testing.assert_allclose(rotation.rotation_vector(*q), turn.as_rotvec(), atol=1e-14)
-        assert rotation.rotation_vector(*-q) == pytest.approx(rotation.rotation_vector(*q), abs=1e-14)
+        assert rotation.rotation_vector(*-q) == pytest.approx(
+            rotation.rotation_vector(*q), abs=1e-14
+        )
         error = rotation.relative(tuple(q), tuple(other.as_quat(scalar_first=True)))
-        np.testing.assert_allclose(rotation.rotation_vector(*error), (turn.inv() * other).as_rotvec(), atol=1e-13)
-        np.testing.assert_allclose(rotation.turned(tuple(q), 1.0, 2.0, 3.0), turn.apply([1.0, 2.0, 3.0]), atol=1e-14)
+        np.testing.assert_allclose(
+            rotation.rotation_vector(*error), (turn.inv() * other).as_rotvec(), atol=1e-13
+        )
+        np.testing.assert_allclose(
+            rotation.turned(tuple(q), 1.0, 2.0, 3.0), turn.apply([1.0, 2.0, 3.0]), atol=1e-14
+        )
         r, dr, h = turn.as_rotvec(), random.normal(size=3), 1e-6
         ends = [Rotation.from_rotvec(r + sign * h * dr) for sign in (-0.5, 0.5)]
-        np.testing.assert_allclose(rotation.rate(*r, *dr), (ends[0].inv() * ends[1]).as_rotvec() / h, atol=1e-8)
+        np.testing.assert_allclose(
+            rotation.rate(*r, *dr), (ends[0].inv() * ends[1]).as_rotvec() / h, atol=1e-8
+        )
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 1e-5, 9e-5, 2e-4, 5e-3, 2e-2], ids=str)
@@ -146,7 +191,9 @@ def test_the_rate_of_a_small_rotation_vector_is_its_series(size):
     "F", [(0.1, -0.2, 0.3), (0.0, 0.0, -1.0), (0.5, 0.1, -0.2), (1.0, 0.0, 0.0), (-0.3, 0.9, -2.0)]
 )
 def test_the_wanted_attitude_has_its_third_axis_along_the_thrust(F):
-    turn = Rotation.from_quat(of_thrust(np.array(F), np.array([0.0, 0.0, 0.4])), scalar_first=True).as_matrix()
+    turn = Rotation.from_quat(
+        of_thrust(np.array(F), np.array([0.0, 0.0, 0.4])), scalar_first=True
+    ).as_matrix()
     np.testing.assert_allclose(turn[:, 2], np.array(F) / np.linalg.norm(F), atol=1e-12)
     np.testing.assert_allclose(turn.T @ turn, np.eye(3), atol=1e-12)
     heading = np.array([math.cos(0.4), math.sin(0.4), 0.0])
@@ -157,14 +204,27 @@ def test_the_wanted_attitude_has_its_third_axis_along_the_thrust(F):
 def test_the_error_of_an_attitude_is_the_rotation_from_its_reference(drone):
     yaw = smc.Sine(0.5, 2.0)
     scenario = smc.Scenario(
-        plant=drone, law="geometric", x0=(0.1, 0.0, 1.0, 0.2, 0.1, 0.3), duration=0.5,
-        reference=[smc.Constant(0.0), smc.Constant(0.0), smc.Constant(1.0), smc.Constant(0.0), smc.Constant(0.0), yaw],
-    )  # fmt: skip
+        plant=drone,
+        law="geometric",
+        x0=(0.1, 0.0, 1.0, 0.2, 0.1, 0.3),
+        duration=0.5,
+        reference=[
+            smc.Constant(0.0),
+            smc.Constant(0.0),
+            smc.Constant(1.0),
+            smc.Constant(0.0),
+            smc.Constant(0.0),
+            yaw,
+        ],
+    )
     trace = smc.run(scenario)
     expected = (
-        Rotation.from_rotvec(trace.r[:, 3:].copy()).inv() * Rotation.from_rotvec(trace.x[:, 3:].copy())
+        Rotation.from_rotvec(trace.r[:, 3:].copy()).inv()
+        * Rotation.from_rotvec(trace.x[:, 3:].copy())
     ).as_rotvec()
-    np.testing.assert_allclose(trace.e, np.hstack([trace.x[:, :3] - trace.r[:, :3], expected]), atol=1e-13)
+    np.testing.assert_allclose(
+        trace.e, np.hstack([trace.x[:, :3] - trace.r[:, :3], expected]), atol=1e-13
+    )
     seen = smc.scores(trace)
     assert list(seen) == ["driven m", "driven rad"]
 
@@ -179,7 +239,9 @@ def test_the_rate_of_an_attitudes_error_is_that_of_the_rotation_from_a_moving_re
     path = [smc.Constant(0.0)] * 3 + [smc.Sine(0.9, 2.0), smc.Sine(0.7, 3.0), smc.Sine(0.8, 4.0)]
     start = {"x0": (0.0, 0.0, 3.0, 0.3, -0.2, 0.1), "v0": (1.0, -2.0, 3.0, 3.0, 5.0, -2.0)}
     trace = smc.run(smc.Scenario(plant=drone, law=watch, reference=path, duration=0.5, **start))
-    bodies, references = (Rotation.from_rotvec(values[:, 3:].copy()) for values in (trace.x, trace.r))
+    bodies, references = (
+        Rotation.from_rotvec(values[:, 3:].copy()) for values in (trace.x, trace.r)
+    )
     errors = references.inv() * bodies
     turned = (errors[:-2].inv() * errors[2:]).as_rotvec() / 2e-3  # by central differences of 1 ms
     np.testing.assert_allclose(trace.s[1:-2, 3:], turned[:-1], atol=1e-3)
@@ -199,10 +261,14 @@ CF2 = """<mujoco model="cf2"><option timestep="0.001" density="1.225" viscosity=
 
 
 def test_a_model_with_thrust_and_moments_of_either_sign_holds_a_pose():
-    """The form of MuJoCo Menagerie's Crazyflie, with its bounds, which it calls arbitrary: a slow law holds it."""
+    """The form of MuJoCo Menagerie's Crazyflie, with its bounds, which it calls arbitrary: a slow
+    law holds it.
+    """
     plant = smc.plant_from(CF2, channels=["flies"], name="cf2")
     law = smc.law("geometric", kx=0.2, kv=0.9, kR=6.0, kW=5.0)
-    trace = smc.run(smc.Scenario(plant=plant, law=law, x0=(0.02, 0.0, 0.2, 0.0, 0.0, 0.1), duration=25.0))
+    trace = smc.run(
+        smc.Scenario(plant=plant, law=law, x0=(0.02, 0.0, 0.2, 0.0, 0.0, 0.1), duration=25.0)
+    )
     assert trace.failure is None
     assert np.abs(trace.e[-1]).max() < 1e-3
     assert trace.applied[:, 4:].max() == 0.0
@@ -239,23 +305,35 @@ SIX = "".join(
 
 
 def test_a_floating_base_goes_to_a_pose_under_a_law_of_arms():
-    """Six thrusters give every force and torque, so that the laws of many joints need no law of flight."""
+    """Six thrusters give every force and torque, so that the laws of many joints need no law of
+    flight.
+    """
     plant = smc.plant_from(THRUSTERS.format(SIX), channels=["floats"], name="base")
     goal = [smc.Constant(value) for value in (0.3, -0.2, 0.1, 0.4, -0.3, 0.8)]
-    trace = smc.run(smc.Scenario(plant=plant, law="super_twisting_computed_torque", reference=goal, duration=8.0))
+    trace = smc.run(
+        smc.Scenario(
+            plant=plant, law="super_twisting_computed_torque", reference=goal, duration=8.0
+        )
+    )
     assert trace.failure is None
     assert np.abs(trace.e[-1]).max() < 2e-3
 
 
 def refusals():
     yield "law of one channel", {"law": "pid"}, "of many joints"
-    yield "disturbance", {"law": "geometric", "disturbance": smc.signals.Relay(0.1, s=1.0)}, "sees the loop"
+    yield (
+        "disturbance",
+        {"law": "geometric", "disturbance": smc.signals.Relay(0.1, s=1.0)},
+        "sees the loop",
+    )
     yield "friction", {"law": "geometric", "friction": smc.Coulomb(0.1)}, "friction"
     yield "estimator", {"law": "geometric", "velocity": "levant"}, "velocity"
     yield "clock", {"law": "geometric", "clock": smc.Clock(missed=0.1)}, "clock"
 
 
-@pytest.mark.parametrize(("fields", "named"), [case[1:] for case in refusals()], ids=[case[0] for case in refusals()])
+@pytest.mark.parametrize(
+    ("fields", "named"), [case[1:] for case in refusals()], ids=[case[0] for case in refusals()]
+)
 def test_what_a_free_body_does_not_take_is_refused(drone, fields, named):
     with pytest.raises(ScenarioError, match=named):
         smc.Scenario(plant=drone, **fields)
@@ -274,15 +352,22 @@ def test_other_uses_of_a_free_joint_are_refused(drone):
 
 @pytest.mark.parametrize("law", ["geometric", "pid"])
 def test_analyses_of_joints_refuse_a_free_body_whatever_the_law(drone, law):
-    for ask in (lambda: smc.basin(drone, law), lambda: smc.chattering(smc.Scenario(plant=drone, law="geometric"))):
-        with pytest.raises(ScenarioError, match=r"drone is a free body, .* is for joints: give another plant"):
+    for ask in (
+        lambda: smc.basin(drone, law),
+        lambda: smc.chattering(smc.Scenario(plant=drone, law="geometric")),
+    ):
+        with pytest.raises(
+            ScenarioError, match=r"drone is a free body, .* is for joints: give another plant"
+        ):
             ask()
 
 
 POD = """<body name="pod" pos="0 0 0.01" euler="0 0 20">
   <inertial pos="0 0 0" mass="1e-9" diaginertia="1e-15 1e-15 1e-15"/>
   <site name="1" pos="0.03253 -0.03253 0"/></body>"""
-PODDED = TEXT.replace('<site name="1" pos="0.03253 -0.03253 0"/>', POD)  # a rotor on a body of its own
+PODDED = TEXT.replace(
+    '<site name="1" pos="0.03253 -0.03253 0"/>', POD
+)  # a rotor on a body of its own
 
 
 @pytest.mark.parametrize("text", [TEXT, PODDED], ids=["on the body", "on a part"])
@@ -297,7 +382,9 @@ def test_a_film_has_an_arrow_for_each_actuator_and_one_for_the_disturbance(text)
     drawn = arrows.flying(arrows.loads(trace, np.array([0.19, 0.2])), 0, scale, "#000000")
     assert [i for i, _ in drawn] == [0, 1, 2, 3, 0]
     lengths = [arrow.high for _, arrow in drawn[:4]]
-    np.testing.assert_allclose(lengths, trace.applied[190:201, :4].mean(axis=0) / scale.control, rtol=0.01)
+    np.testing.assert_allclose(
+        lengths, trace.applied[190:201, :4].mean(axis=0) / scale.control, rtol=0.01
+    )
     model = trace.scenario.plant.load()
     data = mujoco.MjData(model)
     turn = Rotation.from_rotvec([0.3, -0.2, 0.5])
@@ -315,7 +402,9 @@ def test_a_film_has_an_arrow_for_each_actuator_and_one_for_the_disturbance(text)
 
 
 def test_a_free_body_that_fails_at_once_has_no_arrows():
-    law = smc.law_function(joint=True, plants=("a free body",))(lambda y, gains, memory: (math.nan * y.h, y.e))()
+    law = smc.law_function(joint=True, plants=("a free body",))(
+        lambda y, gains, memory: (math.nan * y.h, y.e)
+    )()
     trace = smc.run(smc.Scenario(plant="quadrotor", law=law, duration=0.2))
     assert trace.failure is not None
     scale = next(iter(arrows.scales([trace]).values()))
@@ -325,24 +414,40 @@ def test_a_free_body_that_fails_at_once_has_no_arrows():
 def test_disturbances_are_forces_on_the_centre_of_mass_and_turn_nothing():
     text = TEXT.replace('act="0.0782 0.0782 0.0782 0.0782"', "")
     body = smc.plant_from(text, channels=["body"], name="body", keyframe="hover")
-    fall = {"plant": body, "law": "none", "duration": 0.5, "integrator": "RK4", "x0": (0.0, 0.0, 3.0, 0.4, -0.3, 0.2)}
+    fall = {
+        "plant": body,
+        "law": "none",
+        "duration": 0.5,
+        "integrator": "RK4",
+        "x0": (0.0, 0.0, 3.0, 0.4, -0.3, 0.2),
+    }
     trace = smc.run(smc.Scenario(**fall, disturbance=smc.Constant(0.02)))
     t, a = trace.t[:, None], 0.02 / MASS
-    np.testing.assert_allclose(trace.e[:, :3] - [0.0, 0.0, 2.0], 0.5 * t**2 * [a, a, a - G], atol=1e-12)
+    np.testing.assert_allclose(
+        trace.e[:, :3] - [0.0, 0.0, 2.0], 0.5 * t**2 * [a, a, a - G], atol=1e-12
+    )
     assert np.ptp(trace.x[:, 3:], axis=0).max() < 1e-12
     assert np.all(trace.d == [0.02] * 3 + [0.0] * 3)
-    sideways = smc.run(smc.Scenario(**fall, disturbance=smc.signals.Gust(0.02, time=0.1, width=0.3)))
+    sideways = smc.run(
+        smc.Scenario(**fall, disturbance=smc.signals.Gust(0.02, time=0.1, width=0.3))
+    )
     assert np.abs(sideways.d[:, 0]).max() > 0.0199
     assert np.all(sideways.d[:, 1:] == 0.0)
-    wind = smc.run(smc.Scenario(**fall, disturbance=smc.signals.OrnsteinUhlenbeck(0.02, tau=0.1), seed=3)).d
-    assert np.abs(np.corrcoef(wind[:, :3].T)[np.triu_indices(3, 1)]).max() < 0.9  # each axis has its own
+    wind = smc.run(
+        smc.Scenario(**fall, disturbance=smc.signals.OrnsteinUhlenbeck(0.02, tau=0.1), seed=3)
+    ).d
+    assert (
+        np.abs(np.corrcoef(wind[:, :3].T)[np.triu_indices(3, 1)]).max() < 0.9
+    )  # each axis has its own
     assert np.ptp(wind[:, 0]) > 0.01
 
 
 def test_the_suites_conditions_have_the_size_of_the_body_or_are_refused(drone):
     force = 0.48 / 6.0  # N, of the four rotors, over the study's bound
     assert find_condition("constant").on(drone, 2.0)["disturbance"] == smc.Constant(0.2 * force)
-    assert find_condition("process_noise").on(drone, 2.0)["disturbance"].sigma == pytest.approx(0.2 * force)
+    assert find_condition("process_noise").on(drone, 2.0)["disturbance"].sigma == pytest.approx(
+        0.2 * force
+    )
     with pytest.raises(ScenarioError, match="'lag_20ms' sets actuator, and drone is a free body"):
         find_condition("lag_20ms").on(drone, 2.0)
     assert {"nominal", "noise", "sine", "heavy"} == set(
@@ -351,10 +456,14 @@ def test_the_suites_conditions_have_the_size_of_the_body_or_are_refused(drone):
 
 
 def test_every_seed_starts_within_a_fifth_of_a_metre_and_of_a_radian(drone):
-    starts = np.array([one.resolved.x0 for one in smc.grid(drone, "geometric", seeds=40, gains="default")])
+    starts = np.array(
+        [one.resolved.x0 for one in smc.grid(drone, "geometric", seeds=40, gains="default")]
+    )
     off = np.abs(starts - drone.rest)
     assert np.all((off.max(axis=0) > 0.15) & (off.max(axis=0) <= 0.2))
-    wider = smc.grid(drone, "geometric", seeds=40, gains="default", starts=smc.starts(spread=0.0, by=0.5))
+    wider = smc.grid(
+        drone, "geometric", seeds=40, gains="default", starts=smc.starts(spread=0.0, by=0.5)
+    )
     assert np.abs([one.resolved.x0 for one in wider] - np.array(drone.rest)).max() > 0.45
 
 
@@ -370,16 +479,19 @@ def test_laws_for_a_free_body_are_those_that_it_can_run(drone):
 
 def test_scores_are_of_the_position_the_heading_and_the_actuators(drone):
     """Rotors that push one way tilt the body wherever a force acts, so that its tilt is no error."""
-    trace = smc.run(smc.Scenario(plant=drone, law="geometric", x0=(0.1, -0.2, 1.1, 0.0, 0.0, 0.3), duration=6.0))
+    trace = smc.run(
+        smc.Scenario(plant=drone, law="geometric", x0=(0.1, -0.2, 1.1, 0.0, 0.0, 0.3), duration=6.0)
+    )
     found, e, t = smc.score(trace), trace.e, trace.t
     assert found["itae"] == pytest.approx(np.trapezoid(t * np.abs(e[:, :3]).sum(axis=1), t))
     assert found["tv"] == pytest.approx(np.abs(np.diff(trace.applied, axis=0)).sum(axis=0).max())
-    last = [
-        t[np.flatnonzero(np.abs(part).max(axis=1) > 0.02 * size)[-1] + 1]
-        for part, size in ((e[:, :3], 0.2), (e[:, 5:], 0.3))
-    ]
+    last = []
+    for part, size in ((e[:, :3], 0.2), (e[:, 5:], 0.3)):
+        last.append(t[np.flatnonzero(np.abs(part).max(axis=1) > 0.02 * size)[-1] + 1])
     assert found["settling_time"] == pytest.approx(max(last))
-    pushed = smc.run(smc.Scenario(plant=drone, law="geometric", disturbance=smc.Constant(0.02), duration=8.0))
+    pushed = smc.run(
+        smc.Scenario(plant=drone, law="geometric", disturbance=smc.Constant(0.02), duration=8.0)
+    )
     assert np.abs(pushed.e[-1, 3:5]).min() > 0.05  # rad: it leans into the force
     assert smc.scores(pushed)["driven rad"]["ultimate_bound"] < 0.01
 
@@ -394,7 +506,10 @@ def test_position_and_attitude_have_scales_of_their_own(drone):
     assert math.sqrt(math.prod(box["kx"])) == pytest.approx(scales["T"] ** -2)
     assert math.sqrt(math.prod(box["kR"])) == pytest.approx(scales["T of turns"] ** -2)
     assert all(
-        low < value < high for value, (low, high) in zip(smc.law("geometric").gains.values(), box.values(), strict=True)
+        low < value < high
+        for value, (low, high) in zip(
+            smc.law("geometric").gains.values(), box.values(), strict=True
+        )
     )
 
 
@@ -402,11 +517,15 @@ def test_the_objective_of_a_free_body_is_that_of_its_traces(drone):
     goal = Objective(conditions=("noise", "constant"), duration=0.4, u_max=0.48)
     cases = goal.scenarios(drone, smc.law("geometric"))
     (made,) = Evaluator(goal, cases, ("kx", "kR"))([(5.0, 300.0)])
-    traces = smc.run([dataclasses.replace(one, law=smc.law("geometric", kx=5.0, kR=300.0)) for one in cases])
+    traces = smc.run(
+        [dataclasses.replace(one, law=smc.law("geometric", kx=5.0, kR=300.0)) for one in cases]
+    )
     tracking = variation = 0.0
     for trace in traces:
         for part in (trace.e[:, :3], trace.e[:, 5:]):
-            tracking += np.trapezoid(trace.t * np.abs(part).sum(axis=1), trace.t) / np.abs(part[0]).sum()
+            tracking += (
+                np.trapezoid(trace.t * np.abs(part).sum(axis=1), trace.t) / np.abs(part[0]).sum()
+            )
         variation += np.max(np.abs(np.diff(trace.u, axis=0)).sum(axis=0) / drone.limits) / 0.4
     assert (made.tracking, made.variation) == (pytest.approx(tracking), pytest.approx(variation))
     assert made.objective == goal.evaluation(cases[0], traces).objective
@@ -416,12 +535,23 @@ def test_laws_of_a_free_body_are_compared_and_advised_as_any(drone, tmp_path, mo
     monkeypatch.chdir(tmp_path)
     laws = ["geometric", "quaternion_sliding"]
     found = smc.compare(
-        laws, drone, ["nominal", "constant"], seeds=7, tune=False, defaults=True, duration=3.0, progress=False
+        laws,
+        drone,
+        ["nominal", "constant"],
+        seeds=7,
+        tune=False,
+        defaults=True,
+        duration=3.0,
+        progress=False,
     )
     assert {"itae", "tv_rate"} <= {board.metric for board in found.leaderboard}
-    (itae,) = [b for b in found.leaderboard if b.metric == "itae" and b.group["condition"] == "nominal"]
+    (itae,) = [
+        b for b in found.leaderboard if b.metric == "itae" and b.group["condition"] == "nominal"
+    ]
     assert itae.winner == "geometric"
-    tuned = smc.compare("geometric", drone, "nominal", seeds=1, searches=1, budget=1, duration=0.3, progress=False)
+    tuned = smc.compare(
+        "geometric", drone, "nominal", seeds=1, searches=1, budget=1, duration=0.3, progress=False
+    )
     assert tuned.gains["drone"]["geometric"].source.kind == "tuned here"
 
 

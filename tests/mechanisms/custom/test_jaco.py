@@ -1,13 +1,15 @@
-"""An arm that nobody here wrote: dm_control's Jaco, six joints with velocity servos, tracked by laws of many joints."""
+"""An arm that nobody here wrote: dm_control's Jaco, six joints with velocity servos, tracked by
+laws of many joints.
+"""
 
 import warnings
 
 import mujoco
 import numpy as np
 import pytest
+from helpers import reference
 
 import smc_mujoco as smc
-from helpers import reference
 
 START = (0.0, 2.5, 2.0, 0.0, 0.5, 0.0)  # rad
 LIMITS = [30.5] * 3 + [6.8] * 3  # N m, of the large and the small joints in dm_control
@@ -36,14 +38,19 @@ def test_the_arm_has_a_model_and_its_ranges(jaco):
     assert jaco.ranges[1][1:] == pytest.approx((0.820305, 5.462881))
     model = jaco.load()
     assert model.nu == 6
-    assert (model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE).all()  # motors, not the servos of its file
+    assert (
+        model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE
+    ).all()  # motors, not the servos of its file
 
 
 # law -> largest error on any joint, rad
 FOLLOW = {
-    "computed_torque_sliding": 2e-3, "super_twisting_computed_torque": 2e-3, "unit_vector": 2e-3,
-    "time_delay_sliding": 0.01, "passivity_based": 0.1,
-}  # fmt: skip
+    "computed_torque_sliding": 2e-3,
+    "super_twisting_computed_torque": 2e-3,
+    "unit_vector": 2e-3,
+    "time_delay_sliding": 0.01,
+    "passivity_based": 0.1,
+}
 
 
 def test_laws_of_many_joints_track_on_every_joint(jaco):

@@ -1,4 +1,6 @@
-"""A robot of one's own: what a text says of its channels, bounds, mistakes in laws, and the shapes of a URDF."""
+"""A robot of one's own: what a text says of its channels, bounds, mistakes in laws, and the shapes
+of a URDF.
+"""
 
 import re
 import warnings
@@ -56,7 +58,10 @@ def test_a_text_says_of_a_channel_what_python_says(folder):
         ("mine.xml:lift(u_max=a)", "u_max of channel 'lift' is 'a': give a number"),
         ("mine.xml:lift(motor)+lift", "names a joint twice"),
         ("mine.xml:lift(motor=2)", "Channel's motor is '2': give True or False"),
-        ("mine.xml:lift", r"give smc.Channel\(motor=True\), or JOINT\(motor\) in a text, for one ideal motor"),
+        (
+            "mine.xml:lift",
+            r"give smc.Channel\(motor=True\), or JOINT\(motor\) in a text, for one ideal motor",
+        ),
         (MODEL, "plant is the text of a model: give smc.plant_from"),
     ],
 )
@@ -78,10 +83,14 @@ def test_a_bound_that_nobody_gave_is_told_and_is_of_no_other_joint(folder):
         assert [told.startswith(free) for told in bounds(text)[1]] == [True], text
     assert bounds("mine.xml:lift(motor)+tilt(motor,u_max=5)")[0] == (6.0, 5.0)
     both = bounds("mine.xml:lift(motor)+tilt(motor)")[1]
-    assert ["joints 'lift' and 'tilt' of mine, so that |u| <= 6 N and 6 N m are taken" in told for told in both] == [
-        True
-    ]
-    for text, fields in (("mine.xml:lift(motor,u_max=30)", {}), ("mine.xml:lift(motor)", {"u_max": 30.0})):
+    assert [
+        "joints 'lift' and 'tilt' of mine, so that |u| <= 6 N and 6 N m are taken" in told
+        for told in both
+    ] == [True]
+    for text, fields in (
+        ("mine.xml:lift(motor,u_max=30)", {}),
+        ("mine.xml:lift(motor)", {"u_max": 30.0}),
+    ):
         assert bounds(text, **fields) == (30.0, [])
 
 
@@ -130,7 +139,10 @@ def test_what_is_nearly_right_names_its_cure(folder):
         (lambda: smc.run("duffing"), r"give smc.Scenario\(plant='duffing'"),
         (lambda: smc.film(scenario, "a.mp4"), r"run it first, smc.run\(scenario\)"),
         (lambda: smc.Scenario(plant="duffing", law=one), r"give smc.law_function\(function\)"),
-        (lambda: smc.Scenario(plant="duffing", law="pid", reference=lambda t: t), "smc.signals.TimeSeries"),
+        (
+            lambda: smc.Scenario(plant="duffing", law="pid", reference=lambda t: t),
+            "smc.signals.TimeSeries",
+        ),
     ):
         with pytest.raises(smc.ScenarioError, match=cure):
             call()
@@ -142,7 +154,9 @@ def test_files_of_a_text_are_bytes_of_any_kind_or_text():
     outer = f'{MODEL[:start]}<include file="part.xml"/>{MODEL[end:]}'
     part = f"<mujoco>{MODEL[start:end]}</mujoco>"
     for content in (part, part.encode(), bytearray(part.encode())):
-        made = smc.plant_from(outer, {"tilt": smc.Channel(motor=True)}, assets={"part.xml": content})
+        made = smc.plant_from(
+            outer, {"tilt": smc.Channel(motor=True)}, assets={"part.xml": content}
+        )
         assert made.parameters == whole.parameters
 
 
@@ -150,7 +164,11 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
     plant = as_plant("arm.urdf:j1(motor)+j2(motor)")
     model, plain = plant.build(2).compile(), mujoco.MjSpec.from_file("arm.urdf").compile()
     assert (plain.ngeom, model.ngeom) == (1, 3)
-    assert sorted(model.geom_group.tolist()) == [1, 1, 3]  # the box, which is for contacts, is not seen
+    assert sorted(model.geom_group.tolist()) == [
+        1,
+        1,
+        3,
+    ]  # the box, which is for contacts, is not seen
     np.testing.assert_array_equal(model.body_mass, plain.body_mass)
     np.testing.assert_array_equal(model.body_inertia, plain.body_inertia)
 
@@ -159,10 +177,16 @@ def test_a_urdf_keeps_its_visual_shapes_and_its_motion(folder):
 def test_machines_on_a_fused_base_have_the_colours_of_their_own_laws(folder, monkeypatch):
     plant, seen = as_plant("arm.urdf:j1(motor)+j2(motor)"), []
     plain = stage.Stage.render
-    monkeypatch.setattr(stage.Stage, "render", lambda self, drawn=(): seen.append(self) or plain(self, drawn))
-    traces = smc.run([smc.Scenario(plant=plant, law=law, duration=0.01) for law in ("pid", "classical")])
+    monkeypatch.setattr(
+        stage.Stage, "render", lambda self, drawn=(): seen.append(self) or plain(self, drawn)
+    )
+    traces = smc.run(
+        [smc.Scenario(plant=plant, law=law, duration=0.01) for law in ("pid", "classical")]
+    )
     smc.film(traces, "a.png", at=0.0, size=(320, 180))
-    names = [[seen[0].model.body(seen[0].model.geom_bodyid[i]).name for i in its] for its in seen[0].links]
+    names = []
+    for its in seen[0].links:
+        names.append([seen[0].model.body(seen[0].model.geom_bodyid[i]).name for i in its])
     assert names == [["m0/l1", "m0/l2"], ["m1/l1", "m1/l2"]]
 
 
@@ -170,12 +194,22 @@ def test_machines_on_a_fused_base_have_the_colours_of_their_own_laws(folder, mon
     ("text", "why"),
     [
         ("mine.xml:tilt(motor,u_max=9)", "tuning is not possible here: it has no nominal model"),
-        ("one.xml:lift(motor,u_max=60)", "one starts at 0 under 'nominal', where a law has nothing"),
+        (
+            "one.xml:lift(motor,u_max=60)",
+            "one starts at 0 under 'nominal', where a law has nothing",
+        ),
     ],
 )
 def test_what_no_tuning_can_answer_is_refused_before_the_first_run(folder, text, why):
     with pytest.raises(smc.ScenarioError, match=why) as refused:
-        smc.which(text, laws=["classical", "pid"], conditions="noise", seeds=1, duration=0.05, out=folder / "out")
+        smc.which(
+            text,
+            laws=["classical", "pid"],
+            conditions="noise",
+            seeds=1,
+            duration=0.05,
+            out=folder / "out",
+        )
     assert "defaults=True" in str(refused.value)
     assert not list(folder.glob("out/**/*.parquet"))
 
@@ -184,21 +218,30 @@ def test_what_no_tuning_can_answer_is_refused_before_the_first_run(folder, text,
 @pytest.mark.parametrize(
     ("text", "heads"),
     [
-        ("arm.urdf:j1(motor)+j2(motor)", ["settling time (s)", "ultimate bound (rad)", "TV rate (N·m/s)"]),
+        (
+            "arm.urdf:j1(motor)+j2(motor)",
+            ["settling time (s)", "ultimate bound (rad)", "TV rate (N·m/s)"],
+        ),
         ("mine.xml:lift(motor,u_max=60)+tilt(motor,u_max=9)", ["settling time (s)"]),
     ],
 )
 def test_tables_and_figures_of_two_joints_have_units(folder, text, heads):
     metrics = ["settling_time", "ultimate_bound", "tv_rate"][: len(heads)]
-    runs = [smc.Scenario(plant=as_plant(text), law=law, duration=0.02, x0=0.1) for law in ("pid", "classical")]
+    runs = []
+    for law in ("pid", "classical"):
+        runs.append(smc.Scenario(plant=as_plant(text), law=law, duration=0.02, x0=0.1))
     table = smc.study(runs, "study", progress=False)
     (told,) = smc.leaderboard(table, metrics).tables
     assert told.headings[1:] == [head.replace("·", " ") for head in heads]
-    assert [" ".join(ax.get_xlabel().split()) for ax in smc.plot(table, metrics=metrics).axes] == heads
+    assert [
+        " ".join(ax.get_xlabel().split()) for ax in smc.plot(table, metrics=metrics).axes
+    ] == heads
 
 
 def test_what_mujoco_warns_of_a_model_is_told_once(folder):
-    (folder / "old.xml").write_text(MODEL.replace("<mujoco>", '<mujoco><compiler settotalmass="5"/>'))
+    (folder / "old.xml").write_text(
+        MODEL.replace("<mujoco>", '<mujoco><compiler settotalmass="5"/>')
+    )
     script = """import dataclasses, smc_mujoco as smc
 trace = smc.run(smc.Scenario(plant="old.xml:tilt(motor,u_max=9)", law="pid", duration=0.01, x0=0.1))
 smc.worst_case(trace.scenario, budget=2, within=smc.Uncertainty(mass=(0.9, 1.1)))
@@ -208,7 +251,11 @@ smc.worst_case(dataclasses.replace(trace.scenario, law="classical"), budget=2)""
 
 
 def test_a_machine_without_shapes_cannot_be_filmed_and_says_so(folder):
-    (folder / "bare.urdf").write_text(re.sub(r"<(visual|collision)>.*?</\1>", "", ARM, flags=re.DOTALL))
+    (folder / "bare.urdf").write_text(
+        re.sub(r"<(visual|collision)>.*?</\1>", "", ARM, flags=re.DOTALL)
+    )
     trace = smc.run(smc.Scenario(plant=as_plant("bare.urdf:j1(motor)+j2(motor)"), **RUN))
-    with pytest.raises(smc.ScenarioError, match=r"nothing that moves on bare.* has a shape to be filmed: give"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"nothing that moves on bare.* has a shape to be filmed: give"
+    ):
         smc.film(trace, "a.png", at=0.0, size=(320, 180))

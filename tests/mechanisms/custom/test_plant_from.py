@@ -1,4 +1,6 @@
-"""Models that nobody here wrote become plants: they move as in MuJoCo, laws get f and g, mistakes get a sentence."""
+"""Models that nobody here wrote become plants: they move as in MuJoCo, laws get f and g, mistakes
+get a sentence.
+"""
 
 import dataclasses
 import gc
@@ -10,6 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from helpers import reference as plain
 from helpers.episodes import dm_control_suite, driven_by_dm, run_of
 
 import smc_mujoco as smc
@@ -25,7 +28,6 @@ from smc_mujoco.mechanisms.custom import mjcf
 from smc_mujoco.mechanisms.custom.nominal_model import NominalModel, prepared
 from smc_mujoco.mechanisms.custom.plant_from import UserModel
 from smc_mujoco.simulation import model as models
-from helpers import reference as plain
 from smc_mujoco.studies import run_key
 
 TORQUE = smc.law("computed_torque", kp=100.0, kd=20.0)
@@ -43,7 +45,9 @@ LINKS = """
   {rest}
 </mujoco>
 """
-MOTORS = '<motor name="a" joint="shoulder" gear="-4" ctrlrange="-1 2"/><motor name="b" joint="elbow"/>'
+MOTORS = (
+    '<motor name="a" joint="shoulder" gear="-4" ctrlrange="-1 2"/><motor name="b" joint="elbow"/>'
+)
 ACTUATED = f"<actuator>{MOTORS}</actuator>"
 MORE_KEYS = """
   <actuator><motor joint="shoulder"/></actuator>
@@ -76,7 +80,9 @@ def acrobot() -> smc.Plant:
 
 
 def both_links() -> smc.Plant:
-    return smc.plant_from(suite("acrobot"), {j: smc.Channel(motor=True) for j in ("shoulder", "elbow")})
+    return smc.plant_from(
+        suite("acrobot"), {j: smc.Channel(motor=True) for j in ("shoulder", "elbow")}
+    )
 
 
 def reacher() -> smc.Plant:
@@ -143,7 +149,13 @@ def test_a_foreign_model_moves_as_its_file_does_in_mujoco(name):
 
     u = CTRL[name] * raw.actuator_gear[0, 0]
     scenario = smc.Scenario(
-        plant=plant, law=constant(u=u), duration=1.0, u_max=100.0, x0=0.3, integrator="RK4", physics_step=1e-3
+        plant=plant,
+        law=constant(u=u),
+        duration=1.0,
+        u_max=100.0,
+        x0=0.3,
+        integrator="RK4",
+        physics_step=1e-3,
     )
     trace = smc.run(scenario)
     joints = joints_of(plant, raw)
@@ -183,7 +195,9 @@ def test_f_and_g_are_the_accelerations_of_the_file(name):
         mujoco.mj_forward(raw, data)
         for i in range(plant.n):
             f, g = plant.nominal(x, v, i, values, u)
-            np.testing.assert_allclose(f + g * u[i % plant.driven], data.qacc[dofs[i]], rtol=1e-8, atol=1e-8)
+            np.testing.assert_allclose(
+                f + g * u[i % plant.driven], data.qacc[dofs[i]], rtol=1e-8, atol=1e-8
+            )
 
 
 # laws get f and g
@@ -222,7 +236,15 @@ def test_seven_coupled_joints_settle_as_the_error_equation_says():
     plant = pusher()
     reference, e0 = smc.Constant(-0.3), 0.1
     trace = smc.run(
-        smc.Scenario(plant=plant, law=TORQUE, model="nominal", reference=reference, u_max=1e3, duration=1.0, x0=-0.2)
+        smc.Scenario(
+            plant=plant,
+            law=TORQUE,
+            model="nominal",
+            reference=reference,
+            u_max=1e3,
+            duration=1.0,
+            x0=-0.2,
+        )
     )
     wanted = e0 * (1 + 10 * trace.t) * np.exp(-10 * trace.t)
     assert np.abs(trace.x + 0.3 - wanted[:, None]).max() < 1e-3
@@ -232,20 +254,30 @@ def test_seven_coupled_joints_settle_as_the_error_equation_says():
 PUSHED = {"disturbance": smc.Sine(amplitude=1.0, omega=3.0), "friction": smc.Coulomb(0.1)}
 
 
-@pytest.mark.parametrize(("channels", "fields"), [(("shoulder", "elbow"), PUSHED), (("elbow", "shoulder"), {})])
+@pytest.mark.parametrize(
+    ("channels", "fields"), [(("shoulder", "elbow"), PUSHED), (("elbow", "shoulder"), {})]
+)
 def test_the_plain_loop_gives_the_same_bits(arm, channels, fields):
     """Also where channels have another order than the joints in the file."""
     law, common = smc.law("super_twisting"), {"duration": 0.2, "x0": (0.4, -0.3), "u_max": 20.0}
     scenario = smc.Scenario(plant=arm(channels), law=law, model="nominal", **common, **fields)
     fast, slow = smc.run(scenario), plain.run(scenario)
     assert fast.failure is None
-    assert [name for name in ARRAYS if not np.array_equal(getattr(fast, name), getattr(slow, name))] == []
+    assert [
+        name for name in ARRAYS if not np.array_equal(getattr(fast, name), getattr(slow, name))
+    ] == []
 
 
 def test_threads_change_nothing(arm):
     base = smc.Scenario(plant=arm(), law=TORQUE, model="nominal", duration=0.2, u_max=20.0)
-    many = [dataclasses.replace(base, x0=(0.1 * i, -0.1 * i), mismatch={"mass": 1.0 + 0.1 * i}) for i in range(6)]
-    for one, two, alone in zip(smc.run(many, threads=1), smc.run(many, threads=4), map(smc.run, many), strict=True):
+    many = []
+    for i in range(6):
+        many.append(
+            dataclasses.replace(base, x0=(0.1 * i, -0.1 * i), mismatch={"mass": 1.0 + 0.1 * i})
+        )
+    for one, two, alone in zip(
+        smc.run(many, threads=1), smc.run(many, threads=4), map(smc.run, many), strict=True
+    ):
         np.testing.assert_array_equal(one.x, two.x)
         np.testing.assert_array_equal(one.x, alone.x)
 
@@ -253,7 +285,9 @@ def test_threads_change_nothing(arm):
 @pytest.mark.usefixtures("present_objects_frozen")
 def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
     plant = arm()
-    base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
+    base = smc.Scenario(
+        plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1)
+    )
     many = [dataclasses.replace(base, x0=(0.1 * i, 0.2), v0=0.5) for i in range(7)]
     first, _, _, again = smc.run(base), smc.run(many), smc.run(many), smc.run(base)
     np.testing.assert_array_equal(again.x, first.x)
@@ -265,7 +299,9 @@ def test_data_of_a_nominal_model_are_reused_by_later_runs(arm):
 @pytest.mark.usefixtures("present_objects_frozen")
 def test_data_of_a_nominal_model_are_reused_after_a_failed_run(arm):
     plant = arm(bodies=BALL)
-    good = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1))
+    good = smc.Scenario(
+        plant=plant, law=TORQUE, model="nominal", duration=0.05, u_max=20.0, x0=(0.3, 0.1)
+    )
     bad = dataclasses.replace(good, law=smc.law("computed_torque", kp=1e9, kd=1e9), u_max=math.inf)
     first, astray, again = smc.run(good), smc.run(bad), smc.run(good)
     assert astray.failure is not None
@@ -299,7 +335,9 @@ def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
     def one(y, gains, memory):
         return 1.0, 0.0
 
-    pushed = smc.run(smc.Scenario(plant=plant, law="none", duration=0.3, disturbance=smc.Constant(1.0)))
+    pushed = smc.run(
+        smc.Scenario(plant=plant, law="none", duration=0.3, disturbance=smc.Constant(1.0))
+    )
     driven = smc.run(smc.Scenario(plant=plant, law=one(), duration=0.3))
     np.testing.assert_allclose(pushed.x, driven.x, atol=1e-12)
     np.testing.assert_array_equal(pushed.d, 1.0)
@@ -307,7 +345,14 @@ def test_a_disturbance_is_the_force_on_its_joint_alone(arm):
 
 def test_a_mismatch_is_in_the_true_model_alone(arm):
     plant = arm()
-    base = smc.Scenario(plant=plant, law=TORQUE, model="nominal", duration=2.0, u_max=50.0, reference=smc.Constant(0.3))
+    base = smc.Scenario(
+        plant=plant,
+        law=TORQUE,
+        model="nominal",
+        duration=2.0,
+        u_max=50.0,
+        reference=smc.Constant(0.3),
+    )
     right, wrong = smc.run([base, dataclasses.replace(base, mismatch={"mass": 1.3})])
     assert np.abs(right.x[-1] - 0.3).max() < 1e-5
     assert np.abs(wrong.x[-1] - 0.3).max() > 1e-3
@@ -320,7 +365,10 @@ def test_a_mismatch_is_in_the_true_model_alone(arm):
 def test_u_is_the_force_on_the_joint_within_the_motor_s_limits(arm):
     plant = arm()
     assert isinstance(plant.build, UserModel)
-    assert plant.limits == (4.0, math.inf)  # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
+    assert plant.limits == (
+        4.0,
+        math.inf,
+    )  # gear -4, ctrlrange -1 2: the weaker way; the other motor has none
 
     @smc.law_function
     def much(y, gains, memory):
@@ -343,7 +391,11 @@ LIMITS = {
     "both": ('<motor joint="elbow" gear="3" ctrlrange="-2 2" forcerange="-.5 .5"/>', "", 1.5),
     "the joint's": ('<motor joint="elbow" ctrlrange="-9 9"/>', 'actuatorfrcrange="-2 1"', 1.0),
     "no clamp": ('<motor joint="elbow" ctrlrange="-2 2"/>', "", math.inf),
-    "ideal": ('<position joint="elbow" kp="17.8" forcerange="-3.35 3.35"/>', "", 3.35),  # as of an SO-101
+    "ideal": (
+        '<position joint="elbow" kp="17.8" forcerange="-3.35 3.35"/>',
+        "",
+        3.35,
+    ),  # as of an SO-101
     "ideal, with a gear": ('<position joint="elbow" gear="-2" forcerange="-3 4"/>', "", 6.0),
     "ideal, of two": (
         '<position joint="elbow" forcerange="-3 3"/><velocity joint="elbow" forcerange="-1 1"/>',
@@ -363,18 +415,25 @@ LIMITS = {
 @pytest.mark.parametrize("name", LIMITS)
 def test_a_channel_s_limit_is_what_the_file_s_motor_gives(arm, tmp_path, name):
     motor, joint, limit = LIMITS[name]
-    flag = '<option><flag clampctrl="disable"/></option>' if name == "no clamp" else ""
+    if name == "no clamp":
+        flag = '<option><flag clampctrl="disable"/></option>'
+    else:
+        flag = ""
     arm(["shoulder"])
     text = LINKS.format(rest=f"<actuator>{motor}</actuator>{flag}", bodies="").replace(
         'axis="0.6 0.8 0"', f'axis="0.6 0.8 0" {joint}'
     )
     (tmp_path / "arm.xml").write_text(text)
-    plant = smc.plant_from(tmp_path / "arm.xml", {"elbow": smc.Channel(motor=name.startswith("ideal"))})
+    plant = smc.plant_from(
+        tmp_path / "arm.xml", {"elbow": smc.Channel(motor=name.startswith("ideal"))}
+    )
     assert plant.limits == ((limit,) if limit < math.inf else ())
     assert smc.Scenario(plant=plant, law="none").limits == (limit if limit < math.inf else 6.0,)
     raw = read(plant)
     data = mujoco.MjData(raw)
-    if not name.startswith("ideal"):  # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
+    if not name.startswith(
+        "ideal"
+    ):  # MuJoCo agrees: with a large ctrl of either sign the weaker way gives the limit
         forces = []
         for data.ctrl[0] in (-100.0, 100.0):
             mujoco.mj_forward(raw, data)
@@ -426,8 +485,13 @@ def test_joints_without_a_channel_keep_the_actuators_of_the_model(arm):
 def test_a_keyframe_is_where_runs_start(arm):
     rest = ACTUATED + '<keyframe><key name="home" qpos="0.2 -0.5"/></keyframe>'
     assert arm(rest=rest, keyframe="home").x0 == (0.2, -0.5)
-    assert arm({"elbow": smc.Channel(x0=1.0), "shoulder": None}, rest, keyframe="home").x0 == (1.0, 0.2)
-    trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest, keyframe="home"), law="none", duration=0.1))
+    assert arm({"elbow": smc.Channel(x0=1.0), "shoulder": None}, rest, keyframe="home").x0 == (
+        1.0,
+        0.2,
+    )
+    trace = smc.run(
+        smc.Scenario(plant=arm(["elbow"], rest, keyframe="home"), law="none", duration=0.1)
+    )
     assert trace.x[0, 0] == -0.5
     moving = rest.replace('-0.5"', '-0.5" qvel="1 1"').replace(
         "</keyframe>", '<key name="other" qpos="9 9"/></keyframe>'
@@ -435,24 +499,37 @@ def test_a_keyframe_is_where_runs_start(arm):
     driven_otherwise = arm({"elbow": smc.Channel(motor=True)}, MORE_KEYS, keyframe="home")
     assert smc.run(smc.Scenario(plant=driven_otherwise, law="none", duration=0.1)).failure is None
     for part in (None, smc.Backlash(0.02)):  # which adds joints
-        scenario = smc.Scenario(plant=arm(["elbow"], moving, keyframe="home"), law="none", actuator=part)
+        scenario = smc.Scenario(
+            plant=arm(["elbow"], moving, keyframe="home"), law="none", actuator=part
+        )
         qpos, qvel = models.initial_state(model := models.compile_model(scenario), scenario)
-        assert [qpos[model.joint(joint).qposadr[0]] for joint in ("shoulder", "elbow")] == [0.2, -0.5]
+        assert [qpos[model.joint(joint).qposadr[0]] for joint in ("shoulder", "elbow")] == [
+            0.2,
+            -0.5,
+        ]
         assert not qvel.any()
-    with pytest.raises(smc.ScenarioError, match=r"unknown keyframe of arm.xml 'hme': did you mean 'home'"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"unknown keyframe of arm.xml 'hme': did you mean 'home'"
+    ):
         arm(rest=rest, keyframe="hme")
 
 
-@pytest.mark.parametrize("part", [smc.Lag(0.01), smc.Backlash(0.02), smc.DCMotor(), smc.hardware.RateLimit(100.0)])
+@pytest.mark.parametrize(
+    "part", [smc.Lag(0.01), smc.Backlash(0.02), smc.DCMotor(), smc.hardware.RateLimit(100.0)]
+)
 def test_parts_fit_an_own_model(arm, part):
-    trace = smc.run(smc.Scenario(plant=arm(), law="super_twisting", actuator=part, duration=0.2, x0=(0.3, 0.2)))
+    trace = smc.run(
+        smc.Scenario(plant=arm(), law="super_twisting", actuator=part, duration=0.2, x0=(0.3, 0.2))
+    )
     assert trace.failure is None
 
 
 def test_includes_and_their_contents_count(tmp_path):
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "motors.xml").write_text(f"<mujoco>{ACTUATED}</mujoco>")
-    (tmp_path / "arm.xml").write_text(LINKS.format(rest='<include file="parts/motors.xml"/>', bodies=""))
+    (tmp_path / "arm.xml").write_text(
+        LINKS.format(rest='<include file="parts/motors.xml"/>', bodies="")
+    )
     plant = smc.plant_from(tmp_path / "arm.xml", ["elbow"])
     scenario = smc.Scenario(plant=plant, law="none", duration=0.01)
     assert smc.run(scenario).failure is None
@@ -462,20 +539,26 @@ def test_includes_and_their_contents_count(tmp_path):
 
 
 def test_files_that_others_name_in_folders_of_their_own_count(tmp_path):
-    """An attached model has its own meshdir, and a compiler that is included sets that of the whole."""
+    """An attached model has its own meshdir, and a compiler that is included sets that of the
+    whole.
+    """
     body = (
         '<asset><mesh name="c" file="c.obj"/></asset><worldbody><body name="b"><joint name="j"/>'
         '<geom type="mesh" mesh="c" mass="1"/></body></worldbody>'
     )
     (tmp_path / "sub" / "assets").mkdir(parents=True)
     (tmp_path / "sub" / "assets" / "c.obj").write_text("\n".join([*CORNERS, *FACES]))
-    (tmp_path / "sub" / "child.xml").write_text(f'<mujoco><compiler meshdir="assets"/>{body}</mujoco>')
+    (tmp_path / "sub" / "child.xml").write_text(
+        f'<mujoco><compiler meshdir="assets"/>{body}</mujoco>'
+    )
     (tmp_path / "attaching.xml").write_text(
         '<mujoco><asset><model name="m" file="sub/child.xml"/></asset>'
         '<worldbody><attach model="m" body="b" prefix="left/"/></worldbody></mujoco>'
     )
     (tmp_path / "compiler.xml").write_text('<mujoco><compiler meshdir="sub/assets"/></mujoco>')
-    (tmp_path / "including.xml").write_text(f'<mujoco><include file="compiler.xml"/>{body}</mujoco>')
+    (tmp_path / "including.xml").write_text(
+        f'<mujoco><include file="compiler.xml"/>{body}</mujoco>'
+    )
     motor = smc.Channel(motor=True)
     plants = {"attaching": {"left/j": motor}, "including": {"j": motor}}
     built = [smc.plant_from(tmp_path / f"{name}.xml", joints) for name, joints in plants.items()]
@@ -490,21 +573,29 @@ def test_the_file_s_own_sensors_are_no_channels(arm):
     sensors = '<sensor><jointpos joint="elbow"/><jointvel joint="elbow" delay="0.01" nsample="20"/></sensor>'
     plant = arm(["shoulder"], ACTUATED + sensors)
     scenario = smc.Scenario(plant=plant, law="classical", duration=0.1, x0=0.3)
-    trace, plainly = smc.run(scenario), smc.run(dataclasses.replace(scenario, plant=arm(["shoulder"])))
+    trace, plainly = (
+        smc.run(scenario),
+        smc.run(dataclasses.replace(scenario, plant=arm(["shoulder"]))),
+    )
     assert trace.x.shape == (101, 1)
     np.testing.assert_array_equal(trace.x, plainly.x)
 
 
 @pytest.mark.parametrize("name", ["passive:x", "elbow", "shoulder", "ä b/c"])
 def test_what_a_motor_is_called_does_not_matter(arm, name):
-    plant = arm(rest=f'<actuator><motor name="{name}" joint="shoulder"/><motor joint="elbow"/></actuator>')
+    plant = arm(
+        rest=f'<actuator><motor name="{name}" joint="shoulder"/><motor joint="elbow"/></actuator>'
+    )
     trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.05, x0=(0.3, -0.3)))
     assert trace.failure is None
     assert trace.u[0, 0] < 0.0 < trace.u[0, 1]
 
 
 def test_a_motor_moves_a_joint_whatever_groups_the_file_turns_off(arm):
-    plant = arm({"elbow": smc.Channel(motor=True)}, ACTUATED + '<option actuatorgroupdisable="0 1 2 3 4 5"/>')
+    plant = arm(
+        {"elbow": smc.Channel(motor=True)},
+        ACTUATED + '<option actuatorgroupdisable="0 1 2 3 4 5"/>',
+    )
     trace = smc.run(smc.Scenario(plant=plant, law="classical", duration=0.05, x0=0.3))
     np.testing.assert_array_equal(trace.force[1:, 0], trace.u[:-1, 0])
 
@@ -528,7 +619,9 @@ def test_twice_the_mass_is_twice_all_masses_and_inertias_and_no_armature(arm):
 
 
 def test_a_law_as_an_agent_moves_the_model_as_its_run(arm):
-    environment = dm_control_suite().load(arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)})
+    environment = dm_control_suite().load(
+        arm(), changes={"duration": 0.3, "u_max": 30.0, "x0": (0.4, -0.3)}
+    )
     law = smc.law("observer_free", lam=60.0, k1=3.0)
     trace = smc.run(run_of(environment.task.setting, law))
     states = driven_by_dm(environment, smc.envs.agent(law, environment))
@@ -546,7 +639,10 @@ def test_copies_in_one_batch_touch_the_floor_as_the_single_environment_does(tmp_
         <geom type="capsule" size=".03" fromto="0 0 0 .7 0 0" mass="1"/></body></worldbody>
       <actuator><motor joint="j"/></actuator></mujoco>""")
     plant = smc.plant_from(tmp_path / "falls.xml", {"j": smc.Channel(x0=0.1)})
-    single, many = gym.PlantEnv(plant, changes={"x0": 0.1}), vector_env.BatchEnv(plant, 2, changes={"x0": 0.1})
+    single, many = (
+        gym.PlantEnv(plant, changes={"x0": 0.1}),
+        vector_env.BatchEnv(plant, 2, changes={"x0": 0.1}),
+    )
     single.reset(seed=0)
     many.reset(seed=0)
     alone, both = np.empty(2), np.empty((2, 2))
@@ -561,7 +657,9 @@ def test_copies_in_one_batch_touch_the_floor_as_the_single_environment_does(tmp_
 
 
 def test_hierarchical_brings_in_a_foreign_cart_with_its_pole():
-    plant = smc.plant_from(suite("cartpole"), {"slider": smc.Channel(partner="hinge_1", partner_x0=0.3)})
+    plant = smc.plant_from(
+        suite("cartpole"), {"slider": smc.Channel(partner="hinge_1", partner_x0=0.3)}
+    )
     assert plant.x0 == (0.0, 0.3)
     scenario = smc.Scenario(plant=plant, law="hierarchical")
     assert (scenario.resolved.model, scenario.resolved.u_max) == ("nominal", 10.0)
@@ -584,17 +682,24 @@ def test_a_law_for_a_plant_with_a_free_joint_fits_models_with_one(arm):
 
 def test_laws_and_designs_say_what_they_miss_in_a_model(arm):
     for law in ("hierarchical", "swing_up"):
-        with pytest.raises(smc.ScenarioError, match=rf"law '{law}' is only for .*, not for arm") as caught:
+        with pytest.raises(
+            smc.ScenarioError, match=rf"law '{law}' is only for .*, not for arm"
+        ) as caught:
             smc.Scenario(plant=arm(), law=law)
         assert ("give each channel a partner" in str(caught.value)) == (law == "hierarchical")
     with pytest.raises(
-        smc.ScenarioError, match=r"acrobot\.xml's channel 1 has no actuator, and lqr does not see such a joint"
+        smc.ScenarioError,
+        match=r"acrobot\.xml's channel 1 has no actuator, and lqr does not see such a joint",
     ):
         design.lqr(acrobot())
-    with pytest.raises(smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"):
+    with pytest.raises(
+        smc.ScenarioError, match="arm has no nominal model: joint 'shoulder' moves with"
+    ):
         linear_theory.linear(arm(["elbow"]))
     for law in ("lqr", "mpc"):
-        with pytest.raises(smc.ScenarioError, match=rf"to take {law}'s a1, .*: joint 'shoulder.* or give the three"):
+        with pytest.raises(
+            smc.ScenarioError, match=rf"to take {law}'s a1, .*: joint 'shoulder.* or give the three"
+        ):
             design.linearised(arm(["elbow"]), law)
     given = smc.Scenario(plant=arm(["elbow"]), law=smc.law("lqi", a1=0.0, a2=0.0, b=1.0))
     assert given.resolved.law.gains["b"] == 1.0
@@ -622,7 +727,9 @@ def bounded(arm, tmp_path):
 
 
 def test_a_start_outside_a_joint_s_range_is_refused(bounded):
-    scenario = smc.Scenario(plant=bounded(ELBOW), law="none", x0=(1.0, 3.0))  # the shoulder has no limits
+    scenario = smc.Scenario(
+        plant=bounded(ELBOW), law="none", x0=(1.0, 3.0)
+    )  # the shoulder has no limits
     with pytest.raises(smc.ScenarioError, match=REFUSED):
         dataclasses.replace(scenario, x0=(1.2, 3.0))
     with pytest.raises(smc.ScenarioError, match=r"x0 of joint 'elbow' of arm is -0.6,"):
@@ -657,7 +764,9 @@ def test_a_start_may_be_as_far_beyond_a_range_as_a_limit_gives_way(bounded):
             smc.Scenario(plant=plant, law="none", x0=x0)
 
 
-def test_a_start_that_is_asked_for_is_refused_with_the_plant_and_the_model_s_own_with_the_run(bounded):
+def test_a_start_that_is_asked_for_is_refused_with_the_plant_and_the_model_s_own_with_the_run(
+    bounded,
+):
     key = '<keyframe><key name="home" qpos="0.2 1.2"/><key name="in" qpos="9 0.1"/></keyframe>'
     for asked in ({"elbow": {"x0": 1.2}}, {"shoulder": {"partner": "elbow", "partner_x0": 1.2}}):
         with pytest.raises(smc.ScenarioError, match=REFUSED):
@@ -720,10 +829,16 @@ def test_a_swing_up_has_half_the_torque_of_its_heaviest_pendulum_and_no_slide(tm
         assert tasks.tasks(smc.plant_from(tmp_path / "pole.xml", order)) == ["regulate", "track"]
     body = '<body pos="0 {y} 0"><joint name="{name}" axis="{axis}"/><geom size=".01" pos="0 0 1" mass="{mass}"/></body>'
     three = [("light", "0 1 0", 1.0), ("heavy", "0 1 0", 2.0), ("upright", "0 0 1", 1.0)]
-    bodies = [body.format(y=y, name=name, axis=axis, mass=mass) for y, (name, axis, mass) in enumerate(three)]
-    (tmp_path / "three.xml").write_text(f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>")
+    bodies = []
+    for y, (name, axis, mass) in enumerate(three):
+        bodies.append(body.format(y=y, name=name, axis=axis, mass=mass))
+    (tmp_path / "three.xml").write_text(
+        f"<mujoco><worldbody>{''.join(bodies)}</worldbody></mujoco>"
+    )
     for order in (("upright", "light", "heavy"), ("heavy", "light", "upright")):
-        plant = smc.plant_from(tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True)))
+        plant = smc.plant_from(
+            tmp_path / "three.xml", dict.fromkeys(order, smc.Channel(motor=True))
+        )
         scenario = episode.Setting(plant, "swing_up").scenario
         assert scenario.resolved.u_max == pytest.approx(0.5 * 2.0 * 9.81)
 
@@ -742,35 +857,59 @@ def test_conditions_of_a_model_with_motors_are_told_by_what_differs_from_the_nom
 
 SERVO = '<actuator><position name="p" joint="shoulder"/></actuator>'
 TWO = f'<actuator>{MOTORS}<motor name="c" joint="elbow"/></actuator>'
-TENDON = (
-    '<tendon><fixed name="t"><joint joint="elbow" coef="1"/></fixed></tendon><actuator><motor tendon="t"/></actuator>'
-)
+TENDON = '<tendon><fixed name="t"><joint joint="elbow" coef="1"/></fixed></tendon><actuator><motor tendon="t"/></actuator>'
 ONE_WAY = '<body><joint name="j" actuatorfrcrange="0 2"/><geom size=".1 .1" mass="1"/></body>'
 ROTATING = '<body><joint name="rotor:a"/><geom size=".1 .1" mass="1"/></body>'
 WRONG = {
-    "no joint": {"channels": ["elbwo"]}, "ball": {"channels": ["ball"], "bodies": BALL}, "none": {"rest": ""},
-    "tendon": {"channels": ["elbow"], "rest": TENDON}, "several": {"rest": TWO},
-    "servo": {"channels": ["shoulder"], "rest": SERVO}, "unknown field": {"channels": {"elbow": {"gear": 2}}},
-    "twice": {"channels": ["elbow", "elbow"]}, "empty": {"channels": []}, "text": {"channels": "elbow"},
-    "number": {"channels": {"elbow": 3}}, "partner's x0": {"channels": {"elbow": {"partner_x0": 1.0}}},
-    "set": {"channels": {"elbow"}}, "motor": {"channels": {"elbow": {"motor": "no"}}},
-    "one way": {"channels": ["elbow"], "rest": '<actuator><motor name="m" joint="elbow" ctrlrange="0 2"/></actuator>'},
+    "no joint": {"channels": ["elbwo"]},
+    "ball": {"channels": ["ball"], "bodies": BALL},
+    "none": {"rest": ""},
+    "tendon": {"channels": ["elbow"], "rest": TENDON},
+    "several": {"rest": TWO},
+    "servo": {"channels": ["shoulder"], "rest": SERVO},
+    "unknown field": {"channels": {"elbow": {"gear": 2}}},
+    "twice": {"channels": ["elbow", "elbow"]},
+    "empty": {"channels": []},
+    "text": {"channels": "elbow"},
+    "number": {"channels": {"elbow": 3}},
+    "partner's x0": {"channels": {"elbow": {"partner_x0": 1.0}}},
+    "set": {"channels": {"elbow"}},
+    "motor": {"channels": {"elbow": {"motor": "no"}}},
+    "one way": {
+        "channels": ["elbow"],
+        "rest": '<actuator><motor name="m" joint="elbow" ctrlrange="0 2"/></actuator>',
+    },
     "one way at the joint": {"channels": {"j": {"motor": True}}, "bodies": ONE_WAY},
-    "slow motor": {"channels": ["elbow"], "rest": '<actuator><general joint="elbow" dyntype="filter"/></actuator>'},
-    "no gear": {"channels": ["elbow"], "rest": '<actuator><motor joint="elbow" gear="0"/></actuator>'},
+    "slow motor": {
+        "channels": ["elbow"],
+        "rest": '<actuator><general joint="elbow" dyntype="filter"/></actuator>',
+    },
+    "no gear": {
+        "channels": ["elbow"],
+        "rest": '<actuator><motor joint="elbow" gear="0"/></actuator>',
+    },
     "off": {"rest": ACTUATED + '<option actuatorgroupdisable="0"/>'},
     "rotor": {"channels": {"rotor:a": smc.Channel(motor=True)}, "bodies": ROTATING},
-    "no keyframe": {"keyframe": "home"}, "no site": {"tip": "tip"},
+    "no keyframe": {"keyframe": "home"},
+    "no site": {"tip": "tip"},
     "half a law": {"channels": {"elbow": {"law": "none"}, "shoulder": None}},
-    "half a partner": {"channels": {"elbow": {"partner": "shoulder"}, "j": None}, "bodies": ONE_WAY},
-    "u_max": {"channels": {"elbow": {"u_max": 0.0}}}, "x0": {"channels": {"elbow": {"x0": "a"}}},
+    "half a partner": {
+        "channels": {"elbow": {"partner": "shoulder"}, "j": None},
+        "bodies": ONE_WAY,
+    },
+    "u_max": {"channels": {"elbow": {"u_max": 0.0}}},
+    "x0": {"channels": {"elbow": {"x0": "a"}}},
     "partner's x0 beyond": {"channels": {"elbow": {"partner": "shoulder", "partner_x0": -2e6}}},
-    "name": {"name": "duffing"}, "timeout": {"timeout": 0.0}, "long timeout": {"timeout": 86_401.0},
+    "name": {"name": "duffing"},
+    "timeout": {"timeout": 0.0},
+    "long timeout": {"timeout": 86_401.0},
     "flag": {"rest": f'{ACTUATED}<option><flag actuation="disable"/></option>'},
-    "broken": {"rest": "<actuator>\n<mtor/></actuator>"}, "unclosed": {"rest": "<actuator>\n<motor></actuator>"},
+    "broken": {"rest": "<actuator>\n<mtor/></actuator>"},
+    "unclosed": {"rest": "<actuator>\n<motor></actuator>"},
     "attribute": {"rest": '<actuator>\n<motor joint="elbow" gaer="1"/></actuator>'},
-    "target": {"rest": '<actuator><motor joint="elbwo"/></actuator>'}, "compile": {"bodies": "<body><joint/></body>"},
-}  # fmt: skip
+    "target": {"rest": '<actuator><motor joint="elbwo"/></actuator>'},
+    "compile": {"bodies": "<body><joint/></body>"},
+}
 
 
 def test_a_mistake_is_one_sentence(arm, refused):
@@ -780,19 +919,26 @@ def test_a_mistake_is_one_sentence(arm, refused):
 
 def test_a_broken_file_that_is_included_is_one_sentence(arm, tmp_path):
     (tmp_path / "part.xml").write_text("<mujoco>\n\n<foo></mujoco>")
-    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*\): fix the file$"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*\): fix the file$"
+    ):
         arm(rest='<include file="part.xml"/>')
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
-    with pytest.raises(smc.ScenarioError, match=r"no model at .*arm.xml: give the path of an MJCF file"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"no model at .*arm.xml: give the path of an MJCF file"
+    ):
         smc.plant_from(tmp_path / "arm.xml", ["elbow"])
     for path in ("a\0.xml", "a" * 5000, tmp_path):
-        with pytest.raises(smc.ScenarioError, match=r"no model at .*: give the path of an MJCF file"):
+        with pytest.raises(
+            smc.ScenarioError, match=r"no model at .*: give the path of an MJCF file"
+        ):
             smc.plant_from(path, ["elbow"])
     (tmp_path / "bare.xml").write_text("<mujoco/>")
     with pytest.raises(
-        smc.ScenarioError, match=r"unknown joint of bare.xml 'elbow': none has a name there, so give it"
+        smc.ScenarioError,
+        match=r"unknown joint of bare.xml 'elbow': none has a name there, so give it",
     ):
         smc.plant_from(tmp_path / "bare.xml", ["elbow"])
     with pytest.raises(smc.ScenarioError, match=r"path is 3: give the path"):
@@ -801,23 +947,40 @@ def test_a_file_that_is_not_there_is_one_sentence(tmp_path):
 
 def test_a_law_gets_no_model_that_there_is_not(arm):
     plant = arm(["elbow"])
-    with pytest.raises(smc.ScenarioError, match=r"arm has no nominal model: joint 'shoulder' moves with its channels"):
+    with pytest.raises(
+        smc.ScenarioError,
+        match=r"arm has no nominal model: joint 'shoulder' moves with its channels",
+    ):
         smc.Scenario(plant=plant, law=TORQUE, model="nominal")
     assert smc.run(smc.Scenario(plant=plant, law=TORQUE, duration=0.1)).failure is None
     tied = '<equality><joint joint1="elbow" joint2="shoulder"/></equality>' + ACTUATED
     assert "equality" in arm(rest=tied).unmodelled
     assert arm(rest=tied.replace("<joint joint1", '<joint active="false" joint1')).unmodelled == ""
-    across = '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED  # couples, perhaps
-    assert "a joint without a name moves with" in arm(rest=across, bodies=BALL.replace(' name="ball"', "")).unmodelled
-    assert "make it a channel, or the partner of one if nothing drives it, or give a law" in plant.unmodelled
+    across = (
+        '<tendon><fixed><joint joint="elbow" coef="1"/></fixed></tendon>' + ACTUATED
+    )  # couples, perhaps
+    assert (
+        "a joint without a name moves with"
+        in arm(rest=across, bodies=BALL.replace(' name="ball"', "")).unmodelled
+    )
+    assert (
+        "make it a channel, or the partner of one if nothing drives it, or give a law"
+        in plant.unmodelled
+    )
     wound = '<dcmotor joint="shoulder" motorconst="1 1" resistance="1" inductance="0.1 0"/>'
     rest = f'<actuator><motor joint="elbow"/>{wound}</actuator>'
     assert "dcmotor" in arm({"elbow": smc.Channel(partner="shoulder")}, rest=rest).unmodelled
 
 
 def test_a_force_on_a_body_is_refused(arm):
-    with pytest.raises(smc.ScenarioError, match=r"is a force on a body, and disturbances of arm act on its joints"):
-        smc.Scenario(plant=arm(), law="none", disturbance=smc.signals.Gust(amplitude=1.0, time=0.1, width=0.1))
+    with pytest.raises(
+        smc.ScenarioError, match=r"is a force on a body, and disturbances of arm act on its joints"
+    ):
+        smc.Scenario(
+            plant=arm(),
+            law="none",
+            disturbance=smc.signals.Gust(amplitude=1.0, time=0.1, width=0.1),
+        )
 
 
 # names
@@ -844,13 +1007,21 @@ def test_names_that_no_table_can_show_are_refused_where_they_are_given(arm):
         return 0.0, 0.0
 
     run = smc.Scenario(plant="duffing", law="none", duration=0.01)
-    for name, words in {"a" * 400: "400 characters: give at most 100", "a\nb": "printable", "": "printable"}.items():
+    for name, words in {
+        "a" * 400: "400 characters: give at most 100",
+        "a\nb": "printable",
+        "": "printable",
+    }.items():
         law.__name__ = name
         given = {
             "name": lambda name=name: arm(name=name),
             "name of the law": lambda: smc.law_function(law),
-            "a condition of scene 'x'": lambda name=name: smc.Scene(title="x", conditions={name: {"a": run}}),
-            "a label of condition 'a'": lambda name=name: smc.Scene(title="x", conditions={"a": {name: run}}),
+            "a condition of scene 'x'": lambda name=name: smc.Scene(
+                title="x", conditions={name: {"a": run}}
+            ),
+            "a label of condition 'a'": lambda name=name: smc.Scene(
+                title="x", conditions={"a": {name: run}}
+            ),
         }
         for what, give in given.items():
             with pytest.raises(smc.ScenarioError, match=rf"^{what}.* is .*{words}"):
@@ -878,7 +1049,10 @@ HARM = {  # what the model has, and words of the sentence
         '<size nkey="2000000000"/>',
         "arm.xml takes MuJoCo more than (1 s to compile|4 GiB of memory): make it sm",
     ),
-    "data": ('<size memory="100G"/>', "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller"),
+    "data": (
+        '<size memory="100G"/>',
+        "arm.xml takes MuJoCo more than 4 GiB of memory: make it smaller",
+    ),
     "nan": (
         '<default><joint damping="nan"/></default>',
         r"MuJoCo cannot read \S*arm.xml \(it holds a NaN\): fix the file",
@@ -888,12 +1062,18 @@ HARM = {  # what the model has, and words of the sentence
         '<worldbody><body name="b"><joint/><geom size=".1 .1"/></body></worldbody>',
         r"^\w+\[\d+\] of arm.xml is \S*e\S*: give finite numbers of at most 1e.15 in its MJCF",
     ),
-    "stiffness": ('<default><joint stiffness="1e20"/></default>', r"jnt_stiffness\[\d\] of arm.xml is 1e.20: give"),
+    "stiffness": (
+        '<default><joint stiffness="1e20"/></default>',
+        r"jnt_stiffness\[\d\] of arm.xml is 1e.20: give",
+    ),
     "text": (
         '<custom><text name="smc:direct" data="x"/></custom>',
         "arm.xml has a text 'smc:direct', and names that b",
     ),
-    "body": ('<worldbody><body name="rotor:elbow"/></worldbody>', "a body 'rotor:elbow', and names that begin with"),
+    "body": (
+        '<worldbody><body name="rotor:elbow"/></worldbody>',
+        "a body 'rotor:elbow', and names that begin with",
+    ),
     "tendon": (
         '<tendon><fixed name="play:elbow"><joint joint="elbow" coef="1"/></fixed></tendon>',
         "arm.xml has a tendon 'play:elbow', and names that begin with .*, play:, rotor: are smc_mujoco",
@@ -913,7 +1093,9 @@ def test_a_model_that_would_harm_this_process_is_one_sentence(arm, tmp_path, mon
 
 def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
     ran, timed = [], process.timed
-    monkeypatch.setattr(process, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k))
+    monkeypatch.setattr(
+        process, "timed", lambda command, *a, **k: ran.append(command) or timed(command, *a, **k)
+    )
     body = f'<body name="{ran!r}tried"/>'
     first = arm(bodies=body)
     assert (arm(bodies=body), len(ran)) == (first, 1)
@@ -923,7 +1105,9 @@ def test_a_model_is_tried_once_for_its_content(arm, monkeypatch):
 
 def test_a_plugin_that_this_process_alone_may_have_is_left_to_it(arm, tmp_path):
     rest = ACTUATED + '<extension><plugin plugin="no.such"/></extension>'
-    with pytest.raises(smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*plugin.*\): fix the file"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"MuJoCo cannot read \S*arm.xml \(.*plugin.*\): fix the file"
+    ):
         arm(rest=rest)
     path = tmp_path / "arm.xml"
     mjcf.tried(mjcf.source(path), 20.0)  # says nothing of it
@@ -940,7 +1124,10 @@ def test_names_that_refer_to_motors_and_sensors_do_no_harm(arm):
       <sensor><jointpos name="x:elbow" joint="shoulder"/></sensor>
       <custom><tuple name="t"><element objtype="actuator" objname="b"/><element objtype="sensor" objname="x:elbow"/>
       </tuple></custom>"""
-    parts = {"friction": smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.05), "actuator": smc.Backlash(0.01)}
+    parts = {
+        "friction": smc.hardware.LuGre(coulomb=0.05, static=0.08, stribeck=0.05),
+        "actuator": smc.Backlash(0.01),
+    }
     trace = smc.run(smc.Scenario(plant=arm(["elbow"], rest), law="none", duration=0.05, **parts))
     assert trace.failure is None
 
@@ -948,7 +1135,21 @@ def test_names_that_refer_to_motors_and_sensors_do_no_harm(arm):
 # models that are no files
 
 CORNERS = [f"v {x} {y} {z}" for x in (0, 0.1) for y in (0, 0.1) for z in (0, -0.5)]
-FACES = [f"f {a}" for a in ("1 2 3", "2 3 4", "5 6 7", "6 7 8", "1 2 5", "2 5 6", "3 4 7", "4 7 8", "1 3 5", "2 4 6")]
+FACES = [
+    f"f {a}"
+    for a in (
+        "1 2 3",
+        "2 3 4",
+        "5 6 7",
+        "6 7 8",
+        "1 2 5",
+        "2 5 6",
+        "3 4 7",
+        "4 7 8",
+        "1 3 5",
+        "2 4 6",
+    )
+]
 MESHED = """
 <mujoco model="meshed">
   <compiler meshdir="meshes"/>
@@ -980,20 +1181,33 @@ def of_pymjcf(path, content):
 FORMS = {  # of one model
     "text": lambda path, content: (MESHED, {"c.obj": content}),
     "spec": lambda path, content: (mujoco.MjSpec.from_file(str(path)), None),
-    "spec with assets": lambda path, content: (mujoco.MjSpec.from_string(MESHED, assets={"c.obj": content}), None),
+    "spec with assets": lambda path, content: (
+        mujoco.MjSpec.from_string(MESHED, assets={"c.obj": content}),
+        None,
+    ),
     "pymjcf": of_pymjcf,
 }
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run(meshed, tmp_path, form):
+def test_a_model_that_is_no_file_moves_as_its_file_does_and_is_kept_with_its_run(
+    meshed, tmp_path, form
+):
     path, content = meshed
     model, assets = FORMS[form](path, content)
     channels = {"j": smc.Channel(x0=0.3)}
-    plant, from_file = smc.plant_from(model, channels, assets=assets), smc.plant_from(path, channels)
+    plant, from_file = (
+        smc.plant_from(model, channels, assets=assets),
+        smc.plant_from(path, channels),
+    )
     assert plant.name == "meshed"
     assert pickle.loads(pickle.dumps(plant)) == plant
-    fields = {"law": "super_twisting", "duration": 0.2, "actuator": smc.Backlash(0.01), "model": "nominal"}
+    fields = {
+        "law": "super_twisting",
+        "duration": 0.2,
+        "actuator": smc.Backlash(0.01),
+        "model": "nominal",
+    }
     scenario = smc.Scenario(plant=plant, **fields)
     trace, same = smc.run(scenario), smc.run(smc.Scenario(plant=from_file, **fields))
     np.testing.assert_allclose(trace.x, same.x, atol=1e-9)
@@ -1016,21 +1230,29 @@ def test_an_mjspec_keeps_all_its_digits_and_is_taken_as_it_is_now(meshed):
     assert plant.load().dof_damping[0] == 0.12345678901234567
     assert plant.limits == smc.plant_from(meshed[0], ["j"]).limits
     assert smc.plant_from(spec, ["j"]).load().dof_damping[0] == 9.0
-    assert "0.123457" in mujoco.MjSpec.from_file(str(meshed[0])).to_xml()  # for others MuJoCo writes as it did
+    assert (
+        "0.123457" in mujoco.MjSpec.from_file(str(meshed[0])).to_xml()
+    )  # for others MuJoCo writes as it did
 
 
 def test_a_text_with_includes_is_read_with_them(tmp_path):
     text = LINKS.format(rest='<include file="motors.xml"/>', bodies="")
-    plant = smc.plant_from(text, ["elbow"], assets={"motors.xml": f"<mujoco>{ACTUATED}</mujoco>".encode()})
+    plant = smc.plant_from(
+        text, ["elbow"], assets={"motors.xml": f"<mujoco>{ACTUATED}</mujoco>".encode()}
+    )
     assert (plant.name, plant.driven) == ("model", 1)
     assert smc.run(smc.Scenario(plant=plant, law="none", duration=0.01)).failure is None
 
 
 LOST = {
-    "no file": (MESHED, None), "no bytes": (MESHED, {"c.obj": "text"}), "assets of a file": ("arm.xml", {}),
-    "broken": ("<mujoco>", None), "unnamed": ("<mujoco/>", None), "empty spec": (mujoco.MjSpec(), None),
+    "no file": (MESHED, None),
+    "no bytes": (MESHED, {"c.obj": "text"}),
+    "assets of a file": ("arm.xml", {}),
+    "broken": ("<mujoco>", None),
+    "unnamed": ("<mujoco/>", None),
+    "empty spec": (mujoco.MjSpec(), None),
     "number": (3, None),
-}  # fmt: skip
+}
 
 
 def test_what_a_model_lacks_that_is_no_file_is_one_sentence(refused):
@@ -1042,7 +1264,11 @@ def test_what_a_model_lacks_that_is_no_file_is_one_sentence(refused):
 
 
 def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
-    trace = smc.run(smc.Scenario(plant=arm({"elbow": smc.Channel(motor=True)}, name="mine"), law="none", duration=0.1))
+    trace = smc.run(
+        smc.Scenario(
+            plant=arm({"elbow": smc.Channel(motor=True)}, name="mine"), law="none", duration=0.1
+        )
+    )
     path = trace.save(tmp_path / "a.npz")
     again = smc.load(path)
     assert again.scenario == trace.scenario
@@ -1050,7 +1276,9 @@ def test_a_trace_loads_back_and_knows_its_file(arm, tmp_path):
     np.testing.assert_array_equal(smc.run(again.scenario).x, trace.x)
     arm(bodies=BALL)
     words = r"the scenario of \S*a.npz cannot be restored, its model \S*arm.xml"
-    with pytest.raises(smc.ScenarioError, match=rf"{words}, or a file .* has changed since the run: put it back$"):
+    with pytest.raises(
+        smc.ScenarioError, match=rf"{words}, or a file .* has changed since the run: put it back$"
+    ):
         smc.load(path)
     (tmp_path / "arm.xml").unlink()
     with pytest.raises(smc.ScenarioError, match=rf"{words} is not there: put it back$"):

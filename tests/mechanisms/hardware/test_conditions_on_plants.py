@@ -1,4 +1,6 @@
-"""Every condition of the suite on every plant of the library, and on a wheel: it compiles, or is refused."""
+"""Every condition of the suite on every plant of the library, and on a wheel: it compiles, or is
+refused.
+"""
 
 import contextlib
 
@@ -17,10 +19,15 @@ WHEEL = """<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/>
 @pytest.mark.parametrize("name", [*smc.plants(), "wheel"])
 def test_every_condition_fits_a_plant_or_is_refused(name):
     wheel = name == "wheel"  # its centre of mass is on its hinge
-    machine = smc.plant_from(WHEEL, ["hinge"], name=name) if wheel else name
+    if wheel:
+        machine = smc.plant_from(WHEEL, ["hinge"], name=name)
+    else:
+        machine = name
     compiled, starts = 0, smc.starts(x0=0.1) if wheel else None
     for condition in NAMED:
         with contextlib.suppress(smc.ScenarioError):
-            (scenario,) = smc.grid(machine, "none", condition, starts=starts, gains="default", duration=0.1)
+            (scenario,) = smc.grid(
+                machine, "none", condition, starts=starts, gains="default", duration=0.1
+            )
             compiled += isinstance(compile_model(scenario), mujoco.MjModel)
     assert compiled > len(NAMED) / 2

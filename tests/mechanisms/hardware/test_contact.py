@@ -1,4 +1,6 @@
-"""Contacts obey Coulomb and Newton: friction stops a block where it must, blows keep the speed they should."""
+"""Contacts obey Coulomb and Newton: friction stops a block where it must, blows keep the speed they
+should.
+"""
 
 import math
 
@@ -19,17 +21,30 @@ with mjcb.installed(None):  # this import compiles a model
 
 STEP = 2.5e-4  # s
 G = 9.81  # m/s^2
-OFFERED = [(name, kind) for name, p in sorted(catalogue().items()) for kind in p.contacts if name != "panda"]
-BUILDS = [(*pair, build) for pair in OFFERED for build in ("equation", *catalogue()[pair[0]].mechanisms)]
+OFFERED = [
+    (name, kind)
+    for name, p in sorted(catalogue().items())
+    for kind in p.contacts
+    if name != "panda"
+]
+BUILDS = [
+    (*pair, build) for pair in OFFERED for build in ("equation", *catalogue()[pair[0]].mechanisms)
+]
 STUDIES = [pair for pair in OFFERED if pair[1] != "bobs"]  # bobs in a row need their own places
 CARTS = pytest.mark.parametrize("name", ["duffing", "van_der_pol"])
 # Where a mechanism that nothing else moves meets its obstacle, and the way it goes there.
 MEETS = {
-    ("duffing", "floor"): (1.7, 1), ("duffing", "stops"): (-1.7, -1), ("duffing", "peg"): (0.5, -1),
-    ("van_der_pol", "floor"): (2.2, 1), ("van_der_pol", "stops"): (-2.2, -1), ("van_der_pol", "peg"): (0.5, -1),
-    ("inverted_pendulum", "floor"): (2.44, 1), ("inverted_pendulum", "stops"): (1.0, 1),
-    ("inverted_pendulum", "wall"): (0.7, 1), ("inverted_pendulum", "peg"): (0.2, -1),
-}  # fmt: skip
+    ("duffing", "floor"): (1.7, 1),
+    ("duffing", "stops"): (-1.7, -1),
+    ("duffing", "peg"): (0.5, -1),
+    ("van_der_pol", "floor"): (2.2, 1),
+    ("van_der_pol", "stops"): (-2.2, -1),
+    ("van_der_pol", "peg"): (0.5, -1),
+    ("inverted_pendulum", "floor"): (2.44, 1),
+    ("inverted_pendulum", "stops"): (1.0, 1),
+    ("inverted_pendulum", "wall"): (0.7, 1),
+    ("inverted_pendulum", "peg"): (0.2, -1),
+}
 HITS = pytest.mark.parametrize(("name", "kind"), MEETS, ids=["-".join(pair) for pair in MEETS])
 
 
@@ -37,7 +52,9 @@ def idle(name):
     """The plant without its own forces."""
     p = catalogue()[name]
     zero = {key: 0.0 for key in p.parameters if key not in ("m", "l", "M")}
-    return plant(name, n=2, **zero) if p.n > 1 else plant(name, **zero)
+    if p.n > 1:
+        return plant(name, n=2, **zero)
+    return plant(name, **zero)
 
 
 def undamped(name):
@@ -73,7 +90,12 @@ def steps(model, data, seconds):
 
 @pytest.mark.parametrize(
     ("name", "friction", "mass"),
-    [("duffing", 0.05, 0.5), ("duffing", 0.3, 2.0), ("van_der_pol", 0.1, 2.0), ("van_der_pol", 0.6, 0.5)],
+    [
+        ("duffing", 0.05, 0.5),
+        ("duffing", 0.3, 2.0),
+        ("van_der_pol", 0.1, 2.0),
+        ("van_der_pol", 0.6, 0.5),
+    ],
 )
 def test_a_sliding_block_stops_after_v0_squared_over_2_mu_g(name, friction, mass):
     p = plant(name, **{**idle(name).parameters, "M": mass})
@@ -108,7 +130,9 @@ def test_a_block_breaks_away_at_mu_m_g(name):
     assert data.ctrl[0] == pytest.approx(0.2 * G, rel=0.01)
 
 
-@pytest.mark.parametrize(("name", "mechanism"), [("duffing", "springs"), ("van_der_pol", "equation")])
+@pytest.mark.parametrize(
+    ("name", "mechanism"), [("duffing", "springs"), ("van_der_pol", "equation")]
+)
 def test_a_block_lies_still_on_its_bed_from_the_start(name, mechanism):
     p = plant(name)
     model, data = built(p, Contact("floor", friction=1.0), mechanism)
@@ -121,7 +145,9 @@ def test_a_block_lies_still_on_its_bed_from_the_start(name, mechanism):
     assert data.qpos[0] == pytest.approx(0.3, abs=1e-6)
 
 
-@pytest.mark.parametrize(("name", "friction"), [("duffing", 0.05), ("van_der_pol", 0.2), ("duffing", 0.5)])
+@pytest.mark.parametrize(
+    ("name", "friction"), [("duffing", 0.05), ("van_der_pol", 0.2), ("duffing", 0.5)]
+)
 def test_a_sliding_block_never_leaves_its_bed_and_feels_one_force(name, friction):
     model, data = built(idle(name), Contact("floor", friction=friction))
     data.qpos[0], data.qvel[0] = -1.0, 2.0
@@ -134,7 +160,12 @@ def test_a_sliding_block_never_leaves_its_bed_and_feels_one_force(name, friction
 # blows
 
 
-BLOWS = [(*pair, e) for i, pair in enumerate(MEETS) for j, e in enumerate((0.1, 0.2, 0.5, 0.8, 0.95)) if i % 5 == j]
+BLOWS = [
+    (*pair, e)
+    for i, pair in enumerate(MEETS)
+    for j, e in enumerate((0.1, 0.2, 0.5, 0.8, 0.95))
+    if i % 5 == j
+]
 
 
 @pytest.mark.parametrize(("name", "kind", "restitution"), BLOWS)
@@ -161,7 +192,9 @@ def test_a_blow_keeps_the_share_of_speed_it_should(name, kind, restitution):
     ],
 )
 def test_two_bobs_part_with_their_share_of_speed(name, restitution, within):
-    """Their blows are short, so that they cannot slip through each other: few steps for a strong dashpot."""
+    """Their blows are short, so that they cannot slip through each other: few steps for a strong
+    dashpot.
+    """
     for speed, ahead in ((0.3, 0.01), (1.0, 0.0103), (1.0, 0.0107), (3.0, 0.0103), (3.0, 0.0107)):
         model, data = built(idle(name), Contact("bobs", restitution=restitution))
         data.qpos[0], data.qvel[0] = -ahead, speed
@@ -175,7 +208,10 @@ def test_two_bobs_part_with_their_share_of_speed(name, restitution, within):
 @HITS
 def test_two_metres_a_second_go_a_centimetre_deep_at_most(name, kind):
     place, way = MEETS[name, kind]
-    reach = 1.0 if catalogue()[name].unit == "m" else 0.5 if kind != "peg" else 0.3
+    if catalogue()[name].unit == "m":
+        reach = 1.0
+    else:
+        reach = 0.5 if kind != "peg" else 0.3
     model, data = built(idle(name), Contact(kind))
     data.qpos[0], data.qvel[0] = place - way * 0.02, way * 2.0 / reach
     deepest = max(way * (data.qpos[0] - place) * reach for _ in steps(model, data, 0.1))
@@ -222,7 +258,9 @@ def tangled(model, data):
 
 @pytest.mark.parametrize("restitution", [0.2, 0.95])
 def test_a_chain_that_falls_does_not_tangle(restitution):
-    model, data = built(plant("inverted_pendulum_network"), Contact("bobs", restitution=restitution))
+    model, data = built(
+        plant("inverted_pendulum_network"), Contact("bobs", restitution=restitution)
+    )
     rng = np.random.default_rng(3)
     for _ in range(3):
         mujoco.mj_resetData(model, data)
@@ -254,7 +292,10 @@ def test_a_passive_run_never_gains_energy(name, kind, mechanism, restitution):
     model, data = built(p, Contact(kind, restitution=restitution), mechanism)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     rng = np.random.default_rng(5)
-    data.qpos[0] = {"m": 1.2, "rad": 0.5}[p.unit] if p.n == 1 else -0.6 * rng.uniform(0.4, 1.0)
+    if p.n == 1:
+        data.qpos[0] = {"m": 1.2, "rad": 0.5}[p.unit]
+    else:
+        data.qpos[0] = -0.6 * rng.uniform(0.4, 1.0)
     data.qvel[: p.n] = rng.uniform(-2.0, 2.0, p.n) * (1.0 if p.n == 1 else 0.2)
     mujoco.mj_forward(model, data)
     energy = data.energy  # potential and kinetic, now and after each step
@@ -314,7 +355,9 @@ def test_no_contact_changes_nothing():
 def test_what_a_part_writes_is_an_array_of_the_model():
     p = plant("duffing")
     model, _ = built(p, Contact("floor", friction=0.2, restitution=0.4))
-    assert {field.name for field in Contact("floor", friction=0.2, restitution=0.4).fields(model)} == {
+    assert {
+        field.name for field in Contact("floor", friction=0.2, restitution=0.4).fields(model)
+    } == {
         "pair_friction",
         "pair_solref",
     }
@@ -327,8 +370,14 @@ def test_a_bad_contact_is_refused_in_one_sentence():
         (lambda: Contact("flor").check(plant("duffing")), "did you mean 'floor'?"),
         (lambda: Contact("lava").check(plant("duffing")), "choose from floor, none, peg, stops"),
         (lambda: Contact("floor").check(plant("pendulum_network")), "choose from bobs, none"),
-        (lambda: Contact("stops", friction=0.2).check(plant("duffing")), "'stops' of duffing has no friction"),
-        (lambda: Contact("none", restitution=0.2).check(plant("duffing")), "'none' of duffing has no restitution"),
+        (
+            lambda: Contact("stops", friction=0.2).check(plant("duffing")),
+            "'stops' of duffing has no friction",
+        ),
+        (
+            lambda: Contact("none", restitution=0.2).check(plant("duffing")),
+            "'none' of duffing has no restitution",
+        ),
     ):
         with pytest.raises(ScenarioError, match=words.replace("?", r"\?").replace(".", r"\.")):
             make()

@@ -1,17 +1,19 @@
-"""Lags, rate limits and drives in series do what their equations say, compiled and in the reference loop."""
+"""Lags, rate limits and drives in series do what their equations say, compiled and in the reference
+loop.
+"""
 
 import dataclasses
 import math
 
 import numpy as np
 import pytest
+from helpers import reference
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.analysis.margins import MARGIN_KINDS
 from smc_mujoco.common.errors import ScenarioError
 from smc_mujoco.mechanisms.hardware.drives import drive_step
-from helpers import reference
 from smc_mujoco.simulation.state import LOGGED
 
 H = 5e-4  # s
@@ -28,7 +30,13 @@ def asking(y, gains, memory):
 def scenario(*actuator, **fields):
     """A block of 1 kg, here under a constant command."""
     return smc.Scenario(
-        **{"plant": "duffing", "law": asking(), "duration": 0.1, "physics_step": H, "control_period": H}
+        **{
+            "plant": "duffing",
+            "law": asking(),
+            "duration": 0.1,
+            "physics_step": H,
+            "control_period": H,
+        }
         | {"actuator": actuator}
         | fields
     )
@@ -39,16 +47,26 @@ def mean_risen(t, first, second):
     if first == second:
         integral = t - 2.0 * first + (t + 2.0 * first) * np.exp(-t / first)
     else:
-        integral = t + (first**2 * np.expm1(-t / first) - second**2 * np.expm1(-t / second)) / (first - second)
+        integral = t + (first**2 * np.expm1(-t / first) - second**2 * np.expm1(-t / second)) / (
+            first - second
+        )
     return np.diff(integral) / np.diff(t)
 
 
 @pytest.mark.parametrize("step", [1e-3, 2.5e-4])
-@pytest.mark.parametrize(("first", "second"), [(0.02, 0.005), (0.005, 0.02), (0.01, 0.01), (1e-5, 0.01), (0.01, 1e-5)])
+@pytest.mark.parametrize(
+    ("first", "second"), [(0.02, 0.005), (0.005, 0.02), (0.01, 0.01), (1e-5, 0.01), (0.01, 1e-5)]
+)
 def test_the_mean_force_of_two_lags_is_exact(first, second, step):
-    """For a held u there is no error of the step: what is left is rounding, of the closed form, too."""
-    trace = smc.run(scenario(smc.Lag(first), smc.Lag(second), physics_step=step, control_period=step))
-    np.testing.assert_allclose(trace.force[1:, 0], mean_risen(trace.t, first, second), rtol=0.0, atol=1e-10)
+    """For a held u there is no error of the step: what is left is rounding, of the closed form,
+    too.
+    """
+    trace = smc.run(
+        scenario(smc.Lag(first), smc.Lag(second), physics_step=step, control_period=step)
+    )
+    np.testing.assert_allclose(
+        trace.force[1:, 0], mean_risen(trace.t, first, second), rtol=0.0, atol=1e-10
+    )
     np.testing.assert_array_equal(trace.applied, 1.0)
 
 
@@ -61,7 +79,9 @@ def test_a_lag_gives_a_free_mass_its_exact_velocity(tau):
 
 
 def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
-    equal, nearly = (drive_step((smc.Lag(0.01), smc.Lag(tau)), H, True) for tau in (0.01, 0.01 * (1.0 + 1e-13)))
+    equal, nearly = (
+        drive_step((smc.Lag(0.01), smc.Lag(tau)), H, True) for tau in (0.01, 0.01 * (1.0 + 1e-13))
+    )
     assert equal == pytest.approx(nearly, rel=1e-9)
 
 
@@ -69,7 +89,10 @@ def test_lags_that_are_nearly_equal_are_nearly_equal_lags():
 def test_no_lag_and_no_limit_are_the_plants_own_actuator_to_the_bit(name):
     common = {"plant": name, "law": "super_twisting", "duration": 0.2}
     own, lag, rate = smc.run(
-        [smc.Scenario(**common, actuator=a) for a in (None, smc.Lag(0.0), smc.hardware.RateLimit(math.inf))]
+        [
+            smc.Scenario(**common, actuator=a)
+            for a in (None, smc.Lag(0.0), smc.hardware.RateLimit(math.inf))
+        ]
     )
     for other in (lag, rate):
         for signal in ("x", "v", "u", "force"):
@@ -86,7 +109,9 @@ def test_a_limited_rate_is_exactly_the_rate_starts_at_zero_and_stops_within_a_st
     """The mean over steps of a ramp of 12/s, which meets u between two samples."""
     trace = smc.run(scenario(smc.hardware.RateLimit(12.0), law=stepping(late=0.3), duration=0.6))
     fine = np.linspace(0.0, 0.6, 600 * 200 + 1)
-    force = np.where(fine < 0.3, np.minimum(12.0 * fine, 1.0), np.maximum(1.0 - 12.0 * (fine - 0.3), -1.0))
+    force = np.where(
+        fine < 0.3, np.minimum(12.0 * fine, 1.0), np.maximum(1.0 - 12.0 * (fine - 0.3), -1.0)
+    )
     total = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1])) * (fine[1] - fine[0])))
     means = np.diff(np.interp(trace.t, fine, total)) / H
     np.testing.assert_allclose(trace.force[1:, 0], means, rtol=0.0, atol=1e-5)
@@ -94,7 +119,11 @@ def test_a_limited_rate_is_exactly_the_rate_starts_at_zero_and_stops_within_a_st
 
 def test_a_lag_of_none_leaves_the_other_alone():
     one, before, after = smc.run(
-        [scenario(smc.Lag(0.01)), scenario(smc.Lag(0.0), smc.Lag(0.01)), scenario(smc.Lag(0.01), smc.Lag(0.0))]
+        [
+            scenario(smc.Lag(0.01)),
+            scenario(smc.Lag(0.0), smc.Lag(0.01)),
+            scenario(smc.Lag(0.01), smc.Lag(0.0)),
+        ]
     )
     assert before.force == pytest.approx(one.force, abs=1e-12)
     assert after.force == pytest.approx(one.force, abs=1e-12)
@@ -120,10 +149,14 @@ def test_a_rate_limit_follows_the_lag():
     trace = smc.run(scenario(smc.Lag(0.01), smc.hardware.RateLimit(20.0)))
     fine = np.linspace(0.0, 0.1, 100_001)
     lagged = 1.0 - np.exp(-fine / 0.01)
-    meets = np.argmax((lagged <= 20.0 * fine) & (fine > 0.0))  # the lag is steeper at first, and flatter in the end
+    meets = np.argmax(
+        (lagged <= 20.0 * fine) & (fine > 0.0)
+    )  # the lag is steeper at first, and flatter in the end
     force = np.concatenate((20.0 * fine[:meets], lagged[meets:]))
     total = np.concatenate(([0.0], np.cumsum(0.5 * (force[1:] + force[:-1])) * 1e-6))
-    assert trace.force[1:, 0] == pytest.approx(np.diff(np.interp(trace.t, fine, total)) / H, abs=2e-3)
+    assert trace.force[1:, 0] == pytest.approx(
+        np.diff(np.interp(trace.t, fine, total)) / H, abs=2e-3
+    )
 
 
 @pytest.mark.parametrize(("tau", "rate"), [(1e-4, 1e3), (1e-3, 100.0), (1e-3, 2e3), (0.01, 20.0)])
@@ -139,7 +172,11 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
     for t in step * np.arange(1, parts + 1) / parts:
         lagged, before = u + (first - u) * np.exp(-t / tau), force
         force = np.clip(lagged, before - rate * step / parts, before + rate * step / parts)
-        total, above, below = total + 0.5 * (before + force) / parts, above + (lagged > force), below + (lagged < force)
+        total, above, below = (
+            total + 0.5 * (before + force) / parts,
+            above + (lagged > force),
+            below + (lagged < force),
+        )
     error, whole = np.abs(mean - total), (above + below == 0) | (above == parts) | (below == parts)
     np.testing.assert_allclose(last, lagged, rtol=1e-12)
     assert 100 < whole.sum() < 500
@@ -148,7 +185,9 @@ def test_a_rate_limit_behind_a_lag_errs_by_less_than_the_lag_moves_in_a_step(tau
 
 
 def moved(s, u):
-    """x of the scenario's Duffing block behind its Lag, if any, and its DCMotor, by SciPy, under its samples' u."""
+    """x of the scenario's Duffing block behind its Lag, if any, and its DCMotor, by SciPy, under
+    its samples' u.
+    """
     *lags, motor = s.actuator
     inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
     p = s.plant.values({})
@@ -164,21 +203,36 @@ def moved(s, u):
     z = [s.resolved.x0[0], s.resolved.v0[0], 0.0, 0.0]
     x = [z[0]]
     for held in u[:-1, 0]:
-        z = solve_ivp(rates, (0.0, s.control_period), z, "LSODA", args=(held,), rtol=1e-10, atol=1e-13).y[:, -1]
+        z = solve_ivp(
+            rates, (0.0, s.control_period), z, "LSODA", args=(held,), rtol=1e-10, atol=1e-13
+        ).y[:, -1]
         x.append(z[0])
     return np.array(x)
 
 
-WEAK = smc.DCMotor(0.5, 4e-4, 0.4, 2.0, 1e-4, voltage=3.0, command="voltage")  # L/R = 0.8 ms; 1.3 N m s/rad of back-EMF
+WEAK = smc.DCMotor(
+    0.5, 4e-4, 0.4, 2.0, 1e-4, voltage=3.0, command="voltage"
+)  # L/R = 0.8 ms; 1.3 N m s/rad of back-EMF
 
 
-@pytest.mark.parametrize("actuator", [(smc.Lag(0.02), MOTOR), (MOTOR,), (WEAK,)], ids=["lag", "alone", "weak"])
+@pytest.mark.parametrize(
+    "actuator", [(smc.Lag(0.02), MOTOR), (MOTOR,), (WEAK,)], ids=["lag", "alone", "weak"]
+)
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_a_motor_moves_the_block_as_scipy_says(actuator, integrator):
-    """To second order in the step; under implicitfast to first, because it moves the block by its speed at the end."""
+    """To second order in the step; under implicitfast to first, because it moves the block by its
+    speed at the end.
+    """
     law = asking(u=4.0, omega=5.0)
     base = scenario(
-        *actuator, law=law, x0=0.3, v0=1.0, duration=0.3, control_period=2e-3, integrator=integrator, u_max=4.0
+        *actuator,
+        law=law,
+        x0=0.3,
+        v0=1.0,
+        duration=0.3,
+        control_period=2e-3,
+        integrator=integrator,
+        u_max=4.0,
     )
     traces = smc.run([dataclasses.replace(base, physics_step=step) for step in (1e-3, 2.5e-4)])
     exact = moved(base, traces[0].u)
@@ -193,17 +247,29 @@ def test_a_motor_moves_the_block_as_scipy_says(actuator, integrator):
 
 
 def test_a_free_rotor_is_the_second_order_system_of_its_equations_with_any_step():
-    """Under a held voltage it has the exact speed and current but for the bend of the speed within a step."""
+    """Under a held voltage it has the exact speed and current but for the bend of the speed within
+    a step.
+    """
     motor = smc.DCMotor(inductance=20e-3)
     free = smc.plant("duffing", alpha=0.0, beta=0.0, delta=0.0)
-    trace = smc.run(scenario(motor, plant=free, law=asking(u=6.0 / motor.scale), x0=0.0, u_max=99.0, duration=3.0))
+    trace = smc.run(
+        scenario(
+            motor, plant=free, law=asking(u=6.0 / motor.scale), x0=0.0, u_max=99.0, duration=3.0
+        )
+    )
     inertia = 1.0 + motor.gear**2 * motor.rotor_inertia
     system = np.array(
-        [[-motor.resistance / motor.inductance, -motor.constant / motor.inductance], [motor.constant / inertia, 0.0]]
+        [
+            [-motor.resistance / motor.inductance, -motor.constant / motor.inductance],
+            [motor.constant / inertia, 0.0],
+        ]
     )
     rates, modes = np.linalg.eig(system)
     rest = np.array([0.0, 6.0 / motor.constant])
-    exact = rest[:, None] + ((modes * np.linalg.solve(modes, -rest)) @ np.exp(np.outer(rates, trace.t))).real
+    exact = (
+        rest[:, None]
+        + ((modes * np.linalg.solve(modes, -rest)) @ np.exp(np.outer(rates, trace.t))).real
+    )
     np.testing.assert_allclose(trace.v[:, 0], exact[1], atol=1e-7 * exact[1].max())
     means = 0.5 * motor.constant * (exact[0][1:] + exact[0][:-1])
     np.testing.assert_allclose(trace.force[1:, 0], means, atol=1e-3 * means.max())
@@ -218,7 +284,14 @@ def test_the_supply_and_the_amplifier_limit_the_torque(inductance):
         (smc.DCMotor(inductance=inductance, voltage=math.inf, current=math.inf), 100.0),
     ]
     for motor, most in cases:
-        held = scenario(motor, law=asking(u=100.0), u_max=math.inf, mismatch={"mass": 1e9}, x0=0.0, duration=0.05)
+        held = scenario(
+            motor,
+            law=asking(u=100.0),
+            u_max=math.inf,
+            mismatch={"mass": 1e9},
+            x0=0.0,
+            duration=0.05,
+        )
         torque = smc.run(held).force[:, 0]
         assert torque.max() == pytest.approx(most, rel=1e-6)
         assert torque[-1] == pytest.approx(most, rel=1e-6)
@@ -238,11 +311,33 @@ HARD = [
 
 def hard():
     """Drives in series under noise, delays and bounds, in company of others."""
-    common = {"duration": 0.1, "control_period": 2e-3, "physics_step": 5e-4, "noise": smc.Noise(0.01, 0.05), "seed": 3}
-    common |= {"disturbance": smc.signals.OrnsteinUhlenbeck(0.2, tau=0.1), "integrator": "implicitfast"}
-    plants = {"duffing": "classical", "pendulum_network": "super_twisting", "cart_pole": "cart_pole"}
-    laws = {name: law if law in smc.laws(name) else smc.laws(name)[0] for name, law in plants.items()}
-    return [smc.Scenario(plant=name, law=law, **common | fields) for name, law in laws.items() for fields in HARD]
+    common = {
+        "duration": 0.1,
+        "control_period": 2e-3,
+        "physics_step": 5e-4,
+        "noise": smc.Noise(0.01, 0.05),
+        "seed": 3,
+    }
+    common |= {
+        "disturbance": smc.signals.OrnsteinUhlenbeck(0.2, tau=0.1),
+        "integrator": "implicitfast",
+    }
+    plants = {
+        "duffing": "classical",
+        "pendulum_network": "super_twisting",
+        "cart_pole": "cart_pole",
+    }
+    laws = {}
+    for name, law in plants.items():
+        if law in smc.laws(name):
+            laws[name] = law
+        else:
+            laws[name] = smc.laws(name)[0]
+    return [
+        smc.Scenario(plant=name, law=law, **common | fields)
+        for name, law in laws.items()
+        for fields in HARD
+    ]
 
 
 @pytest.mark.slow
@@ -253,21 +348,31 @@ def test_callback_equals_plain_loop_and_company_and_threads_change_no_bit():
         for one, trace in zip(alone, smc.run(scenarios, threads=threads), strict=True):
             assert trace.failure is None
             for name in LOGGED:
-                np.testing.assert_array_equal(getattr(trace, name), getattr(one, name), err_msg=f"{name} of {one!r}")
+                np.testing.assert_array_equal(
+                    getattr(trace, name), getattr(one, name), err_msg=f"{name} of {one!r}"
+                )
     for s, trace in zip(scenarios, alone, strict=True):
         other = reference.run(s)
         for name in LOGGED:
             if s.plant.name == "cart_pole":  # its nominal model compiles to other roundings
-                np.testing.assert_allclose(getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9)
+                np.testing.assert_allclose(
+                    getattr(trace, name), getattr(other, name), rtol=1e-9, atol=1e-9
+                )
             else:
-                np.testing.assert_array_equal(getattr(trace, name), getattr(other, name), err_msg=f"{name} of {s!r}")
+                np.testing.assert_array_equal(
+                    getattr(trace, name), getattr(other, name), err_msg=f"{name} of {s!r}"
+                )
 
 
 def test_u_is_bounded_and_delayed_before_the_drives():
-    late = smc.run(scenario(smc.Lag(0.01), smc.DCMotor(), law=asking(u=3.0), u_max=2.0, input_delay=4 * H))
+    late = smc.run(
+        scenario(smc.Lag(0.01), smc.DCMotor(), law=asking(u=3.0), u_max=2.0, input_delay=4 * H)
+    )
     assert (late.u == 2.0).all()
     assert late.applied[:, 0].tolist() == [0.0] * 4 + [2.0] * (len(late.t) - 4)
-    lags = smc.run(scenario(smc.Lag(0.01), smc.Lag(0.02), law=asking(u=3.0), u_max=2.0, input_delay=4 * H))
+    lags = smc.run(
+        scenario(smc.Lag(0.01), smc.Lag(0.02), law=asking(u=3.0), u_max=2.0, input_delay=4 * H)
+    )
     assert (lags.force[:5] == 0.0).all()
     assert lags.force[5:, 0] == pytest.approx(2.0 * mean_risen(lags.t[:-4], 0.01, 0.02), abs=1e-10)
 
@@ -300,7 +405,10 @@ def test_theory_of_delays_knows_no_drive():
             (smc.hardware.RateLimit(2.0), smc.Lag(0.2)),
             "actuator has the drives [RateLimit(rate=2.0), Lag(tau=0.2)]: give one drive, or (smc.Lag(0.01), another)",
         ),
-        ((smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)), "actuator has a Backlash twice: give one"),
+        (
+            (smc.Backlash(0.1), smc.Lag(0.2), smc.Backlash(0.1)),
+            "actuator has a Backlash twice: give one",
+        ),
     ],
 )
 def test_parts_that_cannot_be_in_series_are_one_sentence(actuator, says):

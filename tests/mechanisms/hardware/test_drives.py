@@ -1,4 +1,7 @@
-"""Actuators deliver what their equations say: a DC motor does; and play is play. Lags: see test_drive_step."""
+"""Actuators deliver what their equations say: a DC motor does; and play is play.
+
+Lags: see test_drive_step.
+"""
 
 import math
 
@@ -18,7 +21,9 @@ from smc_mujoco.simulation.python_controller import Controller
 
 H = 2.5e-4  # s
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
-NAMES = pytest.mark.parametrize("name", ["duffing", "inverted_pendulum", "pendulum_network", "panda"])
+NAMES = pytest.mark.parametrize(
+    "name", ["duffing", "inverted_pendulum", "pendulum_network", "panda"]
+)
 MOTOR = DCMotor()
 
 
@@ -37,7 +42,9 @@ def home(model):
 
 
 def driven(model, command, seconds, data=None):
-    """Rows (t, position, speed, force, ...activations) at the ends of steps under ctrl = command(t)."""
+    """Rows (t, position, speed, force, ...activations) at the ends of steps under ctrl =
+    command(t).
+    """
     data = mujoco.MjData(model) if data is None else data
     rows = []
     for _ in range(round(seconds / model.opt.timestep)):
@@ -60,7 +67,9 @@ def sine(t):
 
 def test_a_locked_rotors_torque_comes_at_once_without_inductance():
     motor = DCMotor(inductance=0.0)
-    assert driven(locked(motor), lambda t: 4.0 * motor.scale, 0.01)[:, 3] == pytest.approx(4.0, rel=1e-9)
+    assert driven(locked(motor), lambda t: 4.0 * motor.scale, 0.01)[:, 3] == pytest.approx(
+        4.0, rel=1e-9
+    )
 
 
 @pytest.mark.slow
@@ -72,7 +81,9 @@ def test_a_free_rotors_speed_rises_in_its_mechanical_time_constant():
     left = np.exp(-t / time_constant)
     assert speed == pytest.approx(volts / motor.constant * (1.0 - left), rel=1e-2)
     early = t < 3 * time_constant
-    assert torque[early] == pytest.approx(motor.constant * volts / motor.resistance * left[early], rel=1e-2)
+    assert torque[early] == pytest.approx(
+        motor.constant * volts / motor.resistance * left[early], rel=1e-2
+    )
 
 
 def test_the_defaults_are_the_datasheets_motor():
@@ -81,7 +92,9 @@ def test_the_defaults_are_the_datasheets_motor():
     assert no_load_speed == pytest.approx(7580 * 2 * math.pi / 60, rel=0.01)  # rad/s
     mechanical = MOTOR.resistance * MOTOR.rotor_inertia / MOTOR.torque_constant**2
     assert mechanical == pytest.approx(4.67e-3, rel=0.01)  # s
-    assert min(MOTOR.constant * MOTOR.current, MOTOR.voltage / MOTOR.scale) > 1.5 * 6.0  # N m, the laws' usual limit
+    assert (
+        min(MOTOR.constant * MOTOR.current, MOTOR.voltage / MOTOR.scale) > 1.5 * 6.0
+    )  # N m, the laws' usual limit
 
 
 def test_cogging_is_a_sine_of_the_rotors_angle():
@@ -96,11 +109,30 @@ def test_cogging_is_a_sine_of_the_rotors_angle():
 
 
 def test_a_commutator_raises_the_torque_where_a_brush_bridges_two_bars():
-    """By the formula: all of the ripple at either brush, 1/e of it where the cosine has fallen by (bars bridge)^2."""
-    motor = DCMotor(inductance=0.0, gear=2.0, ripple=0.2, bars=9.0, bridge=0.02, brush=0.1, bridge_2=0.01, brush_2=0.4)
-    step, even = drive_step((motor,), 1e-3, True), motor.constant / motor.resistance * (3.0 - motor.constant * 5.0)
+    """By the formula: all of the ripple at either brush, 1/e of it where the cosine has fallen by
+    (bars bridge)^2.
+    """
+    motor = DCMotor(
+        inductance=0.0,
+        gear=2.0,
+        ripple=0.2,
+        bars=9.0,
+        bridge=0.02,
+        brush=0.1,
+        bridge_2=0.01,
+        brush_2=0.4,
+    )
+    step, even = (
+        drive_step((motor,), 1e-3, True),
+        motor.constant / motor.resistance * (3.0 - motor.constant * 5.0),
+    )
     beside = 0.1 + math.acos(1.0 - (9.0 * 0.02) ** 2) / 9.0
-    for turned, share in ((0.1, 0.2), (0.4 - math.tau / 9.0, 0.2), (beside, 0.2 / math.e), (0.25, 0.0)):
+    for turned, share in (
+        (0.1, 0.2),
+        (0.4 - math.tau / 9.0, 0.2),
+        (beside, 0.2 / math.e),
+        (0.25, 0.0),
+    ):
         V = rippled(step, 3.0, turned / 2.0, 5.0)
         torque = motor.constant / motor.resistance * (V - motor.constant * 5.0)
         assert torque == pytest.approx((1.0 + share) * even, rel=1e-6)
@@ -112,7 +144,11 @@ def test_a_ripple_needs_a_motor_alone_whose_current_follows_at_once():
         DCMotor(ripple=0.1)
     uneven = DCMotor(inductance=0.0, ripple=0.1)
     with pytest.raises(ScenarioError, match="DCMotor has a ripple beside another part"):
-        smc.run(smc.Scenario(plant="duffing", law="none", actuator=(uneven, Backlash(0.02)), duration=0.01))
+        smc.run(
+            smc.Scenario(
+                plant="duffing", law="none", actuator=(uneven, Backlash(0.02)), duration=0.01
+            )
+        )
 
 
 @NAMES
@@ -120,7 +156,9 @@ def test_the_rotors_inertia_is_reflected_to_the_joint(name):
     with_motor, own = build(plant(name), MOTOR), build(plant(name))
     reflected = MOTOR.gear**2 * MOTOR.rotor_inertia
     assert with_motor.dof_armature == pytest.approx(own.dof_armature + reflected, rel=1e-12)
-    assert with_motor.dof_M0 == pytest.approx(own.dof_M0 + reflected, rel=1e-9)  # mj_setConst saw it
+    assert with_motor.dof_M0 == pytest.approx(
+        own.dof_M0 + reflected, rel=1e-9
+    )  # mj_setConst saw it
 
 
 def test_a_motor_of_vanishing_constant_is_the_ideal_actuator():
@@ -144,11 +182,15 @@ def test_play_of_no_width_is_a_rigid_rotor(name):
     mujoco.mj_setConst(rigid, mujoco.MjData(rigid))
     a, b = home(with_rotor), home(rigid)
     seconds = 0.2 if name == "panda" else 2.0  # before it meets its stops
-    deviation = np.abs(driven(with_rotor, sine, seconds, a)[:, 1] - driven(rigid, sine, seconds, b)[:, 1]).max()
+    deviation = np.abs(
+        driven(with_rotor, sine, seconds, a)[:, 1] - driven(rigid, sine, seconds, b)[:, 1]
+    ).max()
     at_twice_the_step = home(rigid)
     rigid.opt.timestep = 2 * H
     driven(rigid, sine, seconds, at_twice_the_step)
-    assert deviation < 0.1 * np.abs(at_twice_the_step.qpos - b.qpos).max()  # a tenth of the step's own error
+    assert (
+        deviation < 0.1 * np.abs(at_twice_the_step.qpos - b.qpos).max()
+    )  # a tenth of the step's own error
     assert a.qpos[: rigid.nq] == pytest.approx(b.qpos, abs=1e-4)
 
 
@@ -169,7 +211,9 @@ def test_the_joint_is_free_within_the_play_and_driven_beyond(name):
         data.ctrl[:] = 3.0 if k // 400 % 2 else -3.0
         mujoco.mj_step(model, data)
         speed = np.abs(data.qvel[rotors] - data.qvel[:n]).max()
-        assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.01 + 2e-5 + 2 * H * max(speed, 10.0)
+        assert np.abs(data.qpos[rotors] - data.qpos[:n]).max() < 0.01 + 2e-5 + 2 * H * max(
+            speed, 10.0
+        )
 
 
 @pytest.mark.parametrize("speed", [0.5, 5.0, 50.0])
@@ -194,7 +238,9 @@ def test_play_comes_after_any_drive(name, order):
         parts = (LuGre(0.05, 0.08, 0.01), *(drive, Backlash(0.02, 1e-3))[::order])
         model = build(plant(name), *parts, h=1.25e-4)
         n = len(drive_ids(model))
-        assert [model.joint(model.actuator_trnid[i, 0]).name[:6] for i in drive_ids(model)] == ["rotor:"] * n
+        assert [model.joint(model.actuator_trnid[i, 0]).name[:6] for i in drive_ids(model)] == [
+            "rotor:"
+        ] * n
         own = MOTOR.gear**2 * MOTOR.rotor_inertia
         assert model.dof_armature[n:] == pytest.approx(1e-3 + own)
         assert (model.dof_armature[:n] == 0.0).all()
@@ -209,7 +255,9 @@ def test_play_comes_after_any_drive(name, order):
 def test_only_a_motor_takes_anything_but_newton_metres():
     assert [part.scale for part in (Lag(0.1), RateLimit(1.0), Backlash(0.1))] == [1.0, 1.0, 1.0]
     assert MOTOR.scale == pytest.approx(0.299 / (0.0302 * 12.25))
-    assert build(plant("duffing"), Viscous(0.1), Backlash(0.1)).dof_damping == pytest.approx([0.3, 0.0])
+    assert build(plant("duffing"), Viscous(0.1), Backlash(0.1)).dof_damping == pytest.approx(
+        [0.3, 0.0]
+    )
 
 
 @smc.law_function
@@ -219,7 +267,9 @@ def saturated(y, gains, memory):
 
 
 @pytest.mark.filterwarnings("ignore::smc_mujoco.simulation.run.PlainLoopWarning")
-@pytest.mark.parametrize("law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"])
+@pytest.mark.parametrize(
+    "law", [smc.law("classical", k=100.0), saturated()], ids=["compiled", "plain"]
+)
 def test_the_command_of_a_motor_is_within_the_bound_to_the_last_bit(law):
     """With this gear a command of 6 N becomes volts and comes back an ulp larger."""
     motor = smc.DCMotor(gear=0.32761186154670086)
@@ -238,7 +288,9 @@ def test_a_voltage_is_what_the_winding_gets():
 
 @pytest.mark.parametrize("name", ["duffing", "furuta"])
 def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
-    """x'' = f + g u for u in V, of the driven channel and of the one that it moves, without inductance."""
+    """x'' = f + g u for u in V, of the driven channel and of the one that it moves, without
+    inductance.
+    """
     kind = plant(name)
     motor = DCMotor(0.5, 0.0, 0.05, 2.0, 0.0, voltage=10.0, command="voltage")
     scenario = smc.Scenario(plant=kind, law="none", actuator=motor)
@@ -254,19 +306,33 @@ def test_the_nominal_model_per_volt_is_what_the_joints_do(name):
 
 
 def test_a_motor_without_inductance_has_no_state_and_rk4_integrates_it():
-    """A carriage on a constant voltage, in closed form: implicitfast leads by half a step times its speed."""
+    """A carriage on a constant voltage, in closed form: implicitfast leads by half a step times its
+    speed.
+    """
     motor = DCMotor(0.5, 0.0, 0.05, 20.0, 0.0, voltage=10.0, command="voltage")
     mass, drag = 2.0, motor.constant**2 / motor.resistance
-    fields = {"actuator": motor, "feedforward": smc.Constant(5.0), "duration": 1.0, "control_period": 1e-3, "x0": 0.0}
+    fields = {
+        "actuator": motor,
+        "feedforward": smc.Constant(5.0),
+        "duration": 1.0,
+        "control_period": 1e-3,
+        "x0": 0.0,
+    }
     axis = smc.plant("servo_axis", M=mass, b=0.0, cf=0.0, offset=0.0)
-    trace = smc.run(smc.Scenario(plant=axis, law="none", integrator="RK4", physics_step=1e-3, sensor=None, **fields))
+    trace = smc.run(
+        smc.Scenario(
+            plant=axis, law="none", integrator="RK4", physics_step=1e-3, sensor=None, **fields
+        )
+    )
     speed, lag = 5.0 * motor.constant / motor.resistance / drag, mass / drag
     exact = speed * (trace.t - lag * (1.0 - np.exp(-trace.t / lag)))
     np.testing.assert_allclose(trace.x[:, 0], exact, atol=1e-8)
 
 
 def test_a_voltage_is_bounded_by_the_supply_whatever_u_max_is():
-    s = smc.Scenario(plant="furuta", law="none", actuator=VOLTAGE, feedforward=smc.Constant(50.0), duration=0.01)
+    s = smc.Scenario(
+        plant="furuta", law="none", actuator=VOLTAGE, feedforward=smc.Constant(50.0), duration=0.01
+    )
     assert (s.resolved.u_max, s.limits, s.efforts) == (10.0, (10.0,), ("V", "V"))
     assert smc.run(s).u[:, 0] == pytest.approx(10.0)
     assert smc.Scenario(plant="furuta", law="none", actuator=VOLTAGE, u_max=4.0).limits == (4.0,)

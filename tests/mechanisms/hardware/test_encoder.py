@@ -1,7 +1,9 @@
-"""The encoder reads what its formula says: to the count, to the physics step, and by the odds of its losses.
+"""The encoder reads what its formula says: to the count, to the physics step, and by the odds of
+its losses.
 
-What the controller reads is seen through laws that do nothing and return it as their s. The plant is a Duffing
-oscillator that swings across both wells, so that a reading of another instant is another number.
+What the controller reads is seen through laws that do nothing and return it as their s. The plant
+is a Duffing oscillator that swings across both wells, so that a reading of another instant is
+another number.
 """
 
 import dataclasses
@@ -10,10 +12,10 @@ import math
 
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.runs import JOINTED
 
 import smc_mujoco as smc
-from helpers import reference
 from smc_mujoco.simulation.trace import ARRAYS
 
 
@@ -55,10 +57,13 @@ PERFECT = smc.Encoder(counts=math.inf)
 @pytest.mark.parametrize(
     ("plant", "turn", "counts"),
     [
-        ("duffing", 1.0, 2), ("duffing", 1.0, 2**32), ("van_der_pol", 1.0, 100), ("inverted_pendulum", 2 * math.pi, 3),
+        ("duffing", 1.0, 2),
+        ("duffing", 1.0, 2**32),
+        ("van_der_pol", 1.0, 100),
+        ("inverted_pendulum", 2 * math.pi, 3),
         ("inverted_pendulum", 2 * math.pi, 4096),
     ],
-)  # fmt: skip
+)
 def test_a_reading_is_the_nearest_count(plant, turn, counts):
     trace, x, _ = read(smc.Encoder(counts=counts), plant=plant)
     q = turn / counts
@@ -81,7 +86,11 @@ def test_a_bias_is_added_before_the_rounding():
 
 def test_a_bias_moves_where_the_law_settles():
     gains = smc.paper.GAINS["inverted_pendulum"]["observer_free"]
-    common = {"plant": "inverted_pendulum", "law": smc.law("observer_free", **gains), "duration": 5.0}
+    common = {
+        "plant": "inverted_pendulum",
+        "law": smc.law("observer_free", **gains),
+        "duration": 5.0,
+    }
     unbiased, biased = smc.run(
         [smc.Scenario(**common, sensor=smc.Encoder(math.inf, bias=bias)) for bias in (0.0, 0.01)]
     )
@@ -132,14 +141,19 @@ def test_replacing_the_sensor_replaces_the_velocity_that_was_left_out():
     with_encoder, without = scenario(PERFECT), scenario(None)
     assert dataclasses.replace(with_encoder, sensor=None) == without
     assert dataclasses.replace(without, sensor=PERFECT) == with_encoder
-    assert dataclasses.replace(with_encoder, duration=2.0).resolved.velocity.name == "filtered_difference"
+    assert (
+        dataclasses.replace(with_encoder, duration=2.0).resolved.velocity.name
+        == "filtered_difference"
+    )
 
 
 def test_replacing_the_sensor_keeps_a_velocity_that_was_asked_for():
     lagged = smc.estimator("filtered_difference", tau=0.02)
     for velocity in (lagged, "measured", "filtered_difference"):
         asked = scenario(None, velocity=velocity)
-        assert dataclasses.replace(asked, sensor=PERFECT).resolved.velocity == asked.resolved.velocity
+        assert (
+            dataclasses.replace(asked, sensor=PERFECT).resolved.velocity == asked.resolved.velocity
+        )
         asked = scenario(PERFECT, velocity=velocity)
         assert dataclasses.replace(asked, sensor=None).resolved.velocity == asked.resolved.velocity
 
@@ -150,7 +164,9 @@ def test_replacing_the_sensor_keeps_a_velocity_that_was_asked_for():
 @pytest.mark.parametrize("rate", [0.05, 0.5, 0.9])
 def test_readings_get_lost_at_their_rate(rate):
     """A binomial count, within four standard deviations; runs of losses are geometric."""
-    trace, x, _ = read(smc.Encoder(math.inf, dropout=rate), duration=20.0, velocity="measured", seed=11)
+    trace, x, _ = read(
+        smc.Encoder(math.inf, dropout=rate), duration=20.0, velocity="measured", seed=11
+    )
     lost = (x != trace.x)[1:, 0]
     n = len(lost)
     assert abs(lost.mean() - rate) < 4 * math.sqrt(rate * (1 - rate) / n)
@@ -212,7 +228,9 @@ def test_losses_are_independent_of_the_noise():
 def expected(sensor, changes, name):
     """What a late sensor reads at the samples, from a run whose trace holds every physics step."""
     late = scenario(sensor, **changes)
-    steps = dataclasses.replace(late, sensor=None, velocity="measured", control_period=late.resolved.physics_step)
+    steps = dataclasses.replace(
+        late, sensor=None, velocity="measured", control_period=late.resolved.physics_step
+    )
     fine = getattr(smc.run(steps), name)
     h = late.resolved.physics_step
     delay = round(sensor.delay / h)
@@ -227,17 +245,34 @@ def expected(sensor, changes, name):
 
 
 TIMES = [
-    {"delay": 2.5e-4}, {"delay": 1e-3}, {"delay": 7.5e-4}, {"delay": 0.0335}, {"period": 5e-3}, {"period": 2.5e-3},
-    {"period": 7.5e-4}, {"period": 2.5e-4}, {"period": 0.1}, {"period": 5e-3, "delay": 2e-3},
-    {"period": 5e-3, "delay": 5e-3}, {"period": 3e-3, "delay": 0.01175}, {"period": 0.0125, "delay": 2.5e-4},
-]  # fmt: skip
+    {"delay": 2.5e-4},
+    {"delay": 1e-3},
+    {"delay": 7.5e-4},
+    {"delay": 0.0335},
+    {"period": 5e-3},
+    {"period": 2.5e-3},
+    {"period": 7.5e-4},
+    {"period": 2.5e-4},
+    {"period": 0.1},
+    {"period": 5e-3, "delay": 2e-3},
+    {"period": 5e-3, "delay": 5e-3},
+    {"period": 3e-3, "delay": 0.01175},
+    {"period": 0.0125, "delay": 2.5e-4},
+]
 SOLVERS = pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 
 
-@pytest.mark.parametrize(("times", "integrator"), list(zip(TIMES, itertools.cycle(["RK4", "implicitfast"]))))
+@pytest.mark.parametrize(
+    ("times", "integrator"), list(zip(TIMES, itertools.cycle(["RK4", "implicitfast"])))
+)
 def test_late_readings_are_those_of_their_instants(times, integrator):
     sensor = smc.Encoder(math.inf, **times)
-    changes = {"physics_step": 2.5e-4, "integrator": integrator, "velocity": "measured", "duration": 0.3}
+    changes = {
+        "physics_step": 2.5e-4,
+        "integrator": integrator,
+        "velocity": "measured",
+        "duration": 0.3,
+    }
     _, x, v = read(sensor, **changes)
     np.testing.assert_array_equal(x, expected(sensor, changes, "x"))
     np.testing.assert_array_equal(v, expected(sensor, changes, "v"))
@@ -245,7 +280,11 @@ def test_late_readings_are_those_of_their_instants(times, integrator):
 
 @pytest.mark.parametrize(
     ("times", "step"),
-    [({"period": 0.007}, 1e-3), ({"delay": 0.003}, 1e-3 / 3), ({"period": 0.003, "delay": 0.001}, 1e-3 / 3)],
+    [
+        ({"period": 0.007}, 1e-3),
+        ({"delay": 0.003}, 1e-3 / 3),
+        ({"period": 0.003, "delay": 0.001}, 1e-3 / 3),
+    ],
 )
 def test_ten_seconds_do_not_shift_the_instants(times, step):
     """1e-3 / 3 is no binary number, and its sum over 30 000 steps is not 10."""
@@ -276,9 +315,17 @@ def test_readings_are_held_between_periods_with_their_noise_and_losses():
 
 @pytest.mark.parametrize(("period", "delay"), [(2.5e-3, 0.0), (5e-3, 2e-3), (5e-3, 2.5e-3)])
 def test_late_noise_changes_with_the_reading(period, delay):
-    """A reading taken at t arrives at t + delay with one noise, until the next arrives. Samples are every 1 ms."""
+    """A reading taken at t arrives at t + delay with one noise, until the next arrives.
+
+    Samples are every 1 ms.
+    """
     sensor = smc.Encoder(math.inf, period=period, delay=delay)
-    changes = {"physics_step": 2.5e-4, "integrator": "implicitfast", "velocity": "measured", "duration": 0.5}
+    changes = {
+        "physics_step": 2.5e-4,
+        "integrator": "implicitfast",
+        "velocity": "measured",
+        "duration": 0.5,
+    }
     _, x, _ = read(sensor, noise=smc.Noise(position=0.5), **changes)
     error = x[:, 0] - expected(sensor, changes, "x")[:, 0]
     t = np.arange(len(error)) * 1e-3
@@ -289,7 +336,9 @@ def test_late_noise_changes_with_the_reading(period, delay):
 
 def test_an_encoder_that_reads_once_a_sample_is_one_without_a_period():
     noise = smc.Noise(position=0.1)
-    plainly, period = (read(smc.Encoder(100, dropout=0.2, period=p), noise=noise)[0] for p in (None, 1e-3))
+    plainly, period = (
+        read(smc.Encoder(100, dropout=0.2, period=p), noise=noise)[0] for p in (None, 1e-3)
+    )
     same(plainly, period)
 
 
@@ -312,7 +361,10 @@ def scattered(number):
     step = 1e-3 if integrator == "RK4" else 2.5e-4
     name = str(rng.choice(JOINTED))
     least, most = smc.plant(name).sizes
-    plant = smc.plant(name, n=3) if least <= 3 <= most else smc.plant(name)
+    if least <= 3 <= most:
+        plant = smc.plant(name, n=3)
+    else:
+        plant = smc.plant(name)
     return smc.Scenario(
         plant=plant,
         law=smc.law(str(rng.choice(["observer_free", "super_twisting"]))),
@@ -340,15 +392,26 @@ def test_scattered_encoders_give_the_same_bits_in_both_loops_and_together():
 
 @SOLVERS
 def test_a_perfect_encoder_with_a_tachometer_is_no_encoder(integrator):
-    changes = {"integrator": integrator, "velocity": "measured", "law": "observer_free", "noise": smc.Noise(0.1, 0.1)}
+    changes = {
+        "integrator": integrator,
+        "velocity": "measured",
+        "law": "observer_free",
+        "noise": smc.Noise(0.1, 0.1),
+    }
     for plant in ("duffing", "cart_pole", "pendulum_network"):
-        with_encoder, without = (smc.run(scenario(s, plant=plant, **changes)) for s in (PERFECT, None))
+        with_encoder, without = (
+            smc.run(scenario(s, plant=plant, **changes)) for s in (PERFECT, None)
+        )
         same(with_encoder, without)
 
 
 def test_an_ideal_plant_with_an_encoder_stays_ideal():
     seen = scenario(smc.Encoder(4096, delay=2e-3))
-    assert (seen.resolved.integrator, seen.resolved.physics_step, seen.realistic) == ("RK4", 1e-3, False)
+    assert (seen.resolved.integrator, seen.resolved.physics_step, seen.realistic) == (
+        "RK4",
+        1e-3,
+        False,
+    )
 
 
 def test_every_channel_of_a_network_has_its_encoder():
@@ -362,7 +425,9 @@ def test_every_channel_of_a_network_has_its_encoder():
 
 def test_a_skew_reads_each_channel_earlier_than_the_channel_before():
     plant = smc.plant("pendulum_network", n=3)
-    trace, x, _ = read(smc.Encoder(math.inf, delay=2e-3, skew=3e-3), plant=plant, v0=(0.5, -0.5, 1.0))
+    trace, x, _ = read(
+        smc.Encoder(math.inf, delay=2e-3, skew=3e-3), plant=plant, v0=(0.5, -0.5, 1.0)
+    )
     for i, delay in enumerate((2, 5, 8)):
         late = np.append(trace.x[:1, i].repeat(delay), trace.x[:-delay, i])
         np.testing.assert_array_equal(x[:, i], late)
@@ -371,7 +436,12 @@ def test_a_skew_reads_each_channel_earlier_than_the_channel_before():
 
 
 def test_a_sensor_keeps_as_many_readings_as_are_under_way_in_parts_of_64():
-    for times, count in (({}, 0), ({"period": 0.02}, 64), ({"delay": 0.062}, 64), ({"delay": 0.063}, 128)):
+    for times, count in (
+        ({}, 0),
+        ({"period": 0.02}, 64),
+        ({"delay": 0.062}, 64),
+        ({"delay": 0.063}, 128),
+    ):
         assert smc.Encoder(**times).readings(1e-3) == count
     assert smc.Encoder(delay=0.1265, period=1e-3).readings(5e-4) == 192
     assert smc.Encoder(delay=0.04, skew=0.011).readings(1e-3, 3) == 64
@@ -384,14 +454,17 @@ def test_a_sensor_keeps_as_many_readings_as_are_under_way_in_parts_of_64():
 @pytest.mark.parametrize("field", ["period", "delay"])
 def test_times_that_are_no_whole_number_of_steps_are_refused(field):
     with pytest.raises(
-        smc.ScenarioError, match=rf"Encoder's {field} 0.0015 s .*: give a physics_step that divides it$"
+        smc.ScenarioError,
+        match=rf"Encoder's {field} 0.0015 s .*: give a physics_step that divides it$",
     ):
         scenario(smc.Encoder(**{field: 0.0015}))
     scenario(smc.Encoder(**{field: 0.0015}), physics_step=5e-4)
 
 
 def test_a_period_beyond_all_steps_is_refused():
-    with pytest.raises(smc.ScenarioError, match=r"period 1e\+306 s is not a whole number of physics steps"):
+    with pytest.raises(
+        smc.ScenarioError, match=r"period 1e\+306 s is not a whole number of physics steps"
+    ):
         scenario(smc.Encoder(period=1e306))
 
 
@@ -410,5 +483,7 @@ def test_a_delay_that_no_buffer_holds_is_refused_in_one_sentence(times):
 
 def test_only_an_encoder_is_a_sensor():
     for value in (4096, "encoder", smc.Noise(0.1), [smc.Encoder()], smc.Encoder):
-        with pytest.raises(smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"):
+        with pytest.raises(
+            smc.ScenarioError, match=r"^sensor is .*: give smc.Encoder\(counts=...\) or None$"
+        ):
             scenario(value)

@@ -1,26 +1,35 @@
-"""Coulomb friction on joints that move alone: at 1 ms the motion of an integration by events that shares no code."""
+"""Coulomb friction on joints that move alone: at 1 ms the motion of an integration by events that
+shares no code.
+"""
 
 import dataclasses
 
 import numpy as np
 import pytest
+from helpers import reference
 from scipy.integrate import solve_ivp
 
 import smc_mujoco as smc
 from smc_mujoco.mechanisms.hardware.friction import coulomb_step
-from helpers import reference
 
 PERIOD = 1e-3
 EXACT = {"rtol": 1e-11, "atol": 1e-13, "method": "DOP853"}
 
 
 def by_events(scenario, u, level, d=lambda t: 0.0):
-    """Positions, times held and mean frictions at the samples, (3, K + 1), of x'' = f + g (u + d + friction).
+    """Positions, times held and mean frictions at the samples, (3, K + 1), of x'' = f + g (u + d +
+    friction).
 
-    The joint slides until its speed is 0. Then it stays until the other forces are more than `level`.
+    The joint slides until its speed is 0. Then it stays until the other forces are more than
+    `level`.
     """
     plant = scenario.plant
-    values, x, v, rows = plant.values({}), scenario.resolved.x0[0], 0.0, [(scenario.resolved.x0[0], 0.0, 0.0)]
+    values, x, v, rows = (
+        plant.values({}),
+        scenario.resolved.x0[0],
+        0.0,
+        [(scenario.resolved.x0[0], 0.0, 0.0)],
+    )
 
     def others(x, v, t, held):
         f, g = plant.nominal([x], [v], 0, values)
@@ -34,7 +43,10 @@ def by_events(scenario, u, level, d=lambda t: 0.0):
                 times = np.linspace(t, end, 101)  # it breaks away at the first of them, if it does
                 loads = np.array([others(x, 0.0, time, held)[0] for time in times])
                 count = int(np.argmax(np.abs(loads) > level)) or 100
-                rest, pushed = rest + times[count] - t, pushed - np.trapezoid(loads[: count + 1], times[: count + 1])
+                rest, pushed = (
+                    rest + times[count] - t,
+                    pushed - np.trapezoid(loads[: count + 1], times[: count + 1]),
+                )
                 t = times[count]
                 continue
             way = np.sign(v or load)
@@ -68,14 +80,25 @@ CASES = [
 @pytest.mark.parametrize(("plant", "law", "x0", "level", "d"), CASES)
 def test_motion_and_rest_are_those_of_an_integration_by_events(plant, law, x0, level, d):
     scenario = smc.Scenario(
-        plant=plant, law=law, x0=x0, duration=0.2, friction=smc.Coulomb(level), disturbance=d, u_max=3.0
+        plant=plant,
+        law=law,
+        x0=x0,
+        duration=0.2,
+        friction=smc.Coulomb(level),
+        disturbance=d,
+        u_max=3.0,
     )
     assert (scenario.resolved.integrator, scenario.resolved.physics_step) == ("RK4", PERIOD)
     trace = smc.run(scenario)
-    force = (lambda t: 0.0) if d is None else (lambda t: d.amplitude * np.sin(d.omega * t))
+    if d is None:
+        force = lambda t: 0.0
+    else:
+        force = lambda t: d.amplitude * np.sin(d.omega * t)
     x, held, friction = by_events(scenario, trace.u[:, 0], level, force)
     assert np.abs(trace.x[:, 0] - x).max() < 2e-4 * np.ptp(trace.x)
-    assert np.abs(trace.arrays()["held"][:, 0] - held).max() < PERIOD  # it breaks away at a step's end
+    assert (
+        np.abs(trace.arrays()["held"][:, 0] - held).max() < PERIOD
+    )  # it breaks away at a step's end
     assert smc.score(trace)["stick_time"] == pytest.approx(held.sum(), rel=0.02)
     assert np.abs(trace.reaction[:, 0] - friction).max() < 0.03 * level
     mujocos = smc.run(dataclasses.replace(scenario, integrator="implicitfast"))
@@ -102,8 +125,12 @@ def test_a_step_of_constant_forces_has_the_mean_and_first_moment_of_its_friction
 
 @pytest.mark.parametrize("law", ["classical", "adaptive", "super_twisting"])
 def test_scores_do_not_depend_on_the_step(law):
-    """Steady errors of the published gains; 5.68e-4 and 1.42e-3 by an integration of this pendulum by events."""
-    made = smc.paper.comparison("inverted_pendulum", duration=5.0, changes={"friction": smc.Coulomb(0.1)})
+    """Steady errors of the published gains; 5.68e-4 and 1.42e-3 by an integration of this pendulum
+    by events.
+    """
+    made = smc.paper.comparison(
+        "inverted_pendulum", duration=5.0, changes={"friction": smc.Coulomb(0.1)}
+    )
     scenario = next(scenario for scenario in made.values() if scenario.law.name == law)
     traces = smc.run([dataclasses.replace(scenario, physics_step=PERIOD / k) for k in (1, 4)])
     scores = [smc.score(trace) for trace in traces]
@@ -116,14 +143,24 @@ def test_scores_do_not_depend_on_the_step(law):
 EXTRAS = [
     {"actuator": smc.Lag(2e-3), "disturbance": smc.Sine(0.3, 5.0)},
     {"actuator": smc.hardware.RateLimit(100.0), "jump": smc.Jump(0.03, {"mass": 2.0})},
-    {"friction": (smc.Coulomb(0.4), smc.Viscous(0.1)), "physics_step": 2.5e-4, "disturbance": smc.Sine(1.0, 100.0)},
+    {
+        "friction": (smc.Coulomb(0.4), smc.Viscous(0.1)),
+        "physics_step": 2.5e-4,
+        "disturbance": smc.Sine(1.0, 100.0),
+    },
 ]
 
 
 @pytest.mark.parametrize("extra", EXTRAS)
 @pytest.mark.parametrize("plant", ["inverted_pendulum", "pendulum_network"])
 def test_the_reference_loop_does_the_same_to_the_bit(plant, extra):
-    fields = {"plant": plant, "law": "super_twisting", "x0": 0.02, "duration": 0.06, "friction": smc.Coulomb(0.3)}
+    fields = {
+        "plant": plant,
+        "law": "super_twisting",
+        "x0": 0.02,
+        "duration": 0.06,
+        "friction": smc.Coulomb(0.3),
+    }
     scenario = smc.Scenario(**fields | extra)
     assert scenario.exact_friction
     compiled, plain = smc.run(scenario).arrays(), reference.run(scenario).arrays()
@@ -135,16 +172,24 @@ def test_the_reference_loop_does_the_same_to_the_bit(plant, extra):
 def test_uncoupled_pendulums_of_a_network_stick_each_by_itself():
     x0 = 0.02, -0.1
     fields = {"law": "super_twisting", "friction": smc.Coulomb(0.2), "duration": 0.3}
-    network = smc.run(smc.Scenario(plant=smc.plant("inverted_pendulum_network", n=2, kc=0.0), x0=x0, **fields))
+    network = smc.run(
+        smc.Scenario(plant=smc.plant("inverted_pendulum_network", n=2, kc=0.0), x0=x0, **fields)
+    )
     for i, start in enumerate(x0):
         alone = smc.run(smc.Scenario(plant="inverted_pendulum", x0=start, **fields))
         assert network.x[:, i] == pytest.approx(alone.x[:, 0], abs=1e-12)
-        assert network.arrays()["held"][:, i] == pytest.approx(alone.arrays()["held"][:, 0], abs=1e-12)
+        assert network.arrays()["held"][:, i] == pytest.approx(
+            alone.arrays()["held"][:, 0], abs=1e-12
+        )
 
 
 def test_runs_with_other_levels_share_a_batch():
     levels = 0.0, 0.1, 0.4
-    scenarios = [smc.Scenario(plant="duffing", law="pid", duration=0.5, friction=smc.Coulomb(f)) for f in levels]
+    scenarios = []
+    for f in levels:
+        scenarios.append(
+            smc.Scenario(plant="duffing", law="pid", duration=0.5, friction=smc.Coulomb(f))
+        )
     for scenario, trace in zip(scenarios, smc.run(scenarios), strict=True):
         assert (trace.x == smc.run(scenario).x).all()
         assert np.abs(trace.reaction).max() == pytest.approx(scenario.friction[0].level)
@@ -174,20 +219,30 @@ def test_your_own_robot_of_one_joint_has_it_too():
 @pytest.mark.parametrize(
     "fields",
     [
-        {"integrator": "implicitfast"}, {"actuator": smc.DCMotor()}, {"actuator": smc.Backlash(0.01)},
-        {"contact": "stops"}, {"friction": smc.hardware.LuGre(0.1, 0.2, 0.05)},
-        {"friction": (smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05))}, {"friction": smc.Viscous(0.1)},
-        {"mechanism": "springs"}, {"disturbance": smc.Push("cart", 1.0, 0.0, 0.0)}, {"plant": "cart_pole"},
+        {"integrator": "implicitfast"},
+        {"actuator": smc.DCMotor()},
+        {"actuator": smc.Backlash(0.01)},
+        {"contact": "stops"},
+        {"friction": smc.hardware.LuGre(0.1, 0.2, 0.05)},
+        {"friction": (smc.Coulomb(0.1), smc.hardware.LuGre(0.1, 0.2, 0.05))},
+        {"friction": smc.Viscous(0.1)},
+        {"mechanism": "springs"},
+        {"disturbance": smc.Push("cart", 1.0, 0.0, 0.0)},
+        {"plant": "cart_pole"},
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_all_else_keeps_mujocos_friction(fields):
-    scenario = smc.Scenario(**{"plant": "duffing", "law": "none", "friction": smc.Coulomb(0.1)} | fields)
+    scenario = smc.Scenario(
+        **{"plant": "duffing", "law": "none", "friction": smc.Coulomb(0.1)} | fields
+    )
     assert not scenario.exact_friction
 
 
 def test_a_trace_keeps_how_long_its_joint_was_held(tmp_path):
-    trace = smc.run(smc.Scenario(plant="duffing", law="none", duration=0.3, friction=smc.Coulomb(5.0)))
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law="none", duration=0.3, friction=smc.Coulomb(5.0))
+    )
     assert trace.arrays()["held"][1:] == pytest.approx(PERIOD)
     assert not np.any(trace.x - trace.x[0])  # it does not creep
     assert (smc.load(trace.save(tmp_path / "held.npz")).held == trace.held).all()

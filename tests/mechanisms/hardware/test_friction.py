@@ -1,4 +1,6 @@
-"""Frictions are what they say: they hold below their level, let go above it, and dissipate what the formulas say."""
+"""Frictions are what they say: they hold below their level, let go above it, and dissipate what the
+formulas say.
+"""
 
 import dataclasses
 import math
@@ -16,7 +18,9 @@ from smc_mujoco.mechanisms.plant import field_array, plant
 IMPLICIT, RK4 = mujoco.mjtIntegrator.mjINT_IMPLICITFAST, mujoco.mjtIntegrator.mjINT_RK4
 INERTIA = {"inverted_pendulum": 0.125, "duffing": 1.0}  # kg m^2, kg
 PLANTS = pytest.mark.parametrize("name", sorted(INERTIA))
-STEPS = pytest.mark.parametrize(("h", "integrator"), [(2.5e-4, IMPLICIT), (1e-3, RK4)], ids=["implicitfast", "RK4"])
+STEPS = pytest.mark.parametrize(
+    ("h", "integrator"), [(2.5e-4, IMPLICIT), (1e-3, RK4)], ids=["implicitfast", "RK4"]
+)
 BRISTLES = pytest.mark.parametrize("h", [2.5e-4, 1e-3])
 LUGRE = LuGre(coulomb=0.05, static=0.08, stribeck=0.01)
 ALL = [Viscous(0.1), Coulomb(0.05), LUGRE]
@@ -24,7 +28,9 @@ EACH = pytest.mark.parametrize("part", ALL, ids=lambda part: type(part).__name__
 
 
 def bare(name, *parts, h=2.5e-4, integrator=IMPLICIT):
-    """The plant's inertia with nothing on it but the parts: without the plant's weight, spring and damping."""
+    """The plant's inertia with nothing on it but the parts: without the plant's weight, spring and
+    damping.
+    """
     model = build(plant(name), *parts, h=h, integrator=integrator)
     model.dof_damping[:] -= build(plant(name)).dof_damping
     for field in ("opt.gravity", "jnt_stiffness", "jnt_stiffnesspoly"):
@@ -77,7 +83,9 @@ def test_coulomb_friction_lets_go_just_above_its_level(name, h, integrator):
 def test_a_block_slides_v0_squared_over_twice_its_deceleration(name, h, integrator):
     level = 0.05 if integrator == RK4 else 1.0
     deceleration = level / INERTIA[name]
-    states = coasting(bare(name, Coulomb(level), h=h, integrator=integrator), 1.0, 1.1 / deceleration)
+    states = coasting(
+        bare(name, Coulomb(level), h=h, integrator=integrator), 1.0, 1.1 / deceleration
+    )
     assert states[-1, 0] == pytest.approx(1.0 / (2 * deceleration), rel=0.01)
     sliding = states[: int(0.9 / deceleration / h), 1]
     assert -np.diff(sliding) == pytest.approx(deceleration * h, rel=0.01)
@@ -86,7 +94,9 @@ def test_a_block_slides_v0_squared_over_twice_its_deceleration(name, h, integrat
 @PLANTS
 @STEPS
 def test_no_coulomb_friction_is_no_friction_to_the_bit(name, h, integrator):
-    with_zero, without = (build(plant(name), *parts, h=h, integrator=integrator) for parts in ([Coulomb(0.0)], []))
+    with_zero, without = (
+        build(plant(name), *parts, h=h, integrator=integrator) for parts in ([Coulomb(0.0)], [])
+    )
     assert (coasting(with_zero, 1.0, 1.0) == coasting(without, 1.0, 1.0)).all()
 
 
@@ -122,7 +132,9 @@ def test_lugre_breaks_away_at_its_static_level(h, part):
         mujoco.mj_step(model, data)
         most, speed = max(most, -data.actuator_force[friction]), data.qvel[0]
     assert most == pytest.approx(part.static, rel=0.02)
-    assert speed > 10 * part.static / 20.0 / part.stiffness  # it slides, far faster than bristles bend
+    assert (
+        speed > 10 * part.static / 20.0 / part.stiffness
+    )  # it slides, far faster than bristles bend
 
 
 @PLANTS
@@ -143,7 +155,9 @@ def test_lugre_is_the_formula_of_its_docstring():
         g = LUGRE.coulomb + (LUGRE.static - LUGRE.coulomb) * math.exp(-((v / LUGRE.stribeck) ** 2))
         rate = v - LUGRE.stiffness * abs(v) / g * 4e-5
         damping = 0.2 * math.sqrt(LUGRE.stiffness * 1.0)  # of the cart of 1 kg
-        assert data.qfrc_actuator[0] == pytest.approx(-(LUGRE.stiffness * 4e-5 + damping * rate), rel=1e-9)
+        assert data.qfrc_actuator[0] == pytest.approx(
+            -(LUGRE.stiffness * 4e-5 + damping * rate), rel=1e-9
+        )
 
 
 @EACH
@@ -168,7 +182,8 @@ def test_numbers_are_kept_as_floats():
 
 def test_a_joint_breaks_away_at_no_less_than_it_slides_with():
     with pytest.raises(
-        ScenarioError, match=r"LuGre's static 0\.1 is less than its coulomb 0.2: give static >= coulomb"
+        ScenarioError,
+        match=r"LuGre's static 0\.1 is less than its coulomb 0.2: give static >= coulomb",
     ):
         LuGre(0.2, 0.1, 0.01)
 

@@ -1,4 +1,6 @@
-"""Behind a Lag, RK4 gives the motion of the continuous force: its stages have the force's mean and first moment."""
+"""Behind a Lag, RK4 gives the motion of the continuous force: its stages have the force's mean and
+first moment.
+"""
 
 import numpy as np
 import pytest
@@ -10,7 +12,9 @@ DURATION, PERIOD = 0.2, 1e-3
 
 
 def exact(plant: smc.Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
-    """Positions at the samples, of x'' = f + g F and tau F' = u - F with commands that are held, to 1e-12."""
+    """Positions at the samples, of x'' = f + g F and tau F' = u - F with commands that are held, to
+    1e-12.
+    """
     values, state, positions = plant.values({}), np.array([x0, 0.0, 0.0]), [x0]
 
     def slope(_, y, held):
@@ -18,7 +22,9 @@ def exact(plant: smc.Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
         return [y[1], f + g * y[2], (held - y[2]) / tau]
 
     for held in u[:-1]:
-        state = solve_ivp(slope, (0.0, PERIOD), state, "DOP853", rtol=1e-12, atol=1e-14, args=(held,)).y[:, -1]
+        state = solve_ivp(
+            slope, (0.0, PERIOD), state, "DOP853", rtol=1e-12, atol=1e-14, args=(held,)
+        ).y[:, -1]
         positions.append(state[0])
     return np.array(positions)
 
@@ -26,7 +32,9 @@ def exact(plant: smc.Plant, x0: float, u: np.ndarray, tau: float) -> np.ndarray:
 @pytest.mark.parametrize("tau", [2e-4, 1e-3, 5e-3, 0.05])
 @pytest.mark.parametrize("plant", ["duffing", "inverted_pendulum"])
 def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default_step(plant, tau):
-    scenario = smc.Scenario(plant=plant, law="classical", x0=0.01, duration=DURATION, actuator=smc.Lag(tau))
+    scenario = smc.Scenario(
+        plant=plant, law="classical", x0=0.01, duration=DURATION, actuator=smc.Lag(tau)
+    )
     assert (scenario.resolved.integrator, scenario.resolved.physics_step) == ("RK4", PERIOD)
     trace = smc.run(scenario)
     assert np.ptp(trace.u) == 8.0  # it switches
@@ -34,7 +42,12 @@ def test_positions_behind_a_lag_are_those_of_its_continuous_force_at_the_default
 
 
 def test_the_mean_of_its_force_over_a_control_period_is_in_the_trace():
-    tau, trace = 5e-3, smc.run(smc.Scenario(plant="duffing", law="classical", duration=0.05, actuator=smc.Lag(5e-3)))
+    tau, trace = (
+        5e-3,
+        smc.run(
+            smc.Scenario(plant="duffing", law="classical", duration=0.05, actuator=smc.Lag(5e-3))
+        ),
+    )
     force, means = 0.0, [0.0]
     for u in trace.u[:-1, 0]:
         end = u + (force - u) * np.exp(-PERIOD / tau)

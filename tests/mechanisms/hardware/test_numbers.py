@@ -16,19 +16,30 @@ pytestmark = pytest.mark.quick
 PUBLIC = [getattr(home, name) for home in (smc, smc.hardware, smc.signals) for name in home.__all__]
 PARTS = [value for value in PUBLIC if isinstance(value, type) and issubclass(value, Part)]
 NAMES = re.compile(r"^  ((?:\w+)(?:, \w+)*): (.*?)(?=^  \w|\Z)", re.DOTALL | re.MULTILINE)
-LEAST, RANGE = re.compile(r"([\d.e-]+)(?: \([^)]*\))? or more"), re.compile(r"([\d.]+) \.\. ([\d.]+)")
+LEAST, RANGE = (
+    re.compile(r"([\d.e-]+)(?: \([^)]*\))? or more"),
+    re.compile(r"([\d.]+) \.\. ([\d.]+)"),
+)
 
 
 def said(part):
     """Name of each field that is a number -> what the docstring says of it."""
-    texts = [inspect.cleandoc(one.__doc__).partition("Attributes:\n")[2] for one in part.__mro__[:3]]
-    pairs = [pair for text in texts for pair in NAMES.findall(text)]
+    texts = []
+    for one in part.__mro__[:3]:
+        texts.append(inspect.cleandoc(one.__doc__).partition("Attributes:\n")[2])
+    pairs = []
+    for text in texts:
+        for pair in NAMES.findall(text):
+            pairs.append(pair)
     return {name: " ".join(words.split()) for names, words in pairs for name in names.split(", ")}
 
 
 def made(part):
     """A part with the number 1 where there is no default."""
-    required = {field.name: 1.0 for field in dataclasses.fields(part) if field.default is dataclasses.MISSING}
+    required = {}
+    for field in dataclasses.fields(part):
+        if field.default is dataclasses.MISSING:
+            required[field.name] = 1.0
     return part(**required | ({"kind": "stops"} if "kind" in required else {}))
 
 
@@ -36,18 +47,40 @@ def made(part):
 def test_a_docstring_says_what_is_declared(part):
     for name, whole in of_fields(part).items():
         words, of_all = said(part)[name], whole.one if isinstance(whole, OrNone) else whole
-        one = of_all.one if isinstance(of_all, Each) else of_all
+        if isinstance(of_all, Each):
+            one = of_all.one
+        else:
+            one = of_all
         assert isinstance(whole, OrNone) == ("None: " in words), name
-        if not isinstance(one, Number) or (part, name) == (smc.hardware.LuGre, "static"):  # its bound is coulomb
+        if not isinstance(one, Number) or (part, name) == (
+            smc.hardware.LuGre,
+            "static",
+        ):  # its bound is coulomb
             continue
         ends = RANGE.search(words) or LEAST.search(words)
         assert (one.above == 0.0) == ("greater than 0" in words), name
         assert one.infinite == ("math.inf" in words), name
-        assert max(one.low, -MAX_PARAMETER) == (float(ends[1]) if ends else -MAX_PARAMETER) or one.above == 0.0, name
-        assert min(one.high, MAX_PARAMETER) == (float(ends[2]) if ends and ends.re is RANGE else MAX_PARAMETER), name
+        assert (
+            max(one.low, -MAX_PARAMETER) == (float(ends[1]) if ends else -MAX_PARAMETER)
+            or one.above == 0.0
+        ), name
+        assert min(one.high, MAX_PARAMETER) == (
+            float(ends[2]) if ends and ends.re is RANGE else MAX_PARAMETER
+        ), name
 
 
-ABOUT = ("drives", "in_callback", "limited", "delay", "scale", "unit", "nominal", "stall", "bristles", "forces")
+ABOUT = (
+    "drives",
+    "in_callback",
+    "limited",
+    "delay",
+    "scale",
+    "unit",
+    "nominal",
+    "stall",
+    "bristles",
+    "forces",
+)
 
 
 def test_a_part_is_of_the_kind_that_is_recorded(snapshot):

@@ -37,7 +37,9 @@ def test_a_flank_rebounds_at_less_than_one_percent_of_its_speed(plant, divisor):
 
 
 def between_plastic_stops(scenario, parts):
-    """Positions of Van der Pol's cart at the samples, (K + 1,), under super-twisting: the flanks do not bounce."""
+    """Positions of Van der Pol's cart at the samples, (K + 1,), under super-twisting: the flanks do
+    not bounce.
+    """
     gains, h, bound = scenario.law.gains, scenario.control_period / parts, scenario.limits[0]
     inertia, play = scenario.actuator[0].rotor_inertia, scenario.actuator[0].gap / 2
     x = y = scenario.resolved.x0[0]
@@ -62,7 +64,9 @@ def between_plastic_stops(scenario, parts):
 def test_a_limit_cycle_is_that_between_plastic_stops_at_the_default_step():
     (scenario,) = smc.grid(["van_der_pol"], ["super_twisting"], ["backlash"], 1, "study")
     assert scenario.resolved.physics_step == 1.25e-4
-    traces = smc.run([dataclasses.replace(scenario, physics_step=1.25e-4 / k) for k in (1, 2, 4, 8)])
+    traces = smc.run(
+        [dataclasses.replace(scenario, physics_step=1.25e-4 / k) for k in (1, 2, 4, 8)]
+    )
     exact = between_plastic_stops(dataclasses.replace(scenario, duration=8.0), 20)[-2000:].mean()
     assert exact == pytest.approx(3.55e-4, rel=0.02)
     for trace in traces:
@@ -70,7 +74,9 @@ def test_a_limit_cycle_is_that_between_plastic_stops_at_the_default_step():
 
 
 def test_a_cycle_of_the_adaptive_law_does_not_depend_on_the_step():
-    made = smc.paper.comparison("inverted_pendulum", duration=3.0, changes={"actuator": smc.Backlash(GAP)})
+    made = smc.paper.comparison(
+        "inverted_pendulum", duration=3.0, changes={"actuator": smc.Backlash(GAP)}
+    )
     scenario = next(scenario for scenario in made.values() if scenario.law.name == "adaptive")
     steps = [scenario.resolved.physics_step / k for k in (1, 2, 4)]
     for trace in smc.run([dataclasses.replace(scenario, physics_step=step) for step in steps]):

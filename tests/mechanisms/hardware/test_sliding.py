@@ -1,4 +1,6 @@
-"""Frictions by a formula: exact while a joint slides, holding at rest, the same in both loops; servos under load."""
+"""Frictions by a formula: exact while a joint slides, holding at rest, the same in both loops;
+servos under load.
+"""
 
 import dataclasses
 import functools
@@ -7,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers import reference
 from helpers.runs import assert_same
 
 import smc_mujoco as smc
 from smc_mujoco.control.units import Gain
 from smc_mujoco.mechanisms.hardware.servos import SERVOS
 from smc_mujoco.mechanisms.hardware.sliding import Sliding
-from helpers import reference
 
 # Gaz et al. 2019, table of the Panda's friction: N m, s/rad, rad/s
 P1 = np.array([0.54615, 0.87224, 0.64068, 1.2794, 0.83904, 0.30301, 0.56489])
@@ -29,12 +31,21 @@ def sigmoid(v, p1, p2, p3):
 def flywheel(mass, v0, **fields):
     """A run of a cart of that mass, without a spring, from the speed v0."""
     plant = smc.plant("duffing", M=mass, alpha=0.0, beta=0.0, delta=0.0)
-    return smc.run(smc.Scenario(**{"plant": plant, "law": "none", "x0": 0.0, "v0": v0, "duration": 0.05} | fields))
+    return smc.run(
+        smc.Scenario(
+            **{"plant": plant, "law": "none", "x0": 0.0, "v0": v0, "duration": 0.05} | fields
+        )
+    )
 
 
 def weightless(**fields):
     """The Panda without gravity and law, from rest."""
-    common = {"plant": smc.plant("panda", grav=0.0), "law": "none", "duration": 2.0, "control_period": 2e-3}
+    common = {
+        "plant": smc.plant("panda", grav=0.0),
+        "law": "none",
+        "duration": 2.0,
+        "control_period": 2e-3,
+    }
     return smc.Scenario(**common | fields)
 
 
@@ -47,17 +58,23 @@ def test_friction_at_constant_speed_is_the_published_sigmoid(i):
     for v in (*np.geomspace(2e-3, 10.0, 4), *-np.geomspace(2e-3, 10.0, 4)):
         trace = flywheel(1e12, v, friction=smc.hardware.Sigmoid(P1[i], P2[i], P3[i]))
         assert trace.v[-1, 0] == pytest.approx(v, rel=1e-11)
-        np.testing.assert_allclose(trace.reaction[1:, 0], -sigmoid(v, P1[i], P2[i], P3[i]), rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            trace.reaction[1:, 0], -sigmoid(v, P1[i], P2[i], P3[i]), rtol=0, atol=1e-9
+        )
 
 
 def test_the_pandas_friction_is_the_published_one_in_a_thousand_states():
-    """Along five runs of 200 physics steps, at each of which the friction is logged; joints that turn do not stick."""
+    """Along five runs of 200 physics steps, at each of which the friction is logged; joints that
+    turn do not stick.
+    """
     rng = np.random.default_rng(3)
     friction = dataclasses.replace(smc.plant("panda").friction, hold=0.0)
     steps = {"control_period": 1e-3, "physics_step": 1e-3, "duration": 0.2, "friction": friction}
     traces = smc.run([weightless(v0=rng.uniform(-1.5, 1.5, 7), **steps) for _ in range(5)])
     for trace in traces:
-        np.testing.assert_allclose(trace.reaction[1:], -sigmoid(trace.v[:-1], P1, P2, P3), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            trace.reaction[1:], -sigmoid(trace.v[:-1], P1, P2, P3), rtol=0, atol=1e-12
+        )
     assert np.ptp([trace.v for trace in traces]) > 2.0
 
 
@@ -66,8 +83,12 @@ def test_a_coasting_joint_slows_down_by_the_formula():
     from scipy.integrate import solve_ivp
 
     trace = flywheel(1.0, 1.5, friction=smc.hardware.Sigmoid(P1[3], P2[3], P3[3]), duration=1.0)
-    exact = solve_ivp(lambda t, v: -sigmoid(v, P1[3], P2[3], P3[3]), (0, 1), [1.5], t_eval=trace.t, rtol=1e-10)
-    np.testing.assert_allclose(trace.v[:, 0], exact.y[0], atol=3e-4)  # of a step of 0.25 ms, of first order
+    exact = solve_ivp(
+        lambda t, v: -sigmoid(v, P1[3], P2[3], P3[3]), (0, 1), [1.5], t_eval=trace.t, rtol=1e-10
+    )
+    np.testing.assert_allclose(
+        trace.v[:, 0], exact.y[0], atol=3e-4
+    )  # of a step of 0.25 ms, of first order
 
 
 # a joint at rest
@@ -85,7 +106,9 @@ def limits(i):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_joints_at_rest_hold_every_load_below_their_limits_and_no_other(sign):
-    """On the arm without weight, under a load that grows to 90 % or 110 % of its joints' least limit, and stays."""
+    """On the arm without weight, under a load that grows to 90 % or 110 % of its joints' least
+    limit, and stays.
+    """
     least = min(abs(limits(i)[int(sign > 0.0)]) for i in range(7))
     stay, go = (
         weightless(friction=smc.plant("panda").friction, disturbance=grows(sign * share * least))
@@ -105,10 +128,11 @@ def pulls(y, gains, memory):
 
 
 def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
-    """A limit of the bristles: rigid dry friction would hold any load below its limits, however suddenly it comes.
+    """A limit of the bristles: rigid dry friction would hold any load below its limits, however
+    suddenly it comes.
 
-    The load is that mode of M w = L D w, with D the inertias of the bristles, which has the largest L. In it the
-    bristles bend by 1 + exp(-pi z / sqrt(1 - z^2)) times the load, z = L^-1/2.
+    The load is that mode of M w = L D w, with D the inertias of the bristles, which has the largest
+    L. In it the bristles bend by 1 + exp(-pi z / sqrt(1 - z^2)) times the load, z = L^-1/2.
     """
     panda = smc.plant("panda", grav=0.0)
     M = panda.nominal.dynamics(np.array(panda.rest), np.zeros(7), panda.values({})).M
@@ -120,10 +144,16 @@ def test_a_sudden_load_overshoots_in_stuck_joints_that_move_together():
     load = roots * modes[:, -1]
     holds = np.array([limits(i)[int(one > 0.0)] for i, one in enumerate(load)])
     load = load / (load / holds).max()  # one joint is at its limit
-    runs = [
-        weightless(law=pulls(torque=share * load, rise=rise), x0=panda.rest, friction=panda.friction, duration=1.0)
-        for share, rise in ((0.96 / overshoot, 1e-9), (1.04 / overshoot, 1e-9), (0.97, 0.5))
-    ]
+    runs = []
+    for share, rise in ((0.96 / overshoot, 1e-9), (1.04 / overshoot, 1e-9), (0.97, 0.5)):
+        runs.append(
+            weightless(
+                law=pulls(torque=share * load, rise=rise),
+                x0=panda.rest,
+                friction=panda.friction,
+                duration=1.0,
+            )
+        )
     held, torn, slow = (np.abs(trace.v[-1]).max() for trace in smc.run(runs))
     assert max(held, slow) < 1e-6
     assert torn > 0.01
@@ -142,7 +172,10 @@ def test_without_holding_a_joint_creeps_where_friction_equals_the_load():
 @pytest.mark.parametrize("hold", [None, 0.4])
 def test_a_joint_breaks_away_at_the_holding_force(hold):
     """Under a load that grows by 0.2 N a second, in both directions."""
-    low, high = limits(0) if hold is None else (-hold, hold)
+    if hold is None:
+        low, high = limits(0)
+    else:
+        low, high = (-hold, hold)
     for most, slope in ((high, 0.2), (low, -0.2)):
         part, load = smc.hardware.Sigmoid(P1[0], P2[0], P3[0], hold=hold), smc.signals.Ramp(slope)
         trace = flywheel(0.1, 0.0, friction=part, disturbance=load, duration=2.5)
@@ -152,13 +185,17 @@ def test_a_joint_breaks_away_at_the_holding_force(hold):
 
 
 def test_a_joint_at_rest_stays_and_one_torn_loose_slides():
-    """A push of 0.1 s, then rest under a load that the limits hold; then a push after which F balances the load."""
+    """A push of 0.1 s, then rest under a load that the limits hold; then a push after which F
+    balances the load.
+    """
     push = (
         smc.signals.Pulse(2.0, time=0.0, width=0.1),
         smc.Constant(-0.15),
         smc.signals.Pulse(-2.0, time=1.5, width=0.05),
     )
-    trace = flywheel(0.5, 0.0, friction=smc.hardware.Sigmoid(P1[0], P2[0], P3[0]), disturbance=push, duration=7.0)
+    trace = flywheel(
+        0.5, 0.0, friction=smc.hardware.Sigmoid(P1[0], P2[0], P3[0]), disturbance=push, duration=7.0
+    )
     v = trace.v[:, 0]
     assert v[80] > 0.1
     assert np.abs(v[1200:1500]).max() < 1e-6
@@ -176,7 +213,9 @@ def test_stuck_joints_are_critically_damped():
 
 
 def test_friction_only_takes_energy():
-    trace = flywheel(0.1, 1.0, friction=smc.hardware.Sigmoid(*(p[1] for p in (P1, P2, P3))), duration=3.0)
+    trace = flywheel(
+        0.1, 1.0, friction=smc.hardware.Sigmoid(*(p[1] for p in (P1, P2, P3))), duration=3.0
+    )
     energy = 0.05 * trace.v[:, 0] ** 2
     bend = 0.5 * max(map(abs, limits(1))) ** 2 / (0.1 * 200.0**2)  # J, what a stuck joint can hold
     assert np.all(energy[1:] <= np.minimum.accumulate(energy)[:-1] + bend)
@@ -207,16 +246,35 @@ def scenarios():
         Curious(a=tuple(0.1 * i for i in range(1, 8))),
     ]
     for friction in (*frictions, smc.hardware.Sigmoid(0.5, 9.0, hold=0.7)):
-        yield smc.Scenario(plant="panda", law="computed_torque_sliding", friction=friction, **common)
-    yield smc.Scenario(plant="cart_pole", law="observer_free", friction=Curious(a=(0.5, 0.01)), **common)
+        yield smc.Scenario(
+            plant="panda", law="computed_torque_sliding", friction=friction, **common
+        )
+    yield smc.Scenario(
+        plant="cart_pole", law="observer_free", friction=Curious(a=(0.5, 0.01)), **common
+    )
     servo = smc.hardware.servo("mx64", "m5", command="voltage")
     gust = {"disturbance": smc.signals.Gust(2.0, time=0.05, width=0.1), "duration": 0.2}
     for start in (0.5, -1.5):
         yield smc.Scenario(
-            plant="pendulum_network", law="classical", friction=servo.friction, actuator=servo.motor, x0=start, **gust
+            plant="pendulum_network",
+            law="classical",
+            friction=servo.friction,
+            actuator=servo.motor,
+            x0=start,
+            **gust,
         )
-    at_a_stop = (0.0, 0.0, 0.0, -0.0750, 0.0, 1.5, 0.0)  # the elbow, which it then meets: the load has its force
-    yield smc.Scenario(plant="panda", law="none", friction=frictions[2], x0=at_a_stop, v0=0.5, **common)
+    at_a_stop = (
+        0.0,
+        0.0,
+        0.0,
+        -0.0750,
+        0.0,
+        1.5,
+        0.0,
+    )  # the elbow, which it then meets: the load has its force
+    yield smc.Scenario(
+        plant="panda", law="none", friction=frictions[2], x0=at_a_stop, v0=0.5, **common
+    )
 
 
 def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
@@ -224,7 +282,9 @@ def test_callback_equals_reference_loop_with_a_friction_by_a_formula():
     for scenario, trace in zip(several, smc.run(several), strict=True):
         assert trace.failure is None
         assert_same(trace, reference.run(scenario))
-        assert np.abs(np.diff(np.sign(trace.v), axis=0)).sum() >= 2  # a joint turned back, so it stuck
+        assert (
+            np.abs(np.diff(np.sign(trace.v), axis=0)).sum() >= 2
+        )  # a joint turned back, so it stuck
 
 
 def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():
@@ -242,14 +302,26 @@ def test_bits_do_not_depend_on_threads_and_numbers_are_each_simulations_own():
 
 def published(model, fitted, motor, external, v):
     """The dry friction and the damping of Rhoban/bam's Model.compute_frictions, for arrays."""
-    stribeck, loaded, directional = model in ("m2", "m4", "m5", "m6"), model not in ("m1", "m2"), model in ("m5", "m6")
-    near = np.exp(-(np.abs(v / fitted["dtheta_stribeck"]) ** fitted["alpha"])) if stribeck else 0.0 * v
+    stribeck, loaded, directional = (
+        model in ("m2", "m4", "m5", "m6"),
+        model not in ("m1", "m2"),
+        model in ("m5", "m6"),
+    )
+    if stribeck:
+        near = np.exp(-(np.abs(v / fitted["dtheta_stribeck"]) ** fitted["alpha"]))
+    else:
+        near = 0.0 * v
     loss = fitted["friction_base"] + 0.0 * v
     if stribeck:
         loss = loss + near * fitted["friction_stribeck"]
     if loaded and directional:
-        loss = loss + np.abs(external * fitted["load_friction_external"] - motor * fitted["load_friction_motor"])
-        away = external * fitted["load_friction_external_stribeck"] - motor * fitted["load_friction_motor_stribeck"]
+        loss = loss + np.abs(
+            external * fitted["load_friction_external"] - motor * fitted["load_friction_motor"]
+        )
+        away = (
+            external * fitted["load_friction_external_stribeck"]
+            - motor * fitted["load_friction_motor_stribeck"]
+        )
         loss = loss + near * np.abs(away)
     elif loaded:
         loss = loss + fitted["load_friction_base"] * np.abs(external - motor)
@@ -257,8 +329,12 @@ def published(model, fitted, motor, external, v):
             loss = loss + near * fitted["load_friction_stribeck"] * np.abs(external - motor)
     if model == "m6":
         against = np.sign(external) != np.sign(motor)
-        driven = (np.abs(external) < np.abs(motor)) * fitted["load_friction_external_quad"] * external**2
-        driven_back = (np.abs(external) > np.abs(motor)) * fitted["load_friction_motor_quad"] * motor**2
+        driven = (
+            (np.abs(external) < np.abs(motor)) * fitted["load_friction_external_quad"] * external**2
+        )
+        driven_back = (
+            (np.abs(external) > np.abs(motor)) * fitted["load_friction_motor_quad"] * motor**2
+        )
         loss = loss + near * against * (driven + driven_back)
     return loss, fitted["friction_viscous"]
 
@@ -267,10 +343,17 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
     for name in ("mx64", "mx106"):
         for model in ("m1", "m2", "m3", "m4", "m5", "m6"):
             fitted = SERVOS[name][model]
-            assert (len(fitted) - 3) == {"m1": 2, "m2": 5, "m3": 3, "m4": 7, "m5": 9, "m6": 11}[model]
+            assert (len(fitted) - 3) == {"m1": 2, "m2": 5, "m3": 3, "m4": 7, "m5": 9, "m6": 11}[
+                model
+            ]
             friction = smc.hardware.servo(name, model).friction
-            numbers = functools.partial(reference.sliding_friction, friction, reference.friction_numbers(friction, 0))
-            speeds, torques = np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0], np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0]
+            numbers = functools.partial(
+                reference.sliding_friction, friction, reference.friction_numbers(friction, 0)
+            )
+            speeds, torques = (
+                np.r_[-5.0, -0.7, -1e-3, 1e-3, 0.2, 3.0],
+                np.r_[-6.0, -1.0, 0.0, 0.4, 1.0, 5.0],
+            )
             for v in speeds:
                 for motor in torques:
                     for load in torques:
@@ -278,15 +361,24 @@ def test_servo_friction_is_the_published_code_on_a_grid_of_speed_and_load():
                         held, _ = published(model, fitted, motor, load, 0.0 * v)
                         f, _, _ = numbers(v, motor, load)
                         assert f == pytest.approx(np.sign(v) * loss + damping * v, rel=0, abs=1e-12)
-                        assert numbers(0.0, motor, load)[1:] == pytest.approx([-held, held], rel=0, abs=1e-12)
+                        assert numbers(0.0, motor, load)[1:] == pytest.approx(
+                            [-held, held], rel=0, abs=1e-12
+                        )
 
 
 @pytest.mark.parametrize("model", ["m1", "m4", "m6"])
 def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
-    """One step of a heavy pendulum: weight and disturbance are outside, the motor's torque is that of a step before."""
+    """One step of a heavy pendulum: weight and disturbance are outside, the motor's torque is that
+    of a step before.
+    """
     servo = smc.hardware.servo("mx106", model)
     plant = smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
-    common = {"plant": plant, "friction": servo.friction, "feedforward": smc.Constant(1.5), "law": "none"}
+    common = {
+        "plant": plant,
+        "friction": servo.friction,
+        "feedforward": smc.Constant(1.5),
+        "law": "none",
+    }
     start = {"x0": (0.9, -0.4), "v0": (0.8, 1.2), "disturbance": smc.Constant(-0.6)}
     trace = smc.run(smc.Scenario(**common, **start, physics_step=1e-3, duration=4e-3))
     p = plant.values({})
@@ -301,12 +393,21 @@ def test_a_servo_in_motion_has_the_published_friction_of_its_load(model):
 
 def ends(model, weight):
     """The torques at which a servo that holds a weight of so many N m lifts it, and lets it fall."""
-    servo, plant = smc.hardware.servo("mx106", model), smc.plant("pendulum_network", n=2, kc=0.0, b=0.0)
+    servo, plant = (
+        smc.hardware.servo("mx106", model),
+        smc.plant("pendulum_network", n=2, kc=0.0, b=0.0),
+    )
     p, found = plant.values({}), []
     level = math.asin(weight / (p.m * p.grav * p.l))
     for slope in (0.2, -0.2):
         u = smc.signals.TimeSeries([0.0, 10.0], [weight, weight + 10.0 * slope])
-        common = {"plant": plant, "law": "none", "x0": level, "duration": 6.0, "control_period": 5e-3}
+        common = {
+            "plant": plant,
+            "law": "none",
+            "x0": level,
+            "duration": 6.0,
+            "control_period": 5e-3,
+        }
         trace = smc.run(smc.Scenario(**common, feedforward=u, friction=servo.friction))
         moved = np.argmax(np.abs(trace.v[:, 0]) > 1e-3)
         assert moved
@@ -316,10 +417,11 @@ def ends(model, weight):
 
 @pytest.mark.parametrize("model", ["m1", "m2", "m4", "m5", "m6"])
 def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model):
-    """A servo lifts its weight w at the torque m for which m - w is the friction that holds, and drops it at w - m.
+    """A servo lifts its weight w at the torque m for which m - w is the friction that holds, and
+    drops it at w - m.
 
-    Friction that does not depend on the load is the same both ways, so the two lie symmetrically about the weight. With
-    load-dependent friction they do not: drive and back-drive differ.
+    Friction that does not depend on the load is the same both ways, so the two lie symmetrically
+    about the weight. With load-dependent friction they do not: drive and back-drive differ.
     """
     from scipy.optimize import brentq
 
@@ -347,9 +449,14 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
     ("make", "says"),
     [
         (lambda: smc.hardware.servo("mx65"), "unknown servo 'mx65': did you mean 'mx64'?"),
-        (lambda: smc.hardware.servo("mx64", "m7"), "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6"),
         (
-            lambda: smc.Scenario(plant="panda", law="none", friction=smc.hardware.Sigmoid([1.0, 2.0, 3.0], 5.0)),
+            lambda: smc.hardware.servo("mx64", "m7"),
+            "unknown model of mx64 'm7': choose from m1, m2, m3, m4, m5, m6",
+        ),
+        (
+            lambda: smc.Scenario(
+                plant="panda", law="none", friction=smc.hardware.Sigmoid([1.0, 2.0, 3.0], 5.0)
+            ),
             "Sigmoid's p1 is (1.0, 2.0, 3.0), and panda has 7 channels: give one number, or 7",
         ),
         (
@@ -362,7 +469,10 @@ def test_a_servo_needs_more_to_drive_a_load_than_it_loses_when_driven_back(model
         ),
         (
             lambda: smc.Scenario(
-                plant="duffing", law="none", friction=smc.hardware.Sigmoid(1.0, 5.0), integrator="RK4"
+                plant="duffing",
+                law="none",
+                friction=smc.hardware.Sigmoid(1.0, 5.0),
+                integrator="RK4",
             ),
             "integrator RK4 does not integrate the state of Sigmoid(p1=1.0, p2=5.0, p3=0.0, hold=None)"
             ": leave the integrator out",
@@ -376,7 +486,9 @@ def test_bad_numbers_are_one_sentence(make, says):
 
 
 def test_a_formula_that_raises_ends_its_own_run_with_a_sentence():
-    trace = smc.run(smc.Scenario(plant="duffing", law="none", v0=1.0, duration=0.1, friction=Failing()))
+    trace = smc.run(
+        smc.Scenario(plant="duffing", law="none", v0=1.0, duration=0.1, friction=Failing())
+    )
     assert "friction Failing" in (trace.failure or "")
     assert trace.diverged_at is not None
 

@@ -1,4 +1,6 @@
-"""A stepper motor's steps, field and torque are those of an event integration, written here from its docstring."""
+"""A stepper motor's steps, field and torque are those of an event integration, written here from
+its docstring.
+"""
 
 import dataclasses
 import itertools
@@ -37,12 +39,21 @@ PLANT = smc.plant("inverted_pendulum", m=0.02, l=0.3)
 
 
 def scenario(motor, push, plant=PLANT, **fields):
-    fields = {"duration": 1.2, "seed": 5, "x0": 0.3, "control_period": PERIOD, "law": "none"} | fields
+    fields = {
+        "duration": 1.2,
+        "seed": 5,
+        "x0": 0.3,
+        "control_period": PERIOD,
+        "law": "none",
+    } | fields
     return smc.Scenario(plant=plant, actuator=motor, feedforward=push, **fields)
 
 
 def steps_by_events(motor, commands, phase, duration):
-    """Times and directions of all steps, from events in the order of time. `commands`: (time, u) of the samples."""
+    """Times and directions of all steps, from events in the order of time.
+
+    `commands`: (time, u) of the samples.
+    """
     per = motor.steps * motor.gear / math.tau
     ramp, speed, wish, last = motor.ramp * per, 0.0, (0, 0), 0.0
     events = [(t, 0, u) for t, u in commands]
@@ -91,19 +102,29 @@ def steps_by_events(motor, commands, phase, duration):
         last, rate, sign = t, math.floor(abs(speed) + 1e-9), 1 if speed >= 0.0 else -1
         stops = abs(speed) < motor.stop_band * per or rate < 1 or wish[0] == -sign
         wish = (0, 0) if stops else (sign, rate)
-        until = events[i + 1][0] if i + 1 < len(events) else duration
+        if i + 1 < len(events):
+            until = events[i + 1][0]
+        else:
+            until = duration
         while not motor.refill and max(free, t) < until and add(t):
             pass
     return [(t, way) for t, way in steps if t < duration]
 
 
 def field_of(motor, steps):
-    """Knots (t, position of the field in rad of the joint) of a piecewise linear field; two at a jump."""
+    """Knots (t, position of the field in rad of the joint) of a piecewise linear field; two at a
+    jump.
+    """
     knots, target, before = [(0.0, 0.0)], 0, -math.inf
 
     def at(t):
-        (t0, p0), (t1, p1) = knots[-2:] if len(knots) > 1 else (knots[0], knots[0])
-        return p1 if t >= t1 or t1 == t0 else p0 + (p1 - p0) * (t - t0) / (t1 - t0)
+        if len(knots) > 1:
+            (t0, p0), (t1, p1) = knots[-2:]
+        else:
+            (t0, p0), (t1, p1) = (knots[0], knots[0])
+        if t >= t1 or t1 == t0:
+            return p1
+        return p0 + (p1 - p0) * (t - t0) / (t1 - t0)
 
     for t, way in steps:
         now = at(t)
@@ -117,9 +138,13 @@ def field_of(motor, steps):
 
 
 def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
-    """x, v and the mean torque between `times` of the joint, by RK4 that stops at each knot of the field."""
+    """x, v and the mean torque between `times` of the joint, by RK4 that stops at each knot of the
+    field.
+    """
     knots, positions = field_of(motor, steps)
-    grid = np.unique(np.concatenate([np.arange(0.0, times[-1], substep), times, knots[knots <= times[-1]]]))
+    grid = np.unique(
+        np.concatenate([np.arange(0.0, times[-1], substep), times, knots[knots <= times[-1]]])
+    )
     x, v, impulse, values = x0, 0.0, 0.0, plant.values({})
     rows = []
 
@@ -137,15 +162,25 @@ def moved(motor, steps, plant, x0, times, inertia, substep=2e-5):
             rows.append((x, v, impulse))
         h = b - a
         # the field is continuous from the right at a, and from the left at b
-        first = np.interp(a, knots, positions) if a not in knots else positions[np.flatnonzero(knots == a)[-1]]
-        last = np.interp(b, knots, positions) if b not in knots else positions[np.flatnonzero(knots == b)[0]]
+        if a not in knots:
+            first = np.interp(a, knots, positions)
+        else:
+            first = positions[np.flatnonzero(knots == a)[-1]]
+        if b not in knots:
+            last = np.interp(b, knots, positions)
+        else:
+            last = positions[np.flatnonzero(knots == b)[0]]
         mid = 0.5 * (first + last)
         k1 = rate(first, x, v)
         k2 = rate(mid, x + h / 2 * v, v + h / 2 * k1)
         k3 = rate(mid, x + h / 2 * (v + h / 2 * k1), v + h / 2 * k2)
         k4 = rate(last, x + h * (v + h / 2 * k2), v + h * k3)
         middle = x + h / 2 * v + h * h / 8 * k1
-        start, x, v = x, x + h * v + h * h / 6 * (k1 + k2 + k3), v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        start, x, v = (
+            x,
+            x + h * v + h * h / 6 * (k1 + k2 + k3),
+            v + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4),
+        )
         impulse += h / 6 * (torque(first, start) + 4 * torque(mid, middle) + torque(last, x))
     rows.append((x, v, impulse))
     x, v, impulse = np.array(rows).T
@@ -175,7 +210,9 @@ def looped(one):
 @pytest.mark.parametrize("kind", ["slow", "fast", "each step when it is due", "turns at once"])
 def test_the_steps_are_those_of_an_event_integration(kind):
     motor, push = KINDS[kind]
-    one = scenario(dataclasses.replace(motor, speed=400.0), push)  # so that the queue has room for all
+    one = scenario(
+        dataclasses.replace(motor, speed=400.0), push
+    )  # so that the queue has room for all
     _, steps = by_events(one)
     state, queue = (own := looped(one).motors[0]).state, own.queue
     made = [(queue[2 * i], queue[2 * i + 1]) for i in range(int(state.tail))]
@@ -192,7 +229,9 @@ def test_the_joint_moves_as_behind_these_steps(kind):
     one = scenario(motor, push, duration=0.8, physics_step=1.25e-4)
     trace, steps = by_events(one)
     x, v, force = moved(motor, steps, one.plant, 0.3, trace.t, motor.gear**2 * motor.rotor_inertia)
-    rough = 5e3 if kind == "jumps" else 1.0  # RK4 gets the mean and the first moment of a jump within a step
+    rough = (
+        5e3 if kind == "jumps" else 1.0
+    )  # RK4 gets the mean and the first moment of a jump within a step
     assert trace.x[:, 0] == pytest.approx(x, abs=rough * 1e-9)
     assert trace.v[:, 0] == pytest.approx(v, abs=rough * 1e-7)
     assert trace.force[1:, 0] == pytest.approx(force, abs=rough * 1e-8)
@@ -203,14 +242,25 @@ CONDITIONS = {
     "late and missed samples": {"clock": smc.Clock(jitter=2e-3, missed=0.2), "input_delay": 3e-3},
     "friction": {"friction": smc.Coulomb(0.01)},
     "play": {"actuator": (MOTOR, smc.Backlash(0.05))},
-    "several motors": {"plant": "pendulum_network", "x0": 0.1, "law": "pid", "actuator": Stepper(torque=20.0)},
+    "several motors": {
+        "plant": "pendulum_network",
+        "x0": 0.1,
+        "law": "pid",
+        "actuator": Stepper(torque=20.0),
+    },
     "a free joint": {"plant": "cart_pole", "x0": (0.0, 0.05), "law": "hierarchical"},
 }
 
 
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_the_callback_is_the_reference_loop_to_the_last_bit(name):
-    fields = {"plant": PLANT, "law": "none", "actuator": MOTOR, "feedforward": SLOW, "x0": 0.3} | CONDITIONS[name]
+    fields = {
+        "plant": PLANT,
+        "law": "none",
+        "actuator": MOTOR,
+        "feedforward": SLOW,
+        "x0": 0.3,
+    } | CONDITIONS[name]
     one = smc.Scenario(**fields, duration=0.4, control_period=PERIOD, seed=2)
     compiled, looped = smc.run(one), reference.run(one)
     for column, values in compiled.arrays().items():
@@ -219,7 +269,9 @@ def test_the_callback_is_the_reference_loop_to_the_last_bit(name):
 
 def test_a_missed_sample_adds_no_speed_and_the_next_adds_that_of_both():
     """A field without a generator turns at the speed that the firmware sums."""
-    one = scenario(dataclasses.replace(MOTOR, steps=math.inf), SLOW, clock=smc.Clock(missed=0.3), duration=0.5)
+    one = scenario(
+        dataclasses.replace(MOTOR, steps=math.inf), SLOW, clock=smc.Clock(missed=0.3), duration=0.5
+    )
     loop, speed, last = looped(one), 0.0, 0.0
     for k, t in enumerate(PERIOD * np.arange(one.samples)):
         if loop.late(k) >= 0:
@@ -244,17 +296,23 @@ def pushed(y, gains, memory):
 
 def test_the_nominal_model_has_the_acceleration_as_its_input():
     plant, x, v = smc.plant("furuta", bq=1e-5), (0.3, 0.2), (1.0, 2.0)
-    trace = smc.run(scenario(MOTOR, None, plant, law=pushed(), model="nominal", x0=x, v0=v, duration=0.01))
+    trace = smc.run(
+        scenario(MOTOR, None, plant, law=pushed(), model="nominal", x0=x, v0=v, duration=0.01)
+    )
     p = plant.values({})
     Jp, s, c = p.Jc + p.m * p.l**2, math.sin(x[1]), math.cos(x[1])
-    torque = Jp * s * c * v[0] ** 2 + p.m * p.grav * p.l * s - p.bq * v[1] - p.m * p.L * p.l * c * 3.0
+    torque = (
+        Jp * s * c * v[0] ** 2 + p.m * p.grav * p.l * s - p.bq * v[1] - p.m * p.L * p.l * c * 3.0
+    )
     assert trace.s[0, 0] == pytest.approx(torque / Jp, rel=1e-12)
     assert trace.units()["u0"] == "rad/s^2"
 
 
 def test_the_default_bound_is_the_ramp_and_a_weak_motor_warns():
     assert scenario(MOTOR, None).limits == (80.0,)
-    with pytest.warns(smc.errors.ScenarioWarning, match=r"Stepper gives at most 0\.01 .* more torque"):
+    with pytest.warns(
+        smc.errors.ScenarioWarning, match=r"Stepper gives at most 0\.01 .* more torque"
+    ):
         scenario(dataclasses.replace(MOTOR, torque=0.01), None)
 
 
@@ -280,11 +338,19 @@ REFUSED = {
         "computed_torque_sliding.*model='none'",
     ),
     "environment": (lambda: Setting(PLANT, "regulate", {"actuator": MOTOR}), "no Stepper"),
-    "FMU": (lambda: smc.exchange.law_to_fmu(scenario(MOTOR, None, law="pid"), "never.fmu"), "a Stepper.*u_max"),
+    "FMU": (
+        lambda: smc.exchange.law_to_fmu(scenario(MOTOR, None, law="pid"), "never.fmu"),
+        "a Stepper.*u_max",
+    ),
     "prediction": (lambda: chattering(scenario(MOTOR, None, law="pid")), "measure it in a run"),
-    "certificate": (lambda: smc.certify(scenario(MOTOR, None, law="classical")), "no theorem for an acceleration"),
+    "certificate": (
+        lambda: smc.certify(scenario(MOTOR, None, law="classical")),
+        "no theorem for an acceleration",
+    ),
     "both drives": (
-        lambda: smc.tune("inverted_pendulum", "pid", conditions=("nominal", "stepper"), budget=1, searches=1),
+        lambda: smc.tune(
+            "inverted_pendulum", "pid", conditions=("nominal", "stepper"), budget=1, searches=1
+        ),
         "commands in N m and rad/s.2: tune for each drive alone",
     ),
 }
@@ -306,19 +372,31 @@ def held():
 
 
 TAKEN = {  # an analysis -> what it finds
-    "margins": lambda out: smc.margins("duffing", HELD, ["noise"], quick=True, condition="stepper")[0].value > 0.0,
-    "basin": lambda out: smc.basin(ON, HELD, (3, 3), duration=1.0, condition="stepper").outcome[1, 1] == 1,
-    "worst case": lambda out: smc.worst_case(held(), within=smc.Uncertainty(disturbance=1.0), budget=8).value > 0.0,
+    "margins": lambda out: (
+        smc.margins("duffing", HELD, ["noise"], quick=True, condition="stepper")[0].value > 0.0
+    ),
+    "basin": lambda out: (
+        smc.basin(ON, HELD, (3, 3), duration=1.0, condition="stepper").outcome[1, 1] == 1
+    ),
+    "worst case": lambda out: (
+        smc.worst_case(held(), within=smc.Uncertainty(disturbance=1.0), budget=8).value > 0.0
+    ),
     "sensitivity": lambda out: "share" in str(smc.sensitivity(held(), points=8)),
-    "order of accuracy": lambda out: smc.accuracy(HELD, ON, (2e-3, 1e-3), "stepper", 1, duration=0.5)[0].law == "pid",
-    "tuning": lambda out: smc.tune(ON, "pid", conditions=["stepper"], budget=1, searches=1).objective > 0.0,
+    "order of accuracy": lambda out: (
+        smc.accuracy(HELD, ON, (2e-3, 1e-3), "stepper", 1, duration=0.5)[0].law == "pid"
+    ),
+    "tuning": lambda out: (
+        smc.tune(ON, "pid", conditions=["stepper"], budget=1, searches=1).objective > 0.0
+    ),
     "identification": lambda out: (
         abs(smc.identify(smc.plant(ON), smc.run(held()), ["m"], starts=1).values["m"] - 0.5) < 0.01
     ),
     "comparison": lambda out: (
         smc.compare(HELD, ON, ["stepper"], 2, False, out=out, duration=1.0, progress=False).verdicts
     ),
-    "advice": lambda out: smc.which(ON, "stepper", (), [HELD, "lqr"], 3, 1.0, None, out, True).choices,
+    "advice": lambda out: (
+        smc.which(ON, "stepper", (), [HELD, "lqr"], 3, 1.0, None, out, True).choices
+    ),
 }
 
 
@@ -331,7 +409,9 @@ def test_an_analysis_takes_a_stepper(name, tmp_path):
 
 @pytest.mark.slow
 def test_no_theory_of_a_force_is_told_of_an_acceleration():
-    """Linear theory knows the torque that a law of forces bears, and not the motor that holds the joint itself."""
+    """Linear theory knows the torque that a law of forces bears, and not the motor that holds the
+    joint itself.
+    """
     for condition, told in (("nominal", True), ("stepper", False)):
         (one,) = smc.margins(ON, "observer_free", ["disturbance"], quick=True, condition=condition)
         assert (one.theory is not None) == told

@@ -1,7 +1,8 @@
-"""Does the arctangent hold the cart against a push as well as a relay does, without the relay's chattering?
+"""Does the arctangent hold the cart against a push as well as a relay does, without the relay's
+chattering?
 
-Compare u: under the relay it jumps at every sample, under the arctangent it does not. Compare x at the end: under the
-arctangent the cart rests a little off 0.
+Compare u: under the relay it jumps at every sample, under the arctangent it does not. Compare x at
+the end: under the arctangent the cart rests a little off 0.
 """
 
 import smc_mujoco as smc
@@ -12,7 +13,9 @@ scene = smc.Scene(
     title="Pushed cart",
     conditions={
         "push": {
-            name: smc.Scenario(plant="sprung_cart", law=smc.law(name, k=6.0, c=3.0), disturbance=PUSH, duration=4.0)
+            name: smc.Scenario(
+                plant="sprung_cart", law=smc.law(name, k=6.0, c=3.0), disturbance=PUSH, duration=4.0
+            )
             for name in ("arctan_switching", "classical")
         }
     },

@@ -1,7 +1,7 @@
 """How the claims of Acary, Brogliato & Orlov 2012 are measured, on the last half of the runs.
 
-On the block x'' = u + d the laws of first order control its velocity. Laws of second order see position and velocity;
-that with the observer sees the position alone.
+On the block x'' = u + d the laws of first order control its velocity. Laws of second order see
+position and velocity; that with the observer sees the position alone.
 """
 
 import math
@@ -16,7 +16,9 @@ GAINS = {"a": 1.0, "alpha": 2.0, "start": 0.5}
 
 @law_function(gains=GAINS, positive=("a", "alpha"), memory=1)
 def implicit_observer(y, gains, memory):
-    """Two signs at the end of the period: u = -a S1 - alpha S2 of s and s - z, where z' = -a S1 starts at `start`."""
+    """Two signs at the end of the period: u = -a S1 - alpha S2 of s and s - z, where z' = -a S1
+    starts at `start`.
+    """
     a, alpha = gains.a * y.dt, gains.alpha * y.dt
     second = min(max((y.de - gains.start - memory[0]) / alpha, -1.0), 1.0)
     first = min(max((y.de - alpha * second) / a, -1.0), 1.0)
@@ -39,9 +41,11 @@ def explicit_observer(y, gains, memory):
     relative_degree=2,
 )
 def with_model(y, gains, memory):
-    """Eq. 44: u = -w - kx x' - Mx S2 of s_x = x' + kx x, and a model z'' = u + w, w = ke e' + ks s_e + Mv S1.
+    """Eq. 44: u = -w - kx x' - Mx S2 of s_x = x' + kx x, and a model z'' = u + w, w = ke e' + ks
+    s_e + Mv S1.
 
-    e = x - z, s_e = e' + ke e. Both signs are at the end of the period. The model starts at rest in 0.
+    e = x - z, s_e = e' + ke e. Both signs are at the end of the period. The model starts at rest in
+    0.
     """
     h, e, de = y.dt, y.e - memory[0], y.de - memory[1]
     linear = gains.ke * de + gains.ks * (de + gains.ke * e)
@@ -67,10 +71,12 @@ def implicit_twisting_50(y, gains, memory):
     relative_degree=2,
 )
 def observed_twisting_60(y, gains, memory):
-    """Eq. 60: the twisting of eq. 50 with the velocity of a super-twisting observer, its sign at the end of the period.
+    """Eq. 60: the twisting of eq. 50 with the velocity of a super-twisting observer, its sign at
+    the end of the period.
 
-    The observer's error e solves e (1 + h k2 + h^2 k4) + h k1 [e]^(1/2) + h^2 k3 sgn(e) = b, where b is the error of
-    the position predicted a period ahead, which the law shows in place of s. Estimates start at 1 and 1.
+    The observer's error e solves e (1 + h k2 + h^2 k4) + h k1 [e]^(1/2) + h^2 k3 sgn(e) = b, where
+    b is the error of the position predicted a period ahead, which the law shows in place of s.
+    Estimates start at 1 and 1.
     """
     h = y.dt
     position, velocity = 1.0 + memory[0], 1.0 + memory[1]  # predicted for this sample
@@ -102,7 +108,10 @@ def means(trace):
 def by_condition(runs, measure):
     """Return condition -> measure of its trace; with the law's name if there are several."""
     measured = runs.measured(runs.grid(), measure)
-    return {cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}": value for cell, value in measured.items()}
+    return {
+        cell[2] if len(runs.laws) == 1 else f"{cell[1]}, {cell[2]}": value
+        for cell, value in measured.items()
+    }
 
 
 def amplitude(trace):
@@ -119,13 +128,17 @@ def inside(runs):
 
 def rejection(runs):
     """Largest |x| over what the disturbance adds to x in a control period."""
-    share = by_condition(runs, lambda run: largest(run.v) / (run.scenario.control_period * amplitude(run)))
+    share = by_condition(
+        runs, lambda run: largest(run.v) / (run.scenario.control_period * amplitude(run))
+    )
     return {"largest |x| / (h largest |d|)": share}
 
 
 def multiplier(runs):
     """Largest |u + mean of d over the period before|, over the largest |d|."""
-    ratios = by_condition(runs, lambda run: largest((run.u[1:] + means(run)[:-1])[:-1]) / amplitude(run))
+    ratios = by_condition(
+        runs, lambda run: largest((run.u[1:] + means(run)[:-1])[:-1]) / amplitude(run)
+    )
     return {"largest |u + mean d of the period before| / largest |d|": ratios}
 
 
@@ -136,7 +149,9 @@ def variation(runs):
 
 
 def reaching(runs):
-    """Time from which |x| <= h rho, over the paper's bound h k0 = |x0| / (a - rho), rho the amplitude of d."""
+    """Time from which |x| <= h rho, over the paper's bound h k0 = |x0| / (a - rho), rho the
+    amplitude of d.
+    """
 
     def share(trace):
         rho = amplitude(trace)
@@ -160,10 +175,15 @@ def explicit(runs):
 
 
 def at_periods(runs, condition, count=None):
-    """Return period -> trace of the claim's law at the first periods, with one step of the plant a period."""
+    """Return period -> trace of the claim's law at the first periods, with one step of the plant a
+    period.
+    """
     law, periods = runs.laws[0], runs.values["periods"][:count]
     return runs.traced(
-        {h: runs.scenario(runs.plant, law, condition, control_period=h, physics_step=h) for h in periods}
+        {
+            h: runs.scenario(runs.plant, law, condition, control_period=h, physics_step=h)
+            for h in periods
+        }
     )
 
 
@@ -171,8 +191,12 @@ def with_a_model(runs):
     """Exponents of the largest |s_x| and |x| of the last half in the control period, 3 ms to 0.1 s."""
     traces = at_periods(runs, runs.conditions[0])
     return {
-        "exponent of the largest |s_x| in h": exponent([*traces], [largest(trace.s) for trace in traces.values()]),
-        "exponent of the largest |x| in h": exponent([*traces], [largest(trace.x) for trace in traces.values()]),
+        "exponent of the largest |s_x| in h": exponent(
+            [*traces], [largest(trace.s) for trace in traces.values()]
+        ),
+        "exponent of the largest |x| in h": exponent(
+            [*traces], [largest(trace.x) for trace in traces.values()]
+        ),
     }
 
 
@@ -196,7 +220,9 @@ def rests(runs):
 
 
 def observed(runs):
-    """Exponent of the largest error of the predicted position of the last half in the control period."""
+    """Exponent of the largest error of the predicted position of the last half in the control
+    period.
+    """
     traces = at_periods(runs, runs.conditions[0], -1 if runs.quick else None)
     errors = {h: largest(trace.s) for h, trace in traces.items()}
     return {
@@ -206,7 +232,9 @@ def observed(runs):
 
 
 def converges(runs):
-    """Largest |x| of the last tenth of 120 s over h^2 times the largest |d|, from several starts at h = 0.1 s."""
+    """Largest |x| of the last tenth of 120 s over h^2 times the largest |d|, from several starts at
+    h = 0.1 s.
+    """
 
     def share(trace):
         last = float(np.abs(trace.x[-len(trace.x) // 10 : -1]).max())
@@ -215,5 +243,8 @@ def converges(runs):
     shares = {}
     for start, speed in runs.values["starts"][: 2 if runs.quick else None]:
         measured = runs.measured(runs.grid(x0=start, v0=speed, physics_step=0.1), share)
-        shares |= {f"{cell[2]}, from {start:g} m at {speed:g} m/s": value for cell, value in measured.items()}
+        shares |= {
+            f"{cell[2]}, from {start:g} m at {speed:g} m/s": value
+            for cell, value in measured.items()
+        }
     return {"largest |x| of the last tenth / (h^2 largest |d|)": shares}

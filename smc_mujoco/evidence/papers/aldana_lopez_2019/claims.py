@@ -13,7 +13,9 @@ RUN_BOUNDS = 1.5  # duration of a run over the least bound
 
 
 @law_function(
-    gains={"A": 2.0, "B": 2.0, "p": 0.5, "q": 1.5, "k": 1.0}, positive=("A", "B", "p", "q", "k"), relative_degree=1
+    gains={"A": 2.0, "B": 2.0, "p": 0.5, "q": 1.5, "k": 1.0},
+    positive=("A", "B", "p", "q", "k"),
+    relative_degree=1,
 )
 def general_fixed_time(y, gains, memory):
     """The general system: u = -(A |s|^p + B |s|^q)^k sgn s, s the velocity."""
@@ -59,15 +61,23 @@ def classical_bound(law):
 
 def times(runs, cells, band=BAND):
     """Return name -> settling time of s, from name -> plant, law and start."""
-    scenarios = {
-        name: runs.scenario(plant, law.name, *runs.conditions, law=law, v0=v0, duration=RUN_BOUNDS * least_bound(law))
-        for name, (plant, law, v0) in cells.items()
-    }
+    scenarios = {}
+    for name, (plant, law, v0) in cells.items():
+        scenarios[name] = runs.scenario(
+            plant,
+            law.name,
+            *runs.conditions,
+            law=law,
+            v0=v0,
+            duration=RUN_BOUNDS * least_bound(law),
+        )
     return runs.measured(scenarios, lambda trace: settled(trace, trace.s, band))
 
 
 def from_far(runs):
-    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the least bound and over the classical one."""
+    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the least bound and over the
+    classical one.
+    """
     law = runs.law(runs.plant, *runs.laws)
     (time,) = times(runs, {"": (runs.plant, law, runs.values["start"])}).values()
     bounds = {"least": least_bound(law), "classical": classical_bound(law)}
@@ -75,37 +85,56 @@ def from_far(runs):
 
 
 def from_anywhere(runs):
-    """Time from which |s| stays within 1e-6 m/s, from 0.1 to 100 m/s on three plants, over the least bound."""
-    laws = {plant: runs.law(plant, *runs.laws) for plant in runs.plants[: 1 if runs.quick else None]}
-    cells = {
-        f"{plant}, from {start:g} m/s": (plant, law, start)
-        for plant, law in laws.items()
-        for start in runs.values["starts"]
+    """Time from which |s| stays within 1e-6 m/s, from 0.1 to 100 m/s on three plants, over the
+    least bound.
+    """
+    laws = {
+        plant: runs.law(plant, *runs.laws) for plant in runs.plants[: 1 if runs.quick else None]
     }
+    cells = {}
+    for plant, law in laws.items():
+        for start in runs.values["starts"]:
+            cells[f"{plant}, from {start:g} m/s"] = (plant, law, start)
     bound = least_bound(laws[runs.plant])
     return {"time / least bound": {name: time / bound for name, time in times(runs, cells).items()}}
 
 
 def predefined(runs):
-    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the time Tc that the gains were scaled for."""
+    """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over the time Tc that the gains
+    were scaled for.
+    """
     law, cells = runs.law(runs.plant, *runs.laws), {}
     for tc in runs.values["times"][: 1 if runs.quick else None]:
         gains = {gain: least_bound(law) / tc * law.gains[gain] for gain in ("k1", "k2")}
         cells[tc] = runs.plant, runs.law(runs.plant, *runs.laws, **gains), runs.values["start"]
-    return {"time from far / time asked for": {f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()}}
+    return {
+        "time from far / time asked for": {
+            f"{tc:g} s": time / tc for tc, time in times(runs, cells).items()
+        }
+    }
 
 
 def disturbed(runs):
-    """Time from which |s| stays within 1 mm/s under d = 0.5 sin 5t, with k = 0.6, over the least bound."""
+    """Time from which |s| stays within 1 mm/s under d = 0.5 sin 5t, with k = 0.6, over the least
+    bound.
+    """
     law = runs.law(runs.plant, *runs.laws, k=runs.values["k"])
     cells = {f"from {start:g} m/s": (runs.plant, law, start) for start in runs.values["starts"]}
     measured = times(runs, cells, SWITCHING_BAND)
-    return {"time / least bound": {name: time / least_bound(law) for name, time in measured.items()}}
+    return {
+        "time / least bound": {name: time / least_bound(law) for name, time in measured.items()}
+    }
 
 
 def general(runs):
     """Time from which |s| stays within 1e-6 m/s, from 5000 m/s, over gamma."""
     law = runs.law(runs.plant, *runs.laws)
-    run = runs.scenario(runs.plant, law.name, law=law, v0=runs.values["start"], duration=RUN_BOUNDS * gamma(law.gains))
+    run = runs.scenario(
+        runs.plant,
+        law.name,
+        law=law,
+        v0=runs.values["start"],
+        duration=RUN_BOUNDS * gamma(law.gains),
+    )
     (trace,) = runs.traces([run])
     return {"time from far / gamma": settled(trace, trace.s, BAND) / gamma(law.gains)}

@@ -1,1 +1,5 @@
-"""J. Gaber, Observer-Free Sliding Mode Control via Structured Decomposition: the study and the audit of its claims."""
+"""J.
+
+Gaber, Observer-Free Sliding Mode Control via Structured Decomposition: the study and the audit of
+its claims.
+"""

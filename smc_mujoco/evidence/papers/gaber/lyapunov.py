@@ -1,4 +1,6 @@
-"""The paper's Lyapunov function along its closed loop, exactly: V = s^2 / 2, s = alpha - u / g, and its rate.
+"""The paper's Lyapunov function along its closed loop, exactly:
+
+V = s^2 / 2, s = alpha - u / g, and its rate.
 
     x, v = plane(plant, k1)                                    # a grid of states
     rate = vdot(plant, lam, k1, x, v)                          # V' at each; the paper says V' < 0 wherever s != 0
@@ -12,9 +14,9 @@ With alpha = v + k1 x and u = -lam tanh(alpha), on x'' = f(x, v) + g u,
 
 So V rises beside alpha = 0 wherever f(x, -k1 x) is not k1^2 x, see docs/mathematics.md.
 
-A network is synchronised: with equal angles and rates its springs are relaxed and each channel is one pendulum. Such a
-state with V' > 0 is a state of the whole network.
-Source: J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition", stability analysis; (1) and (2)
+A network is synchronised: with equal angles and rates its springs are relaxed and each channel is
+one pendulum. Such a state with V' > 0 is a state of the whole network. Source: J. Gaber,
+"Observer-Free Sliding Mode Control via Structured Decomposition", stability analysis; (1) and (2)
 derived here.
 """
 
@@ -26,17 +28,23 @@ from smc_mujoco.mechanisms.plant import Plant
 
 GRID_POINTS = 201  # of a grid along each axis: odd, so that it has the origin
 SURFACE_TOLERANCE = 1e-6  # |s| at and below which the claim on V' says nothing
-GRID_REACH = 2.0  # times the largest |x0|, chosen: the states from which the study starts lie well within
+GRID_REACH = (
+    2.0  # times the largest |x0|, chosen: the states from which the study starts lie well within
+)
 
 
 def surface(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return the paper's s = alpha - u / g in the states (x, v), arrays of one shape; in m/s or rad/s, as alpha."""
+    """Return the paper's s = alpha - u / g in the states (x, v), arrays of one shape; in m/s or
+    rad/s, as alpha.
+    """
     alpha = v + k1 * x
     return alpha + lam / _model(plant, x, v)[1] * np.tanh(alpha)
 
 
 def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return V' by (2) in the states (x, v), in the squared unit of s per second; u is not saturated."""
+    """Return V' by (2) in the states (x, v), in the squared unit of s per second; u is not
+    saturated.
+    """
     x, v = np.asarray(x, float), np.asarray(v, float)
     f, g = _model(plant, x, v)
     alpha = v + k1 * x
@@ -46,7 +54,10 @@ def vdot(plant: Plant, lam: float, k1: float, x: np.ndarray, v: np.ndarray) -> n
 
 
 def plane(plant: Plant, k1: float, points: int = GRID_POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """Return a grid of states: x up to GRID_REACH |x0|, v up to k1 times that. On one diagonal alpha is 0."""
+    """Return a grid of states: x up to GRID_REACH |x0|, v up to k1 times that.
+
+    On one diagonal alpha is 0.
+    """
     reach = GRID_REACH * max(map(abs, plant.x0))
     x = np.linspace(-reach, reach, points)
     grid = np.meshgrid(x, k1 * x)
@@ -62,5 +73,7 @@ def _model(plant: Plant, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.n
     """Return f and g of the first channel, with every channel in the same state."""
     p = SimpleNamespace(**plant.parameters)
     pairs = zip(np.ravel(x).tolist(), np.ravel(v).tolist(), strict=True)
-    both = np.array([plant.nominal(np.full(plant.n, a), np.full(plant.n, b), 0, p) for a, b in pairs])
+    both = np.array(
+        [plant.nominal(np.full(plant.n, a), np.full(plant.n, b), 0, p) for a, b in pairs]
+    )
     return both[:, 0].reshape(np.shape(x)), both[:, 1].reshape(np.shape(x))

@@ -1,9 +1,10 @@
 """The study of the paper: its plants' gains and the conditions under which its laws are compared.
 
-The paper (J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition") states d(t) = 0.2 sin(5t), five
-pendulums and Gaussian noise on x and v; it states no gain and no other parameter. Those here were chosen for this
-study: every law is bounded by the same |u| <= 6, and its gains are those of a set in `gains`. Its conditions are named
-in `simulation.conditions`. The plants' parameters are in their files.
+The paper (J. Gaber, "Observer-Free Sliding Mode Control via Structured Decomposition") states d(t)
+= 0.2 sin(5t), five pendulums and Gaussian noise on x and v; it states no gain and no other
+parameter. Those here were chosen for this study: every law is bounded by the same |u| <= 6, and its
+gains are those of a set in `gains`. Its conditions are named in `simulation.conditions`. The
+plants' parameters are in their files.
 
     scenario("duffing", "classical", "noise", seed=3)      # one Scenario
     comparison("duffing", "noise")                         # the four laws: name -> Scenario
@@ -16,7 +17,11 @@ from typing import Any
 from smc_mujoco.common.errors import unknown
 from smc_mujoco.common.frozen import frozen
 from smc_mujoco.control import gain_sets as sets
-from smc_mujoco.simulation.conditions import CONTROL_PERIOD, DURATION, NAMED, PLANTS, SINE, Condition  # noqa: F401
+from smc_mujoco.simulation.conditions import (
+    DURATION,
+    NAMED,
+    Condition,
+)
 from smc_mujoco.simulation.grid import case
 from smc_mujoco.simulation.scenario import U_MAX, Scenario  # noqa: F401
 
@@ -38,7 +43,8 @@ def scenario(
     """Return the scenario of one plant under one law in one condition.
 
     Args:
-      changes: Scenario field -> value, in place of the study's or the condition's: {"friction": Coulomb(0.1)}.
+      changes: Scenario field -> value, in place of the study's or the condition's: {"friction":
+        Coulomb(0.1)}.
       gains: a set of `gains`: "study", "tuned", "tracking", or "default".
 
     Raises:
@@ -48,7 +54,9 @@ def scenario(
         if name not in Scenario.fields():
             raise unknown("field of a Scenario", name, Scenario.fields())
     made = case(sets.paper_plant(plant), law_name, condition, duration, gains, changes=changes)
-    return dataclasses.replace(made, seed=changes.get("seed", seed)).named(None if changes else made.condition)
+    return dataclasses.replace(made, seed=changes.get("seed", seed)).named(
+        None if changes else made.condition
+    )
 
 
 def comparison(
@@ -60,4 +68,7 @@ def comparison(
     gains: str = "study",
 ) -> dict[str, Scenario]:
     """Return law name -> scenario, for one plant in one condition; arguments as of `scenario`."""
-    return {name: scenario(plant, name, condition, duration=duration, changes=changes, gains=gains) for name in laws}
+    return {
+        name: scenario(plant, name, condition, duration=duration, changes=changes, gains=gains)
+        for name in laws
+    }

@@ -8,10 +8,11 @@ from smc_mujoco.evidence.papers.measures import two_signs
 
 @law_function(gains={"G": 10.0, "beta": 0.3}, positive=("G", "beta"), memory=1, relative_degree=2)
 def implicit_twisting(y, gains, memory):
-    """Twisting with both signs at the end of the period: v = -a S1 - b S2, a = G (1 + beta dt/2), b = G beta.
+    """Twisting with both signs at the end of the period: v = -a S1 - b S2, a = G (1 + beta dt/2), b
+    = G beta.
 
-    S1 is in sgn(e+ + dt/2 e'+) and S2 in sgn(e'+), with e'+ = e' + dt v and e+ = e + dt (e' + e'+)/2, v the
-    acceleration of the error.
+    S1 is in sgn(e+ + dt/2 e'+) and S2 in sgn(e'+), with e'+ = e' + dt v and e+ = e + dt (e' +
+    e'+)/2, v the acceleration of the error.
     """
     a, b = gains.G * (1.0 + gains.beta * y.dt / 2.0), gains.G * gains.beta
     return command(y, two_signs(-(y.e + 1.5 * y.dt * y.de) / y.dt**2, a, -y.de / y.dt, b)), y.e
@@ -23,11 +24,19 @@ def quarter(signal):
 
 
 def rests(runs):
-    """Largest |x| and |u| of the last quarter of 12 s at control periods of 5 to 100 ms, without a disturbance."""
-    traces = runs.traced({f"{1e3 * h:g} ms": runs.only(control_period=h) for h in runs.values["periods"]}).items()
+    """Largest |x| and |u| of the last quarter of 12 s at control periods of 5 to 100 ms, without a
+    disturbance.
+    """
+    traces = runs.traced(
+        {f"{1e3 * h:g} ms": runs.only(control_period=h) for h in runs.values["periods"]}
+    ).items()
     return {
-        "largest |x| of the last quarter, m": {name: np.abs(quarter(trace.x)).max() for name, trace in traces},
-        "largest |u| of the last quarter, N": {name: np.abs(quarter(trace.u)).max() for name, trace in traces},
+        "largest |x| of the last quarter, m": {
+            name: np.abs(quarter(trace.x)).max() for name, trace in traces
+        },
+        "largest |u| of the last quarter, N": {
+            name: np.abs(quarter(trace.u)).max() for name, trace in traces
+        },
     }
 
 
@@ -41,18 +50,25 @@ def ratios(runs, scenarios, names):
     traces, shares = runs.traces(scenarios), {}
     for what, of in measures.items():
         pairs = zip(map(of, traces[::2]), map(of, traces[1::2]), strict=True)
-        by_name = {name: float(implicit / explicit) for name, (implicit, explicit) in zip(names, pairs, strict=True)}
+        by_name = {}
+        for name, (implicit, explicit) in zip(names, pairs, strict=True):
+            by_name[name] = float(implicit / explicit)
         shares[f"{what} of the last quarter, implicit / explicit"] = by_name
     return shares
 
 
 def compared(runs):
-    """Error e and command u of the last quarter of 12 s at 10 ms, implicit over explicit, equal gains and model."""
+    """Error e and command u of the last quarter of 12 s at 10 ms, implicit over explicit, equal
+    gains and model.
+    """
     return ratios(runs, runs.grid().values(), runs.plants)
 
 
 def at_every_period(runs):
     """Error e and command u of the last quarter of 12 s at 1 to 50 ms, implicit over explicit."""
     periods = runs.values["periods"]
-    scenarios = [scenario for h in periods for scenario in runs.grid(control_period=h).values()]
+    scenarios = []
+    for h in periods:
+        for scenario in runs.grid(control_period=h).values():
+            scenarios.append(scenario)
     return ratios(runs, scenarios, [f"{1e3 * h:g} ms" for h in periods])

@@ -16,24 +16,36 @@ def classical_margins(gains):
 def twisting_margins(gains):
     """The two conditions of twisting for e'' = g (u + d), N."""
     r1, r2 = gains["r1"], gains["r2"]
-    return {"(r1 + r2) - D > (r1 - r2) + D, N": 2.0 * (r2 - FORCE), "r1 - r2 > D, N": r1 - r2 - FORCE}
+    return {
+        "(r1 + r2) - D > (r1 - r2) + D, N": 2.0 * (r2 - FORCE),
+        "r1 - r2 > D, N": r1 - r2 - FORCE,
+    }
 
 
 def super_twisting_margins(gains):
     """The two conditions of super-twisting for s' = g (u + d), g >= 1 and |d'| <= L."""
-    return {"k2 > L, N/s": gains["k2"] - SLOPE, "k1 > sqrt(k2 + L)": gains["k1"] - (gains["k2"] + SLOPE) ** 0.5}
+    return {
+        "k2 > L, N/s": gains["k2"] - SLOPE,
+        "k1 > sqrt(k2 + L)": gains["k1"] - (gains["k2"] + SLOPE) ** 0.5,
+    }
 
 
 def sweep(runs):
     """Return plant -> traces, each start at each control period, in the order of the periods."""
     starts, values = runs.values.get("starts", [0.5]), runs.values
-    plants, starts = (runs.plants[:1], starts[:1]) if runs.quick else (runs.plants, starts)
-    scenarios = [
-        runs.on(plant).only(x0=x0, control_period=h, duration=values["settled"] + END_SAMPLES * h)
-        for plant in plants
-        for h in values["periods"]
-        for x0 in starts
-    ]
+    if runs.quick:
+        plants, starts = (runs.plants[:1], starts[:1])
+    else:
+        plants, starts = (runs.plants, starts)
+    scenarios = []
+    for plant in plants:
+        for h in values["periods"]:
+            for x0 in starts:
+                scenarios.append(
+                    runs.on(plant).only(
+                        x0=x0, control_period=h, duration=values["settled"] + END_SAMPLES * h
+                    )
+                )
     traces = np.array(runs.traces(scenarios), dtype=object).reshape(len(plants), -1)
     return dict(zip(plants, traces, strict=True))
 
@@ -41,21 +53,34 @@ def sweep(runs):
 def exponents(runs, measure):
     """Return plant -> exponent of a measure as a function of the control period."""
     periods = runs.values["periods"]
-    return {plant: exponent(periods, [measure(run) for run in traces]) for plant, traces in sweep(runs).items()}
+    return {
+        plant: exponent(periods, [measure(run) for run in traces])
+        for plant, traces in sweep(runs).items()
+    }
 
 
 def accuracy_of_s(runs):
-    """Exponent of the largest |s| of the last 3000 samples as a function of the control period, 0.5 to 4 ms."""
+    """Exponent of the largest |s| of the last 3000 samples as a function of the control period, 0.5
+    to 4 ms.
+    """
     return {"exponent of the largest |s| in the period": exponents(runs, lambda run: late(run.s))}
 
 
 def continuity(runs):
-    """Exponent of the largest step of u from sample to sample, of the last 3000, as a function of the period."""
-    return {"exponent of the largest step of u in the period": exponents(runs, lambda run: late_step(run.u))}
+    """Exponent of the largest step of u from sample to sample, of the last 3000, as a function of
+    the period.
+    """
+    return {
+        "exponent of the largest step of u in the period": exponents(
+            runs, lambda run: late_step(run.u)
+        )
+    }
 
 
 def switching(runs):
-    """Largest step of u of the last 3000 samples, as a share of 2k, at control periods of 1 and 4 ms."""
+    """Largest step of u of the last 3000 samples, as a share of 2k, at control periods of 1 and 4
+    ms.
+    """
     (law,), steps = runs.laws, {}
     for plant, traces in sweep(runs).items():
         k = runs.law(plant, law).gains["k"]
@@ -70,5 +95,7 @@ def finite_time(runs):
     ratios = {}
     for (plant, *_), trace in runs.traced(runs.grid()).items():
         (start,) = map(abs, trace.scenario.resolved.x0)
-        ratios[plant] = settled(trace, trace.x, narrow * start) / settled(trace, trace.x, wide * start)
+        ratios[plant] = settled(trace, trace.x, narrow * start) / settled(
+            trace, trace.x, wide * start
+        )
     return {"time to 1e-5 |x0| / time to 1e-2 |x0|": ratios}

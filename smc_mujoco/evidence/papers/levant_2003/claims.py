@@ -9,33 +9,51 @@ END_SHARE = 0.1  # share of a run that counts as its end
 
 
 def precision(runs):
-    """Exponent of the largest |e| of the last 3000 samples as a function of the control period, 0.25 to 2 ms."""
+    """Exponent of the largest |e| of the last 3000 samples as a function of the control period,
+    0.25 to 2 ms.
+    """
     values = runs.values
     traces = runs.traces(
-        runs.only(x0=x0, control_period=h, physics_step=h, duration=values["settled"] + END_SAMPLES * h)
+        runs.only(
+            x0=x0, control_period=h, physics_step=h, duration=values["settled"] + END_SAMPLES * h
+        )
         for h in values["periods"]
         for x0 in values["starts"][: 1 if runs.quick else None]
     )
-    return {"exponent of the largest |e| in the period": exponent(values["periods"], [late(run.x) for run in traces])}
+    return {
+        "exponent of the largest |e| in the period": exponent(
+            values["periods"], [late(run.x) for run in traces]
+        )
+    }
 
 
 def noise(runs):
-    """Exponents of the largest errors of the last 3000 samples as functions of the noise's standard deviation eps.
+    """Exponents of the largest errors of the last 3000 samples as functions of the noise's standard
+    deviation eps.
 
-    The control period is in proportion to eps^(1/3), eps = (period / 30 ms)^3, so that the noise is the same for every
-    eps, relative to the speed of the loop. At one fixed period, white noise averages out where the loop is slow.
+    The control period is in proportion to eps^(1/3), eps = (period / 30 ms)^3, so that the noise is
+    the same for every eps, relative to the speed of the loop. At one fixed period, white noise
+    averages out where the loop is slow.
     """
     values, scenarios = runs.values, []
     eps = [(h / values["pace"]) ** 3 for h in values["periods"]]
     for h, size in zip(values["periods"], eps, strict=True):
-        sampled = {"control_period": h, "physics_step": h, "duration": values["settled"] + END_SAMPLES * h}
+        sampled = {
+            "control_period": h,
+            "physics_step": h,
+            "duration": values["settled"] + END_SAMPLES * h,
+        }
         for seed in values["seeds"][: 1 if runs.quick else None]:
-            scenarios.append(runs.only(x0=0.02, noise=smc.Noise(position=size), seed=seed, **sampled))
+            scenarios.append(
+                runs.only(x0=0.02, noise=smc.Noise(position=size), seed=seed, **sampled)
+            )
     traces = runs.traces(scenarios)
     return {
         "exponent of |e| in the noise": exponent(eps, [late(trace.x) for trace in traces]),
         "exponent of |e'| in the noise": exponent(eps, [late(trace.v) for trace in traces]),
-        "exponent of |e''| in the noise": exponent(eps, [late(trace.force + trace.d) for trace in traces]),
+        "exponent of |e''| in the noise": exponent(
+            eps, [late(trace.force + trace.d) for trace in traces]
+        ),
     }
 
 
@@ -56,12 +74,16 @@ def end(trace):
 def output_feedback(runs):
     """Largest |x| of the last tenth of 12 s, over |x0|, on three plants that the law does not know."""
     traces = runs.traced(runs.grid())
-    shares = {plant: end(trace) / max(map(abs, trace.scenario.resolved.x0)) for (plant, *_), trace in traces.items()}
+    shares = {}
+    for (plant, *_), trace in traces.items():
+        shares[plant] = end(trace) / max(map(abs, trace.scenario.resolved.x0))
     return {"largest |x| of the last tenth / |x0|": shares}
 
 
 def standard_chatters(runs):
-    """Largest step of u of the last tenth of 12 s over 2 k, and half the range of the force behind the lag over k."""
+    """Largest step of u of the last tenth of 12 s over 2 k, and half the range of the force behind
+    the lag over k.
+    """
     steps, forces = {}, {}
     for (plant, *_), trace in runs.traced(runs.grid()).items():
         last, k = slice(-int(END_SHARE * len(trace.t)), -1), trace.scenario.law.gains["k"]
@@ -71,7 +93,13 @@ def standard_chatters(runs):
 
 
 def chattering(runs):
-    """Largest |x| of the last tenth under the nested law over that under the classical law, behind the same lag."""
+    """Largest |x| of the last tenth under the nested law over that under the classical law, behind
+    the same lag.
+    """
     ends = {cell[:2]: end(trace) for cell, trace in runs.traced(runs.grid()).items()}
     nested, classical = runs.laws
-    return {"largest |x|, nested / classical": {p: ends[p, nested] / ends[p, classical] for p in runs.plants}}
+    return {
+        "largest |x|, nested / classical": {
+            p: ends[p, nested] / ends[p, classical] for p in runs.plants
+        }
+    }

@@ -10,13 +10,19 @@ QUICK_PERIOD, FORCE = 5e-4, 13.0  # s, of a quick audit; N, the largest d with w
 
 
 def margins(gains):
-    """How far the largest disturbance D is below what the sampling allows, N: 2 sqrt(eps/h) - 1 - D."""
+    """How far the largest disturbance D is below what the sampling allows, N: 2 sqrt(eps/h) - 1 -
+    D.
+    """
     return {"D < 2 sqrt(eps/h) - 1, N": 2.0 * (gains["eps"] / QUICK_PERIOD) ** 0.5 - 1.0 - FORCE}
 
 
 def sampled(runs):
-    """Return the fields of a quick audit's runs, which are sampled more coarsely if the claim says how."""
-    return {"control_period": runs.values["quick_period"]} if runs.quick and "quick_period" in runs.values else {}
+    """Return the fields of a quick audit's runs, which are sampled more coarsely if the claim says
+    how.
+    """
+    if runs.quick and "quick_period" in runs.values:
+        return {"control_period": runs.values["quick_period"]}
+    return {}
 
 
 def by_condition(runs, measure):
@@ -27,22 +33,26 @@ def by_condition(runs, measure):
 
 def stays(runs):
     """Largest |s| of the last half of 8 s over eps, under d = D sin 2t with D = 0.5, 2 and 10 N."""
-    shares = {
-        f"{plant}, {condition}": largest(trace.s) / trace.scenario.law.gains["eps"]
-        for (plant, _, condition), trace in runs.traced(runs.grid(**sampled(runs))).items()
-    }
+    shares = {}
+    for (plant, _, condition), trace in runs.traced(runs.grid(**sampled(runs))).items():
+        shares[f"{plant}, {condition}"] = largest(trace.s) / trace.scenario.law.gains["eps"]
     return {"largest |s| of the last half / eps": shares}
 
 
 def limit(runs):
-    """Largest |s| of the last half over eps, under d = D sin 2t with D below and above 2 sqrt(eps/h) - 1."""
+    """Largest |s| of the last half over eps, under d = D sin 2t with D below and above 2
+    sqrt(eps/h) - 1.
+    """
     (plant,), (law,), measured = runs.plants, runs.laws, {}
     eps = runs.law(plant, law).gains["eps"]
     for side, share in zip(("below", "above"), runs.values["shares"], strict=True):
         grid = {}
         for h in runs.values["periods"]:
             size = share * (2.0 * (eps / h) ** 0.5 - 1.0)
-            adapted, d = runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size), smc.Sine(size, 2.0)
+            adapted, d = (
+                runs.law(plant, law, k_max=MAX_STEP_RATIO * eps / h - size),
+                smc.Sine(size, 2.0),
+            )
             name = f"{1e3 * h:g} ms, D = {size:.3g} N"
             grid[name] = runs.scenario(plant, law, law=adapted, control_period=h, disturbance=d)
         measured[f"{side}: largest |s| of the last half / eps"] = runs.measured(
@@ -53,7 +63,9 @@ def limit(runs):
 
 def predefined(runs):
     """Largest |s| of the last half of 8 s over eps = 0.3, 0.1 and 0.03, under d = 2 sin 2t."""
-    laws = {f"eps = {eps:g}": runs.law(runs.plant, *runs.laws, eps=eps) for eps in runs.values["widths"]}
+    laws = {}
+    for eps in runs.values["widths"]:
+        laws[f"eps = {eps:g}"] = runs.law(runs.plant, *runs.laws, eps=eps)
     grid = {name: runs.only(law=law, **sampled(runs)) for name, law in laws.items()}
     shares = runs.measured(grid, lambda trace: largest(trace.s) / trace.scenario.law.gains["eps"])
     return {"largest |s| of the last half / eps": shares}
@@ -61,19 +73,27 @@ def predefined(runs):
 
 def converges(runs):
     """Time from which |s| < eps in 8 s, from s0 = 0.5, 5 and 50 m/s, under d = 2 sin 2t."""
-    grid = {f"from {start:g} m/s": runs.only(v0=start, **sampled(runs)) for start in runs.values["starts"]}
-    times = runs.measured(grid, lambda trace: settled(trace, trace.s, trace.scenario.law.gains["eps"]))
+    grid = {}
+    for start in runs.values["starts"]:
+        grid[f"from {start:g} m/s"] = runs.only(v0=start, **sampled(runs))
+    times = runs.measured(
+        grid, lambda trace: settled(trace, trace.s, trace.scenario.law.gains["eps"])
+    )
     return {"time from which |s| < eps, s": times}
 
 
 def not_overestimated(runs):
-    """Largest |u|, which is the gain K as u = -K sgn s, of the last half of 8 s, over the largest |d|."""
+    """Largest |u|, which is the gain K as u = -K sgn s, of the last half of 8 s, over the largest
+    |d|.
+    """
     ratios = by_condition(runs, lambda trace: largest(trace.u) / largest(trace.d))
     return {"largest gain of the last half / largest |d|": ratios}
 
 
 def falls(runs):
-    """|u|, which is the gain K, at 4 s, in a pulse of 5 N from 1 to 5 s, and its largest value after 6 s."""
+    """|u|, which is the gain K, at 4 s, in a pulse of 5 N from 1 to 5 s, and its largest value
+    after 6 s.
+    """
     (trace,) = runs.traces(runs.grid(**sampled(runs)).values())
     inside, after = np.searchsorted(trace.t, (4.0, 6.0))
     gain, force = float(abs(trace.u[inside, 0])), float(abs(trace.d[inside, 0]))
@@ -84,7 +104,9 @@ def falls(runs):
 
 
 def within(runs):
-    """Largest |s| of the last half of 8 s over eps D / (1 + D), under d = D sin 2t with D = 0.5, 2 and 10 N."""
+    """Largest |s| of the last half of 8 s over eps D / (1 + D), under d = D sin 2t with D = 0.5, 2
+    and 10 N.
+    """
 
     def share(trace):
         bound = largest(trace.d)

@@ -15,7 +15,10 @@ TRIANGLE_PERIODS = 40  # periods of the triangle before its slope flips
 
 def margins(gains):
     """The two conditions of theorem 3.4, with |d'| <= 1."""
-    return {"k2 > L, N/s": gains["k2"] - L, "k1 > sqrt(k2 + L)": gains["k1"] - math.sqrt(gains["k2"] + L)}
+    return {
+        "k2 > L, N/s": gains["k2"] - L,
+        "k1 > sqrt(k2 + L)": gains["k1"] - math.sqrt(gains["k2"] + L),
+    }
 
 
 def slopes(period, duration, seed):
@@ -28,10 +31,16 @@ def slopes(period, duration, seed):
 
 
 def flip(period, sign):
-    """Return a triangle of slopes L and -L with mean 0 over a period, that keeps one slope after TRIANGLE_PERIODS."""
-    corners = sign * 0.5 * L * period * (-1.0) ** np.arange(TRIANGLE_PERIODS + 1)  # the last one is sign L T / 2
+    """Return a triangle of slopes L and -L with mean 0 over a period, that keeps one slope after
+    TRIANGLE_PERIODS.
+    """
+    corners = (
+        sign * 0.5 * L * period * (-1.0) ** np.arange(TRIANGLE_PERIODS + 1)
+    )  # the last one is sign L T / 2
     last = corners[-1] + sign * L * period
-    return smc.signals.TimeSeries((np.arange(TRIANGLE_PERIODS + 2) * period).tolist(), [*corners.tolist(), last])
+    return smc.signals.TimeSeries(
+        (np.arange(TRIANGLE_PERIODS + 2) * period).tolist(), [*corners.tolist(), last]
+    )
 
 
 def late(trace):
@@ -41,7 +50,9 @@ def late(trace):
 
 def random_runs(runs, law):
     """Return name -> largest |x| under random slopes, for each period and seed."""
-    seeds, periods = (runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods"))
+    seeds, periods = (
+        runs.values[name][: 1 if runs.quick else None] for name in ("seeds", "periods")
+    )
     grid, fields = {}, {"duration": 5.0, "v0": 0.1}
     for period, seed in itertools.product(periods, seeds):
         drawn = {"control_period": period, "disturbance": slopes(period, 5.0, seed)}
@@ -51,7 +62,9 @@ def random_runs(runs, law):
 
 
 def bounded(runs):
-    """Largest |x| of the last half of 5 s over L T^2, under slopes of L and -L drawn for each period."""
+    """Largest |x| of the last half of 5 s over L T^2, under slopes of L and -L drawn for each
+    period.
+    """
     return {"largest |x| of the last half / (L T^2)": random_runs(runs, runs.laws[0])}
 
 
@@ -75,32 +88,49 @@ def attained(runs):
 
 
 def best_possible(runs):
-    """The larger |x| over L T^2 of two runs under disturbances that a sampled law cannot tell apart, for seven laws."""
+    """The larger |x| over L T^2 of two runs under disturbances that a sampled law cannot tell
+    apart, for seven laws.
+    """
     (condition,) = runs.conditions
-    cells = [(law, sign) for law in runs.laws for sign in (1.0, -1.0)]
-    ends = [last(trace) for trace in runs.traces(flipped(runs, law, condition, sign) for law, sign in cells)]
+    cells = []
+    for law in runs.laws:
+        for sign in (1.0, -1.0):
+            cells.append((law, sign))
+    ends = []
+    for trace in runs.traces(flipped(runs, law, condition, sign) for law, sign in cells):
+        ends.append(last(trace))
     worse = np.reshape(ends, (-1, 2)).max(axis=1)
     return {"worse of the two |x| / (L T^2)": dict(zip(runs.laws, worse.tolist(), strict=True))}
 
 
 def compared(runs):
-    """Largest |x| of the last half of 5 s under random slopes, over that of the explicit and the older implicit law."""
+    """Largest |x| of the last half of 5 s under random slopes, over that of the explicit and the
+    older implicit law.
+    """
     proper, *others = runs.laws
     ours, ratios = random_runs(runs, proper), {}
     for law in others:
-        ratios |= {f"{law}, {name}": ours[name] / theirs for name, theirs in random_runs(runs, law).items()}
+        ratios |= {
+            f"{law}, {name}": ours[name] / theirs for name, theirs in random_runs(runs, law).items()
+        }
     return {"proper / other, largest |x| of the last half": ratios}
 
 
 def no_windup(runs):
-    """How far s goes beyond 0 from 20 m/s, over that of the law without conditioning; largest |x| of the last half."""
+    """How far s goes beyond 0 from 20 m/s, over that of the law without conditioning; largest |x|
+    of the last half.
+    """
     d = smc.Sine(1.5, 0.6)
     ours, plain = runs.traces(
-        runs.scenario(runs.plant, law, v0=runs.values["start"], u_max=runs.values["u_max"], disturbance=d)
+        runs.scenario(
+            runs.plant, law, v0=runs.values["start"], u_max=runs.values["u_max"], disturbance=d
+        )
         for law in runs.laws
     )
     beyond = [max(-float(trace.v[:-1].min()), 0.0) for trace in (ours, plain)]
     return {
-        "overshoot / that of the law without conditioning": beyond[0] / beyond[1] if beyond[1] else math.inf,
+        "overshoot / that of the law without conditioning": beyond[0] / beyond[1]
+        if beyond[1]
+        else math.inf,
         "largest |x| of the last half / (L T^2)": late(ours),
     }

@@ -32,21 +32,33 @@ def layer(runs):
     """Largest |s| of the last third of 30 s over mu, under d = D sin t with D = 0.5, 5 and 20 N."""
     mu = runs.law(runs.plant, *runs.laws).gains["mu"]
     shares = runs.measured(runs.grid(), lambda trace: float(np.abs(third(trace.v)).max()) / mu)
-    return {"largest |s| of the last third / mu": {cell[2]: share for cell, share in shares.items()}}
+    return {
+        "largest |s| of the last third / mu": {cell[2]: share for cell, share in shares.items()}
+    }
 
 
 def established(runs):
     """Time from which |s| stays within 5 mu in 30 s, from s0 = 0.1 to 100 m/s, under d = 5 sin t."""
     grid = {f"from {start:g} m/s": runs.only(v0=start) for start in runs.values["starts"]}
     band = BAND_IN_LAYERS * runs.law(runs.plant, *runs.laws).gains["mu"]
-    return {"time from which |s| <= 5 mu, s": runs.measured(grid, lambda trace: settled(trace, trace.v, band))}
+    return {
+        "time from which |s| <= 5 mu, s": runs.measured(
+            grid, lambda trace: settled(trace, trace.v, band)
+        )
+    }
 
 
 def narrower(runs):
-    """Exponent of the largest |s| of the last third of 30 s as a function of mu, 1 to 4 cm/s, under d = 5 sin t."""
+    """Exponent of the largest |s| of the last third of 30 s as a function of mu, 1 to 4 cm/s, under
+    d = 5 sin t.
+    """
     layers = runs.values["layers"]
     traces = runs.traces(runs.only(law=runs.law(runs.plant, *runs.laws, mu=mu)) for mu in layers)
-    return {"exponent of the largest |s| in mu": exponent(layers, [np.abs(third(one.v)).max() for one in traces])}
+    return {
+        "exponent of the largest |s| in mu": exponent(
+            layers, [np.abs(third(one.v)).max() for one in traces]
+        )
+    }
 
 
 def not_overestimated(runs):
@@ -64,9 +76,13 @@ def not_overestimated(runs):
 
 
 def calmer(runs):
-    """Total variation of u of the last third of 30 s under d = 0.5 sin t, over that of super-twisting with L = 20."""
+    """Total variation of u of the last third of 30 s under d = 0.5 sin t, over that of
+    super-twisting with L = 20.
+    """
     adaptive, fixed = runs.traces(runs.grid().values())
-    ours, theirs = (float(np.abs(np.diff(third(trace.u), axis=0)).sum()) for trace in (adaptive, fixed))
+    ours, theirs = (
+        float(np.abs(np.diff(third(trace.u), axis=0)).sum()) for trace in (adaptive, fixed)
+    )
     mu = adaptive.scenario.law.gains["mu"]
     return {
         "variation of u, adaptive / fixed": ours / theirs,

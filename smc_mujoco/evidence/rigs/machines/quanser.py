@@ -1,7 +1,9 @@
-"""Quanser's rigs: QUBE-Servo 2, IP02 cart and SRV02 rotary pendulum by their published parameters; QUBE-Servo 3.
+"""Quanser's rigs:
 
-The QUBE-Servo 3 is a twin: `python benchmarks/qube_servo_3.py` finds its numbers in two public records of one machine.
-The dead bands of the amplifiers are left out.
+QUBE-Servo 2, IP02 cart and SRV02 rotary pendulum by their published parameters; QUBE-Servo 3.
+
+The QUBE-Servo 3 is a twin: `python benchmarks/qube_servo_3.py` finds its numbers in two public
+records of one machine. The dead bands of the amplifiers are left out.
 """
 
 import itertools
@@ -20,9 +22,7 @@ from smc_mujoco.simulation.signals import Constant
 
 DRIVER = "BlueRiverTech/quanser-openai-driver (MIT)"
 QUBE_3 = "Quanser's qube3_rotpen_param.m and user manual (no licence stated)"
-THESIS = (
-    "P. A. Bermeo Garcia and S. S. Guazhima Fernandez, Gemelo digital del pendulo de Furuta QUBE-Servo 3, 2026 (MIT)"
-)
+THESIS = "P. A. Bermeo Garcia and S. S. Guazhima Fernandez, Gemelo digital del pendulo de Furuta QUBE-Servo 3, 2026 (MIT)"
 STEP = f"identified here from a step of 1 V and ten free falls of {THESIS}"
 IP02 = "Quanser, IP02 linear servo, user manual (no licence stated)"
 LONG_SOURCE = "Quanser's setup_sp_configuration.m, pendulum LONG_24IN (no licence stated)"
@@ -30,97 +30,185 @@ SRV02 = "Quanser, SRV02 rotary servo and pendulum, user manuals (no licence stat
 
 
 def motor(q):
-    """Return motor and gearbox, whose efficiency divides resistance and inductance: less torque per volt."""
+    """Return motor and gearbox, whose efficiency divides resistance and inductance: less torque per
+    volt.
+    """
     return DCMotor(
-        resistance=q.resistance / q.efficiency, inductance=q.inductance / q.efficiency,
-        torque_constant=q.torque_constant, gear=q.gear, rotor_inertia=q.rotor_inertia, voltage=q.voltage,
-        current=math.inf, command="voltage",
-    )  # fmt: skip
+        resistance=q.resistance / q.efficiency,
+        inductance=q.inductance / q.efficiency,
+        torque_constant=q.torque_constant,
+        gear=q.gear,
+        rotor_inertia=q.rotor_inertia,
+        voltage=q.voltage,
+        current=math.inf,
+        command="voltage",
+    )
 
 
 def rotary(q):
     """Return the fields of a scenario of a rotary pendulum."""
     cabled = {name: getattr(q, key) for name, key in CABLED.items() if hasattr(q, key)}
     furuta = plant(
-        "furuta", J=q.arm_inertia, L=q.arm_length, m=q.pendulum_mass, l=q.pendulum_centre, Jc=q.pendulum_inertia,
-        b=q.arm_damping, bq=q.pendulum_damping, **cabled,
-    )  # fmt: skip
+        "furuta",
+        J=q.arm_inertia,
+        L=q.arm_length,
+        m=q.pendulum_mass,
+        l=q.pendulum_centre,
+        Jc=q.pendulum_inertia,
+        b=q.arm_damping,
+        bq=q.pendulum_damping,
+        **cabled,
+    )
     fields = {
-        "plant": furuta, "actuator": motor(q), "sensor": Encoder(counts=round(q.counts)), "control_period": 2e-3,
+        "plant": furuta,
+        "actuator": motor(q),
+        "sensor": Encoder(counts=round(q.counts)),
+        "control_period": 2e-3,
         "x0": (0.0, 0.1),
-    }  # fmt: skip
+    }
     if level := getattr(q, "cable_friction", 0.0):  # the cable's bristles, without a Stribeck drop
-        fields["friction"] = LuGre(level, level, 1.0, q.cable_stiffness, BRISTLE_DAMPING, driven=True)
+        fields["friction"] = LuGre(
+            level, level, 1.0, q.cable_stiffness, BRISTLE_DAMPING, driven=True
+        )
     return fields
 
 
 def linear(q):
     """Return the fields of a scenario of a cart with a pole."""
-    cart = plant("cart_pole", M=q.cart_mass, m=q.pole_mass, l=q.pole_half_length, b=q.cart_damping, bq=q.pole_damping)
+    cart = plant(
+        "cart_pole",
+        M=q.cart_mass,
+        m=q.pole_mass,
+        l=q.pole_half_length,
+        b=q.cart_damping,
+        bq=q.pole_damping,
+    )
     return {
-        "plant": cart, "actuator": motor(q), "sensor": Encoder(counts=round(q.counts)), "control_period": 1e-3,
+        "plant": cart,
+        "actuator": motor(q),
+        "sensor": Encoder(counts=round(q.counts)),
+        "control_period": 1e-3,
         "x0": (0.0, 0.1),
-    }  # fmt: skip
+    }
 
 
-BRISTLE_DAMPING = 1e-6  # N m s/rad; chosen: more than their stiffness times a step, and nothing beside the arm's
+BRISTLE_DAMPING = (
+    1e-6  # N m s/rad; chosen: more than their stiffness times a step, and nothing beside the arm's
+)
 CABLED = {"cfq": "pendulum_friction", "k": "cable", "grav": "gravity"}  # plant's name -> quantity
 UNITS = {  # quantity -> unit, and range
-    "resistance": ("ohm", 1e-3), "inductance": ("H", 0.0), "torque_constant": ("N m/A", 1e-6),
-    "rotor_inertia": ("kg m^2", 0.0), "gear": ("", 1e-3), "efficiency": ("", 0.01, 1.0), "voltage": ("V", 0.1),
-    "arm_inertia": ("kg m^2", 1e-7), "arm_length": ("m", 1e-3), "arm_damping": ("N m s/rad", 0.0),
-    "pendulum_mass": ("kg", 1e-4), "pendulum_centre": ("m", 1e-3), "pendulum_inertia": ("kg m^2", 1e-8),
-    "pendulum_damping": ("N m s/rad", 0.0), "counts": ("1/turn", 2.0),
-    "pendulum_friction": ("N m", 0.0), "cable": ("N m/rad", 0.0),
-    "cable_friction": ("N m", 0.0), "cable_stiffness": ("N m/rad", 1e-6), "gravity": ("m/s^2", 1.0),
-}  # fmt: skip
+    "resistance": ("ohm", 1e-3),
+    "inductance": ("H", 0.0),
+    "torque_constant": ("N m/A", 1e-6),
+    "rotor_inertia": ("kg m^2", 0.0),
+    "gear": ("", 1e-3),
+    "efficiency": ("", 0.01, 1.0),
+    "voltage": ("V", 0.1),
+    "arm_inertia": ("kg m^2", 1e-7),
+    "arm_length": ("m", 1e-3),
+    "arm_damping": ("N m s/rad", 0.0),
+    "pendulum_mass": ("kg", 1e-4),
+    "pendulum_centre": ("m", 1e-3),
+    "pendulum_inertia": ("kg m^2", 1e-8),
+    "pendulum_damping": ("N m s/rad", 0.0),
+    "counts": ("1/turn", 2.0),
+    "pendulum_friction": ("N m", 0.0),
+    "cable": ("N m/rad", 0.0),
+    "cable_friction": ("N m", 0.0),
+    "cable_stiffness": ("N m/rad", 1e-6),
+    "gravity": ("m/s^2", 1.0),
+}
 
 
 def quantities(source, **values):
     """Return name -> Quantity, from numbers of one source in UNITS."""
     values = {name: values[name] for name in UNITS if name in values}
-    return {name: Quantity(value, UNITS[name][0], source, *UNITS[name][1:]) for name, value in values.items()}
+    return {
+        name: Quantity(value, UNITS[name][0], source, *UNITS[name][1:])
+        for name, value in values.items()
+    }
 
 
 QUBE_SERVO_2 = Rig(
     name="qube_servo_2",
     label="QUBE-Servo 2 with rotary pendulum, by its published parameters",
     quantities=quantities(
-        DRIVER, resistance=8.4, inductance=1.16e-3, torque_constant=0.042, rotor_inertia=4e-6, gear=1.0, efficiency=1.0,
-        voltage=10.0, arm_inertia=0.095 * 0.085**2 / 12.0, arm_length=0.085, arm_damping=5e-5, pendulum_mass=0.024,
-        pendulum_centre=0.129 / 2, pendulum_inertia=0.024 * 0.129**2 / 12, pendulum_damping=2.5e-6, counts=2048.0,
+        DRIVER,
+        resistance=8.4,
+        inductance=1.16e-3,
+        torque_constant=0.042,
+        rotor_inertia=4e-6,
+        gear=1.0,
+        efficiency=1.0,
+        voltage=10.0,
+        arm_inertia=0.095 * 0.085**2 / 12.0,
+        arm_length=0.085,
+        arm_damping=5e-5,
+        pendulum_mass=0.024,
+        pendulum_centre=0.129 / 2,
+        pendulum_inertia=0.024 * 0.129**2 / 12,
+        pendulum_damping=2.5e-6,
+        counts=2048.0,
     ),
     machine=rotary,
     about="The arm's inertia is m r^2/12. With m r^2/3 a controller that balances the machine lets the twin fall.",
-)  # fmt: skip
-FOUND = ("resistance", "arm_inertia", "arm_damping", "cable", "cable_friction", "cable_stiffness")  # of the sets below
-QUBE_3_SETS = (  # identified; with a third and with three times the weight of the way back from the stop
+)
+FOUND = (
+    "resistance",
+    "arm_inertia",
+    "arm_damping",
+    "cable",
+    "cable_friction",
+    "cable_stiffness",
+)  # of the sets below
+# identified; with a third and with three times the weight of the way back from the stop
+QUBE_3_SETS = (
     (7.732, 8.757e-5, 2.842e-4, 2.011e-3, 1.813e-3, 2.734e-3),
     (7.829, 8.655e-5, 2.832e-4, 2.079e-3, 1.625e-3, 2.465e-3),
     (7.391, 9.578e-5, 2.492e-4, 2.508e-3, 1.225e-3, 4.398e-3),
 )
-# V/rad and V s/rad: the surface of least quadratic cost of the first set, with the weights of `rotary_swing_up`
+# V/rad and V s/rad: the surface of least quadratic cost of the first set, with the weights of
+# `rotary_swing_up`
 QUBE_3_SURFACE = {"c1": -4.48198, "c2": -44.6088, "c3": -1.99339, "c4": -3.83042}
 QUBE_SERVO_3 = Rig(
     name="qube_servo_3",
     label="QUBE-Servo 3 with rotary pendulum, identified from public records",
     quantities=quantities(
-        QUBE_3, inductance=1.15e-3, torque_constant=0.0422, rotor_inertia=1.4e-6, gear=1.0, efficiency=1.0,
-        voltage=10.0, arm_length=0.085, counts=2048.0,
+        QUBE_3,
+        inductance=1.15e-3,
+        torque_constant=0.0422,
+        rotor_inertia=1.4e-6,
+        gear=1.0,
+        efficiency=1.0,
+        voltage=10.0,
+        arm_length=0.085,
+        counts=2048.0,
     )
     | quantities(STEP, **dict(zip(FOUND, QUBE_3_SETS[0], strict=True)))
     | quantities(
-        THESIS, pendulum_mass=0.024, pendulum_centre=0.12865 / 2, pendulum_inertia=0.024 * 0.12865**2 / 12,
-        pendulum_damping=0.0, pendulum_friction=6.1e-6, gravity=9.7807,
+        THESIS,
+        pendulum_mass=0.024,
+        pendulum_centre=0.12865 / 2,
+        pendulum_inertia=0.024 * 0.12865**2 / 12,
+        pendulum_damping=0.0,
+        pendulum_friction=6.1e-6,
+        gravity=9.7807,
     ),
     machine=rotary,
     identified_from=("step of 1 V", "ten free falls"),
     free=FOUND,
     published={
         "quanser": {
-            "resistance": 7.5, "arm_inertia": 0.095 * 0.085**2 / 3, "arm_damping": 1e-3, "cable": 0.0,
-            "cable_friction": 0.0, "pendulum_centre": 0.129 / 2, "pendulum_inertia": 0.024 * 0.129**2 / 12,
-            "pendulum_damping": 5e-5, "pendulum_friction": 0.0, "gravity": 9.81,
+            "resistance": 7.5,
+            "arm_inertia": 0.095 * 0.085**2 / 3,
+            "arm_damping": 1e-3,
+            "cable": 0.0,
+            "cable_friction": 0.0,
+            "pendulum_centre": 0.129 / 2,
+            "pendulum_inertia": 0.024 * 0.129**2 / 12,
+            "pendulum_damping": 5e-5,
+            "pendulum_friction": 0.0,
+            "gravity": 9.81,
             "source": f"{QUBE_3}: m r^2/3 for the arm, which is 2.6 times what the records say",
         },
     },
@@ -133,12 +221,15 @@ QUBE_SERVO_3 = Rig(
     "turn of the arm, and hardly any from a fall. Without it the sum of squares is four times as large, and with an "
     "amplifier that brakes in falls 1.7 times. The thesis measured 0.71e-3 N m and 1.19e-3 N m/rad of the cable at "
     "rest, half of the friction and of the spring found here.",
-)  # fmt: skip
+)
 FALLS = 25.0, 19.0, 13.0  # degrees, of falls that cover the machine's swings of 8 to 25
 
 
-def moved(twin: Rig, volts: float | None, angle: float, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return times, the arm's angle and the pendulum's from hanging, of a QUBE-Servo that starts at rest.
+def moved(
+    twin: Rig, volts: float | None, angle: float, duration: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times, the arm's angle and the pendulum's from hanging, of a QUBE-Servo that starts at
+    rest.
 
     `volts`: None for an open circuit, in which only the rotor's inertia is left of the motor.
     """
@@ -153,14 +244,18 @@ def moved(twin: Rig, volts: float | None, angle: float, duration: float) -> tupl
 
 
 def falls(twin: Rig) -> tuple[float, float]:
-    """Return frequency, Hz, and damping ratio of the pendulum, means of the first periods of FALLS, circuit open."""
+    """Return frequency, Hz, and damping ratio of the pendulum, means of the first periods of FALLS,
+    circuit open.
+    """
     found = []
     for angle in map(math.radians, FALLS):
         t, _, a = moved(twin, None, angle, 1.2)
         i = np.flatnonzero(a[:-1] * a[1:] < 0.0)
         crossings = t[i] + (t[i + 1] - t[i]) * a[i] / (a[i] - a[i + 1])
         peaks = [np.abs(a[j:k]).max() for j, k in itertools.pairwise(i[:4])]
-        found.append((1.0 / (crossings[2] - crossings[0]), math.log(peaks[0] / peaks[2]) / math.tau))
+        found.append(
+            (1.0 / (crossings[2] - crossings[0]), math.log(peaks[0] / peaks[2]) / math.tau)
+        )
     frequency, damping = np.mean(found, axis=0)
     return float(frequency), float(damping)
 
@@ -169,24 +264,45 @@ SRV02_PENDULUM = Rig(
     name="srv02",
     label="SRV02 with rotary pendulum, by its published parameters",
     quantities=quantities(
-        SRV02, resistance=2.6, inductance=0.18e-3, torque_constant=7.68e-3, rotor_inertia=3.9e-7, gear=70.0,
-        efficiency=0.9 * 0.69, voltage=10.0, arm_inertia=2e-3, arm_length=0.216, arm_damping=2.4e-3,
-        pendulum_mass=0.127, pendulum_centre=0.156, pendulum_inertia=1.2e-3, pendulum_damping=2.4e-3, counts=4096.0,
+        SRV02,
+        resistance=2.6,
+        inductance=0.18e-3,
+        torque_constant=7.68e-3,
+        rotor_inertia=3.9e-7,
+        gear=70.0,
+        efficiency=0.9 * 0.69,
+        voltage=10.0,
+        arm_inertia=2e-3,
+        arm_length=0.216,
+        arm_damping=2.4e-3,
+        pendulum_mass=0.127,
+        pendulum_centre=0.156,
+        pendulum_inertia=1.2e-3,
+        pendulum_damping=2.4e-3,
+        counts=4096.0,
     ),
     machine=rotary,
-)  # fmt: skip
+)
 IP02_CART = Rig(
     name="ip02",
     label="IP02 cart with a pendulum, by its published parameters",
     quantities=quantities(
-        IP02, resistance=2.6, inductance=0.18e-3, torque_constant=7.67e-3, rotor_inertia=3.9e-7, gear=3.71 / 6.35e-3,
-        efficiency=1.0, voltage=10.0,
+        IP02,
+        resistance=2.6,
+        inductance=0.18e-3,
+        torque_constant=7.67e-3,
+        rotor_inertia=3.9e-7,
+        gear=3.71 / 6.35e-3,
+        efficiency=1.0,
+        voltage=10.0,
     )
     | {
         "cart_mass": Quantity(0.57, "kg", f"{IP02}; 0.94 with its weight", 0.01),
         "cart_damping": Quantity(5.4, "N s/m", f"{IP02}; 4.3 without its weight", 0.0),
         "pole_mass": Quantity(0.23, "kg", LONG_SOURCE, 1e-3),
-        "pole_half_length": Quantity(0.3302, "m", f"{LONG_SOURCE}, pivot to centre of gravity", 1e-3),
+        "pole_half_length": Quantity(
+            0.3302, "m", f"{LONG_SOURCE}, pivot to centre of gravity", 1e-3
+        ),
         "pole_damping": Quantity(2.4e-3, "N m s/rad", LONG_SOURCE, 0.0),
         "counts": Quantity(4096.0, "1/turn", f"{IP02}, of the pendulum", 2.0),
     },
@@ -194,4 +310,4 @@ IP02_CART = Rig(
     about="The pole is uniform, with 6 % more inertia about its centre than Quanser's, whose tip is 0.6413 m from the "
     "hinge. The cart's position has the pendulum's 4096 counts, for a metre in place of a turn. The counts of the "
     "machine are 22.75 um.",
-)  # fmt: skip
+)

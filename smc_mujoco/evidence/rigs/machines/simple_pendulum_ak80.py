@@ -1,8 +1,8 @@
 """Torque-limited simple pendulum on an AK80-6 motor, which takes torques.
 
-The masses and lengths of its links matter only through the inertia J and the moment m c of their weight. The plant has
-a point mass (m c)^2 / J at the distance J / (m c) instead. Positions are 0 hanging in records, and 0 upright in the
-plant.
+The masses and lengths of its links matter only through the inertia J and the moment m c of their
+weight. The plant has a point mass (m c)^2 / J at the distance J / (m c) instead. Positions are 0
+hanging in records, and 0 upright in the plant.
 """
 
 import math
@@ -32,7 +32,8 @@ def machine(q):
     }
 
 
-# Found by smc.tune on the quantities below: 96 sets of gains, seed 0, starts within 20 % of 0.3 rad, |u| <= 6 N m.
+# Found by smc.tune on the quantities below: 96 sets of gains, seed 0, starts within 20 % of 0.3
+# rad, |u| <= 6 N m.
 SEARCH = Search(rule="differential evolution", evaluations=96)
 LAWS = (
     law("observer_free", lam=2.749, k1=18.27).sourced(SHIPPED, SEARCH),

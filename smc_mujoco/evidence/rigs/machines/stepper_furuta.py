@@ -1,7 +1,9 @@
-"""Rotary pendulum on a stepper motor: a hobbyist's machine whose public recordings ran two sliding modes.
+"""Rotary pendulum on a stepper motor: a hobbyist's machine whose public recordings ran two sliding
+modes.
 
-Nothing of the recordings is here but figures of those under the linear law, from which the ensemble was found. The sets
-are draws whose simulated recordings have these figures, see benchmarks/stepper_furuta.py.
+Nothing of the recordings is here but figures of those under the linear law, from which the ensemble
+was found. The sets are draws whose simulated recordings have these figures, see
+benchmarks/stepper_furuta.py.
 """
 
 import math
@@ -9,7 +11,14 @@ import math
 import numpy as np
 
 from smc_mujoco.evidence.rigs.controllers import rotary
-from smc_mujoco.evidence.rigs.firmware import DEGREES, FOUR_STATES, LINEAR, TICK, TWO_STATES, firmware
+from smc_mujoco.evidence.rigs.firmware import (
+    DEGREES,
+    FOUR_STATES,
+    LINEAR,
+    TICK,
+    TWO_STATES,
+    firmware,
+)
 from smc_mujoco.evidence.rigs.predictions import Prediction
 from smc_mujoco.evidence.rigs.records import Columns
 from smc_mujoco.evidence.rigs.rig import Quantity, Rig
@@ -24,13 +33,12 @@ MACHINE = "Piyushiitk24/Rotary-Inverted-Pendulum at 05a9ffa (no licence stated)"
 FORMULA = f"{MACHINE}: from formulas, not identified"
 LIBRARY = "FastAccelStepper 0.33.9 (MIT) on an ATmega2560"
 MEMORY = "from memory of a data sheet, not verified"
-FOUND = (
-    "identified here: a draw whose runs under the linear law have the recorded figures, benchmarks/stepper_furuta.py"
-)
+FOUND = "identified here: a draw whose runs under the linear law have the recorded figures, benchmarks/stepper_furuta.py"
 ABLATED = "its number here is the machine's; 0 leaves it out"
 STEP = 2.5e-4  # s
 ARM_INERTIA = 1.104e-3  # kg m^2, with the pendulum's mass on the arm's end; N m per rad/s^2 of u
-# 1/s^2 and 1/s: the surface of least quadratic cost of the machine's own model, with the weights of `rotary_swing_up`
+# 1/s^2 and 1/s: the surface of least quadratic cost of the machine's own model, with the weights of
+# `rotary_swing_up`
 SURFACE = {"c1": -20.2542, "c2": -227.487, "c3": -12.589, "c4": -22.2163}
 LAWS = (
     firmware(kind=LINEAR).named("linear"),
@@ -42,19 +50,34 @@ LAWS = (
 def machine(q):
     """Return the fields of a scenario."""
     pendulum = plant(
-        "furuta", J=q.arm_inertia - q.pendulum_mass * q.arm_length**2, L=q.arm_length, m=q.pendulum_mass,
-        l=q.pendulum_centre, Jc=q.pendulum_inertia - q.pendulum_mass * q.pendulum_centre**2, bq=q.pivot_damping,
-        cf=q.arm_friction, cfq=q.pivot_friction,
-    )  # fmt: skip
+        "furuta",
+        J=q.arm_inertia - q.pendulum_mass * q.arm_length**2,
+        L=q.arm_length,
+        m=q.pendulum_mass,
+        l=q.pendulum_centre,
+        Jc=q.pendulum_inertia - q.pendulum_mass * q.pendulum_centre**2,
+        bq=q.pivot_damping,
+        cf=q.arm_friction,
+        cfq=q.pivot_friction,
+    )
     step = math.tau / 1600.0  # of the firmware, rad
     motor = Stepper(
-        steps=round(q.steps) or math.inf, torque=q.holding_torque, damping=q.arm_damping, rotor_inertia=0.0,
-        speed=15e3 * step, ramp=20e3 * step, stop_band=q.stop_band * step, queue=q.queue, refill=q.refill,
-    )  # fmt: skip
+        steps=round(q.steps) or math.inf,
+        torque=q.holding_torque,
+        damping=q.arm_damping,
+        rotor_inertia=0.0,
+        speed=15e3 * step,
+        ramp=20e3 * step,
+        stop_band=q.stop_band * step,
+        queue=q.queue,
+        refill=q.refill,
+    )
     return {
         "plant": pendulum,
         "actuator": motor,
-        "sensor": Encoder(round(q.counts) or math.inf, q.upright_error, delay=q.sensor_delay, skew=q.sensor_skew),
+        "sensor": Encoder(
+            round(q.counts) or math.inf, q.upright_error, delay=q.sensor_delay, skew=q.sensor_skew
+        ),
         "noise": Noise(position=q.sensor_noise),
         "clock": Clock(pause=q.pause),
         "disturbance": OrnsteinUhlenbeck(q.vibration, 0.05, 5e-3) if q.vibration else None,
@@ -66,7 +89,9 @@ def machine(q):
 
 
 def start(seed):
-    """Return where the pendulum is let go, rad: 0.5 to 1 degrees from upright, so that the firmware engages near 2."""
+    """Return where the pendulum is let go, rad: 0.5 to 1 degrees from upright, so that the firmware
+    engages near 2.
+    """
     random = np.random.default_rng(seed)
     return 0.0, math.radians(random.uniform(0.5, 1.0)) * random.choice((-1, 1))
 
@@ -82,9 +107,16 @@ def steps_of(*targets):
 
 
 NAMES = (
-    "holding_torque", "arm_damping", "arm_friction", "pivot_friction", "pivot_damping", "upright_error", "sensor_noise",
-    "vibration", "pendulum_inertia",
-)  # fmt: skip
+    "holding_torque",
+    "arm_damping",
+    "arm_friction",
+    "pivot_friction",
+    "pivot_damping",
+    "upright_error",
+    "sensor_noise",
+    "vibration",
+    "pendulum_inertia",
+)
 SETS = (  # of the quantities above, as benchmarks/stepper_furuta.py prints them, the nearest first
     (0.1404, 0.006761, 0.00792, 0.0001499, 8.631e-05, 0.005923, 9.895e-05, 0.007587, 0.0001036),
     (0.1494, 0.006834, 0.007885, 0.0001388, 6.145e-05, 0.003578, 0.0004589, 0.00637, 0.0001034),
@@ -98,12 +130,18 @@ SETS = (  # of the quantities above, as benchmarks/stepper_furuta.py prints them
 BEST = dict(zip(NAMES, SETS[0], strict=True))
 SECOND = (0.1991, 0.01633, 0.003776, 0.0001473, 0.0002129, -0.01205, 0.0001302, 0.004392, 9.59e-05)
 QUANTITIES = {
-    "arm_inertia": Quantity(ARM_INERTIA, "kg m^2", f"{FORMULA}; with the pendulum's mass on its end", 5e-4, 1e-2),
+    "arm_inertia": Quantity(
+        ARM_INERTIA, "kg m^2", f"{FORMULA}; with the pendulum's mass on its end", 5e-4, 1e-2
+    ),
     "arm_length": Quantity(0.19, "m", MACHINE, 0.01, 1.0),
     "pendulum_mass": Quantity(11.962e-3, "kg", MACHINE, 1e-3, 0.1),
     "pendulum_centre": Quantity(0.08768, "m", FORMULA, 0.01, 1.0),
     "pendulum_inertia": Quantity(
-        BEST["pendulum_inertia"], "kg m^2", f"{FOUND}; about the pivot, 1.0215e-4 by formula", 1e-5, 1e-2
+        BEST["pendulum_inertia"],
+        "kg m^2",
+        f"{FOUND}; about the pivot, 1.0215e-4 by formula",
+        1e-5,
+        1e-2,
     ),
     "holding_torque": Quantity(BEST["holding_torque"], "N m", FOUND, 1e-3, 100.0),
     "arm_damping": Quantity(BEST["arm_damping"], "N m s/rad", FOUND, 0.0, 1.0),
@@ -112,11 +150,17 @@ QUANTITIES = {
     "pivot_damping": Quantity(BEST["pivot_damping"], "N m s/rad", FOUND, 0.0, 1e-2),
     "upright_error": Quantity(BEST["upright_error"], "rad", FOUND, -0.1, 0.1),
     "sensor_noise": Quantity(BEST["sensor_noise"], "rad", FOUND, 0.0, 0.01),
-    "vibration": Quantity(BEST["vibration"], "N m", f"{FOUND}; rms on the arm, correlated over 0.05 s", 0.0, 1.0),
+    "vibration": Quantity(
+        BEST["vibration"], "N m", f"{FOUND}; rms on the arm, correlated over 0.05 s", 0.0, 1.0
+    ),
     "counts": Quantity(4096.0, "", f"{MACHINE}; {ABLATED}", 0.0, 1e6),
     "sensor_delay": Quantity(2e-3, "s", f"chosen: AS5600's default filter, {MEMORY}", 0.0, 0.01),
-    "sensor_skew": Quantity(5e-4, "s", f"{MACHINE}: one bus, the pendulum's sensor is read first", 0.0, 0.01),
-    "pause": Quantity(7.3e-3, "s", f"{MACHINE}: its longest ticks; a line of text a second", 0.0, 0.1),
+    "sensor_skew": Quantity(
+        5e-4, "s", f"{MACHINE}: one bus, the pendulum's sensor is read first", 0.0, 0.01
+    ),
+    "pause": Quantity(
+        7.3e-3, "s", f"{MACHINE}: its longest ticks; a line of text a second", 0.0, 0.1
+    ),
     "steps": Quantity(1600.0, "", f"{MACHINE}; {ABLATED}", 0.0, 1e6),
     "stop_band": Quantity(50.0, "steps/s", f"{MACHINE}; {ABLATED}", 0.0, 1e4),
     "queue": Quantity(0.02, "s", LIBRARY, 0.0, 1.0),
@@ -124,13 +168,28 @@ QUANTITIES = {
 }
 STIFF = {"holding_torque": 20.0, "arm_damping": 0.5}  # a spring of 150 Hz
 PLAIN = STIFF | dict.fromkeys(
-    ("steps", "arm_friction", "pivot_friction", "pivot_damping", "upright_error", "sensor_noise", "vibration", "counts",
-     "sensor_delay", "sensor_skew", "pause"), 0.0,
-)  # fmt: skip
+    (
+        "steps",
+        "arm_friction",
+        "pivot_friction",
+        "pivot_damping",
+        "upright_error",
+        "sensor_noise",
+        "vibration",
+        "counts",
+        "sensor_delay",
+        "sensor_skew",
+        "pause",
+    ),
+    0.0,
+)
 PREDICTION = Prediction(
     conditions={
         "hold": {"duration": 70.0},
-        "nudges": {"duration": 50.3, "reference": steps_of((15.0, 20.0), (24.34, -20.0), (36.73, 0.0))},
+        "nudges": {
+            "duration": 50.3,
+            "reference": steps_of((15.0, 20.0), (24.34, -20.0), (36.73, 0.0)),
+        },
     },
     start=start,
     figures=lambda trace: figures(logged(trace)),
@@ -138,17 +197,47 @@ PREDICTION = Prediction(
     shown=("alpha_rms", "acceleration_rms", "running", "centroid"),
     recorded={
         "hold": {
-            "alpha_rms": 0.439, "alpha_max": 3.82, "theta_std": 2.28, "theta_max": 10.8, "alpha_rate_rms": 16.3,
-            "theta_rate_rms": 9.3, "acceleration_rms": 1066.0, "speed_rms": 33.0, "running": 0.064, "resting": 0.80,
-            "resting_50": 0.21, "resting_90": 0.47, "second_25": 0.018, "second_50": 0.064, "second_75": 0.40,
+            "alpha_rms": 0.439,
+            "alpha_max": 3.82,
+            "theta_std": 2.28,
+            "theta_max": 10.8,
+            "alpha_rate_rms": 16.3,
+            "theta_rate_rms": 9.3,
+            "acceleration_rms": 1066.0,
+            "speed_rms": 33.0,
+            "running": 0.064,
+            "resting": 0.80,
+            "resting_50": 0.21,
+            "resting_90": 0.47,
+            "second_25": 0.018,
+            "second_50": 0.064,
+            "second_75": 0.40,
             "second_90": 0.78,
-            "centroid": 4.73, "ratio": 1.85, "phase": -174.5, "gain": 1.15, "lag": -81.0,
+            "centroid": 4.73,
+            "ratio": 1.85,
+            "phase": -174.5,
+            "gain": 1.15,
+            "lag": -81.0,
         },
         "nudges": {
-            "alpha_rms": 0.844, "alpha_max": 3.65, "theta_std": 12.57, "theta_max": 29.6, "alpha_rate_rms": 31.1,
-            "theta_rate_rms": 18.0, "acceleration_rms": 2005.0, "speed_rms": 57.3, "running": 0.260, "centroid": 4.69,
-            "second_25": 0.47, "second_50": 0.75, "second_75": 1.03, "second_90": 1.27,
-            "ratio": 1.82, "phase": -173.4, "gain": 1.21, "lag": -81.0,
+            "alpha_rms": 0.844,
+            "alpha_max": 3.65,
+            "theta_std": 12.57,
+            "theta_max": 29.6,
+            "alpha_rate_rms": 31.1,
+            "theta_rate_rms": 18.0,
+            "acceleration_rms": 2005.0,
+            "speed_rms": 57.3,
+            "running": 0.260,
+            "centroid": 4.69,
+            "second_25": 0.47,
+            "second_50": 0.75,
+            "second_75": 1.03,
+            "second_90": 1.27,
+            "ratio": 1.82,
+            "phase": -173.4,
+            "gain": 1.21,
+            "lag": -81.0,
         },
     },
     fitted_on="linear",
@@ -164,7 +253,7 @@ PREDICTION = Prediction(
     },
     about="The figures of the linear law were fitted on; all of the sliding modes are predicted, and their recordings "
     "were not opened. Only the order of the three laws on the machine is known here.",
-)  # fmt: skip
+)
 STEPPER_FURUTA = Rig(
     name="stepper_furuta",
     label="Rotary pendulum on a stepper motor",
@@ -172,11 +261,15 @@ STEPPER_FURUTA = Rig(
     machine=machine,
     controller=LAWS[0],
     columns=Columns(x=("theta", "alpha"), u="u", reference="target"),
-    identified_from=tuple(f"{condition}, {PREDICTION.fitted_on}" for condition in PREDICTION.recorded),
+    identified_from=tuple(
+        f"{condition}, {PREDICTION.fitted_on}" for condition in PREDICTION.recorded
+    ),
     free=NAMES,
     published={
         "second_search": dict(zip(NAMES, SECOND, strict=True))
-        | {"source": f"{FOUND} second: the one set of 16 whose runs allow the recorded rms of the hold"},
+        | {
+            "source": f"{FOUND} second: the one set of 16 whose runs allow the recorded rms of the hold"
+        },
     },
     ensemble=tuple(dict(zip(NAMES, values, strict=True)) for values in SETS[1:]),
     laws=(*LAWS, *rotary(ARM_INERTIA, SURFACE)),
